@@ -1,0 +1,101 @@
+# Everything here needs only make and a Python from 3.11 to 3.13. Choose another with: make setup PYTHON=/path/to/python3
+# The environment lives in .venv and is reused until pyproject.toml or requirements.lock changes.
+.DEFAULT_GOAL := help
+.PHONY: help setup reproduce test lint types format bench lock clean
+.DELETE_ON_ERROR:
+
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check --no-input
+LOCK := requirements.lock
+LOCK_BENCH := requirements-bench.lock
+RUNTIME := $(VENV)/.runtime-installed
+DEV := $(VENV)/.dev-installed
+BENCH := $(VENV)/.bench-installed
+# Test processes at once.
+JOBS ?= 2
+
+# Makes .venv with the first suitable Python, unless a working one is there.
+define make_venv
+	@if ! $(BIN)/python -m pip --version >/dev/null 2>&1; then \
+	  for candidate in $(if $(PYTHON),"$(PYTHON)",python3.13 python3.12 python3.11 python3 python); do \
+	    if "$$candidate" -c 'import sys, venv, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' \
+	        >/dev/null 2>&1; then found="$$candidate"; break; fi; \
+	  done; \
+	  if [ -z "$$found" ]; then \
+	    echo "make: no Python 3.11, 3.12 or 3.13 with venv and ensurepip$(if $(PYTHON), at $(PYTHON)); set PYTHON=" >&2; \
+	    exit 1; \
+	  fi; \
+	  echo "Creating $(VENV) with $$found ($$("$$found" --version 2>&1))"; \
+	  rm -rf $(VENV); \
+	  "$$found" -m venv $(VENV) || exit 1; \
+	fi
+endef
+
+help:  ## list the targets
+	@sed -n 's/^\([a-z]*\):[^#]*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 20
+
+setup: $(DEV)  ## make .venv with everything that the tests need
+
+$(RUNTIME): pyproject.toml $(LOCK)
+	$(make_venv)
+	@echo "Installing chilopod and what it runs on"
+	@$(PIP) install -c $(LOCK) setuptools
+	@$(PIP) install -c $(LOCK) --no-build-isolation -e .
+	@touch $@
+
+$(DEV): pyproject.toml $(LOCK)
+	$(make_venv)
+	@echo "Installing chilopod, what it runs on and what its tests need"
+	@$(PIP) install -c $(LOCK) setuptools
+	@$(PIP) install -c $(LOCK) --no-build-isolation -e '.[dev]'
+	@touch $(RUNTIME) $@
+
+$(BENCH): $(RUNTIME) $(LOCK_BENCH)
+	@echo "Installing the peers of the benchmarks"
+	@$(PIP) install -c $(LOCK) -r $(LOCK_BENCH)
+	@touch $@
+
+reproduce: $(RUNTIME)  ## compute the paper's results and write report/index.html; options in ARGS="--quick"
+	$(BIN)/chilopod reproduce $(ARGS)
+
+test: lint types  ## all checks and all tests
+	$(BIN)/python -m pytest -n $(JOBS) --benchmark-disable $(ARGS)
+
+lint: $(DEV)  ## style and the contracts between layers
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/lint-imports
+
+types: $(DEV)  ## static types
+	$(BIN)/mypy
+
+format: $(DEV)  ## rewrite files in the project's style
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+bench: $(BENCH)  ## benchmarks beside their peers; rewrites the tables in benchmarks/README.md
+	$(BIN)/python benchmarks/straight_walk.py
+	$(BIN)/python benchmarks/startup.py
+
+# One lock for all supported Pythons and systems: no addresses and no hashes, so it also serves as a constraints file.
+UV := $(VENV)-lock/bin/uv
+COMPILE := $(UV) pip compile --quiet --no-config --universal --python-version 3.11 --fork-strategy fewest \
+	--upgrade --no-header --no-emit-index-url --no-emit-find-links
+
+lock:  ## renew both lock files from pyproject.toml
+	$(make_venv)
+	@test -x $(UV) || { $(BIN)/python -m venv $(VENV)-lock && \
+	  $(VENV)-lock/bin/python -m pip --quiet --disable-pip-version-check install uv; }
+	@$(COMPILE) --extra dev pyproject.toml >$(LOCK).new
+	@{ echo '# Python 3.11 to 3.13, all systems: what chilopod runs on and what its tests need. Written by `make lock`.'; \
+	  cat $(LOCK).new; } >$(LOCK)
+	@$(COMPILE) --group bench -c $(LOCK) >$(LOCK_BENCH).new
+	@{ echo '# The peers of the benchmarks, on top of requirements.lock. Written by `make lock`.'; \
+	  cat $(LOCK_BENCH).new; } >$(LOCK_BENCH)
+	@rm -f $(LOCK).new $(LOCK_BENCH).new
+
+clean:  ## remove the environment, caches and generated output
+	rm -rf $(VENV) $(VENV)-lock build dist report .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks \
+	  .import_linter_cache src/*.egg-info
+	find src tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true
