@@ -1,0 +1,93 @@
+"""The command line: parse, call, print, and nothing else.
+
+Each command lives in a module of this package and imports what it needs when it runs, so that ``--help`` stays fast.
+Results go to stdout, everything else to stderr. An error is one line on stderr and exit code 2.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+from chilopod.cli import robot
+from chilopod.cli.options import new_app
+from chilopod.errors import ChilopodError, one_line
+
+USAGE_ERROR = 2
+INTERNAL_ERROR = 1
+INTERRUPTED = 130
+
+app = new_app("Many-legged robots that turn by bifurcation: simulate, analyse and steer them.")
+app.add_typer(robot.app, name="robot")
+
+
+@app.callback(invoke_without_command=True)
+def _root(
+    ctx: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show a traceback when something fails.")] = False,
+) -> None:
+    if version:
+        import chilopod
+
+        typer.echo(f"chilopod {chilopod.__version__}")
+        raise typer.Exit
+    if ctx.invoked_subcommand is None:
+        typer.echo(ctx.get_help())
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Parameters
+    ----------
+    argv
+        Arguments after the program's name; by default those of this process.
+
+    Returns
+    -------
+    int
+        Exit code: 0, or 2 for anything the user can put right, 1 for a fault of chilopod, 130 when interrupted.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    # What a robot is called need not fit the terminal's encoding; better a question mark than a crash.
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+    try:
+        code = app(arguments, prog_name="chilopod", standalone_mode=False)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # Whoever read our output has seen enough. Python would complain once more when it flushes at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except (typer.Abort, KeyboardInterrupt):
+        return _fail("interrupted", INTERRUPTED)
+    except Exception as error:
+        # Before the arguments are parsed there is no other way to know; a usage error is not parsed to the end.
+        if "--debug" in arguments:
+            raise
+        # Usage errors have no public base class that all supported versions of typer share, but they all do this.
+        if hasattr(error, "format_message"):
+            return _fail(f"{error.format_message()} ({_help_of(error)})", USAGE_ERROR)
+        if isinstance(error, ChilopodError | OSError):
+            return _fail(str(error), USAGE_ERROR)
+        return _fail(
+            f"this is a fault of chilopod, please report it: {type(error).__name__}: {error} (--debug shows more)",
+            INTERNAL_ERROR,
+        )
+    return code if isinstance(code, int) else 0
+
+
+def _help_of(error: Exception) -> str:
+    context = getattr(error, "ctx", None)
+    return f"see {context.command_path if context else 'chilopod'} --help"
+
+
+def _fail(message: str, code: int) -> int:
+    print(f"error: {one_line(message)}", file=sys.stderr)
+    return code

@@ -1,0 +1,105 @@
+"""``chilopod robot``: make, show and check robot files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from chilopod.cli.options import JsonOption, RobotArg, SetOption, new_app, print_json, read_robot
+
+app = new_app("Make, show and check robot files.")
+
+
+@app.callback(invoke_without_command=True)
+def _group(ctx: typer.Context) -> None:
+    if ctx.invoked_subcommand is None:
+        typer.echo(ctx.get_help())
+
+
+@app.command()
+def new(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The robot file to write, such as my.toml.")],
+    modules: Annotated[
+        str | None,
+        typer.Option(metavar="N", help="Number of modules; the last spring is repeated, length and mass stay."),
+    ] = None,
+    preset: Annotated[str, typer.Option(metavar="NAME", help="The robot to start from.")] = "aoi2022-planar",
+    overrides: SetOption = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite the file if it exists.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Write a new robot file, named after the file, to edit by hand."""
+    from chilopod.output import write_atomic
+
+    robot = read_robot(preset, ([f"body.modules={modules}"] if modules is not None else []) + (overrides or []))
+    robot = robot.with_(name=file.stem)
+    write_atomic(file, robot.to_toml(), replace=force)
+    if as_json:
+        print_json({"robot": robot.name, "file": str(file)})
+    else:
+        typer.echo(f"wrote {file}")
+
+
+@app.command()
+def show(robot: RobotArg, overrides: SetOption = None, as_json: JsonOption = False) -> None:
+    """Print every number of a robot, its unit, and where it comes from."""
+    from chilopod import units
+
+    described = read_robot(robot, overrides)
+    derived = {
+        "module_length": (described.module_length, "m"),
+        "module_mass": (described.module_mass, "kg"),
+        "module_yaw_inertia": (described.module_yaw_inertia, "kg*m^2"),
+        "period": (described.gait.period, "s"),
+        "duty": (described.gait.duty, ""),
+        "speed": (described.gait.speed, "m/s"),
+    }
+    if as_json:
+        parameters = {}
+        for path in described.parameters():
+            value, unit = described.get(path), described.unit_of(path)
+            parameters[path] = {
+                "value": units.from_si(value, unit),
+                "unit": unit,
+                "value_si": value,
+                "si_unit": described.si_unit_of(path),
+                "provenance": described.provenance_of(path),
+            }
+        print_json(
+            {
+                "robot": described.name,
+                "parameters": parameters,
+                "derived": {name: {"value_si": value, "si_unit": unit} for name, (value, unit) in derived.items()},
+            }
+        )
+        return
+    rows = [
+        (
+            path,
+            units.format(described.get(path), described.unit_of(path), digits=6),
+            described.provenance_of(path) or "",
+        )
+        for path in described.parameters()
+    ]
+    rows += [(name, units.format(value, unit, digits=6), "derived") for name, (value, unit) in derived.items()]
+    widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
+    typer.echo(described.name)
+    for name, quantity, origin in rows:
+        typer.echo(f"  {name:<{widths[0]}}  {quantity:<{widths[1]}}  {origin}".rstrip())
+
+
+@app.command()
+def check(robot: RobotArg, overrides: SetOption = None, as_json: JsonOption = False) -> None:
+    """Say whether a robot is valid, and what is unusual about it."""
+    from chilopod.robot import remarks
+
+    described = read_robot(robot, overrides)
+    found = remarks(described)
+    if as_json:
+        print_json({"robot": described.name, "valid": True, "remarks": found})
+        return
+    typer.echo(f"{described.name}: valid, {described.body.modules} modules")
+    for remark in found:
+        typer.echo(f"  {remark}")

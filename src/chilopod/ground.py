@@ -1,0 +1,19 @@
+"""The floor as the planar model sees it."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from chilopod.units import Description, Quantity
+
+
+class Ground(Description):
+    """Viscous friction under every foot in stance: force = -friction * (foot velocity relative to the floor).
+
+    Attributes
+    ----------
+    friction
+        Friction coefficient of one foot, N*s/m, positive.
+    """
+
+    friction: Annotated[float, Quantity("N*s/m", "N*s/m")]

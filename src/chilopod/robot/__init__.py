@@ -1,0 +1,14 @@
+"""The description of a robot that every engine reads: validated, immutable, from TOML with units.
+
+>>> from chilopod import load_robot
+>>> robot = load_robot("aoi2022-planar").override("springs.stiffness[0]", "12 N*mm/deg")
+>>> robot.get("springs.stiffness[0]")
+0.6875493541569879
+"""
+
+from chilopod.robot.files import Table, presets
+from chilopod.robot.model import Robot, load_robot
+from chilopod.robot.parts import Body, Legs, Springs
+from chilopod.robot.remarks import remarks
+
+__all__ = ["Body", "Legs", "Robot", "Springs", "Table", "load_robot", "presets", "remarks"]

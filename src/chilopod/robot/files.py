@@ -1,0 +1,152 @@
+"""Robot files as tables: finding them, reading TOML safely, writing it back."""
+
+from __future__ import annotations
+
+import datetime
+import json
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from chilopod.errors import RobotFileError, nearest_name
+
+_PRESETS: Final = Path(__file__).parent.parent / "robots"
+_LARGEST_FILE: Final = 1_000_000
+_BARE_KEY: Final = re.compile(r"[A-Za-z0-9_-]+")
+
+
+class Table(Mapping[str, Any]):
+    """An immutable, hashable TOML table; lists within are tuples, tables within are Tables."""
+
+    def __init__(self, items: Mapping[str, Any] | None = None) -> None:
+        self._items = {str(key): _frozen(value) for key, value in (items or {}).items()}
+
+    def __getitem__(self, key: str) -> Any:
+        return self._items[key]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._items)
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    def __hash__(self) -> int:
+        return hash(frozenset(self._items.items()))
+
+    def __repr__(self) -> str:
+        return f"Table({self._items!r})"
+
+
+def presets() -> list[str]:
+    """Return the names of the robots that come with chilopod."""
+    return sorted(path.stem for path in _PRESETS.glob("*.toml"))
+
+
+def read_table(robot: str | Path) -> tuple[dict[str, Any], str]:
+    """Read a robot file or preset.
+
+    Parameters
+    ----------
+    robot
+        Name of a preset or path of a file. A file that is named like a preset is reached as ``./name``.
+
+    Returns
+    -------
+    tuple
+        The table as it stands in the file, not yet validated, and what to call the source in messages.
+
+    Raises
+    ------
+    RobotFileError
+        If there is no such file or preset, or it is no TOML.
+    """
+    source, path = str(robot), Path(robot)
+    names = presets()
+    if source in names:
+        path = _PRESETS / f"{source}.toml"
+    try:
+        if not path.is_file():
+            raise _not_found(robot, names)
+        with path.open("rb") as file:
+            content = file.read(_LARGEST_FILE + 1)
+    except (OSError, ValueError) as error:
+        if isinstance(error, RobotFileError):
+            raise
+        raise RobotFileError(f"cannot be read ({getattr(error, 'strerror', None) or error})", source=source) from None
+    if len(content) > _LARGEST_FILE:
+        raise RobotFileError("too large for a robot file", source=source, allowed=f"up to {_LARGEST_FILE} bytes")
+    if not content.strip():
+        raise RobotFileError("the file is empty", source=source)
+    try:
+        return tomllib.loads(content.decode()), source
+    except UnicodeDecodeError:
+        raise RobotFileError("is not a text file (UTF-8)", source=source) from None
+    except RecursionError:
+        raise RobotFileError("is nested too deeply", source=source) from None
+    except ValueError as error:  # TOMLDecodeError, and integers of more digits than Python converts
+        raise RobotFileError(f"is not valid TOML: {error}", source=source) from None
+
+
+def to_toml(table: Mapping[str, Any]) -> str:
+    """Write a table as TOML text that reads back to equal values; None values are left out."""
+    return "\n".join(_lines(table, ())).strip() + "\n"
+
+
+def _not_found(robot: str | Path, names: list[str]) -> RobotFileError:
+    source, path = str(robot), Path(robot)
+    if path.is_dir():
+        return RobotFileError("is a folder, not a robot file", source=source)
+    if path.exists():
+        return RobotFileError("is not a regular file", source=source)
+    if isinstance(robot, Path) or len(path.parts) > 1 or path.suffix:
+        return RobotFileError("no such file", source=source, nearest=nearest_name(source, names))
+    allowed = f"a robot file or one of the presets {', '.join(names)}"
+    return RobotFileError("no such preset or file", value=source, allowed=allowed, nearest=nearest_name(source, names))
+
+
+def _frozen(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return Table(value)
+    if isinstance(value, list | tuple):
+        return tuple(_frozen(item) for item in value)
+    return value
+
+
+def _lines(table: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[str]:
+    # In TOML whatever follows a [header] belongs to it, so a table's own values come before its sub-tables.
+    plain = {key: value for key, value in table.items() if not isinstance(value, Mapping) and value is not None}
+    nested = {key: value for key, value in table.items() if isinstance(value, Mapping)}
+    if path and (plain or not nested):
+        yield f"\n[{'.'.join(_key(part) for part in path)}]"
+    for key, value in plain.items():
+        yield f"{_key(key)} = {_value(value)}"
+    for key, value in nested.items():
+        yield from _lines(value, (*path, key))
+
+
+def _key(key: str) -> str:
+    return key if _BARE_KEY.fullmatch(key) else _text(key)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return _text(value)
+    if isinstance(value, datetime.date | datetime.time):
+        return value.isoformat()
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_value(item) for item in value) + "]"
+    if isinstance(value, int):
+        # Python reads hexadecimal of any length, but neither reads nor writes decimals of more than 4300 digits.
+        return hex(value) if value >= 2**63 else str(value)
+    return repr(value)
+
+
+def _text(text: str) -> str:
+    # JSON's escapes are TOML's, but TOML also forbids a bare DEL.
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -1,0 +1,322 @@
+"""The robot as validated, immutable objects in SI units and radians, and its parameters by dotted path."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Final, Self
+
+from pydantic import PlainValidator, model_validator
+
+from chilopod.errors import ChilopodError, ParameterError, RobotFileError
+from chilopod.gait import Gait
+from chilopod.ground import Ground
+from chilopod.robot.files import Table, read_table, to_toml
+from chilopod.robot.parameters import QUANTITIES, Place, place_of, spring_index
+from chilopod.robot.parts import MODULES, Body, Legs, Springs, spread
+from chilopod.units import Description, format, quantities
+
+_OVERRIDDEN: Final = "set by override"
+
+
+def _name(text: object) -> str:
+    return _printable(text, longest=100)
+
+
+def _printable(text: object, longest: int) -> str:
+    if not isinstance(text, str):
+        raise ParameterError("must be text", value=text)
+    if not (text.strip() and text.isprintable() and len(text) <= longest):
+        raise ParameterError("is no plain text", value=text, allowed=f"1 to {longest} printable characters")
+    return text
+
+
+def _table(table: object) -> Table:
+    if not isinstance(table, Mapping):
+        raise ParameterError("must be a table", value=table)
+    return table if isinstance(table, Table) else Table(table)
+
+
+def _provenance(table: object) -> Table:
+    """Read [provenance], where a key is a dotted path, quoted or not (TOML makes tables of the latter)."""
+    flat: dict[str, str] = {}
+    pending = list(_table(table).items())
+    while pending:
+        path, text = pending.pop(0)
+        if isinstance(text, Mapping):
+            pending[:0] = [(f"{path}.{key}", item) for key, item in text.items()]
+            continue
+        try:
+            flat[path] = _printable(text, longest=1000)
+        except ParameterError as error:
+            error.field = path
+            raise
+    return Table(flat)
+
+
+class Robot(Description):
+    """A many-legged robot with a flexible body axis, its gait and its floor.
+
+    Attributes
+    ----------
+    name
+        Printable text.
+    body, springs, legs, gait, ground
+        The parts of the description, in SI units and radians.
+    twin
+        What only the three-dimensional model reads; kept as it stands.
+    provenance
+        Where numbers come from: text by dotted path.
+
+    Raises
+    ------
+    UnitError, ParameterError
+        On construction, naming the first field that is wrong.
+    """
+
+    name: Annotated[str, PlainValidator(_name)]
+    body: Body
+    springs: Springs
+    legs: Legs
+    gait: Gait
+    ground: Ground
+    twin: Annotated[Table, PlainValidator(_table)] = Table()
+    provenance: Annotated[Table, PlainValidator(_provenance)] = Table()
+
+    @classmethod
+    def load(cls, robot: str | Path) -> Self:
+        """Read a robot file, or a preset by its name.
+
+        Raises
+        ------
+        RobotFileError
+            If it cannot be read or describes no valid robot; the message says where and why.
+        """
+        table, source = read_table(robot)
+        try:
+            return cls(**table)
+        except ChilopodError as error:
+            raise RobotFileError(
+                error.problem,
+                field=error.field,
+                value=error.value,
+                allowed=error.allowed,
+                nearest=error.nearest,
+                source=source,
+            ) from None
+        except RecursionError:
+            raise RobotFileError("is nested too deeply", source=source) from None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _spread_springs(cls, data: Any) -> Any:
+        if not (isinstance(data, Mapping) and isinstance(data.get("body"), Mapping | Body)):
+            return data
+        body, springs = data["body"], data.get("springs")
+        if not isinstance(springs, Mapping):
+            return data
+        try:
+            modules = body.modules if isinstance(body, Body) else MODULES.read(body.get("modules"))
+        except ChilopodError:
+            return data  # the field itself reports it
+        return {
+            **data,
+            "springs": spread(spread(springs, "stiffness", int(modules) - 1), "damping", int(modules) - 1),
+        }
+
+    @model_validator(mode="after")
+    def _counts_agree(self) -> Self:
+        joints = self.body.modules - 1
+        for key in ("stiffness", "damping"):
+            count = len(getattr(self.springs, key))
+            if count != joints:
+                raise ParameterError(
+                    f"has {count} values",
+                    field=f"springs.{key}",
+                    allowed=f"{joints}, one fewer than body.modules, or a single value for all",
+                )
+        for path in self.provenance:
+            if not path.startswith("twin."):
+                try:
+                    self._locate(path)
+                except ParameterError as error:
+                    error.field = f"provenance.{path}"
+                    raise
+        return self
+
+    @property
+    def module_length(self) -> float:
+        """Length of one module, m."""
+        return self.body.length / self.body.modules
+
+    @property
+    def module_mass(self) -> float:
+        """Mass of one module, kg."""
+        return self.body.mass / self.body.modules
+
+    @property
+    def module_yaw_inertia(self) -> float:
+        """Moment of inertia of one module about its centre, kg*m^2: the one given, or that of a uniform rod."""
+        if self.body.yaw_inertia is not None:
+            return self.body.yaw_inertia
+        return self.module_mass * self.module_length**2 / 12.0
+
+    def parameters(self) -> tuple[str, ...]:
+        """Return the path of every number of this robot, springs one by one."""
+        paths: list[str] = []
+        for path, quantity in QUANTITIES.items():
+            count = self.body.modules - 1
+            paths += [f"{path}[{index}]" for index in range(count)] if quantity.each else [path]
+        return tuple(paths)
+
+    def get(self, path: str) -> float:
+        """Return a parameter in SI units.
+
+        Parameters
+        ----------
+        path
+            Such as ``gait.stride`` or ``springs.stiffness[0]``. Without an index the springs count as one parameter,
+            which has a value if all are alike. ``body.yaw_inertia`` is that of the uniform rod where none is given.
+
+        Raises
+        ------
+        ParameterError
+            If `path` names no number, or springs of different value.
+        """
+        place = self._locate(path)
+        if path == "body.yaw_inertia":
+            return self.module_yaw_inertia
+        value = getattr(getattr(self, place.section), place.key)
+        if not place.quantity.each:
+            return float(value)
+        if place.index is None and any(item != value[0] for item in value):
+            raise ParameterError("its values differ", field=path, allowed=f"one of them, such as {path}[0]")
+        return float(value[place.index or 0])
+
+    def unit_of(self, path: str) -> str:
+        """Return the unit a parameter is written in, such as ``N*mm/deg``; empty for a count.
+
+        Raises
+        ------
+        ParameterError
+            If `path` names no number.
+        """
+        return self._locate(path).quantity.display
+
+    def si_unit_of(self, path: str) -> str:
+        """Return the SI unit of what `get` returns, such as ``N*m/rad``; raises as `unit_of`."""
+        return self._locate(path).quantity.si
+
+    def with_value(self, path: str, value: float) -> Self:
+        """Return this robot with one parameter changed to `value` in SI units; about 20 us, for sweeps.
+
+        `path` is as for `get`; without an index all springs are set. Changing ``body.modules`` repeats the last spring
+        and damper for joints that are new and drops those that are gone; length and mass are those of the whole robot
+        and stay. What `provenance` said of a changed parameter is replaced by a note that it was overridden.
+
+        Raises
+        ------
+        ParameterError
+            If `path` names no number or `value` is out of range.
+        """
+        place = self._locate(path)
+        try:
+            return self._replaced(path, place, place.quantity.check(value))
+        except ParameterError as error:
+            error.field = path
+            raise
+
+    def override(self, path: str, value: object) -> Self:
+        """Return this robot with one parameter changed: a number in SI units or text with its unit.
+
+        As `with_value` otherwise; also raises `UnitError` if the text is no quantity or of another dimension.
+        """
+        place = self._locate(path)
+        try:
+            return self._replaced(path, place, place.quantity.read(value))
+        except ChilopodError as error:
+            error.field = path
+            raise
+
+    def set_from_text(self, assignments: Iterable[str]) -> Self:
+        """Return this robot with overrides such as ``springs.stiffness[0]=12 N*mm/deg`` made in the order given.
+
+        Raises
+        ------
+        ParameterError, UnitError
+            If one of them is no assignment, or as `override`.
+        """
+        robot = self
+        for assignment in assignments:
+            path, equals, value = assignment.partition("=")
+            if not equals:
+                raise ParameterError("is not an override", value=assignment, allowed="PATH=VALUE")
+            robot = robot.override(path.strip(), value)
+        return robot
+
+    def with_(self, **fields: Any) -> Self:
+        """Return this robot with whole fields replaced, such as ``name=`` or ``gait=``, validated again."""
+        return type(self)(**{**dict(self), **fields})
+
+    def provenance_of(self, path: str) -> str | None:
+        """Return what is said about where a parameter comes from; a spring falls back on what is said of all."""
+        found: str | None = self.provenance.get(path, self.provenance.get(path.partition("[")[0]))
+        return found
+
+    def to_toml(self) -> str:
+        """Write this robot as the text of a robot file; reading it gives an equal robot, to the last bit."""
+        table: dict[str, Any] = {"name": self.name}
+        for path, quantity in QUANTITIES.items():
+            section, key = path.split(".")
+            value = getattr(getattr(self, section), key)
+            if value is None:
+                continue
+            if quantity.integer:
+                text: Any = value
+            elif path == "springs.damping" and len(set(value)) == 1:
+                text = format(value[0], quantity.display)
+            elif quantity.each:
+                text = [format(item, quantity.display) for item in value]
+            else:
+                text = format(value, quantity.display)
+            table.setdefault(section, {})[key] = text
+        for name in ("twin", "provenance"):
+            if getattr(self, name):
+                table[name] = getattr(self, name)
+        return to_toml(table)
+
+    def _locate(self, path: str) -> Place:
+        place = place_of(path)
+        if place.index is not None and place.index >= self.body.modules - 1:
+            raise ParameterError("there is no such spring", field=path, allowed=f"0 to {self.body.modules - 2}")
+        return place
+
+    def _replaced(self, path: str, place: Place, value: float) -> Self:
+        # Every field is checked on its own and the counts keep, so nothing needs validating again.
+        section: Description = getattr(self, place.section)
+        old = getattr(section, place.key)
+        new: Any = value
+        if place.quantity.each:
+            new = tuple(value if place.index in (None, index) else item for index, item in enumerate(old))
+        if new == old:
+            return self
+        changes: dict[str, Any] = {place.section: section.model_copy(update={place.key: new})}
+        # What was said of single springs no longer holds when all are set, nor when their joints are gone.
+        joints = 0 if place.quantity.each and place.index is None else self.body.modules - 1
+        if place.quantity is MODULES:
+            joints = int(value) - 1
+            changes["springs"] = self.springs.model_copy(
+                update={key: _resized(getattr(self.springs, key), joints) for key in quantities(Springs)}
+            )
+        told = {name: text for name, text in self.provenance.items() if spring_index(name, path) < joints}
+        changes["provenance"] = Table({**told, path: _OVERRIDDEN})
+        return self.model_copy(update=changes)
+
+
+def load_robot(robot: str | Path) -> Robot:
+    """Read a robot file, or a preset by its name; see `Robot.load`."""
+    return Robot.load(robot)
+
+
+def _resized(values: tuple[float, ...], count: int) -> tuple[float, ...]:
+    return (values + values[-1:] * count)[:count]

@@ -1,0 +1,76 @@
+"""Dotted paths of a robot's numbers, such as ``gait.stride`` or ``springs.stiffness[0]``."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
+
+from chilopod.errors import ParameterError, nearest_name
+from chilopod.gait import Gait
+from chilopod.ground import Ground
+from chilopod.robot.parts import Body, Legs, Springs
+from chilopod.units import Description, Quantity, quantities
+
+_PATH: Final = re.compile(r"([a-z_]+\.[a-z_]+)(?:\[([0-9]{1,6})\])?")
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a parameter stands: section, key, index among the springs or None, and what it may hold."""
+
+    section: str
+    key: str
+    index: int | None
+    quantity: Quantity
+
+
+SECTIONS: Final[dict[str, type[Description]]] = {
+    "body": Body,
+    "springs": Springs,
+    "legs": Legs,
+    "gait": Gait,
+    "ground": Ground,
+}
+QUANTITIES: Final = {
+    f"{section}.{key}": quantity for section, model in SECTIONS.items() for key, quantity in quantities(model).items()
+}
+"""The quantity of every number of a robot by its path, springs not counted singly."""
+
+
+@lru_cache(maxsize=1024)
+def place_of(path: str) -> Place:
+    """Read a dotted path such as ``springs.stiffness[0]``; whether the robot has that many springs is not checked.
+
+    Raises
+    ------
+    ParameterError
+        If `path` names no number, with the nearest path that does.
+    """
+    known = QUANTITIES
+    match = _PATH.fullmatch(path)
+    stem, index = match.groups() if match else (path, None)
+    if stem not in known:
+        if stem.partition(".")[0] in ("name", "provenance"):
+            raise ParameterError("is text, not a parameter", field=path, allowed=", ".join(known))
+        bare, bracket, rest = path.partition("[")
+        # "stiffness" alone, or under a wrong section, is nearer to what was meant than spelling can tell.
+        same_key = (name for name in known if name.partition(".")[2] == bare.rpartition(".")[2])
+        nearest = next(same_key, None) or nearest_name(bare, known)
+        if nearest and known[nearest].each:
+            nearest += bracket + rest
+        raise ParameterError("names no parameter", field=path, allowed=", ".join(known), nearest=nearest)
+    quantity = known[stem]
+    if index is not None and not quantity.each:
+        raise ParameterError("has no index", field=path, allowed=stem)
+    section, key = stem.split(".")
+    return Place(section, key, None if index is None else int(index), quantity)
+
+
+def spring_index(path: str, changed: str) -> int:
+    """Return the index of a spring in a path that a change of `changed` concerns, and -1 in any other."""
+    match = _PATH.fullmatch(path)
+    if match is None or match[2] is None or (changed != "body.modules" and match[1] != changed):
+        return -1
+    return int(match[2])

@@ -1,0 +1,25 @@
+"""What is legal in a robot's description and yet worth knowing."""
+
+from __future__ import annotations
+
+from chilopod.robot.model import Robot
+
+
+def remarks(robot: Robot) -> list[str]:
+    """Return a sentence for everything unusual about a valid robot; an empty list if there is nothing."""
+    found = []
+    if not robot.gait.half_period_symmetric:
+        found.append(
+            "Left and right legs are not half a period apart: analyses use the whole period, at twice the work."
+        )
+    standing = robot.gait.schedule(robot.body.modules).contact
+    if not standing.any(axis=(1, 2)).all():
+        found.append("There are moments when no foot of the robot stands.")
+    elif not standing.any(axis=2).all():
+        found.append("There are moments when a module has no foot on the floor.")
+    if abs(robot.legs.forward_offset) + robot.gait.stride / 2.0 > robot.module_length:
+        found.append("Feet reach more than a module's length ahead of or behind their module's centre.")
+    unexplained = [path for path in robot.parameters() if robot.provenance_of(path) is None]
+    if unexplained:
+        found.append(f"Numbers without provenance: {', '.join(unexplained)}.")
+    return found

@@ -1,0 +1,13 @@
+"""Quantities with units at the edges of chilopod; SI and radians inside.
+
+>>> from chilopod import units
+>>> units.parse("41 N*mm/deg", "N*m/rad")
+2.3491269600363753
+>>> units.format(units.parse("41 N*mm/deg", "N*m/rad"), "N*mm/deg")
+'41 N*mm/deg'
+"""
+
+from chilopod.units.expressions import Unit, format, from_si, parse, unit
+from chilopod.units.quantity import Description, Quantity, quantities
+
+__all__ = ["Description", "Quantity", "Unit", "format", "from_si", "parse", "quantities", "unit"]

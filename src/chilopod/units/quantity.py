@@ -1,0 +1,154 @@
+"""Fields of a description that hold quantities, and the base class of descriptions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any, Final, TypeGuard
+
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
+from pydantic_core import CoreSchema, core_schema
+
+from chilopod.errors import ChilopodError, ParameterError, nearest_name
+from chilopod.units.expressions import format, parse
+
+# Far outside anything that walks, and far inside what products and quotients of a few quantities need to stay finite.
+_SMALLEST: Final = 1e-12
+_LARGEST: Final = 1e9
+# What pydantic says of the few kinds of mistake it finds itself, in the words of a robot file.
+_PLAIN_WORDS: Final = {"model_type": "must be a table"}
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """What a field may hold; used as ``Annotated[float, Quantity(...)]`` in a `Description`.
+
+    Attributes
+    ----------
+    si
+        SI unit of the value inside, radians for angles; empty for a plain number.
+    display
+        Unit it is written in.
+    at_least, at_most
+        Range in SI units, both ends included. By default positive, and not beyond all reason.
+    integer
+        Whether only whole numbers are allowed.
+    each
+        Whether the field holds a tuple of such values.
+    optional
+        Whether the field may be None.
+    """
+
+    si: str
+    display: str
+    at_least: float = _SMALLEST
+    at_most: float = _LARGEST
+    integer: bool = False
+    each: bool = False
+    optional: bool = False
+
+    def check(self, value: float, given: object = None) -> float:
+        """Return `value` (SI units) if it is in range; an int where whole numbers are asked for.
+
+        Raises
+        ------
+        ParameterError
+            If it is not; the message shows `given`, what the user wrote, where there is such a thing.
+        """
+        if self.at_least <= value <= self.at_most and not (self.integer and value != math.floor(value)):
+            return int(value) if self.integer else value
+        shown = value if given is None else given
+        low, high = (format(end, self.display, digits=6) for end in (self.at_least, self.at_most))
+        allowed = f"{low} to {high}"
+        if not math.isfinite(value):
+            problem = "must be finite"
+        elif self.at_least > 0.0 >= value:
+            problem = "must be positive"
+            allowed = allowed if self.integer else f"more than 0 {self.display}"
+        elif self.at_least == 0.0 > value:
+            problem, allowed = "must not be negative", f"0 {self.display} or more"
+        elif self.integer and self.at_least <= value <= self.at_most:
+            problem = "must be a whole number"
+        else:
+            problem = "out of range"
+        raise ParameterError(problem, value=shown, allowed=allowed)
+
+    def read(self, value: object) -> float:
+        """Read one value, a number in SI units or text with its unit, and check its range."""
+        return self.check(parse(value, self.si), given=value)
+
+    def read_field(self, value: object) -> Any:
+        """Read what a whole field may hold: a value, a tuple of them, or None."""
+        if value is None and self.optional:
+            return None
+        if not self.each:
+            return self.read(value)
+        if not is_list(value):
+            raise ParameterError("must be a list, one value for each", value=value)
+        values = []
+        for index, item in enumerate(value):
+            try:
+                values.append(self.read(item))
+            except ChilopodError as error:
+                error.field = f"[{index}]"
+                raise
+        return tuple(values)
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Let pydantic read the field by `read_field` alone."""
+        return core_schema.no_info_plain_validator_function(self.read_field)
+
+
+class Description(BaseModel):
+    """Base of the frozen objects that describe a robot: unknown keys are refused, errors say one line.
+
+    Raises
+    ------
+    UnitError, ParameterError
+        On construction, naming the first field that is wrong.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    def __init__(self, /, **data: Any) -> None:
+        try:
+            super().__init__(**data)
+        except ValidationError as error:
+            raise _explained(error, type(self)) from None
+
+
+def quantities(model: type[Description]) -> dict[str, Quantity]:
+    """Return the quantity of each field of `model` that holds one, in order of declaration."""
+    return {
+        name: extra
+        for name, field in model.model_fields.items()
+        for extra in field.metadata
+        if isinstance(extra, Quantity)
+    }
+
+
+def is_list(value: object) -> TypeGuard[Collection[Any]]:
+    """Whether `value` stands for several values: a list, tuple or array, and neither text nor a table."""
+    return isinstance(value, Collection) and not isinstance(value, str | bytes | Mapping)
+
+
+def _explained(error: ValidationError, model: type[Description]) -> ChilopodError:
+    """Turn pydantic's report into the one error that helps most."""
+    found = error.errors(include_url=False)
+    # A misspelt key also leaves its right spelling missing; the misspelling is the news.
+    first = next((item for item in found if item["type"] == "extra_forbidden"), found[0])
+    field = ".".join(str(part) for part in first["loc"])
+    cause = first.get("ctx", {}).get("error")
+    if isinstance(cause, ChilopodError):
+        inner = cause.field or ""
+        cause.field = field + inner if inner.startswith("[") or not (field and inner) else f"{field}.{inner}"
+        return cause
+    if first["type"] == "missing":
+        return ParameterError("is missing", field=field)
+    if first["type"] == "extra_forbidden":
+        names = list(model.model_fields)
+        return ParameterError(
+            "unknown key", field=field, allowed=", ".join(names), nearest=nearest_name(str(first["loc"][-1]), names)
+        )
+    return ParameterError(_PLAIN_WORDS.get(first["type"], first["msg"]), field=field, value=first["input"])

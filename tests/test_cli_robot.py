@@ -1,0 +1,230 @@
+"""The commands of ``chilopod robot``, and what every command does with bad input."""
+
+import importlib.metadata
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import chilopod
+from chilopod.cli import main
+from chilopod.robot import load_robot
+
+PRESET = "aoi2022-planar"
+
+
+def run(*arguments: str) -> tuple[int, str, str]:
+    """Run the command line in this process: exit code, stdout, stderr."""
+    with redirect_stdout(StringIO()) as out, redirect_stderr(StringIO()) as err:
+        code = main(arguments)
+    return code, out.getvalue(), err.getvalue()
+
+
+def refused(*arguments: str) -> str:
+    """Run what must be refused, and return the one line it says."""
+    code, out, err = run(*arguments)
+    assert code == 2
+    assert out == ""
+    assert err.startswith("error: ")
+    assert err.endswith("\n")
+    line = err.removesuffix("\n")
+    assert line.isprintable()
+    return line
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch) -> Iterator:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_help_names_the_commands():
+    for arguments in ([], ["--help"]):
+        code, out, err = run(*arguments)
+        assert (code, err) == (0, "")
+        assert "robot" in out
+    for arguments in (["robot"], ["robot", "--help"]):
+        code, out, err = run(*arguments)
+        assert (code, err) == (0, "")
+        assert "show" in out
+
+
+def test_version():
+    assert chilopod.__version__ == importlib.metadata.version("chilopod")
+    assert run("--version") == (0, f"chilopod {chilopod.__version__}\n", "")
+
+
+def test_new_writes_a_robot_that_reads_back(folder):
+    assert run("robot", "new", "mine.toml", "--modules", "8", "--set", "gait.stride=2 cm") == (
+        0,
+        "wrote mine.toml\n",
+        "",
+    )
+    robot = load_robot("mine.toml")
+    assert robot.name == "mine"
+    assert robot.body.modules == 8
+    assert robot.gait.stride == 0.02
+    assert os.listdir(folder) == ["mine.toml"]
+
+
+def test_new_overwrites_only_when_told(folder):
+    (folder / "mine.toml").write_text("precious")
+    assert "mine.toml: exists" in refused("robot", "new", "mine.toml")
+    assert (folder / "mine.toml").read_text() == "precious"
+    code, out, _ = run("robot", "new", "mine.toml", "--force", "--json")
+    assert code == 0
+    assert json.loads(out) == {"robot": "mine", "file": "mine.toml"}
+    assert load_robot("mine.toml").name == "mine"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["no/such/folder/x.toml"],
+        ["."],
+        ["x.toml", "--modules", "1"],
+        ["x.toml", "--modules", "many"],
+        ["x.toml", "--preset", "aoi2022"],
+        ["x.toml", "--set", "gait.stride=3 kg"],
+        ["\udcff.toml"],
+        ["\x1b.toml"],
+    ],
+)
+def test_new_leaves_nothing_behind_when_refused(folder, arguments):
+    refused("robot", "new", *arguments)
+    assert os.listdir(folder) == []
+
+
+def test_show_prints_every_number_with_its_origin():
+    code, out, err = run("robot", "show", PRESET, "--set", "springs.stiffness[0]=12 N*mm/deg")
+    assert (code, err) == (0, "")
+    assert all(path in out for path in load_robot(PRESET).parameters())
+    assert re.search(r"springs.stiffness\[0\] +12 N\*mm/deg +set by override\n", out)
+    assert "identified here: chilopod identify planar" in out
+
+
+def test_show_as_json():
+    code, out, err = run("robot", "show", PRESET, "--json")
+    assert (code, err) == (0, "")
+    shown = json.loads(out)
+    assert shown["robot"] == PRESET
+    spring = shown["parameters"]["springs.stiffness[0]"]
+    assert spring["value"] == 41.0
+    assert spring["unit"] == "N*mm/deg"
+    assert spring["value_si"] == pytest.approx(2.34912696)
+    assert shown["derived"]["speed"]["value_si"] == pytest.approx(0.03 / 0.31)
+
+
+def test_check():
+    assert run("robot", "check", PRESET) == (0, f"{PRESET}: valid, 6 modules\n", "")
+    code, out, _ = run("robot", "check", PRESET, "--json", "--set", "gait.side_phase=0")
+    assert code == 0
+    assert json.loads(out)["valid"] is True
+    assert "whole period" in json.loads(out)["remarks"][0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["robot", "sho", PRESET], "No such command 'sho'"),
+        (["robto"], "No such command 'robto'"),
+        (["robot", "show"], "Missing argument"),
+        (["robot", "show", PRESET, "extra"], "extra"),
+        (["robot", "show", PRESET, "--jsn"], "--jsn"),
+        (["robot", "show", PRESET, "--set"], "--set"),
+        (["--nope"], "--nope"),
+        (["robot", "show", "aoi2022-planer"], "did you mean 'aoi2022-planar'?"),
+        (["robot", "check", PRESET, "--set", "body.lenght=1"], "did you mean 'body.length'?"),
+    ],
+)
+def test_mistakes_are_one_line(arguments, complaint):
+    assert complaint in refused(*arguments)
+
+
+hostile = st.text(max_size=30) | st.sampled_from(["--set", "--json", "--debug", "-", "--", "robot", "show", PRESET])
+
+
+@given(st.lists(hostile.filter(lambda text: text != "--debug"), max_size=5))
+def test_random_arguments(arguments):
+    # `new` would write wherever the arguments say.
+    if "new" not in arguments:
+        code, _, err = run(*arguments)
+        assert code in (0, 2)
+        assert (code == 2) == bool(err)
+        assert err.count("\n") <= 1
+
+
+@given(
+    st.sampled_from(
+        ["", "gait.", "springs.", "springs.stiffness", "springs.stiffness[0]", "body.mass", "body.modules"]
+    ),
+    st.text(max_size=20),
+    st.text("0123456789.e-+ Nmkgsdegra*/^()", max_size=15),
+)
+def test_random_overrides(stem, rest, value):
+    code, out, err = run("robot", "show", PRESET, "--json", "--set", f"{stem}{rest}={value}")
+    if code == 0:
+        assert json.loads(out)["robot"] == PRESET
+        assert err == ""
+    else:
+        assert (code, out) == (2, "")
+        assert err.count("\n") == 1
+
+
+@given(st.binary(max_size=300))
+def test_random_files(tmp_path_factory, content):
+    file = tmp_path_factory.getbasetemp() / "hostile.toml"
+    file.write_bytes(content)
+    assert "hostile.toml: " in refused("robot", "check", str(file))
+
+
+def test_faults_of_our_own_show_no_traceback_unless_asked(monkeypatch):
+    def broken(self, assignments):
+        raise TypeError("two\nlines")
+
+    monkeypatch.setattr("chilopod.robot.Robot.set_from_text", broken)
+    code, out, err = run("robot", "show", PRESET)
+    assert (code, out) == (1, "")
+    assert err.count("\n") == 1
+    assert "TypeError: two lines" in err
+    with pytest.raises(TypeError):
+        run("--debug", "robot", "show", PRESET)
+
+
+def python(*arguments: str, **keywords) -> subprocess.CompletedProcess:
+    return subprocess.run([sys.executable, *arguments], capture_output=True, timeout=60, check=False, **keywords)
+
+
+def test_the_process_itself_ends_with_the_code():
+    result = python("-m", "chilopod", "robot", "show", "nothing-like-it")
+    assert result.returncode == 2
+    assert result.stdout == b""
+    assert result.stderr.count(b"\n") == 1
+
+
+def test_odd_terminals_do_not_matter(folder):
+    assert run("robot", "new", "µ.toml")[0] == 0
+    result = python(
+        "-m", "chilopod", "robot", "show", "µ.toml", env={**os.environ, "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "1"}
+    )
+    assert (result.returncode, result.stderr) == (0, b"")
+    command = f"{sys.executable} -m chilopod robot show {PRESET}"
+    closed = subprocess.run(["bash", "-c", f"{command} | true"], capture_output=True, timeout=60, check=False)
+    assert closed.stderr == b""
+
+
+def test_help_loads_nothing_heavy():
+    code = (
+        "import sys; from chilopod.cli import main; main(['--help']); "
+        "heavy = {'numpy', 'pydantic', 'scipy', 'numba', 'matplotlib'}; "
+        "print(sorted(heavy & set(sys.modules)), file=sys.stderr)"
+    )
+    assert python("-c", code).stderr.strip() == b"[]"

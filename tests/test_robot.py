@@ -1,0 +1,384 @@
+"""Robots: reading, refusing, overriding, writing."""
+
+import copy
+import math
+import pickle
+import tomllib
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from chilopod import ChilopodError, Gait, ParameterError, Robot, RobotFileError, UnitError, load_robot
+from chilopod.robot import Body, Legs, Springs, presets, remarks
+
+PRESET = "aoi2022-planar"
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return load_robot(PRESET)
+
+
+def table():
+    return tomllib.loads(load_robot(PRESET).to_toml())
+
+
+def changed(path, value):
+    """The preset as a table with one entry set, or deleted where value is `...`."""
+    result = table()
+    *sections, key = path.split("/")
+    place = result
+    for section in sections:
+        place = place[section]
+    if value is ...:
+        del place[key]
+    else:
+        place[key] = value
+    return result
+
+
+# -- the preset
+
+
+def test_preset_has_the_numbers_of_the_paper(robot):
+    assert robot.body == Body(modules=6, length=1.35, mass=8.5)
+    assert robot.springs == Springs(stiffness=["41 N*mm/deg"] * 5, damping=0.0)
+    assert robot.legs == Legs(forward_offset=0.048, half_width=0.0728)
+    assert robot.ground.friction == 256.5
+    assert robot.module_length == pytest.approx(0.225)
+    assert robot.module_mass == pytest.approx(8.5 / 6)
+    assert robot.module_yaw_inertia == pytest.approx(8.5 / 6 * 0.225**2 / 12)
+
+
+@pytest.mark.parametrize("name", presets())
+def test_every_number_of_a_preset_says_where_it_comes_from(name):
+    preset = load_robot(name)
+    assert preset.name == name
+    assert all(preset.provenance_of(path) for path in preset.parameters())
+    assert remarks(preset) == []
+
+
+# -- reading and writing
+
+
+@st.composite
+def robots(draw):
+    joints = draw(st.integers(2, 9)) - 1
+    positive = st.floats(1e-6, 1e6)
+    angle = st.floats(-2 * math.pi, 2 * math.pi)
+    return Robot(
+        name=draw(st.text("abc -_'\"\\äµ", min_size=1).filter(str.strip)),
+        body=Body(
+            modules=joints + 1,
+            length=draw(positive),
+            mass=draw(positive),
+            yaw_inertia=draw(st.none() | positive),
+        ),
+        springs=Springs(
+            stiffness=draw(st.lists(positive, min_size=joints, max_size=joints)),
+            damping=draw(st.lists(st.floats(0, 1e6), min_size=joints, max_size=joints)),
+        ),
+        legs=Legs(forward_offset=draw(st.floats(-10, 10)), half_width=draw(st.floats(0, 10))),
+        gait=Gait(
+            stride=draw(positive),
+            stance=draw(positive),
+            swing=draw(positive),
+            module_phase=draw(angle),
+            side_phase=draw(angle),
+        ),
+        ground={"friction": draw(positive)},
+    )
+
+
+@given(robots())
+def test_round_trip_through_toml_is_exact(described):
+    assert Robot(**tomllib.loads(described.to_toml())) == described
+
+
+def test_reserved_table_and_provenance_survive(robot):
+    text = (
+        robot.to_toml()
+        + """
+[twin]
+hip_height = "98 mm"
+on = true
+"odd key" = [1, 2.5, -0.0, inf, 0xFFFFFFFFFFFFFFFFFFFFFF]
+when = 2022-01-01T00:00:00
+servo = {kp = 7.5, deep = {er = ["a\\u007fb", 'c"d']}}
+[[twin.links]]
+length = 6
+[[twin.links]]
+[twin.empty]
+"""
+    )
+    first = Robot(**tomllib.loads(text))
+    again = Robot(**tomllib.loads(first.to_toml()))
+    assert again == first
+    assert hash(again) == hash(first)
+    assert pickle.loads(pickle.dumps(first)) == first
+    assert first.twin["servo"]["deep"]["er"] == ("a\x7fb", 'c"d')
+    assert len(first.twin["links"]) == 2
+    assert first.provenance == robot.provenance
+
+
+def test_provenance_keys_need_no_quotes():
+    described = Robot(**changed("provenance", {"gait": {"stride": "measured"}}))
+    assert described.provenance_of("gait.stride") == "measured"
+
+
+def test_one_spring_stands_for_all(robot):
+    assert Robot(**changed("springs/stiffness", "41 N*mm/deg")).springs == robot.springs
+    assert Robot(**changed("springs/damping", ["0"] * 5)).springs == robot.springs
+
+
+def test_objects_are_frozen(robot):
+    with pytest.raises(ValueError, match="frozen"):
+        robot.body.mass = 1.0
+    with pytest.raises(TypeError):
+        robot.provenance["gait.stride"] = "x"
+
+
+# -- overrides
+
+
+def test_override_and_get(robot):
+    softer = robot.override("springs.stiffness[0]", "12 N*mm/deg")
+    assert softer.get("springs.stiffness[0]") == pytest.approx(12e-3 * 180 / math.pi, rel=1e-15)
+    assert softer.springs.stiffness[1:] == robot.springs.stiffness[1:]
+    assert softer.gait is robot.gait
+    assert softer.provenance_of("springs.stiffness[0]") == "set by override"
+    assert softer.provenance_of("springs.stiffness[1]") == robot.provenance_of("springs.stiffness[1]")
+    assert robot.unit_of("springs.stiffness") == "N*mm/deg"
+    assert robot.si_unit_of("springs.stiffness") == "N*m/rad"
+    with pytest.raises(ParameterError, match="values differ"):
+        softer.get("springs.stiffness")
+
+
+def test_override_of_all_springs(robot):
+    uniform = robot.with_value("springs.stiffness[0]", 0.7).with_value("springs.stiffness", 0.5)
+    assert uniform.springs.stiffness == (0.5,) * 5
+    assert uniform.get("springs.stiffness") == 0.5
+    assert {uniform.provenance_of(f"springs.stiffness[{i}]") for i in range(5)} == {"set by override"}
+
+
+def test_setting_the_same_value_changes_nothing(robot):
+    assert robot.with_value("gait.stride", 0.03) is robot
+
+
+def test_number_of_modules_takes_the_springs_along(robot):
+    robot = robot.with_value("springs.stiffness[4]", 0.3)
+    assert robot.override("body.modules", 8).springs.stiffness[3:] == (robot.springs.stiffness[3], 0.3, 0.3, 0.3)
+    short = robot.override("body.modules", "2")
+    assert short.springs.stiffness == robot.springs.stiffness[:1]
+    assert short.body.length == robot.body.length
+    assert not any("[4]" in path for path in short.provenance)
+    assert Robot(**tomllib.loads(short.to_toml())) == short
+
+
+def test_yaw_inertia_is_the_rods_until_given(robot):
+    assert robot.get("body.yaw_inertia") == robot.module_yaw_inertia
+    assert robot.with_value("body.yaw_inertia", 0.01).module_yaw_inertia == 0.01
+
+
+def test_set_from_text(robot):
+    result = robot.set_from_text(["gait.stride = 1.8 cm", "springs.stiffness=28 N*mm/deg", "gait.module_phase=180 deg"])
+    assert result.gait.stride == pytest.approx(0.018)
+    assert result.gait.module_phase == math.pi
+    assert robot.set_from_text([]) is robot
+
+
+def test_with_replaces_and_validates(robot):
+    assert robot.with_(name="other").name == "other"
+    with pytest.raises(ParameterError, match=r"springs\.stiffness: has 5 values; allowed: 3"):
+        robot.with_(body=Body(modules=4, length=1, mass=1))
+
+
+@given(data=st.data())
+def test_overrides_agree_with_a_file_that_says_the_same(data):
+    robot = load_robot(PRESET)
+    path = data.draw(st.sampled_from([p for p in robot.parameters() if p != "body.modules"]))
+    value = data.draw(st.floats(1e-3, 5.0))
+    result = robot.with_value(path, value)
+    assert result.get(path) == value
+    assert Robot(**tomllib.loads(result.to_toml())) == result
+    # The inertia of a rod follows its mass and length.
+    others = [other for other in robot.parameters() if other not in (path, "body.yaw_inertia")]
+    assert [result.get(other) for other in others] == [robot.get(other) for other in others]
+
+
+@pytest.mark.parametrize(
+    ("assignment", "error", "complaint"),
+    [
+        ("springs.stifness[0]=1", ParameterError, "did you mean 'springs.stiffness[0]'?"),
+        ("stiffness[2]=1", ParameterError, "did you mean 'springs.stiffness[2]'?"),
+        ("legs.mass=1", ParameterError, "did you mean 'body.mass'?"),
+        ("springs.stiffness[5]=1", ParameterError, "no such spring; allowed: 0 to 4"),
+        ("springs.stiffness[-1]=1", ParameterError, "names no parameter"),
+        ("body.mass[0]=1", ParameterError, "has no index"),
+        ("name=x", ParameterError, "is text"),
+        ("provenance.gait.stride=1", ParameterError, "is text"),
+        ("twin.x=1", ParameterError, "names no parameter"),
+        ("body=1", ParameterError, "names no parameter"),
+        ("=1", ParameterError, "names no parameter"),
+        ("gait.stride", ParameterError, "allowed: PATH=VALUE"),
+        ("gait.stride=3 kg", UnitError, "gait.stride = '3 kg': is a mass; allowed: a length"),
+        ("gait.stride=", UnitError, "does not start with a finite number"),
+        ("gait.stride=nan", UnitError, "gait.stride"),
+        ("body.modules=1", ParameterError, "allowed: 2 to 1000"),
+        ("body.modules=2.5", ParameterError, "whole number"),
+        ("body.modules=1e6", ParameterError, "allowed: 2 to 1000"),
+        ("springs.damping=-1", ParameterError, "must not be negative"),
+        ("springs.stiffness[0]=0", ParameterError, "must be positive"),
+    ],
+)
+def test_overrides_refused(robot, assignment, error, complaint):
+    with pytest.raises(error) as caught:
+        robot.set_from_text([assignment])
+    assert complaint in str(caught.value)
+
+
+def test_numeric_path_refuses_too(robot):
+    for value in (math.nan, math.inf, -1.0, 0.0, 1e300):
+        with pytest.raises(ParameterError, match=r"springs\.stiffness\[0\]"):
+            robot.with_value("springs.stiffness[0]", value)
+
+
+# -- bad files
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "complaint"),
+    [
+        ("body/lenght", "1 m", "body.lenght: unknown key; did you mean 'length'?"),
+        ("boddy", {}, "boddy: unknown key; did you mean 'body'?"),
+        ("body", ..., "body: is missing"),
+        ("body", 3, "body = 3: must be a table"),
+        ("gait/swing", ..., "gait.swing: is missing"),
+        ("body/length", "3 kg", "body.length = '3 kg': is a mass; allowed: a length"),
+        ("body/mass", "-1 kg", "body.mass = '-1 kg': must be positive"),
+        ("body/mass", 0, "body.mass = 0: must be positive"),
+        ("body/mass", math.nan, "body.mass = nan: not a finite number"),
+        ("body/mass", math.inf, "body.mass = inf: not a finite number"),
+        ("body/mass", True, "body.mass = True: not a quantity"),
+        ("body/modules", 1, "body.modules = 1: out of range; allowed: 2 to 1000"),
+        ("body/modules", 10**9, "body.modules = 1000000000: out of range"),
+        ("body/modules", "six", "body.modules = 'six'"),
+        ("body/modules", 7, "springs.stiffness: has 5 values; allowed: 6, one fewer than body.modules"),
+        ("springs/stiffness", ["1"] * 4, "springs.stiffness: has 4 values; allowed: 5"),
+        ("springs/stiffness", [1, 2, "x", 4, 5], "springs.stiffness[2] = 'x'"),
+        ("springs/stiffness", {"a": 1}, "springs.stiffness = {'a': 1}: must be a list"),
+        ("springs/damping", ["1"] * 6, "springs.damping: has 6 values; allowed: 5"),
+        ("springs/stiffness", "3 N*m", "springs.stiffness[0] = '3 N*m': is a torque"),
+        ("gait/stance", "0 s", "gait.stance = '0 s': must be positive"),
+        ("name", "", "name = ''"),
+        ("name", "a\nb", "name = 'a\\nb'"),
+        ("name", 5, "name = 5: must be text"),
+        ("twin", 5, "twin = 5: must be a table"),
+        ("provenance", {"gait.strid": "x"}, "provenance.gait.strid: names no parameter; did you mean 'gait.stride'?"),
+        ("provenance", {"springs.damping[7]": "x"}, "provenance.springs.damping[7]: there is no such spring"),
+        ("provenance", {"gait.stride": 5}, "provenance.gait.stride = 5: must be text"),
+        ("provenance", {"gait.stride": "\x1b[31m"}, "provenance.gait.stride = '\\x1b[31m'"),
+    ],
+)
+def test_bad_descriptions(path, value, complaint):
+    with pytest.raises(ChilopodError) as caught:
+        Robot(**changed(path, value))
+    assert str(caught.value).startswith(complaint)
+    assert str(caught.value).isprintable()
+
+
+def test_an_integer_too_long_to_print_is_refused_like_any_other():
+    with pytest.raises(UnitError, match="mass = <int>: not a finite number"):
+        Robot(**changed("body/mass", 16**5000))
+
+
+@pytest.mark.parametrize(
+    ("content", "complaint"),
+    [
+        (b"", "is empty"),
+        (b" \n", "is empty"),
+        (b"\x00\x01\xff\xfe", "not a text file"),
+        (b"name = ", "is not valid TOML"),
+        (b"a = " + b"[" * 5000, "nested too deeply"),
+        (b"a" + b".a" * 5000 + b" = 1", "unknown key"),
+        (b"twin.a" + b".a" * 5000 + b" = 1", "nested too deeply"),
+        (b"x = " + b"9" * 5000, "is not valid TOML"),
+        (b"# " + b"x" * 1_000_001, "too large"),
+        (b"name = 'x'", "body: is missing"),
+    ],
+)
+def test_bad_files(tmp_path, content, complaint):
+    file = tmp_path / "robot.toml"
+    file.write_bytes(content)
+    with pytest.raises(RobotFileError) as caught:
+        load_robot(file)
+    assert str(caught.value).startswith(f"{file}: ")
+    assert complaint in str(caught.value)
+
+
+@given(st.binary(max_size=200))
+def test_random_files_are_refused(tmp_path_factory, content):
+    file = tmp_path_factory.getbasetemp() / "random.toml"
+    file.write_bytes(content)
+    with pytest.raises(RobotFileError) as caught:
+        load_robot(file)
+    assert str(caught.value).isprintable()
+
+
+toml_values = st.recursive(
+    st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text(max_size=20),
+    lambda inner: st.lists(inner, max_size=6) | st.dictionaries(st.text(max_size=8), inner, max_size=4),
+    max_leaves=8,
+)
+
+
+@given(
+    st.sampled_from(["body", "springs", "gait", "name", "twin", "provenance", "body/mass", "springs/stiffness", "new"]),
+    toml_values,
+)
+def test_random_entries_are_valid_or_refused(path, value):
+    try:
+        described = Robot(**changed(path, value))
+    except ChilopodError as error:
+        message = str(error)
+    else:
+        message = ""
+        assert Robot(**tomllib.loads(described.to_toml())) == described
+    assert message.isprintable()
+
+
+@pytest.mark.parametrize(
+    ("name", "complaint"),
+    [
+        ("aoi2022-planer", "no such preset or file; did you mean 'aoi2022-planar'?"),
+        ("missing.toml", "missing.toml: no such file"),
+        ("no/such/folder", "no/such/folder: no such file"),
+        ("/", "is a folder"),
+        ("/dev/zero", "not a regular file"),
+        ("\0", "no such preset or file"),
+        ("", "folder"),
+        ("x" * 5000, "cannot be read"),
+    ],
+)
+def test_missing_robots(name, complaint):
+    with pytest.raises(RobotFileError) as caught:
+        load_robot(name)
+    assert complaint in str(caught.value)
+
+
+# -- remarks
+
+
+def test_remarks(robot):
+    assert "whole period" in remarks(robot.override("gait.side_phase", "90 deg"))[0]
+    assert "no foot of the robot" in remarks(robot.set_from_text(["gait.swing=9 s", "gait.module_phase=0"]))[0]
+    assert "a module has no foot" in remarks(robot.override("gait.swing", "0.4 s"))[0]
+    assert "reach" in remarks(robot.override("legs.forward_offset", "-1 m"))[0]
+    assert "gait.stride" in remarks(robot.with_(provenance={}))[0]
+
+
+def test_descriptions_accept_arrays_and_copy(robot):
+    assert Springs(stiffness=np.full(5, 2.0), damping=np.float32(0)).stiffness == (2.0,) * 5
+    assert copy.deepcopy(robot) == robot
