@@ -1,0 +1,69 @@
+"""Flow of the nonlinear planar model and its derivative, many robots at a time.
+
+The compiled loop runs over robots; each is carried from switch to switch, so that the integrator only ever sees a
+smooth right-hand side. A tangent is one more "robot" whose state has an imaginary part (see
+:mod:`chilopod.integrate`).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+import numpy as np
+
+from chilopod.compiled import parallel_njit
+from chilopod.integrate import integrator
+from chilopod.planar.dynamics import rhs
+
+SCRATCH = 10
+"""Columns of scratch per module that the right-hand side needs."""
+
+_integrate = integrator(rhs)
+
+
+@parallel_njit
+def advance(
+    starts: Any,
+    widths: Any,
+    scalars: Any,
+    stiffness: Any,
+    damping: Any,
+    moments: Any,
+    owner: Any,
+    states: Any,
+    tolerance: float,
+    ok: Any,
+) -> None:
+    """Carry every row of ``states`` through all intervals, in place, on all cores.
+
+    Parameters
+    ----------
+    starts, widths
+        Where in its contact interval each piece starts and how long it lasts, s, shape (pieces,).
+    scalars, stiffness, damping
+        Of the robots, shapes (robots, 4), (robots, N-1), (robots, N-1).
+    moments
+        Contact moments at the start of the contact interval of every piece, shape (robots, pieces, N, 4).
+    owner
+        Which robot a state belongs to, shape (states,).
+    states
+        Reduced states, shape (states, 2N+1), or with poses behind, (states, 2N+4); float64 or complex128.
+    tolerance
+        Of the integrator, relative to max(1, |x|).
+    ok
+        Set to False where a state could not be carried to the end, shape (states,).
+    """
+    for r in numba.prange(states.shape[0]):
+        p = owner[r]
+        x = states[r].copy()
+        work = np.empty((16, x.size), x.dtype)
+        scratch = np.empty((moments.shape[2], SCRATCH), x.dtype)
+        h = 0.0
+        for s in range(widths.size):
+            args = (scalars[p], stiffness[p], damping[p], moments[p, s], scratch)
+            h, reached = _integrate(args, x, starts[s], starts[s] + widths[s], h, tolerance, work)
+            if not reached:
+                ok[r] = False
+                break
+        states[r] = x

@@ -1,0 +1,240 @@
+"""The linearisation about the straight walk (paper eq. 2) and its fundamental solution by Taylor series.
+
+Between two switching instants the perturbation of the reduced state obeys
+
+    dz/dt = (A0 + A1 t + A2 t^2) z,
+
+a polynomial of second degree because the feet move back at constant speed. Substituting z = sum z_k t^k gives the
+exact recurrence (k + 1) z_{k+1} = A0 z_k + A1 z_{k-1} + A2 z_{k-2}.
+
+The feet damp motion at rates from 0 to some -rho = -450 /s, and the series of exp(-rho t) cancels itself to nothing.
+So the series is taken of y = exp(rho t / 2) z, whose rates are centred about zero: its terms add up to the large
+growth of the slow modes instead of cancelling, round-off stays relative to the slow modes however long the step, and
+one step spans the whole interval between two switches. The derivation by hand is checked in the tests against the
+derivative of the nonlinear model.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+
+from chilopod.compiled import njit, parallel_njit
+from chilopod.planar.series import PANEL, ROWS, series_term
+
+Array = NDArray[np.float64]
+
+TRUNCATION = 1e-17
+"""Relative size of the last Taylor term that is kept: an order of magnitude below round-off."""
+
+_LONGEST = 32.0  # decay exponents in a step; e^32 is far from overflow and needs some 100 orders
+_MOST_ORDERS = 400
+_KEPT = 24  # terms held before the last three move back to the bottom
+_CHECKED = 4
+
+
+def mass_matrix(modules: int, length: float, mass: float, inertia: float) -> tuple[Array, Array]:
+    """Return the mass matrix (N+2, N+2) of the straight chain and its lateral kinematics (N, N+2).
+
+    The velocities are eta = (vx, vy, w_0 .. w_{N-1}): module 1's centre and the *absolute* yaw rates. The lateral
+    velocity of module i is lateral[i] eta.
+    """
+    lateral = np.zeros((modules, modules + 2))
+    lateral[:, 1] = 1.0
+    for i in range(1, modules):
+        lateral[i:, 1 + i] -= 0.5 * length
+        lateral[i:, 2 + i] -= 0.5 * length
+    matrix = mass * lateral.T @ lateral
+    matrix[0, 0] = modules * mass
+    matrix[2:, 2:] += inertia * np.eye(modules)
+    return matrix, lateral
+
+
+def system_matrices(
+    length: float, mass: float, inertia: float, speed: float, moments: Array
+) -> tuple[Array, Array, Array, Array]:
+    """A0, A1, A2 of every interval, for a robot without springs and dampers, and what these add.
+
+    The state is z = (delta vx, delta vy, w_0 .. w_{N-1}, theta_1 .. theta_{N-1}) with *absolute* yaw rates w. A spring
+    k_j or damper d_j at joint j puts -k_j theta_j - d_j theta_j' between its modules: column j of ``joint`` times that
+    torque.
+
+    Parameters
+    ----------
+    length, mass, inertia
+        Of a module, m, kg, kg*m^2.
+    speed
+        Of the straight walk, m/s.
+    moments
+        Contact moments at the start of every interval, shape (intervals, N, 4).
+
+    Returns
+    -------
+    passive
+        Shape (intervals, N+2, 3, 2N+1): the upper rows of A0, A1, A2. The lower rows are the same for all robots:
+        theta_j' = w_j - w_{j-1}.
+    joint
+        Acceleration of the velocities by a unit torque at a joint, shape (N+2, N-1).
+    rates
+        Joint rates as functions of the velocities, shape (N-1, N+2).
+    decay
+        The fastest rate at which the feet damp motion at the start of every interval, 1/s, shape (intervals,).
+    """
+    intervals, n, _ = moments.shape
+    m, lateral = mass_matrix(n, length, mass, inertia)
+    c, c_x, c_y, c_xx = np.moveaxis(moments, -1, 0)
+    zero = np.zeros_like(c)
+    # Contact moments as polynomials in time, shape (3, intervals, n).
+    c_t = np.stack([c, zero, zero])
+    cx_t = np.stack([c_x, -speed * c, zero])
+    cy_t = np.stack([c_y, zero, zero])
+    cxx_t = np.stack([c_xx, -2.0 * speed * c_x, speed**2 * c])
+
+    # Power of the feet: sum over modules of (vx_i, vy_i, w_i)^T D_i (vx_i, vy_i, w_i), with vy_i = lateral[i] eta.
+    drag = np.einsum("psi,ia,ib->psab", c_t, lateral, lateral)
+    drag[..., 0, 0] += c_t.sum(-1)
+    drag[..., 0, 2:] -= cy_t
+    drag[..., 2:, 0] -= cy_t
+    cross = np.einsum("psi,ia->psai", cx_t, lateral)
+    drag[..., :, 2:] += cross
+    drag[..., 2:, :] += np.swapaxes(cross, -1, -2)
+    drag[..., range(2, n + 2), range(2, n + 2)] += cxx_t
+
+    # A module that points psi_i away from module 1 meets the floor sideways: vy_i = lateral[i] eta - speed psi_i.
+    heading = np.tril(np.ones((n, n - 1)), -1)
+    sideways = np.einsum("psi,ia,ij->psaj", c_t, lateral, heading)
+    sideways[..., 2:, :] += np.einsum("psi,ij->psij", cx_t, heading)
+
+    force = np.zeros((3, intervals, n + 2, 2 * n + 1))
+    force[..., : n + 2] = -drag
+    force[..., n + 2 :] = speed * sideways
+    force[0, :, :, 2] -= mass * speed * lateral.sum(0)  # module 1's frame turns: vy' = a_y - w0 vx
+
+    rates = np.zeros((n - 1, n + 2))
+    rates[range(n - 1), range(2, n + 1)] = -1.0
+    rates[range(n - 1), range(3, n + 2)] = 1.0
+    decay: Array = np.array([eigh(one, m, eigvals_only=True)[-1] for one in drag[0]])
+    passive = np.moveaxis(np.linalg.solve(m, force), 0, 2).astype(np.float64, order="C")
+    joint = np.linalg.solve(m, rates.T).astype(np.float64, copy=False)
+    return passive, joint, rates, decay
+
+
+@njit(fastmath={"nnan", "ninf", "nsz", "reassoc"})  # a maximum may then be taken eight at a time
+def _largest(rows: Any) -> float:
+    size = 0.0
+    for i in range(rows.shape[0]):
+        for q in range(PANEL):
+            size = max(size, abs(rows[i, q]))
+    return size
+
+
+@njit
+def _propagate(widths: Any, upper: Any, decay: Any, state: Any) -> tuple[float, int]:
+    """Carry one panel of columns through all intervals, in place; returns (error, orders).
+
+    ``state`` has 2N+1 rows and then zeros, up to a multiple of ROWS. The error bounds that of the largest entry of the
+    result: round-off and what the series leave out, summed over the steps.
+    """
+    intervals, velocities = upper.shape[0], upper.shape[1]
+    n = upper.shape[3]
+    rows = state.shape[0]
+    # h A0 + shift, h^2 A1, h^3 A2 side by side; A2 acts on the velocities alone.
+    block = np.zeros((rows, 2 * rows + velocities))
+    # Terms of the series, the newest on top, so that orders k, k-1, k-2 lie one below the other and one product serves
+    # all three.
+    terms = np.empty((_KEPT * rows, PANEL))
+    squares = 0.0
+    orders = 0
+    for s in range(intervals):
+        parts = max(1, int(np.ceil(0.5 * decay[s] * widths[s] / _LONGEST)))
+        h = widths[s] / parts
+        # A multiple of 1/4, so that exp(-shift) undoes exactly what is added to the diagonal.
+        shift = np.rint(2.0 * decay[s] * h) * 0.25
+        for part in range(parts):
+            t = part * h
+            for i in range(velocities):
+                for j in range(n):
+                    a1, a2 = upper[s, i, 1, j], upper[s, i, 2, j]
+                    block[i, j] = h * (upper[s, i, 0, j] + t * (a1 + t * a2))
+                    block[i, rows + j] = h * h * (a1 + 2.0 * t * a2)
+                    if j < velocities:
+                        block[i, 2 * rows + j] = h * h * h * a2
+                block[i, i] += shift
+            for i in range(velocities, n):
+                joint = i - velocities
+                block[i, joint + 2] = -h
+                block[i, joint + 3] = h
+                block[i, i] = shift
+            at = (_KEPT - 3) * rows
+            terms[at : at + rows] = state
+            terms[at + rows :] = 0.0
+            for k in range(1, _MOST_ORDERS + 1):
+                if at == 0:
+                    at = (_KEPT - 3) * rows
+                    terms[at:] = terms[: 3 * rows]
+                series_term(block, terms, at, 1.0 / k, state)
+                at -= rows
+                orders += 1
+                # The recurrence remembers two orders: three small ones in a row end it.
+                if k % _CHECKED == 0 and _largest(terms[at : at + 3 * rows]) <= TRUNCATION * _largest(state):
+                    break
+            back = np.exp(-shift)
+            for i in range(n):
+                for q in range(PANEL):
+                    state[i, q] *= back
+            squares += _largest(state) ** 2
+    # A step rounds each entry by some eps of the largest; the steps err independently, so their squares add up.
+    # Against extended precision the factor 64 leaves a margin of five or more on random robots (see the tests).
+    return 64.0 * 2.220446049250313e-16 * np.sqrt(squares), orders
+
+
+@njit
+def _propagate_all(widths: Any, upper: Any, decay: Any, matrix: Any) -> tuple[float, int]:
+    """Write the fundamental matrix (2N+1, 2N+1) into ``matrix``, panel by panel."""
+    n = matrix.shape[0]
+    error = 0.0
+    orders = 0
+    state = np.empty(((n + ROWS - 1) // ROWS * ROWS, PANEL))
+    for first in range(0, n, PANEL):
+        last = min(first + PANEL, n)
+        state[:] = 0.0
+        for q in range(first, last):
+            state[q, q - first] = 1.0
+        e, k = _propagate(widths, upper, decay, state)
+        error = max(error, e)
+        orders += k
+        matrix[:, first:last] = state[:n, : last - first]
+    return error, orders
+
+
+@parallel_njit
+def propagate_batch(widths: Any, upper: Any, decay: Any, matrices: Any, errors: Any) -> None:
+    """:func:`propagate` for many robots with the same gait, on all cores: ``upper`` and ``matrices`` have robots in
+    front."""
+    for r in numba.prange(matrices.shape[0]):
+        errors[r] = _propagate_all(widths, upper[r], decay, matrices[r])[0]
+
+
+def propagate(widths: Array, upper: Array, decay: Array) -> tuple[Array, float, int]:
+    """Return the fundamental matrix over all intervals.
+
+    Parameters
+    ----------
+    widths
+        Duration of every interval, s, shape (intervals,).
+    upper
+        Upper rows of A0, A1, A2 of every interval, shape (intervals, N+2, 3, 2N+1), springs and dampers included.
+    decay
+        Fastest decay in every interval, 1/s, shape (intervals,); it need not be exact.
+
+    Returns
+    -------
+    The matrix (2N+1, 2N+1), the bound on the error of its largest entry, and the number of Taylor orders computed.
+    """
+    matrix = np.empty((upper.shape[3], upper.shape[3]))
+    error, orders = _propagate_all(widths, upper, decay, matrix)
+    return matrix, error, orders

@@ -1,0 +1,301 @@
+"""The planar robot as a periodic dynamical system in reduced coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.integrate import COMPLEX_STEP
+from chilopod.planar import linear
+from chilopod.planar.contact import contact_moments
+from chilopod.planar.drift import Drift
+from chilopod.planar.dynamics import rhs as compiled_rhs
+from chilopod.planar.flow import SCRATCH, advance
+
+if TYPE_CHECKING:
+    from chilopod.gait import Gait, Schedule
+    from chilopod.robot import Robot
+
+Array = NDArray[np.float64]
+
+TOLERANCE = 1e-13
+"""Default tolerance of the nonlinear flow, relative to max(1, |x|), per step."""
+
+_SAME_INSTANT = 1e-12  # in periods
+
+
+class PlanarModel:
+    """The paper's planar model (eq. 1) of one robot, period by period.
+
+    The state is ``[vx, vy, w0, theta_1 .., theta_1' ..]``, length 2N+1 (see :mod:`chilopod.planar.dynamics`). The
+    object has everything :mod:`chilopod.stability` asks of a periodic system: ``dimension``, ``period``,
+    ``switch_times``, ``symmetry``, ``spatial_symmetry``, ``orbit`` and the flows.
+
+    Parameters
+    ----------
+    robot
+        The description; SI inside.
+    tolerance
+        Of the nonlinear flow, relative to max(1, |x|). The straight walk does not use it: there the derivative comes
+        from the linearised equations by Taylor series, to round-off.
+    """
+
+    def __init__(self, robot: Robot, tolerance: float = TOLERANCE) -> None:
+        self.robot = robot
+        self.tolerance = tolerance
+        self.modules = robot.body.modules
+        self.dimension = 2 * self.modules + 1
+        self.period = robot.gait.period
+        self.stiffness: Array = np.array(robot.springs.stiffness)
+        self.damping: Array = np.array(robot.springs.damping)
+
+    @property
+    def orbit(self) -> Array:
+        """The straight walk, shape (2N+1,): every stance foot rests on the floor, so it moves at stride/stance for
+        ever."""
+        state = np.zeros(self.dimension)
+        state[0] = self.robot.gait.speed
+        return state
+
+    @property
+    def schedule(self) -> Schedule:
+        """Contact pattern of one period."""
+        return self.robot.gait.schedule(self.modules)
+
+    @property
+    def switch_times(self) -> Array:
+        """Instants in [0, period) at which a foot touches down or lifts off, s."""
+        return self.schedule.times[:-1]
+
+    @property
+    def reflection(self) -> Array:
+        """Matrix that mirrors a state left to right, shape (2N+1, 2N+1)."""
+        signs = -np.ones(self.dimension)
+        signs[0] = 1.0
+        return np.diag(signs)
+
+    @property
+    def symmetry(self) -> Array | None:
+        """The reflection if the right legs do half a period later what the left legs do, else None."""
+        return self.reflection if self.robot.gait.half_period_symmetric else None
+
+    @property
+    def spatial_symmetry(self) -> Array | None:
+        """The reflection if left and right legs move together, else None."""
+        turns = self.robot.gait.side_phase / (2.0 * np.pi)
+        return self.reflection if abs(turns - round(turns)) < _SAME_INSTANT else None
+
+    def flow(self, x: ArrayLike, t0: float, t1: float) -> tuple[Array, Array]:
+        """State at t1 of the robot that is in state x at t0, and its derivative with respect to x.
+
+        Parameters
+        ----------
+        x
+            Shape (2N+1,).
+        t0, t1
+            Times, s, ``t0 <= t1``; the gait is at phase 0 at time 0.
+
+        Raises
+        ------
+        AnalysisError
+            If the motion diverges.
+        """
+        state, derivative, _ = self.flow_with_error(x, t0, t1)
+        return state, derivative
+
+    def flow_with_error(self, x: ArrayLike, t0: float, t1: float) -> tuple[Array, Array, float]:
+        """:meth:`flow`, and a bound on the error of the largest entry of the derivative."""
+        x = self._checked(x)
+        if np.array_equal(x, self.orbit):
+            matrix, error = self._linear_flow(t0, t1)
+            return x.copy(), matrix, error
+        n = self.dimension
+        batch = np.tile(x.astype(np.complex128), (n, 1))
+        batch += 1j * COMPLEX_STEP * np.eye(n)
+        self._advance(batch, t0, t1)
+        derivative = batch.imag.T / COMPLEX_STEP
+        # Measured against finer steps, the global error stays within some tens of the tolerance per step (see the
+        # tests).
+        error = 100.0 * self.tolerance * max(1.0, float(np.abs(derivative).max()))
+        return batch[0].real.copy(), derivative, error
+
+    def flow_states(self, states: ArrayLike, t0: float, t1: float) -> Array:
+        """Carry many states, shape (states, 2N+1), on all cores, without derivatives."""
+        batch = np.array(states, dtype=np.float64)
+        if batch.ndim != 2 or batch.shape[1] != self.dimension:
+            raise ParameterError(
+                "states have the wrong shape",
+                value=batch.shape,
+                allowed=f"(any number, {self.dimension})",
+                field="states",
+            )
+        self._advance(batch, t0, t1)
+        return batch
+
+    def rhs(self, x: ArrayLike, t: float) -> Array:
+        """dx/dt at time t (s) in state x, shape (2N+1,)."""
+        x = self._checked(x)
+        starts, _, interval = self._pieces(t, t + self.period)
+        out = np.empty_like(x)
+        scratch = np.empty((self.modules, SCRATCH))
+        args = (self._scalars[0], self.stiffness, self.damping, self._moments(interval[:1])[0], scratch)
+        compiled_rhs(float(starts[0]), x, args, out)
+        return out
+
+    def drift(self, x: ArrayLike) -> Drift:
+        """How the robot moves over the floor in one period that starts in state x at time 0."""
+        batch = np.append(self._checked(x), np.zeros(3))[None]
+        self._advance(batch, 0.0, self.period)
+        forward, left, turn = batch[0, -3:].tolist()
+        return Drift(forward, left, turn, self.period)
+
+    @staticmethod
+    def flow_many(models: Sequence[PlanarModel], t0: float, t1: float) -> tuple[Array, Array]:
+        """Derivative of the flow on the straight walks of many robots with one gait and size, on all cores.
+
+        Returns
+        -------
+        Derivatives, shape (robots, 2N+1, 2N+1), and the bounds on the error of their largest entries, shape (robots,).
+        """
+        pieces = [model._linear_pieces(t0, t1) for model in models]
+        widths, _, decay = pieces[0]
+        upper = np.stack([each for _, each, _ in pieces])
+        matrices = np.empty((len(models), upper.shape[-1], upper.shape[-1]))
+        errors = np.empty(len(models))
+        linear.propagate_batch(widths, upper, decay, matrices, errors)
+        to_joint, from_joint = _joint_rates(models[0].modules)
+        return to_joint @ matrices @ from_joint, errors
+
+    def can_flow_with(self, other: PlanarModel) -> bool:
+        """Whether :meth:`flow_many` may take both robots at once: they differ in springs at the most in what sets the
+        shape."""
+        return self.modules == other.modules and self.robot.gait == other.robot.gait
+
+    # -- inside
+    # ---------------------------------------------------------------------------------------------------------------
+
+    def _checked(self, x: ArrayLike) -> Array:
+        state = np.asarray(x, dtype=np.float64)
+        if state.shape != (self.dimension,):
+            raise ParameterError(
+                "state has the wrong shape", field="x", value=state.shape, allowed=f"({self.dimension},)"
+            )
+        return state
+
+    def _pieces(self, t0: float, t1: float) -> tuple[Array, Array, NDArray[np.intp]]:
+        return _pieces(self.robot.gait, self.modules, t0, t1)
+
+    @cached_property
+    def _scalars(self) -> Array:
+        robot = self.robot
+        return np.array([[robot.module_length, robot.module_mass, robot.module_yaw_inertia, robot.gait.speed]])
+
+    def _moments(self, interval: NDArray[np.intp]) -> Array:
+        legs = self.robot.legs
+        moments = contact_moments(legs.forward_offset, legs.half_width, self.robot.ground.friction, self.schedule)
+        return moments[interval]
+
+    def _advance(self, batch: NDArray[np.float64] | NDArray[np.complex128], t0: float, t1: float) -> None:
+        starts, widths, interval = self._pieces(t0, t1)
+        moments = self._moments(interval)
+        ok = np.ones(len(batch), dtype=np.bool_)
+        advance(
+            starts,
+            widths,
+            self._scalars,
+            self.stiffness[None],
+            self.damping[None],
+            moments[None],
+            np.zeros(len(batch), dtype=np.intp),
+            batch,
+            self.tolerance,
+            ok,
+        )
+        if not ok.all():
+            raise AnalysisError(f"the motion diverges between {t0:g} s and {t1:g} s", field="x")
+
+    def _linear_pieces(self, t0: float, t1: float) -> tuple[Array, Array, Array]:
+        """Widths of the pieces, upper rows of A0, A1, A2 of every piece about its own start, and its fastest decay."""
+        robot = self.robot
+        passive, joint, rates, decay = _passive_matrices(
+            robot.gait,
+            self.modules,
+            *self._scalars[0, :3].tolist(),
+            robot.legs.forward_offset,
+            robot.legs.half_width,
+            robot.ground.friction,
+        )
+        starts, widths, interval = self._pieces(t0, t1)
+        upper = passive[interval]
+        if starts.any():
+            t = starts[:, None, None]
+            upper[:, :, 0] += t * (upper[:, :, 1] + t * upper[:, :, 2])
+            upper[:, :, 1] += 2.0 * t * upper[:, :, 2]
+        n = self.modules
+        upper[:, :, 0, n + 2 :] -= joint * self.stiffness
+        if self.damping.any():
+            upper[:, :, 0, : n + 2] -= joint * self.damping @ rates
+        return widths, upper, decay[interval]
+
+    def _linear_flow(self, t0: float, t1: float) -> tuple[Array, float]:
+        matrix, error, _ = linear.propagate(*self._linear_pieces(t0, t1))
+        to_joint, from_joint = _joint_rates(self.modules)
+        return to_joint @ matrix @ from_joint, error
+
+
+@lru_cache(maxsize=32)
+def _passive_matrices(
+    gait: Gait,
+    modules: int,
+    length: float,
+    mass: float,
+    inertia: float,
+    forward_offset: float,
+    half_width: float,
+    friction: float,
+) -> tuple[Array, Array, Array, Array]:
+    """:func:`linear.system_matrices` of one period; a sweep over springs computes them once."""
+    moments = contact_moments(forward_offset, half_width, friction, gait.schedule(modules))
+    return linear.system_matrices(length, mass, inertia, gait.speed, moments)
+
+
+@lru_cache(maxsize=256)
+def _pieces(gait: Gait, modules: int, t0: float, t1: float) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Cut [t0, t1] at the switches.
+
+    Returns
+    -------
+    Where in its contact interval each piece starts (s), how long it lasts (s), and which interval of the period it
+    belongs to.
+    """
+    if not (np.isfinite(t0) and np.isfinite(t1) and t0 <= t1):
+        raise ParameterError("times must be finite and in order", field="t0, t1", value=(t0, t1), allowed="t0 <= t1")
+    period = gait.period
+    times = gait.schedule(modules).times
+    first, last = int(np.floor(t0 / period + _SAME_INSTANT)), int(np.ceil(t1 / period - _SAME_INSTANT))
+    switches = (period * np.arange(first, last)[:, None] + times[:-1]).ravel()
+    interval = np.tile(np.arange(len(times) - 1), max(0, last - first))
+    begins = np.maximum(switches, t0)
+    ends = np.minimum(np.append(switches[1:], last * period), t1)
+    used = ends - begins > _SAME_INSTANT * period
+    starts = (begins - switches)[used]
+    starts[starts < _SAME_INSTANT * period] = 0.0
+    return starts, (ends - begins)[used], interval[used]
+
+
+@lru_cache(maxsize=64)
+def _joint_rates(modules: int) -> tuple[Array, Array]:
+    """Change of coordinates from (vx, vy, w_0 .. w_{N-1}, theta) to (vx, vy, w_0, theta, theta'), and back."""
+    n = modules
+    matrix = np.zeros((2 * n + 1, 2 * n + 1))
+    matrix[:3, :3] = np.eye(3)
+    joints = np.arange(n - 1)
+    matrix[3 + joints, n + 2 + joints] = 1.0
+    matrix[n + 2 + joints, 3 + joints] = 1.0
+    matrix[n + 2 + joints, 2 + joints] = -1.0
+    return matrix, np.rint(np.linalg.inv(matrix))
