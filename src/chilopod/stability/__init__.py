@@ -1,0 +1,32 @@
+"""Stability and bifurcations of periodic orbits, of any periodic system.
+
+>>> from math import cos
+>>> from chilopod.stability import from_rhs, multipliers
+>>> mathieu = from_rhs(lambda t, y: [y[1], -(0.5 - 0.4 * cos(2 * t)) * y[0]], 2, 3.141592653589793, orbit=[0, 0])
+>>> multipliers(mathieu).stable
+False
+"""
+
+from chilopod.stability.floquet import Exponents, Multipliers, exponents, multipliers, sweep
+from chilopod.stability.jumps import UndeclaredSwitch
+from chilopod.stability.locate import BifurcationPoint, Criticality, Kind, locate
+from chilopod.stability.rhs import NotAnalytic, from_rhs
+from chilopod.stability.system import PeriodicSystem, SystemLike, find_orbit
+
+__all__ = [
+    "BifurcationPoint",
+    "Criticality",
+    "Exponents",
+    "Kind",
+    "Multipliers",
+    "NotAnalytic",
+    "PeriodicSystem",
+    "SystemLike",
+    "UndeclaredSwitch",
+    "exponents",
+    "find_orbit",
+    "from_rhs",
+    "locate",
+    "multipliers",
+    "sweep",
+]

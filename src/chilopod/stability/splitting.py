@@ -1,0 +1,94 @@
+"""Eigenvalues and eigenvectors of a product of matrices, each to its own scale.
+
+The product of many factors that contract some directions enormously holds only the slow directions; the fast ones
+drown in round-off. Subspace iteration forward through the factors gives the nested spaces of the slowest directions,
+iteration backward through the inverses those of the fastest, and their intersections split the space into groups of
+like size (the Oseledets splitting of a periodic cocycle). The product restricted to a group is small and well scaled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+_GAP = 1.0
+"""Groups are separated by at least this much in ln|eigenvalue|."""
+
+_PASSES = 40
+"""Passes through the product: a gap of 1 leaves exp(-40) of the neighbouring group."""
+
+
+def split_product(factors: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]:
+    """Logarithms of the eigenvalues of ``factors[-1] @ ... @ factors[0]``, and its eigenvectors.
+
+    Parameters
+    ----------
+    factors
+        Square matrices (n, n), each invertible and of moderate condition.
+
+    Returns
+    -------
+    logarithms
+        ln|eigenvalue| + i angle, by falling modulus, shape (n,).
+    vectors
+        Unit eigenvectors as columns, the largest entry real and positive, shape (n, n).
+    """
+    n = factors[0].shape[0]
+    slow, growth = _iterate(factors, n)
+    inverses: list[Array] = [np.linalg.inv(factor).astype(np.float64, copy=False) for factor in reversed(factors)]
+    fast = _iterate(inverses, n)[0]
+    # Backward iteration meets the nodes in reverse: its node 0 is the same instant, its node 1 the last factor's start.
+    fast = [fast[0], *reversed(fast[1:])]
+    borders = [0, *(np.flatnonzero(-np.diff(growth) > _GAP) + 1).tolist(), n]
+    logarithms, vectors = [], []
+    for a, b in zip(borders, borders[1:], strict=False):
+        bases = [_intersection(one[:, :b], other[:, : n - a], b - a) for one, other in zip(slow, fast, strict=True)]
+        values, columns = _restricted(factors, bases)
+        logarithms.append(values)
+        vectors.append(columns)
+    log_all, vec_all = np.concatenate(logarithms), np.hstack(vectors)
+    order = np.argsort(-log_all.real, kind="stable")
+    vec_all = vec_all[:, order]
+    peaks = vec_all[np.abs(vec_all).argmax(axis=0), range(n)]
+    return log_all[order], vec_all * (np.abs(peaks) / peaks) / np.linalg.norm(vec_all, axis=0)
+
+
+def _iterate(factors: Sequence[Array], n: int) -> tuple[list[Array], Array]:
+    """Bases whose first j columns span the j directions that grow most, one before every factor; and ln of the growth
+    of each."""
+    basis = np.linalg.qr(np.random.default_rng(0).standard_normal((n, n)))[0]
+    bases: list[Array] = []
+    growth = np.zeros(n)
+    for _ in range(_PASSES):
+        bases = []
+        growth[:] = 0.0
+        for factor in factors:
+            bases.append(basis)
+            basis, upper = np.linalg.qr(factor @ basis)
+            growth += np.log(np.abs(np.diag(upper)))
+    return bases, growth
+
+
+def _intersection(one: Array, other: Array, dimension: int) -> Array:
+    """Orthonormal basis of the intersection of two column spaces that is known to have the given dimension."""
+    left = np.linalg.svd(one.T @ other)[0]
+    return one @ left[:, :dimension]
+
+
+def _restricted(factors: Sequence[Array], bases: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]:
+    """Eigenvalues (as logarithms) and eigenvectors of the product on the invariant subspaces spanned by ``bases``."""
+    product, scale = np.eye(bases[0].shape[1]), 0.0
+    # From one known basis to the next: carried along, a fast direction would be swamped by the round-off of the slow
+    # ones.
+    for factor, before, after in zip(factors, bases, [*bases[1:], bases[0]], strict=True):
+        product = after.T @ factor @ before @ product
+        size = float(np.abs(product).max())
+        product /= size
+        scale += float(np.log(size))
+    values, columns = np.linalg.eig(product)
+    return np.log(np.abs(values)) + scale + 1j * np.angle(values), bases[0] @ columns

@@ -1,0 +1,283 @@
+"""What the analyses need to know of a periodic system, and the return map built from it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chilopod.errors import AnalysisError, ParameterError
+
+Array = NDArray[np.float64]
+
+Flow = Callable[[Array, float, float], tuple[Array, Array]]
+"""``flow(x, t0, t1) -> (state at t1, its derivative with respect to x)``, shapes (n,) and (n, n)."""
+
+
+@runtime_checkable
+class SystemLike(Protocol):
+    """A T-periodic system dx/dt = f(t, x), f(t + T, x) = f(t, x), given by its flow.
+
+    Besides what stands here, an object *may* have:
+
+    - ``spatial_symmetry``: a matrix P with f(t, P x) = P f(t, x);
+    - ``orbit``: a state on a known periodic orbit at time 0, shape (n,);
+    - ``flow_with_error(x, t0, t1) -> (state, derivative, bound)``: bound on the error of the largest entry of the
+      derivative;
+    - ``flow_states(states, t0, t1)``: many states without derivatives, shape (states, n);
+    - ``flow_many(systems, t0, t1)`` and ``can_flow_with(other)``: derivatives along the known orbits of many systems
+      at once.
+    """
+
+    @property
+    def dimension(self) -> int:
+        """Number of states n."""
+        ...
+
+    @property
+    def period(self) -> float:
+        """T."""
+        ...
+
+    @property
+    def symmetry(self) -> Array | None:
+        """A matrix S with S f(t, x) = f(t + T/2, S x), so that H = S flow(T/2) is a return map; or None."""
+        ...
+
+    def flow(self, x: Array, t0: float, t1: float) -> tuple[Array, Array]:
+        """State at t1 and its derivative with respect to the state x at t0."""
+        ...
+
+
+@dataclass(frozen=True)
+class PeriodicSystem:
+    """A periodic system of one's own, from anything that has a flow.
+
+    To start from a right-hand side, see :func:`chilopod.stability.from_rhs`.
+
+    Parameters
+    ----------
+    dimension
+        Number of states n.
+    period
+        T, positive.
+    flow
+        ``flow(x, t0, t1) -> (x1, dx1/dx)``.
+    symmetry
+        Optional S, shape (n, n), with S f(t, x) = f(t + T/2, S x): then the orbits with S x(T/2) = x(0) are fixed
+        points of the half-period map H = S flow(T/2), whose multipliers nu square to those of the full period.
+    spatial_symmetry
+        Optional P, shape (n, n), with P f(t, x) = f(t, P x), such as a reflection.
+    orbit
+        A state at time 0 on the periodic orbit, if it is known exactly.
+    """
+
+    dimension: int
+    period: float
+    flow: Flow
+    symmetry: Array | None = None
+    spatial_symmetry: Array | None = None
+    orbit: Array | None = None
+    flow_with_error: Callable[[Array, float, float], tuple[Array, Array, float]] | None = field(
+        default=None, repr=False
+    )
+    flow_states: Callable[[Array, float, float], Array] | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        if self.dimension < 1:
+            raise ParameterError("must be at least 1", field="dimension", value=self.dimension)
+        if not (np.isfinite(self.period) and self.period > 0):
+            raise ParameterError("must be positive and finite", field="period", value=self.period)
+        for name in ("symmetry", "spatial_symmetry"):
+            matrix = getattr(self, name)
+            if matrix is None:
+                continue
+            matrix = np.array(matrix, dtype=np.float64)
+            if matrix.shape != (self.dimension, self.dimension):
+                raise ParameterError(
+                    "has the wrong shape",
+                    field=name,
+                    value=matrix.shape,
+                    allowed=f"({self.dimension}, {self.dimension})",
+                )
+            if not np.allclose(matrix @ matrix, np.eye(self.dimension)):
+                raise ParameterError("must be its own inverse: applied twice it gives every state back", field=name)
+            object.__setattr__(self, name, matrix)
+
+
+@dataclass(frozen=True)
+class ReturnMap:
+    """One evaluation of the return map at a state.
+
+    Attributes
+    ----------
+    state
+        H(x), shape (n,).
+    jacobian
+        dH/dx, shape (n, n).
+    error
+        Bound on the error of the largest entry of ``jacobian``; NaN if it was not asked for.
+    halves
+        2 if H = S flow(T/2), 1 if H = flow(T): the full period is H applied so many times.
+    """
+
+    state: Array
+    jacobian: Array
+    error: float
+    halves: int
+
+
+def optional(system: SystemLike, name: str) -> Any:
+    """An optional attribute of a system (see :class:`SystemLike`), None if it lacks it."""
+    return getattr(system, name, None)
+
+
+def halves(system: SystemLike) -> int:
+    """How many applications of the return map make one period: 2 with the half-period symmetry, else 1."""
+    return 1 if system.symmetry is None else 2
+
+
+def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple[Array, Array, float]:
+    """The flow with an error bound; where the system gives none, one is estimated by taking the interval in two parts.
+
+    A step-controlled integrator makes independent errors in the two computations, so ten times their difference is a
+    sound bound; a flow of fixed steps that ignores how it is called cannot be seen through this way and should bring
+    its own.
+    """
+    own = optional(system, "flow_with_error")
+    if own is not None:
+        state, derivative, error = own(x, t0, t1)
+        return state, derivative, float(error)
+    state, derivative = system.flow(x, t0, t1)
+    middle = t0 + 0.381966 * (t1 - t0)
+    half_way, first = system.flow(x, t0, middle)
+    _, second = system.flow(half_way, middle, t1)
+    size = max(1.0, float(np.abs(derivative).max()))
+    return state, derivative, 10.0 * float(np.abs(second @ first - derivative).max()) + 1e-15 * size
+
+
+def return_map(system: SystemLike, x: ArrayLike, with_error: bool = True) -> ReturnMap:
+    """Evaluate the return map H and its derivative at a state.
+
+    Parameters
+    ----------
+    system, x
+        The system and a state at time 0, shape (n,).
+    with_error
+        Whether to bound the error as well, which may cost a second computation; without, ``error`` is NaN.
+
+    Raises
+    ------
+    AnalysisError
+        If the flow gives anything that is not finite.
+    """
+    x = np.asarray(x, dtype=np.float64)
+    count = halves(system)
+    error = np.nan
+    if with_error:
+        state, jacobian, error = flow_with_error(system, x, 0.0, system.period / count)
+    else:
+        state, jacobian = system.flow(x, 0.0, system.period / count)
+    if system.symmetry is not None:
+        state, jacobian = system.symmetry @ state, system.symmetry @ jacobian
+    if not (np.isfinite(state).all() and np.isfinite(jacobian).all()):
+        raise AnalysisError("the flow is not finite over one return", field="flow")
+    return ReturnMap(state, jacobian, error, count)
+
+
+def return_maps(systems: Sequence[SystemLike]) -> list[ReturnMap]:
+    """The return maps of many systems at their known orbits, together where they can."""
+    first = systems[0]
+    together = optional(first, "flow_many")
+    alike = optional(first, "can_flow_with")
+    if together is None or alike is None or len(systems) == 1 or not all(alike(system) for system in systems[1:]):
+        return [return_map(system, known_orbit(system)) for system in systems]
+    count = halves(first)
+    jacobians, errors = together(systems, 0.0, first.period / count)
+    symmetry = np.eye(first.dimension) if first.symmetry is None else first.symmetry
+    return [
+        ReturnMap(known_orbit(system), symmetry @ jacobian, float(error), count)
+        for system, jacobian, error in zip(systems, jacobians, errors, strict=True)
+    ]
+
+
+def returned_states(system: SystemLike, states: Array) -> Array:
+    """H of many states at once, shape (states, n)."""
+    duration = system.period / halves(system)
+    many = optional(system, "flow_states")
+    if many is not None:
+        result = np.asarray(many(states, 0.0, duration))
+    else:
+        result = np.array([system.flow(x, 0.0, duration)[0] for x in states])
+    if system.symmetry is not None:
+        result = result @ system.symmetry.T
+    return result
+
+
+def known_orbit(system: SystemLike) -> Array:
+    """The orbit a system knows of itself.
+
+    Raises
+    ------
+    AnalysisError
+        If it knows none.
+    """
+    orbit = optional(system, "orbit")
+    if orbit is None:
+        raise AnalysisError(
+            "this system does not know its periodic orbit", field="orbit", allowed="a first guess of it"
+        )
+    return np.asarray(orbit, dtype=np.float64)
+
+
+def find_orbit(system: SystemLike, guess: ArrayLike | None = None, with_error: bool = True) -> tuple[Array, ReturnMap]:
+    """A periodic orbit: a fixed point of the return map, by Newton's method.
+
+    Parameters
+    ----------
+    system
+        The system; one that knows its orbit needs no guess.
+    guess
+        A state at time 0 near the orbit, shape (n,).
+    with_error
+        As for :func:`return_map`.
+
+    Returns
+    -------
+    The state at time 0, and the return map there.
+
+    Raises
+    ------
+    AnalysisError
+        If Newton's method does not converge in 30 steps.
+    """
+    if guess is None:
+        x = known_orbit(system)
+        return x, return_map(system, x, with_error)
+    x = np.array(guess, dtype=np.float64)
+    if x.shape != (system.dimension,):
+        raise ParameterError("has the wrong shape", field="orbit", value=x.shape, allowed=f"({system.dimension},)")
+    best = np.inf
+    for _ in range(30):
+        image = return_map(system, x, with_error=False)
+        residual = image.state - x
+        size = float(np.abs(residual).max())
+        scale = max(1.0, float(np.abs(x).max()))
+        # Converged once the residual is at the accuracy of the flow, or has stopped falling close to it.
+        if size <= 4e-16 * scale or (size <= 1e-10 * scale and size >= 0.5 * best):
+            return x, return_map(system, x) if with_error else image
+        best = min(best, size)
+        try:
+            x = x - np.linalg.solve(image.jacobian - np.eye(x.size), residual)
+        except np.linalg.LinAlgError:
+            break
+        if not np.isfinite(x).all():
+            break
+    raise AnalysisError(
+        f"no periodic orbit found near the guess (residual {best:.1e})",
+        field="orbit",
+        allowed="a guess closer to the orbit",
+    )
