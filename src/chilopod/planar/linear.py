@@ -10,8 +10,9 @@ exact recurrence (k + 1) z_{k+1} = A0 z_k + A1 z_{k-1} + A2 z_{k-2}.
 The feet damp motion at rates from 0 to some -rho = -450 /s, and the series of exp(-rho t) cancels itself to nothing.
 So the series is taken of y = exp(rho t / 2) z, whose rates are centred about zero: its terms add up to the large
 growth of the slow modes instead of cancelling, round-off stays relative to the slow modes however long the step, and
-one step spans the whole interval between two switches. The derivation by hand is checked in the tests against the
-derivative of the nonlinear model.
+one step spans the whole interval between two switches. Springs that ring at a high frequency f beside little damping
+still cancel, by exp(|rho/2 + i f| h - rho h / 2), and shorten the step h. The derivation by hand is checked in the
+tests against the derivative of the nonlinear model.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from typing import Any
 import numba
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh
+from scipy.linalg import lu_factor, lu_solve
 
 from chilopod.compiled import njit, parallel_njit
 from chilopod.planar.series import PANEL, ROWS, series_term
@@ -31,20 +32,25 @@ Array = NDArray[np.float64]
 TRUNCATION = 1e-17
 """Relative size of the last Taylor term that is kept: an order of magnitude below round-off."""
 
-_LONGEST = 32.0  # decay exponents in a step; e^32 is far from overflow and needs some 100 orders
+_LONGEST = 32.0  # radius of the centred rates times the step; e^32 is far from overflow and needs some 100 orders
+_CANCELLED = 2.0  # of which so much may be lost to cancellation: a factor e^2 in round-off
+_ROUND_OFF = 2.0**-20  # size of the round-off that is carried along, far above the true one and far below the states
+_CARRIED, _OWN = 16.0, 128.0  # safety: of that column, and of the largest entry
 _MOST_ORDERS = 400
+_MOST_EXTENDED = 60  # modules; beyond them extended precision takes too long
 _KEPT = 24  # terms held before the last three move back to the bottom
 _CHECKED = 4
 
 
-def mass_matrix(modules: int, length: float, mass: float, inertia: float) -> tuple[Array, Array]:
+def mass_matrix(modules: int, length: float, mass: float, inertia: float, dtype: Any = float) -> tuple[Any, Any]:
     """Return the mass matrix (N+2, N+2) of the straight chain and its lateral kinematics (N, N+2).
 
     The velocities are eta = (vx, vy, w_0 .. w_{N-1}): module 1's centre and the *absolute* yaw rates. The lateral
     velocity of module i is lateral[i] eta.
     """
-    lateral = np.zeros((modules, modules + 2))
+    lateral = np.zeros((modules, modules + 2), dtype)
     lateral[:, 1] = 1.0
+    length, mass, inertia = dtype(length), dtype(mass), dtype(inertia)
     for i in range(1, modules):
         lateral[i:, 1 + i] -= 0.5 * length
         lateral[i:, 2 + i] -= 0.5 * length
@@ -55,7 +61,7 @@ def mass_matrix(modules: int, length: float, mass: float, inertia: float) -> tup
 
 
 def system_matrices(
-    length: float, mass: float, inertia: float, speed: float, moments: Array
+    length: float, mass: float, inertia: float, speed: float, moments: Array, durations: Array
 ) -> tuple[Array, Array, Array, Array]:
     """A0, A1, A2 of every interval, for a robot without springs and dampers, and what these add.
 
@@ -71,6 +77,8 @@ def system_matrices(
         Of the straight walk, m/s.
     moments
         Contact moments at the start of every interval, shape (intervals, N, 4).
+    durations
+        Of the intervals, s, shape (intervals,).
 
     Returns
     -------
@@ -82,11 +90,16 @@ def system_matrices(
     rates
         Joint rates as functions of the velocities, shape (N-1, N+2).
     decay
-        The fastest rate at which the feet damp motion at the start of every interval, 1/s, shape (intervals,).
+        The fastest rate at which the feet damp motion in every interval, 1/s, shape (intervals,). What springs and
+        dampers add is for :func:`joint_bound`.
     """
     intervals, n, _ = moments.shape
-    m, lateral = mass_matrix(n, length, mass, inertia)
-    c, c_x, c_y, c_xx = np.moveaxis(moments, -1, 0)
+    # The mass matrix of a long chain is nearly singular and turns round-off in what follows into accelerations a
+    # thousand times larger; extended precision, where the machine has it, keeps them good to double.
+    extended: Any = np.longdouble if n <= _MOST_EXTENDED else np.float64
+    m, lateral = mass_matrix(n, length, mass, inertia, extended)
+    mass, speed = extended(mass), extended(speed)
+    c, c_x, c_y, c_xx = np.moveaxis(moments.astype(extended), -1, 0)
     zero = np.zeros_like(c)
     # Contact moments as polynomials in time, shape (3, intervals, n).
     c_t = np.stack([c, zero, zero])
@@ -95,7 +108,8 @@ def system_matrices(
     cxx_t = np.stack([c_xx, -2.0 * speed * c_x, speed**2 * c])
 
     # Power of the feet: sum over modules of (vx_i, vy_i, w_i)^T D_i (vx_i, vy_i, w_i), with vy_i = lateral[i] eta.
-    drag = np.einsum("psi,ia,ib->psab", c_t, lateral, lateral)
+    drag = np.zeros((3, intervals, n + 2, n + 2), extended)
+    drag[0] = (lateral.T * c[:, None]) @ lateral
     drag[..., 0, 0] += c_t.sum(-1)
     drag[..., 0, 2:] -= cy_t
     drag[..., 2:, 0] -= cy_t
@@ -105,11 +119,12 @@ def system_matrices(
     drag[..., range(2, n + 2), range(2, n + 2)] += cxx_t
 
     # A module that points psi_i away from module 1 meets the floor sideways: vy_i = lateral[i] eta - speed psi_i.
-    heading = np.tril(np.ones((n, n - 1)), -1)
-    sideways = np.einsum("psi,ia,ij->psaj", c_t, lateral, heading)
+    heading = np.tril(np.ones((n, n - 1), extended), -1)
+    sideways = np.zeros((3, intervals, n + 2, n - 1), extended)
+    sideways[0] = (lateral.T * c[:, None]) @ heading
     sideways[..., 2:, :] += np.einsum("psi,ij->psij", cx_t, heading)
 
-    force = np.zeros((3, intervals, n + 2, 2 * n + 1))
+    force = np.zeros((3, intervals, n + 2, 2 * n + 1), extended)
     force[..., : n + 2] = -drag
     force[..., n + 2 :] = speed * sideways
     force[0, :, :, 2] -= mass * speed * lateral.sum(0)  # module 1's frame turns: vy' = a_y - w0 vx
@@ -117,10 +132,31 @@ def system_matrices(
     rates = np.zeros((n - 1, n + 2))
     rates[range(n - 1), range(2, n + 1)] = -1.0
     rates[range(n - 1), range(3, n + 2)] = 1.0
-    decay: Array = np.array([eigh(one, m, eigvals_only=True)[-1] for one in drag[0]])
-    passive = np.moveaxis(np.linalg.solve(m, force), 0, 2).astype(np.float64, order="C")
-    joint = np.linalg.solve(m, rates.T).astype(np.float64, copy=False)
+    # A power series knows no direction of time, so its terms grow as fast as the motion of the interval before, run
+    # backwards, would: the mean of the drag from -h to 0 counts too. Within the interval the largest stands at an end,
+    # since a foot damps as the square of a linear function of time.
+    h = durations[:, None, None]
+    drags = np.stack(
+        [drag[0], drag[0] + h * (drag[1] + h * drag[2]), drag[0] - h * (drag[1] / 2.0 - h * drag[2] / 3.0)]
+    )
+    inverse_root = np.linalg.inv(np.linalg.cholesky(m.astype(np.float64)))
+    decay: Array = np.linalg.eigvalsh(inverse_root @ drags.astype(np.float64) @ inverse_root.T)[..., -1].max(axis=0)
+    columns = np.moveaxis(force, 2, 0).reshape(n + 2, -1)
+    solved = _solve(m, np.concatenate([columns, rates.T], axis=1))
+    passive = solved[:, : columns.shape[1]].reshape(n + 2, 3, intervals, 2 * n + 1)
+    passive = np.ascontiguousarray(passive.transpose(2, 0, 1, 3))
+    joint = np.ascontiguousarray(solved[:, columns.shape[1] :])
     return passive, joint, rates, decay
+
+
+def _solve(matrix: Any, right: Any) -> Array:
+    """Solve with a matrix in extended precision: elimination in double, and two refinements."""
+    factors = lu_factor(matrix.astype(np.float64))
+    solution = np.zeros_like(right)
+    for _ in range(3):
+        solution += lu_solve(factors, (right - matrix @ solution).astype(np.float64))
+    rounded: Array = solution.astype(np.float64)
+    return rounded
 
 
 @njit(fastmath={"nnan", "ninf", "nsz", "reassoc"})  # a maximum may then be taken eight at a time
@@ -132,12 +168,28 @@ def _largest(rows: Any) -> float:
     return size
 
 
+def joint_bound(compliance: Array, torque: Array) -> float:
+    """Upper bound on the largest eigenvalue of ``compliance @ diag(torque)``.
+
+    With the accelerations of the joints under unit torques at the joints for ``compliance``, the square of the highest
+    frequency (1/s^2) if ``torque`` holds the springs, the fastest decay (1/s) if it holds the dampers.
+    """
+    return float((np.abs(compliance) @ torque).max())
+
+
+def steps(widths: Array, decay: Array, frequency: float) -> float:
+    """About how many Taylor steps :func:`propagate` takes."""
+    centred = np.hypot(0.5 * decay, frequency)
+    return float((widths * np.maximum(centred / _LONGEST, (centred - 0.5 * decay) / _CANCELLED)).sum())
+
+
 @njit
-def _propagate(widths: Any, upper: Any, decay: Any, state: Any) -> tuple[float, int]:
+def _propagate(widths: Any, upper: Any, decay: Any, frequency: float, state: Any) -> tuple[float, int]:
     """Carry one panel of columns through all intervals, in place; returns (error, orders).
 
     ``state`` has 2N+1 rows and then zeros, up to a multiple of ROWS. The error bounds that of the largest entry of the
-    result: round-off and what the series leave out, summed over the steps.
+    result. How much round-off matters depends on what the motion makes of it, so the last column is no solution but a
+    sample of round-off: every step adds what rounding its matrix may do, with arbitrary signs, and carries it on.
     """
     intervals, velocities = upper.shape[0], upper.shape[1]
     n = upper.shape[3]
@@ -147,10 +199,14 @@ def _propagate(widths: Any, upper: Any, decay: Any, state: Any) -> tuple[float, 
     # Terms of the series, the newest on top, so that orders k, k-1, k-2 lie one below the other and one product serves
     # all three.
     terms = np.empty((_KEPT * rows, PANEL))
-    squares = 0.0
+    reach = np.empty(n)
+    bits = 1
+    largest = 0.0
     orders = 0
     for s in range(intervals):
-        parts = max(1, int(np.ceil(0.5 * decay[s] * widths[s] / _LONGEST)))
+        centred = np.hypot(0.5 * decay[s], frequency)
+        rate = max(centred / _LONGEST, (centred - 0.5 * decay[s]) / _CANCELLED)
+        parts = max(1, int(np.ceil(rate * widths[s])))
         h = widths[s] / parts
         # A multiple of 1/4, so that exp(-shift) undoes exactly what is added to the diagonal.
         shift = np.rint(2.0 * decay[s] * h) * 0.25
@@ -169,9 +225,20 @@ def _propagate(widths: Any, upper: Any, decay: Any, state: Any) -> tuple[float, 
                 block[i, joint + 2] = -h
                 block[i, joint + 3] = h
                 block[i, i] = shift
+            for i in range(n):
+                reach[i] = 0.0
+                for q in range(PANEL - 1):
+                    reach[i] = max(reach[i], abs(state[i, q]))
+            for i in range(n):
+                size = reach[i]
+                for j in range(n):
+                    size += abs(block[i, j]) * reach[j]
+                bits = (bits * 1103515245 + 12345) & 0x7FFFFFFF
+                state[i, PANEL - 1] += _ROUND_OFF * (size if bits & 0x10000 else -size)
             at = (_KEPT - 3) * rows
             terms[at : at + rows] = state
             terms[at + rows :] = 0.0
+            peak = 0.0
             for k in range(1, _MOST_ORDERS + 1):
                 if at == 0:
                     at = (_KEPT - 3) * rows
@@ -180,31 +247,35 @@ def _propagate(widths: Any, upper: Any, decay: Any, state: Any) -> tuple[float, 
                 at -= rows
                 orders += 1
                 # The recurrence remembers two orders: three small ones in a row end it.
-                if k % _CHECKED == 0 and _largest(terms[at : at + 3 * rows]) <= TRUNCATION * _largest(state):
-                    break
+                if k % _CHECKED == 0:
+                    size = _largest(terms[at : at + 3 * rows])
+                    peak = max(peak, size)
+                    if size <= TRUNCATION * _largest(state):
+                        break
             back = np.exp(-shift)
             for i in range(n):
                 for q in range(PANEL):
                     state[i, q] *= back
-            squares += _largest(state) ** 2
-    # A step rounds each entry by some eps of the largest; the steps err independently, so their squares add up.
-    # Against extended precision the factor 64 leaves a margin of five or more on random robots (see the tests).
-    return 64.0 * 2.220446049250313e-16 * np.sqrt(squares), orders
+            largest = max(largest, _largest(state), back * peak)
+    carried = 0.0
+    for i in range(n):
+        carried = max(carried, abs(state[i, PANEL - 1]))
+    # How much the factors leave to spare on random robots, the tests find in extended precision.
+    return 2.220446049250313e-16 * (_CARRIED * carried / _ROUND_OFF + _OWN * largest), orders
 
 
 @njit
-def _propagate_all(widths: Any, upper: Any, decay: Any, matrix: Any) -> tuple[float, int]:
-    """Write the fundamental matrix (2N+1, 2N+1) into ``matrix``, panel by panel."""
+def _propagate_all(widths: Any, upper: Any, decay: Any, frequency: float, matrix: Any) -> tuple[float, int]:
+    """Carry the columns of ``matrix`` (2N+1, 2N+1) through all intervals, in place, panel by panel."""
     n = matrix.shape[0]
     error = 0.0
     orders = 0
     state = np.empty(((n + ROWS - 1) // ROWS * ROWS, PANEL))
-    for first in range(0, n, PANEL):
-        last = min(first + PANEL, n)
+    for first in range(0, n, PANEL - 1):
+        last = min(first + PANEL - 1, n)
         state[:] = 0.0
-        for q in range(first, last):
-            state[q, q - first] = 1.0
-        e, k = _propagate(widths, upper, decay, state)
+        state[:n, : last - first] = matrix[:, first:last]
+        e, k = _propagate(widths, upper, decay, frequency, state)
         error = max(error, e)
         orders += k
         matrix[:, first:last] = state[:n, : last - first]
@@ -212,15 +283,14 @@ def _propagate_all(widths: Any, upper: Any, decay: Any, matrix: Any) -> tuple[fl
 
 
 @parallel_njit
-def propagate_batch(widths: Any, upper: Any, decay: Any, matrices: Any, errors: Any) -> None:
-    """:func:`propagate` for many robots with the same gait, on all cores: ``upper`` and ``matrices`` have robots in
-    front."""
+def propagate_batch(widths: Any, upper: Any, decay: Any, frequency: Any, matrices: Any, errors: Any) -> None:
+    """:func:`propagate` for many robots with the same gait, on all cores: all but ``widths`` have robots in front."""
     for r in numba.prange(matrices.shape[0]):
-        errors[r] = _propagate_all(widths, upper[r], decay, matrices[r])[0]
+        errors[r] = _propagate_all(widths, upper[r], decay[r], frequency[r], matrices[r])[0]
 
 
-def propagate(widths: Array, upper: Array, decay: Array) -> tuple[Array, float, int]:
-    """Return the fundamental matrix over all intervals.
+def propagate(widths: Array, upper: Array, decay: Array, frequency: float, matrix: Array) -> tuple[float, int]:
+    """Multiply ``matrix`` from the left by the fundamental matrix over all intervals, in place.
 
     Parameters
     ----------
@@ -230,11 +300,14 @@ def propagate(widths: Array, upper: Array, decay: Array) -> tuple[Array, float, 
         Upper rows of A0, A1, A2 of every interval, shape (intervals, N+2, 3, 2N+1), springs and dampers included.
     decay
         Fastest decay in every interval, 1/s, shape (intervals,); it need not be exact.
+    frequency
+        Highest frequency at which the springs ring, 1/s; likewise.
+    matrix
+        Shape (2N+1, 2N+1).
 
     Returns
     -------
-    The matrix (2N+1, 2N+1), the bound on the error of its largest entry, and the number of Taylor orders computed.
+    The bound on the error of the largest entry, and the number of Taylor orders computed.
     """
-    matrix = np.empty((upper.shape[3], upper.shape[3]))
-    error, orders = _propagate_all(widths, upper, decay, matrix)
-    return matrix, error, orders
+    error, orders = _propagate_all(widths, upper, decay, frequency, matrix)
+    return float(error), int(orders)

@@ -27,6 +27,8 @@ TOLERANCE = 1e-13
 """Default tolerance of the nonlinear flow, relative to max(1, |x|), per step."""
 
 _SAME_INSTANT = 1e-12  # in periods
+_ROWS_DIFFER = 2.0  # joint rates are differences of two rows
+_MOST_STEPS = 2e5  # of the linear flow: ten seconds or so
 
 
 class PlanarModel:
@@ -43,11 +45,14 @@ class PlanarModel:
     tolerance
         Of the nonlinear flow, relative to max(1, |x|). The straight walk does not use it: there the derivative comes
         from the linearised equations by Taylor series, to round-off.
+    use_symmetry
+        Whether to offer the half-period symmetry of the gait, where it has one, to the analyses.
     """
 
-    def __init__(self, robot: Robot, tolerance: float = TOLERANCE) -> None:
+    def __init__(self, robot: Robot, tolerance: float = TOLERANCE, use_symmetry: bool = True) -> None:
         self.robot = robot
         self.tolerance = tolerance
+        self.use_symmetry = use_symmetry
         self.modules = robot.body.modules
         self.dimension = 2 * self.modules + 1
         self.period = robot.gait.period
@@ -82,7 +87,7 @@ class PlanarModel:
     @property
     def symmetry(self) -> Array | None:
         """The reflection if the right legs do half a period later what the left legs do, else None."""
-        return self.reflection if self.robot.gait.half_period_symmetric else None
+        return self.reflection if self.use_symmetry and self.robot.gait.half_period_symmetric else None
 
     @property
     def spatial_symmetry(self) -> Array | None:
@@ -134,6 +139,7 @@ class PlanarModel:
                 allowed=f"(any number, {self.dimension})",
                 field="states",
             )
+        self._check_finite(batch, "states")
         self._advance(batch, t0, t1)
         return batch
 
@@ -162,14 +168,16 @@ class PlanarModel:
         -------
         Derivatives, shape (robots, 2N+1, 2N+1), and the bounds on the error of their largest entries, shape (robots,).
         """
+        if not all(models[0].can_flow_with(model) for model in models[1:]):
+            raise ParameterError("must have the same gait and number of modules", field="models")
         pieces = [model._linear_pieces(t0, t1) for model in models]
-        widths, _, decay = pieces[0]
-        upper = np.stack([each for _, each, _ in pieces])
-        matrices = np.empty((len(models), upper.shape[-1], upper.shape[-1]))
-        errors = np.empty(len(models))
-        linear.propagate_batch(widths, upper, decay, matrices, errors)
+        widths = pieces[0][0]
+        upper, decay, frequency = (np.stack([piece[part] for piece in pieces]) for part in (1, 2, 3))
         to_joint, from_joint = _joint_rates(models[0].modules)
-        return to_joint @ matrices @ from_joint, errors
+        matrices = np.tile(from_joint, (len(models), 1, 1))
+        errors = np.empty(len(models))
+        linear.propagate_batch(widths, upper, decay, frequency, matrices, errors)
+        return to_joint @ matrices, _ROWS_DIFFER * errors
 
     def can_flow_with(self, other: PlanarModel) -> bool:
         """Whether :meth:`flow_many` may take both robots at once: they differ in springs at the most in what sets the
@@ -185,7 +193,13 @@ class PlanarModel:
             raise ParameterError(
                 "state has the wrong shape", field="x", value=state.shape, allowed=f"({self.dimension},)"
             )
+        self._check_finite(state, "x")
         return state
+
+    @staticmethod
+    def _check_finite(states: Array, field: str) -> None:
+        if not np.isfinite(states).all():
+            raise ParameterError("must be finite", field=field)
 
     def _pieces(self, t0: float, t1: float) -> tuple[Array, Array, NDArray[np.intp]]:
         return _pieces(self.robot.gait, self.modules, t0, t1)
@@ -219,8 +233,9 @@ class PlanarModel:
         if not ok.all():
             raise AnalysisError(f"the motion diverges between {t0:g} s and {t1:g} s", field="x")
 
-    def _linear_pieces(self, t0: float, t1: float) -> tuple[Array, Array, Array]:
-        """Widths of the pieces, upper rows of A0, A1, A2 of every piece about its own start, and its fastest decay."""
+    def _linear_pieces(self, t0: float, t1: float) -> tuple[Array, Array, Array, float]:
+        """Widths of the pieces, upper rows of A0, A1, A2 of every piece about its own start, its fastest decay, and the
+        frequency of the springs."""
         robot = self.robot
         passive, joint, rates, decay = _passive_matrices(
             robot.gait,
@@ -240,12 +255,23 @@ class PlanarModel:
         upper[:, :, 0, n + 2 :] -= joint * self.stiffness
         if self.damping.any():
             upper[:, :, 0, : n + 2] -= joint * self.damping @ rates
-        return widths, upper, decay[interval]
+        compliance = rates @ joint
+        frequency = np.sqrt(linear.joint_bound(compliance, self.stiffness))
+        decay = decay[interval] + linear.joint_bound(compliance, self.damping)
+        steps = linear.steps(widths, decay, frequency)
+        if not steps < _MOST_STEPS:
+            raise AnalysisError(
+                f"motion is too fast to follow from {t0:g} s to {t1:g} s: about {steps:.0e} steps",
+                field="springs, ground",
+                allowed="less stiffness, damping or friction, or more mass",
+            )
+        return widths, upper, decay, frequency
 
     def _linear_flow(self, t0: float, t1: float) -> tuple[Array, float]:
-        matrix, error, _ = linear.propagate(*self._linear_pieces(t0, t1))
         to_joint, from_joint = _joint_rates(self.modules)
-        return to_joint @ matrix @ from_joint, error
+        matrix = from_joint.copy()
+        error, _ = linear.propagate(*self._linear_pieces(t0, t1), matrix)
+        return to_joint @ matrix, _ROWS_DIFFER * error
 
 
 @lru_cache(maxsize=32)
@@ -260,8 +286,9 @@ def _passive_matrices(
     friction: float,
 ) -> tuple[Array, Array, Array, Array]:
     """:func:`linear.system_matrices` of one period; a sweep over springs computes them once."""
-    moments = contact_moments(forward_offset, half_width, friction, gait.schedule(modules))
-    return linear.system_matrices(length, mass, inertia, gait.speed, moments)
+    schedule = gait.schedule(modules)
+    moments = contact_moments(forward_offset, half_width, friction, schedule)
+    return linear.system_matrices(length, mass, inertia, gait.speed, moments, np.diff(schedule.times))
 
 
 @lru_cache(maxsize=256)
@@ -277,14 +304,14 @@ def _pieces(gait: Gait, modules: int, t0: float, t1: float) -> tuple[Array, Arra
         raise ParameterError("times must be finite and in order", field="t0, t1", value=(t0, t1), allowed="t0 <= t1")
     period = gait.period
     times = gait.schedule(modules).times
-    first, last = int(np.floor(t0 / period + _SAME_INSTANT)), int(np.ceil(t1 / period - _SAME_INSTANT))
+    first, last = int(np.floor(t0 / period)), int(np.ceil(t1 / period))
     switches = (period * np.arange(first, last)[:, None] + times[:-1]).ravel()
     interval = np.tile(np.arange(len(times) - 1), max(0, last - first))
     begins = np.maximum(switches, t0)
     ends = np.minimum(np.append(switches[1:], last * period), t1)
-    used = ends - begins > _SAME_INSTANT * period
+    # However short, a piece counts: the fastest motion is over in little more than round-off.
+    used = ends > begins
     starts = (begins - switches)[used]
-    starts[starts < _SAME_INSTANT * period] = 0.0
     return starts, (ends - begins)[used], interval[used]
 
 
