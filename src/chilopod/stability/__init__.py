@@ -7,15 +7,20 @@
 False
 """
 
+from chilopod.stability.branch import Branch, BranchPoint, Ending, begin, follow, leave_pitchfork
 from chilopod.stability.floquet import Exponents, Multipliers, exponents, multipliers, sweep
 from chilopod.stability.jumps import UndeclaredSwitch
-from chilopod.stability.locate import BifurcationPoint, Criticality, Kind, locate
+from chilopod.stability.locate import locate
+from chilopod.stability.points import BifurcationPoint, Criticality, Kind
 from chilopod.stability.rhs import NotAnalytic, from_rhs
 from chilopod.stability.system import PeriodicSystem, SystemLike, find_orbit
 
 __all__ = [
     "BifurcationPoint",
+    "Branch",
+    "BranchPoint",
     "Criticality",
+    "Ending",
     "Exponents",
     "Kind",
     "Multipliers",
@@ -23,9 +28,12 @@ __all__ = [
     "PeriodicSystem",
     "SystemLike",
     "UndeclaredSwitch",
+    "begin",
     "exponents",
     "find_orbit",
+    "follow",
     "from_rhs",
+    "leave_pitchfork",
     "locate",
     "multipliers",
     "sweep",

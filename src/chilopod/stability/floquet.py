@@ -111,6 +111,17 @@ def spectrum(image: ReturnMap) -> Spectrum:
     return Spectrum(values, right, left, np.where(np.isfinite(condition), condition, np.inf) * matrix_error)
 
 
+def counts_outside(values: ComplexArray) -> tuple[int, int, int]:
+    """Number of multipliers beyond -1, beyond +1, and of complex pairs outside the unit circle."""
+    real = np.abs(values.imag) < 1e-9 * np.maximum(1e-3, np.abs(values))
+    outside = np.abs(values) > 1.0
+    return (
+        int((real & (values.real < -1.0)).sum()),
+        int((real & (values.real > 1.0)).sum()),
+        int((~real & outside & (values.imag > 0)).sum()),
+    )
+
+
 def _multipliers(image: ReturnMap, orbit: Array) -> Multipliers:
     spec = spectrum(image)
     nu = spec.values

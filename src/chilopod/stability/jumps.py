@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import warnings
 from collections.abc import Callable
 from typing import Any
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 _PROBES = 257
+_SETTLED = 3  # zooms after which only a jump is left of a change that had smooth parts too
 
 
 class UndeclaredSwitch(UserWarning):
@@ -23,39 +25,62 @@ def warn_of_jumps(
 ) -> None:
     """Look for jumps of the right-hand side inside the intervals where it should be smooth.
 
-    It is sampled at fixed states away from zero (a jump in a coefficient hides at x = 0), and wherever it changes by
-    much more than at the neighbours the change is followed down to an interval of 1e-12 of the period.
+    It is sampled at fixed states away from zero (a jump in a coefficient hides at x = 0). The fourth differences of a
+    smooth function fall as the fourth power of the spacing, those of a jump stay: wherever they stand out they are
+    followed down to an interval of 1e-12 of the period.
     """
     base = np.zeros(n) if orbit is None else orbit
     states = [base + np.cos(3.0 * np.arange(n) + 1.0 + s) for s in range(2)]
-    period = edges[-1]
+    period = float(edges[-1])
 
     def values(t: float) -> Array:
-        return np.concatenate([np.asarray(rhs(t, x, *args), dtype=np.float64).ravel() for x in states])
+        parts = []
+        for x in states:
+            try:
+                with np.errstate(all="ignore"):
+                    part = np.asarray(rhs(t, x, *args), dtype=np.float64)
+            except (ArithmeticError, ValueError):  # not defined at this state
+                part = np.zeros(n)
+            parts.append(np.where(np.isfinite(part), part, 0.0))
+        return np.concatenate(parts)
 
     found: list[float] = []
     for a, b in zip(edges, edges[1:], strict=False):
         margin = 1e-9 * (b - a)
         times = np.linspace(a + margin, b - margin, max(9, int(_PROBES * (b - a) / period)) + 1)
         samples = np.array([values(t) for t in times])
-        changes = np.abs(np.diff(samples, axis=0)).max(axis=1)
-        typical = np.median(changes)
-        for i in np.flatnonzero(changes > 4.0 * typical + 1e-9 * np.abs(samples).max()):
-            low, high, v_low, v_high = times[i], times[i + 1], samples[i], samples[i + 1]
-            jump = changes[i]
-            while high - low > 1e-12 * period:
-                middle = 0.5 * (low + high)
-                v = values(middle)
-                if np.abs(v - v_low).max() >= np.abs(v_high - v).max():
-                    high, v_high = middle, v
-                else:
-                    low, v_low = middle, v
-            if np.abs(v_high - v_low).max() > 0.05 * jump:
-                found.append(float(high))
+        rough = _fourth_differences(samples)
+        smallest = 1e-9 * float(np.abs(samples).max())
+        for i in np.flatnonzero(rough > 4.0 * np.median(rough) + smallest):
+            at = _zoom(values, float(times[i]), float(times[i + 4]), 1e-12 * period, smallest)
+            if at is not None and all(abs(at - t) > 1e-9 * period for t in found):
+                found.append(at)
     if found:
-        listed = ", ".join(f"{t:.9g}" for t in found[:6]) + (" ..." if len(found) > 6 else "")
+        listed = ", ".join(f"{t:.9g}" for t in sorted(found)[:6]) + (" ..." if len(found) > 6 else "")
         warnings.warn(
-            f"the right-hand side jumps at t = {listed}, not among switch_times: results would lose most digits",
+            f"the right-hand side jumps at t = {listed}, not among switch_times: that costs digits and time",
             UndeclaredSwitch,
             stacklevel=4,
         )
+
+
+def _fourth_differences(samples: Array) -> Array:
+    """The largest fourth difference of any component over each five successive samples, shape (samples - 4,)."""
+    return np.asarray(np.abs(np.diff(samples, n=4, axis=0)).max(axis=1))
+
+
+def _zoom(values: Callable[[float], Array], low: float, high: float, width: float, smallest: float) -> float | None:
+    """Where in an interval a function jumps, to within ``width``; None if it is smooth there after all."""
+    settled = np.inf
+    for zoom in itertools.count():
+        times = np.linspace(low, high, 17)
+        rough = _fourth_differences(np.array([values(t) for t in times]))
+        i = int(rough.argmax())
+        if zoom == _SETTLED:
+            settled = rough[i]
+        if rough[i] < smallest or (zoom > _SETTLED and rough[i] < 0.3 * settled):
+            return None
+        low, high = float(times[i]), float(times[i + 4])
+        if high - low < width:
+            return 0.5 * (low + high)
+    raise AssertionError  # unreachable

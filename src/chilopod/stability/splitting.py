@@ -22,6 +22,9 @@ _GAP = 1.0
 _PASSES = 40
 """Passes through the product: a gap of 1 leaves exp(-40) of the neighbouring group."""
 
+_AT_REST = 1e-8
+"""A basis that moves by less from one pass to the next has converged."""
+
 
 def split_product(factors: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]:
     """Logarithms of the eigenvalues of ``factors[-1] @ ... @ factors[0]``, and its eigenvectors.
@@ -39,12 +42,21 @@ def split_product(factors: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]
         Unit eigenvectors as columns, the largest entry real and positive, shape (n, n).
     """
     n = factors[0].shape[0]
-    slow, growth = _iterate(factors, n)
+    slow, growth, slow_motion = _iterate(factors, n)
     inverses: list[Array] = [np.linalg.inv(factor).astype(np.float64, copy=False) for factor in reversed(factors)]
-    fast = _iterate(inverses, n)[0]
+    fast, _, fast_motion = _iterate(inverses, n)
     # Backward iteration meets the nodes in reverse: its node 0 is the same instant, its node 1 the last factor's start.
     fast = [fast[0], *reversed(fast[1:])]
-    borders = [0, *(np.flatnonzero(-np.diff(growth) > _GAP) + 1).tolist(), n]
+    # Eigenvalues of one modulus in slanted directions can feign a gap for a while; their spaces do not come to rest.
+    borders = [
+        0,
+        *(
+            b
+            for b in range(1, n)
+            if growth[b - 1] - growth[b] > _GAP and max(slow_motion[b - 1], fast_motion[n - b - 1]) < _AT_REST
+        ),
+        n,
+    ]
     logarithms, vectors = [], []
     for a, b in zip(borders, borders[1:], strict=False):
         bases = [_intersection(one[:, :b], other[:, : n - a], b - a) for one, other in zip(slow, fast, strict=True)]
@@ -58,20 +70,22 @@ def split_product(factors: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]
     return log_all[order], vec_all * (np.abs(peaks) / peaks) / np.linalg.norm(vec_all, axis=0)
 
 
-def _iterate(factors: Sequence[Array], n: int) -> tuple[list[Array], Array]:
-    """Bases whose first j columns span the j directions that grow most, one before every factor; and ln of the growth
-    of each."""
+def _iterate(factors: Sequence[Array], n: int) -> tuple[list[Array], Array, Array]:
+    """Bases whose first j columns span the j directions that grow most, one before every factor; ln of the growth of
+    each in a pass, averaged over half of them; and how much the space of the first j still moves in a pass."""
     basis = np.linalg.qr(np.random.default_rng(0).standard_normal((n, n)))[0]
     bases: list[Array] = []
     growth = np.zeros(n)
-    for _ in range(_PASSES):
+    for turn in range(_PASSES):
         bases = []
-        growth[:] = 0.0
         for factor in factors:
             bases.append(basis)
             basis, upper = np.linalg.qr(factor @ basis)
-            growth += np.log(np.abs(np.diag(upper)))
-    return bases, growth
+            if turn >= _PASSES // 2:
+                growth += np.log(np.abs(np.diag(upper)))
+    turned = bases[0].T @ basis
+    motion = np.array([np.linalg.norm(turned[j:, :j]) for j in range(1, n)])
+    return bases, growth / (_PASSES - _PASSES // 2), motion
 
 
 def _intersection(one: Array, other: Array, dimension: int) -> Array:

@@ -13,6 +13,9 @@ from chilopod.errors import AnalysisError, ParameterError
 
 Array = NDArray[np.float64]
 
+_RETURNS = 1e-6
+"""How far from its start a known orbit may come back, relative to its size and to how errors grow."""
+
 Flow = Callable[[Array, float, float], tuple[Array, Array]]
 """``flow(x, t0, t1) -> (state at t1, its derivative with respect to x)``, shapes (n,) and (n, n)."""
 
@@ -140,8 +143,27 @@ def halves(system: SystemLike) -> int:
     return 1 if system.symmetry is None else 2
 
 
+class _WholePeriod:
+    """A system as it is, but without its half-period symmetry and its known orbit."""
+
+    symmetry = None
+    orbit = None
+
+    def __init__(self, system: SystemLike) -> None:
+        self._system = system
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._system, name)
+
+
+def whole_period(system: SystemLike) -> SystemLike:
+    """The same system for the analysis of orbits that do not have its half-period symmetry."""
+    whole: SystemLike = _WholePeriod(system)  # it hands the rest through
+    return whole
+
+
 def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple[Array, Array, float]:
-    """The flow with an error bound; where the system gives none, one is estimated by taking the interval in two parts.
+    """The flow with an error bound; where the system gives none, one is estimated by taking the interval in parts.
 
     A step-controlled integrator makes independent errors in the two computations, so ten times their difference is a
     sound bound; a flow of fixed steps that ignores how it is called cannot be seen through this way and should bring
@@ -152,11 +174,22 @@ def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple
         state, derivative, error = own(x, t0, t1)
         return state, derivative, float(error)
     state, derivative = system.flow(x, t0, t1)
-    middle = t0 + 0.381966 * (t1 - t0)
-    half_way, first = system.flow(x, t0, middle)
-    _, second = system.flow(half_way, middle, t1)
+    _check_shapes(state, derivative, x.size)
+    # Cut near the start as well, or the steps up to the cut would be the same, errors included.
+    times = [t0 + part * (t1 - t0) for part in (0.0, 0.0477, 0.382)] + [t1]
+    passing, product = x, np.eye(x.size)
+    for a, b in zip(times, times[1:], strict=False):
+        passing, factor = system.flow(passing, a, b)
+        product = factor @ product
     size = max(1.0, float(np.abs(derivative).max()))
-    return state, derivative, 10.0 * float(np.abs(second @ first - derivative).max()) + 1e-15 * size
+    return state, derivative, 10.0 * float(np.abs(product - derivative).max()) + 1e-15 * size
+
+
+def _check_shapes(state: Array, derivative: Array, n: int) -> None:
+    if np.shape(state) != (n,) or np.shape(derivative) != (n, n):
+        raise AnalysisError(
+            f"gives shapes {np.shape(state)} and {np.shape(derivative)}", field="flow", allowed=f"({n},) and ({n}, {n})"
+        )
 
 
 def return_map(system: SystemLike, x: ArrayLike, with_error: bool = True) -> ReturnMap:
@@ -175,12 +208,16 @@ def return_map(system: SystemLike, x: ArrayLike, with_error: bool = True) -> Ret
         If the flow gives anything that is not finite.
     """
     x = np.asarray(x, dtype=np.float64)
+    n = system.dimension
+    if x.shape != (n,):
+        raise ParameterError("has the wrong shape", field="orbit", value=x.shape, allowed=f"({n},)")
     count = halves(system)
     error = np.nan
     if with_error:
         state, jacobian, error = flow_with_error(system, x, 0.0, system.period / count)
     else:
         state, jacobian = system.flow(x, 0.0, system.period / count)
+    _check_shapes(state, jacobian, n)
     if system.symmetry is not None:
         state, jacobian = system.symmetry @ state, system.symmetry @ jacobian
     if not (np.isfinite(state).all() and np.isfinite(jacobian).all()):
@@ -194,7 +231,7 @@ def return_maps(systems: Sequence[SystemLike]) -> list[ReturnMap]:
     together = optional(first, "flow_many")
     alike = optional(first, "can_flow_with")
     if together is None or alike is None or len(systems) == 1 or not all(alike(system) for system in systems[1:]):
-        return [return_map(system, known_orbit(system)) for system in systems]
+        return [_known_return(system)[1] for system in systems]
     count = halves(first)
     jacobians, errors = together(systems, 0.0, first.period / count)
     symmetry = np.eye(first.dimension) if first.symmetry is None else first.symmetry
@@ -233,6 +270,20 @@ def known_orbit(system: SystemLike) -> Array:
     return np.asarray(orbit, dtype=np.float64)
 
 
+def _known_return(system: SystemLike, with_error: bool = True) -> tuple[Array, ReturnMap]:
+    """The orbit a system knows of itself and the return map there, once it is seen to return."""
+    x = known_orbit(system)
+    image = return_map(system, x, with_error)
+    off = float(np.abs(image.state - x).max())
+    if not off <= _RETURNS * max(1.0, float(np.abs(x).max())) * max(1.0, float(np.abs(image.jacobian).max())):
+        raise AnalysisError(
+            f"is no periodic orbit: one return later the state is {off:.1e} away",
+            field="orbit",
+            allowed="a state on the orbit at time 0, or as a first guess, which is then improved",
+        )
+    return x, image
+
+
 def find_orbit(system: SystemLike, guess: ArrayLike | None = None, with_error: bool = True) -> tuple[Array, ReturnMap]:
     """A periodic orbit: a fixed point of the return map, by Newton's method.
 
@@ -252,16 +303,15 @@ def find_orbit(system: SystemLike, guess: ArrayLike | None = None, with_error: b
     Raises
     ------
     AnalysisError
-        If Newton's method does not converge in 30 steps.
+        If Newton's method does not converge in 15 steps.
     """
     if guess is None:
-        x = known_orbit(system)
-        return x, return_map(system, x, with_error)
+        return _known_return(system, with_error)
     x = np.array(guess, dtype=np.float64)
     if x.shape != (system.dimension,):
         raise ParameterError("has the wrong shape", field="orbit", value=x.shape, allowed=f"({system.dimension},)")
     best = np.inf
-    for _ in range(30):
+    for step in range(15):
         image = return_map(system, x, with_error=False)
         residual = image.state - x
         size = float(np.abs(residual).max())
@@ -269,6 +319,8 @@ def find_orbit(system: SystemLike, guess: ArrayLike | None = None, with_error: b
         # Converged once the residual is at the accuracy of the flow, or has stopped falling close to it.
         if size <= 4e-16 * scale or (size <= 1e-10 * scale and size >= 0.5 * best):
             return x, return_map(system, x) if with_error else image
+        if step > 2 and size > 10.0 * best:
+            break
         best = min(best, size)
         try:
             x = x - np.linalg.solve(image.jacobian - np.eye(x.size), residual)

@@ -1,0 +1,105 @@
+"""Checks of what a user hands over with a right-hand side: one line of error instead of a traceback, or of nonsense."""
+
+from __future__ import annotations
+
+import itertools
+import operator
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chilopod.errors import ParameterError
+
+Array = NDArray[np.float64]
+
+_COARSEST = 1e-3
+
+
+def checked_arguments(
+    rhs: object, dimension: object, period: object, args: object, tolerance: object
+) -> tuple[int, float, tuple[Any, ...], float]:
+    """Dimension, period, args and tolerance as what they should be."""
+    if not callable(rhs):
+        raise ParameterError("must be a function", field="rhs", value=rhs, allowed="rhs(t, x, *args)")
+    try:
+        size = operator.index(dimension)  # type: ignore[arg-type]
+    except TypeError:
+        size = 0
+    if size < 1:
+        raise ParameterError("must be a whole number", field="dimension", value=dimension, allowed="1 or more")
+    if not isinstance(args, tuple):
+        raise ParameterError("must be a tuple", field="args", value=args, allowed="such as (0.5,)")
+    length = float(finite_array(period, (), "period"))
+    if not length > 0:
+        raise ParameterError("must be positive and finite", field="period", value=period)
+    error = float(finite_array(tolerance, (), "tolerance"))
+    if not 0 < error <= _COARSEST:
+        raise ParameterError("is out of range", field="tolerance", value=tolerance, allowed=f"0 to {_COARSEST:g}")
+    return size, length, args, error
+
+
+def finite_array(value: Any, shape: tuple[int, ...], field: str) -> Array:
+    """``value`` as finite numbers in an array of the given shape."""
+    try:
+        array = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ParameterError("must be numbers", field=field, value=value) from None
+    if array.shape != shape:
+        raise ParameterError("has the wrong shape", field=field, value=array.shape, allowed=str(shape))
+    if not np.isfinite(array).all():
+        raise ParameterError("must be finite", field=field, value=value)
+    return array
+
+
+def check_shape(
+    function: Callable[..., ArrayLike],
+    args: tuple[Any, ...],
+    times: Array,
+    x: Array,
+    shape: tuple[int, ...],
+    field: str,
+) -> None:
+    """Evaluate a function once, and see that it gives an array of the right shape."""
+    try:
+        with np.errstate(all="ignore"):
+            result = np.asarray(function(float(times[0]), x.copy(), *args), dtype=np.float64)
+    except (ArithmeticError, ValueError) as error:
+        if "shape" not in str(error) and "sequence" not in str(error):
+            return  # a singularity just here: no fault of the function
+        raise ParameterError(f"returns no array of numbers ({error})", field=field) from error
+    except Exception as error:
+        raise ParameterError(
+            f"cannot be evaluated at a state of shape {x.shape} ({type(error).__name__}: {error})", field=field
+        ) from error
+    if result.shape != shape:
+        raise ParameterError("returns the wrong shape", field=field, value=result.shape, allowed=str(shape))
+
+
+def check_symmetry(
+    field: str,
+    matrix: Array,
+    shift: float,
+    rhs: Callable[..., ArrayLike],
+    args: tuple[Any, ...],
+    times: Array,
+    base: Array,
+    period: float,
+) -> None:
+    """Test S f(t, x) = f(t + shift, S x) at some times and states: a wrong symmetry gives wrong multipliers in
+    silence."""
+    for t, turn in itertools.product(times.tolist(), (1.0, 2.0)):
+        x = base + np.cos(3.0 * np.arange(base.size) + turn)
+        try:
+            with np.errstate(all="ignore"):
+                here = np.asarray(rhs(t, x, *args), dtype=np.float64)
+                there = np.asarray(rhs((t + shift) % period, matrix @ x, *args), dtype=np.float64)
+        except (ArithmeticError, ValueError):  # not defined at this state
+            continue
+        if np.abs(matrix @ here - there).max() > 1e-6 * max(1.0, float(np.abs(here).max())):
+            raise ParameterError(
+                f"is no symmetry of the right-hand side, as at t = {t:g}",
+                field=field,
+                allowed="S with S f(t, x) = f(t + T/2, S x)" if shift else "P with P f(t, x) = f(t, P x)",
+            )

@@ -1,0 +1,287 @@
+"""Building a system from a right-hand side: what is warned of, what is refused, and how the derivative is had."""
+
+import warnings
+from math import cos, exp, pi, sin
+
+import numba
+import numpy as np
+import pytest
+
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.stability import NotAnalytic, PeriodicSystem, UndeclaredSwitch, from_rhs, multipliers
+
+
+def oscillator(t, x):
+    return [x[1], -x[0]]
+
+
+def hill(coefficient):
+    return lambda t, x: [x[1], -coefficient(t) * x[0]]
+
+
+# Jumps
+
+
+@pytest.mark.parametrize("size", [1.0, 0.1, 0.01, 1e-4])
+@pytest.mark.parametrize("background", [lambda t: 1.0, cos, lambda t: cos(t) + 0.3 * cos(5 * t)])
+def test_undeclared_jump_is_warned_of(size, background):
+    with pytest.warns(UndeclaredSwitch, match=r"jumps at t = 1\.2661\d*, 5\.0170\d*, not among"):
+        from_rhs(hill(lambda t: background(t) + size * np.sign(cos(t) - 0.3)), 2, 2 * pi, orbit=[0, 0])
+
+
+def test_each_undeclared_jump_is_listed():
+    with pytest.warns(UndeclaredSwitch, match=r"t = 1, 1\.01, not among"):
+        from_rhs(hill(lambda t: cos(t) + (1.0 < t % (2 * pi) < 1.01)), 2, 2 * pi)
+
+
+def test_one_of_two_switches_declared():
+    with pytest.warns(UndeclaredSwitch, match=r"t = 4\.71238\d*, not among"):
+        from_rhs(hill(lambda t: 1 + 0.5 * np.sign(cos(t))), 2, 2 * pi, switch_times=[pi / 2])
+
+
+def test_a_jump_that_multiplies_zero_on_the_orbit_is_found():
+    """x = 0 never feels the jump, its neighbours do: the multiplier would be off."""
+    with pytest.warns(UndeclaredSwitch):
+        from_rhs(lambda t, x: [-x[0] * (2.0 if t % 2.0 > 0.7 else 1.0)], 1, 2.0, orbit=[0.0])
+
+
+def test_a_declared_jump_is_cheaper_and_exact():
+    calls = 0
+
+    def rhs(t, x):
+        nonlocal calls
+        calls += 1
+        return [-x[0] * (2.0 if t % 2.0 > 0.7 else 1.0)]
+
+    def cost(system):
+        nonlocal calls
+        calls = 0
+        matrix = system.flow(np.zeros(1), 0.0, 2.0)[1]
+        return calls, abs(matrix[0, 0] - exp(-0.7 - 2.6))
+
+    declared, error = cost(from_rhs(rhs, 1, 2.0, orbit=[0.0], switch_times=[0.7]))
+    with pytest.warns(UndeclaredSwitch):
+        system = from_rhs(rhs, 1, 2.0, orbit=[0.0])
+    undeclared, larger = cost(system)
+    assert undeclared > 2 * declared
+    assert error < 1e-15
+    assert error < larger
+
+
+@pytest.mark.parametrize(
+    "coefficient",
+    [
+        lambda t: 1 + cos(t),
+        lambda t: 1 + cos(50 * t),
+        lambda t: 1 + cos(200 * t),
+        lambda t: 1 + exp(-(((t - 1) / 0.01) ** 2)),
+        lambda t: 1 + np.tanh(1e3 * cos(t)),
+        lambda t: 1 + abs(sin(t)),
+        lambda t: 1.0,
+        lambda t: 1e12 * (1 + cos(t)),
+    ],
+    ids=["slow", "fast", "faster", "pulse", "steep", "kink", "constant", "large"],
+)
+def test_no_false_alarm_for_continuous_coefficients(coefficient):
+    from_rhs(hill(coefficient), 2, 2 * pi, orbit=[0, 0])  # warnings are errors here
+
+
+def test_no_false_alarm_for_declared_switches():
+    from_rhs(hill(lambda t: 1 + 0.5 * np.sign(cos(t))), 2, 2 * pi, switch_times=[pi / 2, 3 * pi / 2])
+    from_rhs(hill(lambda t: t % 1.0), 2, 1.0)  # the ends of the period are always switches
+    from_rhs(hill(lambda t: (t - 0.25) % 1.0), 2, 1.0, switch_times=np.array([0.25]))
+
+
+def test_no_alarm_where_a_function_is_not_defined_everywhere():
+    system = from_rhs(lambda t, x: [1 - x[0] ** 0.5 if x[0] > 0 else 1 / 0], 1, 2.0)
+    found = multipliers(system, [1.1])
+    assert found.orbit[0] == pytest.approx(1.0, abs=1e-12)
+    assert abs(found.values[0] - exp(-1.0)) <= found.error_bound
+
+
+# The derivative
+
+
+@numba.njit
+def cube_by_power(t, x):
+    return np.array([x[1], -x[0] - 0.2 * x[1] - x[0] ** 3])
+
+
+def test_a_compiled_power_is_warned_of_and_still_right():
+    with pytest.warns(NotAnalytic, match=r"write x\*x\*x"):
+        system = from_rhs(cube_by_power, 2, 2.0, orbit=[0, 0])
+    plain = from_rhs(cube_by_power.py_func, 2, 2.0, orbit=[0, 0])
+    x = np.array([-0.7, 0.4])
+    np.testing.assert_allclose(system.flow(x, 0.0, 2.0)[1], plain.flow(x, 0.0, 2.0)[1], rtol=1e-12)
+
+
+@pytest.mark.parametrize("absolute", [abs, np.abs, lambda v: v if v > 0 else -v])
+def test_a_function_that_takes_no_complex_states_is_differenced(absolute):
+    found = multipliers(from_rhs(lambda t, x: [-x[0] * absolute(2.0 + x[0])], 1, 1.5, orbit=[0.0]))
+    assert found.values[0] == pytest.approx(exp(-3.0), rel=1e-8)
+    assert abs(found.values[0] - exp(-3.0)) <= found.error_bound < 1e-6
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_not_analytic_in_one_part_of_the_period_only(compiled):
+    """|x + 1| - 1 counts in the second half only; a complex step would drop its derivative in silence."""
+
+    def rhs(t, x):
+        slope = -1.0 * x
+        if t % 2.0 > 1.0:
+            slope[0] -= abs(x[0] + 1.0) - 1.0
+        return slope
+
+    if compiled:
+        with pytest.warns(NotAnalytic):
+            system = from_rhs(numba.njit(rhs), 1, 2.0, switch_times=[1.0], orbit=[0.0])
+    else:
+        system = from_rhs(rhs, 1, 2.0, switch_times=[1.0], orbit=[0.0])
+    found = multipliers(system)
+    assert found.values[0] == pytest.approx(exp(-3.0), rel=1e-8)
+    assert abs(found.values[0] - exp(-3.0)) <= found.error_bound
+
+
+def test_own_jacobian_complex_step_and_compiled_agree():
+    @numba.njit
+    def compiled(t, x, k):
+        return np.array([x[1], -k * np.sin(x[0]) * (1 + 0.3 * np.cos(t)) - 0.1 * x[1]])
+
+    def jacobian(t, x, k):
+        return [[0.0, 1.0], [-k * np.cos(x[0]) * (1 + 0.3 * np.cos(t)), -0.1]]
+
+    x = np.array([0.9, -0.2])
+    ways = [
+        from_rhs(compiled, 2, 2 * pi, args=(1.7,)),
+        from_rhs(compiled.py_func, 2, 2 * pi, args=(1.7,)),
+        from_rhs(compiled.py_func, 2, 2 * pi, args=(1.7,), jacobian=jacobian),
+    ]
+    results = [way.flow(x, 0.2, 6.0) for way in ways]
+    for state, derivative in results[1:]:
+        np.testing.assert_allclose(state, results[0][0], rtol=1e-12)
+        np.testing.assert_allclose(derivative, results[0][1], rtol=1e-11)
+    many = ways[0].flow_states(np.array([x, 2 * x]), 0.2, 6.0)
+    np.testing.assert_allclose(many[0], results[0][0], rtol=1e-12)
+
+
+# Time
+
+
+@pytest.mark.parametrize("start", [0.0, 0.3, 0.7, 1.9, -3.1, 14.3])
+def test_flow_over_a_period_from_any_time(start):
+    system = from_rhs(lambda t, x: [-x[0] * (2.0 if t % 2.0 > 0.7 else 1.0)], 1, 2.0, orbit=[0.0], switch_times=[0.7])
+    state, derivative = system.flow(np.array([3.0]), start, start + 2.0)
+    assert derivative[0, 0] == pytest.approx(exp(-3.3), rel=1e-12)
+    assert state[0] == pytest.approx(3 * exp(-3.3), rel=1e-12)
+
+
+def test_the_function_is_never_asked_at_a_switch():
+    asked = []
+
+    def rhs(t, x):
+        asked.append(t)
+        return -1.0 * x
+
+    system = from_rhs(rhs, 1, 2.0, switch_times=[0.5, 1.25], orbit=[0.0])
+    asked.clear()
+    system.flow(np.zeros(1), 0.0, 2.0)
+    assert asked
+    assert not {0.0, 0.5, 1.25, 2.0} & set(asked)
+    assert min(asked) > 0.0
+    assert max(asked) < 2.0
+
+
+# What is refused
+
+REFUSED = {
+    "dimension 0": (oscillator, 0, 1.0, {}, "dimension"),
+    "dimension 2.5": (oscillator, 2.5, 1.0, {}, "dimension"),
+    "dimension too large": (oscillator, 3, 1.0, {}, "rhs"),
+    "dimension too small": (oscillator, 1, 1.0, {}, "rhs"),
+    "returns nothing": (lambda t, x: None, 2, 1.0, {}, "rhs"),
+    "returns a ragged list": (lambda t, x: [x, 1.0], 2, 1.0, {}, "rhs"),
+    "returns a matrix": (lambda t, x: np.eye(2), 2, 1.0, {}, "rhs"),
+    "not a function": (3.0, 2, 1.0, {}, "rhs"),
+    "takes no args": (oscillator, 2, 1.0, {"args": (1.0,)}, "rhs"),
+    "args no tuple": (oscillator, 2, 1.0, {"args": 1.0}, "args"),
+    "period negative": (oscillator, 2, -1.0, {}, "period"),
+    "period zero": (oscillator, 2, 0.0, {}, "period"),
+    "period nan": (oscillator, 2, np.nan, {}, "period"),
+    "period infinite": (oscillator, 2, np.inf, {}, "period"),
+    "period text": (oscillator, 2, "one", {}, "period"),
+    "tolerance zero": (oscillator, 2, 1.0, {"tolerance": 0.0}, "tolerance"),
+    "tolerance negative": (oscillator, 2, 1.0, {"tolerance": -1e-9}, "tolerance"),
+    "tolerance nan": (oscillator, 2, 1.0, {"tolerance": np.nan}, "tolerance"),
+    "tolerance one": (oscillator, 2, 1.0, {"tolerance": 1.0}, "tolerance"),
+    "switch outside": (oscillator, 2, 1.0, {"switch_times": [1.0]}, "switch_times"),
+    "switch negative": (oscillator, 2, 1.0, {"switch_times": [-0.1]}, "switch_times"),
+    "switch nan": (oscillator, 2, 1.0, {"switch_times": [np.nan]}, "switch_times"),
+    "switch text": (oscillator, 2, 1.0, {"switch_times": "ab"}, "switch_times"),
+    "switch table": (oscillator, 2, 1.0, {"switch_times": [[0.1, 0.2]]}, "switch_times"),
+    "orbit too long": (oscillator, 2, 1.0, {"orbit": [0, 0, 0]}, "orbit"),
+    "orbit a number": (oscillator, 2, 1.0, {"orbit": 0.0}, "orbit"),
+    "orbit nan": (oscillator, 2, 1.0, {"orbit": [0, np.nan]}, "orbit"),
+    "orbit text": (oscillator, 2, 1.0, {"orbit": "zero"}, "orbit"),
+    "jacobian shape": (oscillator, 2, 1.0, {"jacobian": lambda t, x: [[1.0]]}, "jacobian"),
+    "symmetry shape": (oscillator, 2, 1.0, {"symmetry": [[1.0]]}, "symmetry"),
+    "symmetry vector": (oscillator, 2, 1.0, {"symmetry": [1.0, -1.0]}, "symmetry"),
+    "symmetry no involution": (oscillator, 2, 1.0, {"symmetry": [[0, 1], [-1, 0]]}, "symmetry"),
+    "symmetry nan": (oscillator, 2, 1.0, {"symmetry": [[np.nan, 0], [0, 1]]}, "symmetry"),
+    "spatial symmetry shape": (oscillator, 2, 1.0, {"spatial_symmetry": np.eye(3)}, "spatial_symmetry"),
+    "spatial symmetry stretched": (oscillator, 2, 1.0, {"spatial_symmetry": 2 * np.eye(2)}, "spatial_symmetry"),
+    "no symmetry of it": (hill(cos), 2, 2 * pi, {"symmetry": -np.eye(2)}, "symmetry"),
+    "no mirror of it": (
+        lambda t, x: [x[1], -(x[0] ** 2)],
+        2,
+        1.0,
+        {"spatial_symmetry": -np.eye(2)},
+        "spatial_symmetry",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_bad_arguments_are_one_line(case):
+    rhs, dimension, period, options, field = REFUSED[case]
+    with pytest.raises(ParameterError) as error:
+        from_rhs(rhs, dimension, period, **options)
+    assert error.value.field == field
+    assert str(error.value).startswith(field)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_a_right_hand_side_that_is_not_finite_ends(bad, compiled):
+    def rhs(t, x):
+        return np.array([bad, 0.0]) * (1.0 + 0.0 * x[0])
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of whatever kind: it is the error that counts
+        system = from_rhs(numba.njit(rhs) if compiled else rhs, 2, 1.0, orbit=[0, 0])
+        with pytest.raises(AnalysisError):
+            multipliers(system)
+
+
+@pytest.mark.parametrize("guess", [[10.0, 0.0], [np.nan, 0.0]])
+def test_a_motion_that_diverges_is_one_line(guess):
+    system = from_rhs(lambda t, x: [x[0] * x[0], -x[1]], 2, 1.0)
+    with pytest.raises(AnalysisError) as error:
+        multipliers(system, guess)
+    assert "\n" not in str(error.value)
+
+
+def test_a_state_that_is_no_orbit_is_refused():
+    def rhs(t, x):
+        return [-x[0] + cos(t)]
+
+    with pytest.raises(AnalysisError, match="is no periodic orbit"):
+        multipliers(from_rhs(rhs, 1, 2 * pi, orbit=[0.0]))
+    found = multipliers(from_rhs(rhs, 1, 2 * pi), [0.0])
+    assert found.orbit[0] == pytest.approx(0.5, abs=1e-13)  # x = (cos t + sin t) / 2
+
+
+def test_symmetries_that_hold_are_accepted():
+    system = from_rhs(hill(lambda t: 1 + cos(2 * t)), 2, 2 * pi, symmetry=-np.eye(2), spatial_symmetry=-np.eye(2))
+    assert isinstance(system, PeriodicSystem)
+    np.testing.assert_array_equal(system.symmetry, -np.eye(2))

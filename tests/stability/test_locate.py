@@ -1,0 +1,170 @@
+"""Every crossing in the interval is found, none is invented, and each lies within its error bound."""
+
+from math import pi
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.linalg import expm
+
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.stability import Kind, PeriodicSystem, locate
+
+PERIOD = 1.3
+
+
+def diagonal(*rates):
+    """Multipliers exp(T rate(mu)), one a dimension."""
+
+    def system(mu):
+        values = np.array([rate(mu) for rate in rates])
+
+        def flow(x, t0, t1):
+            matrix = np.diag(np.exp(values * (t1 - t0)))
+            return matrix @ x, matrix
+
+        return PeriodicSystem(len(values), PERIOD, flow, orbit=np.zeros(len(values)))
+
+    return system
+
+
+def with_roots(*roots, scale=1.0):
+    return lambda mu: scale * np.prod([mu - root for root in roots])
+
+
+def decaying(mu):
+    return -1.0
+
+
+def assert_found(points, roots):
+    assert len(points) == len(roots), [point.value for point in points]
+    for point, root in zip(points, sorted(roots), strict=True):
+        assert abs(point.value - root) <= point.error_bound
+        assert point.error_bound < 1e-6
+
+
+def test_an_interval_without_a_crossing_gives_an_empty_list():
+    assert locate(diagonal(lambda mu: -0.1 - mu * mu, decaying), (-1.0, 1.0)) == []
+    assert locate(diagonal(lambda mu: 0.3 + mu * mu, decaying), (-1.0, 1.0)) == []
+
+
+@pytest.mark.parametrize(
+    "roots",
+    [(0.3,), (0.11, 0.13, 0.62), (0.11, 0.13, 0.62, 0.91), (0.2, 0.21, 0.22, 0.9, 0.91)],
+    ids=str,
+)
+def test_one_multiplier_that_crosses_several_times(roots):
+    assert_found(locate(diagonal(with_roots(*roots, scale=20.0), decaying), (0.0, 1.0)), roots)
+
+
+@pytest.mark.parametrize("roots", [(0.3, 0.32), (0.43, 0.445), (0.05, 0.9), (0.41, 0.48)], ids=str)
+@pytest.mark.parametrize("scale", [-0.1, -1.0, -100.0, 1.0])
+def test_out_and_in_again_within_a_small_part_of_the_interval(roots, scale):
+    assert_found(locate(diagonal(with_roots(*roots, scale=scale), decaying), (0.0, 1.0)), roots)
+
+
+def test_a_bump():
+    bump = diagonal(lambda mu: -1.0 + 1.2 * np.exp(-(((mu - 0.44) / 0.08) ** 2)), lambda mu: -2.0)
+    half = 0.08 * np.sqrt(np.log(1.2))
+    assert_found(locate(bump, (0.0, 1.0)), (0.44 - half, 0.44 + half))
+
+
+@pytest.mark.parametrize("gap", [1e-2, 1e-3, 1e-4, 1e-5, 1e-7])
+def test_two_multipliers_that_cross_nearly_together(gap):
+    both_out = diagonal(with_roots(0.3), with_roots(0.3 + gap, scale=2.0), decaying)
+    assert_found(locate(both_out, (0.0, 1.0)), (0.3, 0.3 + gap))
+    one_out_one_in = diagonal(with_roots(0.3), with_roots(0.3 + gap, scale=-2.0), decaying)
+    assert_found(locate(one_out_one_in, (0.0, 1.0)), (0.3, 0.3 + gap))
+
+
+@pytest.mark.parametrize("where", [0.5, 0.25, 0.625])
+def test_a_crossing_at_a_point_of_the_first_grid(where):
+    assert_found(locate(diagonal(with_roots(where), decaying), (0.0, 1.0)), (where,))
+
+
+@given(
+    st.lists(st.integers(1, 31), min_size=1, max_size=3, unique=True),
+    st.sampled_from([-30.0, -3.0, 3.0, 30.0]),
+    st.floats(-3.0, -0.2),
+)
+@settings(max_examples=60, deadline=None)
+def test_none_missed(places, scale, other):
+    roots = [0.031 * place for place in places]
+    assert_found(locate(diagonal(with_roots(*roots, scale=scale), lambda mu: other), (0.0, 1.0)), roots)
+
+
+def test_bound_holds_in_a_slanted_basis_far_from_zero():
+    """Large values of the parameter, an ill-conditioned eigenbasis, an awkward scale."""
+    basis = np.array([[1.0, 1.0, 0.0], [0.0, 1e-3, 1.0], [0.3, 0.0, 1.0]])
+    inverse = np.linalg.inv(basis)
+    root = 41234.5678
+
+    def system(mu):
+        def flow(x, t0, t1):
+            matrix = basis @ np.diag(np.exp(np.array([1e-4 * (mu - root), -0.5, -2.0]) * (t1 - t0))) @ inverse
+            return matrix @ x, matrix
+
+        return PeriodicSystem(3, PERIOD, flow, orbit=np.zeros(3))
+
+    (point,) = locate(system, (20000.0, 75000.0))
+    assert abs(point.value - root) <= point.error_bound < 1e-3
+    np.testing.assert_allclose(point.mode.real, basis[:, 0] / np.linalg.norm(basis[:, 0]), atol=1e-9)
+
+
+def test_kinds_side_by_side():
+    """A real multiplier through +1, a pair through the circle and, with half a turn a period, one through -1."""
+
+    def system(mu):
+        def flow(x, t0, t1):
+            t = t1 - t0
+            matrix = np.zeros((5, 5))
+            matrix[0, 0] = np.exp((mu - 0.2) * t)
+            c, s = np.cos(1.1 * t), np.sin(1.1 * t)
+            matrix[1:3, 1:3] = np.exp((mu - 0.5) * t) * np.array([[c, s], [-s, c]])
+            # A Moebius frame: turned by pi in a period, then stretched in the turned axes.
+            a, b = pi * t0 / PERIOD, pi * t1 / PERIOD
+            before = np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]])
+            after = np.array([[np.cos(b), -np.sin(b)], [np.sin(b), np.cos(b)]])
+            matrix[3:, 3:] = after @ np.diag(np.exp([(mu - 0.8) * t, -t])) @ before.T
+            return matrix @ x, matrix
+
+        return PeriodicSystem(5, PERIOD, flow, orbit=np.zeros(5))
+
+    points = locate(system, (0.0, 1.0), normal_form=False)
+    assert_found(points, (0.2, 0.5, 0.8))
+    assert [point.kind for point in points[1:]] == [Kind.NEIMARK_SACKER, Kind.PERIOD_DOUBLING]
+    assert points[1].frequency == pytest.approx(1.1, rel=1e-12)
+    assert points[2].frequency == pytest.approx(pi / PERIOD, rel=1e-12)
+
+
+def test_a_pair_that_meets_on_the_real_axis_is_no_bifurcation():
+    """Complex inside, complex no more, then one real multiplier leaves: one point only."""
+
+    def system(mu):
+        def flow(x, t0, t1):
+            # Eigenvalues -0.3 +- sqrt(mu - 0.4): complex below 0.4, real above, zero at 0.49.
+            matrix = expm(np.array([[-0.3, 1.0], [mu - 0.4, -0.3]]) * (t1 - t0))
+            return matrix @ x, matrix
+
+        return PeriodicSystem(2, PERIOD, flow, orbit=np.zeros(2))
+
+    assert_found(locate(system, (0.0, 1.0)), (0.49,))
+
+
+@pytest.mark.parametrize(
+    "between", [(1.0, 0.0), (0.0, 0.0), (0.0, np.inf), (np.nan, 1.0), (0.0,), (0, 1, 2), "ab", None]
+)
+def test_a_bad_interval_is_one_line(between):
+    with pytest.raises(ParameterError) as error:
+        locate(diagonal(decaying), between)
+    assert str(error.value).startswith("between")
+    assert "\n" not in str(error.value)
+
+
+def test_a_family_without_known_orbits_needs_a_guess():
+    def system(mu):
+        return PeriodicSystem(1, 1.0, lambda x, t0, t1: (x, np.eye(1)))
+
+    with pytest.raises(AnalysisError, match="does not know its periodic orbit"):
+        locate(system, (0.0, 1.0))

@@ -1,0 +1,173 @@
+"""Systems from anything that has a flow, and how sure their multipliers are."""
+
+from math import exp, pi
+
+import numpy as np
+import pytest
+
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.stability import PeriodicSystem, SystemLike, exponents, find_orbit, locate, multipliers, sweep
+
+
+class Own:
+    """A user's own class: a forced, damped oscillator with its exact flow, x'' + 2 d x' + x = cos t written out."""
+
+    def __init__(self, rate=-0.4, spin=0.7):
+        self.rate, self.spin = rate, spin
+
+    dimension = 2
+    period = 2 * pi
+    symmetry = None
+
+    def matrix(self, t):
+        c, s = np.cos(self.spin * t), np.sin(self.spin * t)
+        return np.exp(self.rate * t) * np.array([[c, s], [-s, c]])
+
+    def path(self, t):
+        return np.array([1.0 + np.sin(t), np.cos(t)])
+
+    def flow(self, x, t0, t1):
+        matrix = self.matrix(t1 - t0)
+        return self.path(t1) + matrix @ (x - self.path(t0)), matrix
+
+
+def known(rate, spin):
+    return np.exp(2 * pi * np.array([rate + 1j * abs(spin), rate - 1j * abs(spin)]))
+
+
+def test_own_class_is_a_system():
+    assert isinstance(Own(), SystemLike)
+    found = multipliers(Own(), [0.0, 0.0])
+    np.testing.assert_allclose(found.orbit, [1.0, 1.0], atol=1e-14)
+    np.testing.assert_allclose(np.sort_complex(found.values), np.sort_complex(known(-0.4, 0.7)), rtol=1e-12)
+    assert found.stable
+    assert exponents(Own(), [0.0, 0.0]).values[0] == pytest.approx(-0.4 + 0.3j, rel=1e-12)
+
+
+def test_own_class_is_located_and_followed():
+    (point,) = locate(lambda mu: Own(rate=mu), (-0.3, 0.2), orbit=[0.9, 1.2], normal_form=False)
+    assert abs(point.value) <= point.error_bound < 1e-10
+    np.testing.assert_allclose(point.orbit, [1.0, 1.0], atol=1e-12)
+
+
+def test_optional_attributes_are_used():
+    class Better(Own):
+        orbit = np.array([1.0, 1.0])
+
+        def flow_with_error(self, x, t0, t1):
+            return *self.flow(x, t0, t1), 1e-5
+
+    found = multipliers(Better())
+    # Condition 1 (normal), 2-norm of a matrix whose entries are off by 1e-5, safety 4: about 1e-4 at most.
+    assert 1e-5 < found.error_bound < 2e-4
+    assert [m.values.tolist() for m in sweep([Better(), Better(-0.1)])] == [
+        multipliers(b).values.tolist() for b in (Better(), Better(-0.1))
+    ]
+    assert sweep([]) == []
+
+
+@pytest.mark.parametrize("noise", [1e-12, 1e-8, 1e-4])
+def test_error_of_a_flow_that_gives_none_is_estimated_by_splitting(noise):
+    """A flow with errors that depend on the interval, as those of a step-controlled integrator do."""
+
+    class Noisy(Own):
+        def flow(self, x, t0, t1):
+            state, matrix = super().flow(x, t0, t1)
+            wrong = noise * np.random.default_rng(int(1e6 * (t0 + 3 * t1))).uniform(-1, 1, (2, 2))
+            return state, matrix + wrong
+
+    found = multipliers(Noisy(), [1.0, 1.0])
+    error = np.abs(np.sort_complex(found.values) - np.sort_complex(known(-0.4, 0.7))).max()
+    assert noise / 1000 < error <= found.error_bound
+    assert found.error_bound < 1e3 * noise
+
+
+def test_error_bound_of_an_exact_flow_is_round_off():
+    assert multipliers(Own(), [1.0, 1.0]).error_bound < 1e-12
+
+
+def test_half_period_squares_to_the_full_period():
+    def flow(x, t0, t1):
+        matrix = np.diag(np.exp(np.array([0.05, -0.3]) * (t1 - t0)))
+        return matrix @ x, matrix
+
+    mirrored = PeriodicSystem(2, 2.0, flow, symmetry=[[-1.0, 0.0], [0.0, 1.0]], orbit=np.zeros(2))
+    plain = PeriodicSystem(2, 2.0, flow, orbit=np.zeros(2))
+    half, full = multipliers(mirrored), multipliers(plain)
+    np.testing.assert_allclose(half.half_period, [-exp(0.05), exp(-0.3)], rtol=1e-14)
+    np.testing.assert_allclose(half.values, full.values, rtol=1e-13)
+    assert full.half_period is None
+    assert not half.stable
+
+
+@pytest.mark.parametrize(
+    ("symmetry", "message"),
+    [
+        (np.eye(3), "wrong shape"),
+        ([1.0, -1.0], "wrong shape"),
+        ([[0.0, 1.0], [-1.0, 0.0]], "its own inverse"),
+        ([[np.nan, 0.0], [0.0, 1.0]], "its own inverse"),
+        (np.zeros((2, 2)), "its own inverse"),
+    ],
+)
+@pytest.mark.parametrize("name", ["symmetry", "spatial_symmetry"])
+def test_symmetries_are_checked(name, symmetry, message):
+    with pytest.raises(ParameterError, match=message) as error:
+        PeriodicSystem(2, 1.0, Own().flow, **{name: symmetry})
+    assert error.value.field == name
+
+
+@pytest.mark.parametrize(
+    ("dimension", "period", "field"), [(0, 1.0, "dimension"), (2, 0.0, "period"), (2, np.nan, "period")]
+)
+def test_dimension_and_period_are_checked(dimension, period, field):
+    with pytest.raises(ParameterError) as error:
+        PeriodicSystem(dimension, period, Own().flow)
+    assert error.value.field == field
+
+
+@pytest.mark.parametrize(
+    "flow",
+    [
+        lambda x, t0, t1: (x, np.eye(3)),
+        lambda x, t0, t1: (np.zeros(3), np.eye(2)),
+        lambda x, t0, t1: (x, np.full((2, 2), np.nan)),
+        lambda x, t0, t1: (x + np.inf, np.eye(2)),
+    ],
+    ids=["matrix", "state", "nan", "infinite"],
+)
+def test_a_broken_flow_is_one_line(flow):
+    system = PeriodicSystem(2, 1.0, flow, orbit=np.zeros(2))
+    with pytest.raises(AnalysisError) as error:
+        multipliers(system)
+    assert error.value.field == "flow"
+    assert "\n" not in str(error.value)
+
+
+def test_no_orbit_to_be_found():
+    system = PeriodicSystem(1, 1.0, lambda x, t0, t1: (x + (t1 - t0), np.eye(1)))
+    with pytest.raises(AnalysisError, match="no periodic orbit found"):
+        find_orbit(system, [0.0])
+    with pytest.raises(AnalysisError, match="does not know its periodic orbit"):
+        multipliers(system)
+
+
+@pytest.mark.parametrize("guess", [[0.0], [0.0, 0.0, 0.0], 0.0])
+def test_a_guess_of_the_wrong_shape(guess):
+    with pytest.raises(ParameterError, match="wrong shape"):
+        multipliers(Own(), guess)
+
+
+def test_a_defective_matrix_has_a_useless_but_honest_bound():
+    """A Jordan block: a perturbation e moves its eigenvalues by sqrt(e)."""
+    system = PeriodicSystem(2, 1.0, lambda x, t0, t1: (x, np.array([[1.0, t1 - t0], [0.0, 1.0]])), orbit=np.zeros(2))
+    found = multipliers(system)
+    assert np.abs(found.values - 1).max() <= found.error_bound
+    assert found.error_bound > 1e-8
+    assert not found.stable
+
+
+def test_results_are_immutable():
+    found = multipliers(Own(), [1.0, 1.0])
+    with pytest.raises(AttributeError):
+        found.error_bound = 0.0

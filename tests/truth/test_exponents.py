@@ -1,0 +1,116 @@
+"""Exponents of systems whose multipliers lie dozens of orders of magnitude apart."""
+
+from math import log, pi
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from chilopod.errors import AnalysisError
+from chilopod.stability import PeriodicSystem, exponents
+
+PERIOD = 2 * pi
+SKEW = np.array([[0.0, 0.5, -0.2, 0.3], [-0.5, 0.0, 0.4, 0.1], [0.2, -0.4, 0.0, -0.6], [-0.3, -0.1, 0.6, 0.0]])
+SLANT = np.array([[1.0, 0.3, 0.0, 0.2], [0.1, 1.2, -0.4, 0.0], [0.0, 0.2, 0.9, 0.3], [-0.3, 0.0, 0.1, 1.1]])
+
+
+def frame(t):
+    """A T-periodic change of variables that is not orthogonal."""
+    return expm(SKEW * np.sin(t)) @ SLANT
+
+
+def exactly(generator):
+    """x = P(t) u with u' = generator u, by its exact flow."""
+
+    def flow(x, t0, t1):
+        matrix = frame(t1) @ expm(generator * (t1 - t0)) @ np.linalg.inv(frame(t0))
+        return matrix @ x, matrix
+
+    return PeriodicSystem(4, PERIOD, flow, orbit=np.zeros(4))
+
+
+def rotation(a, w):
+    return np.array([[a, w], [-w, a]])
+
+
+def blocks(*parts):
+    n = sum(len(np.atleast_2d(p)) for p in parts)
+    result, i = np.zeros((n, n)), 0
+    for part in map(np.atleast_2d, parts):
+        result[i : i + len(part), i : i + len(part)] = part
+        i += len(part)
+    return result
+
+
+SPREAD = [0.1, -0.8, -log(1e25) / PERIOD, -log(1e60) / PERIOD]
+
+
+def test_sixty_orders_of_magnitude():
+    found = exponents(exactly(np.diag(SPREAD)))
+    np.testing.assert_allclose(found.values.real, SPREAD, rtol=1e-11)
+    np.testing.assert_array_equal(found.values.imag, 0.0)
+    modes = SLANT / np.linalg.norm(SLANT, axis=0)
+    modes = modes * np.sign(modes[np.abs(modes).argmax(axis=0), range(4)])
+    np.testing.assert_allclose(found.modes, modes, atol=1e-9)
+
+
+def test_fast_and_slow_pairs():
+    """Pairs 40 orders of magnitude apart; the frequencies are given modulo one turn a period."""
+    slow, fast = rotation(-0.05, 0.3), rotation(-log(1e40) / PERIOD, 1.7)
+    found = exponents(exactly(blocks(slow, fast)))
+    wrapped = 1.7 - 2.0
+    expected = [-0.05 + 0.3j, -0.05 - 0.3j]
+    expected += [complex(-log(1e40) / PERIOD, abs(wrapped)), complex(-log(1e40) / PERIOD, -abs(wrapped))]
+    np.testing.assert_allclose(found.values, expected, rtol=1e-10)
+
+
+def test_modes_are_eigenvectors_of_the_period():
+    system = exactly(blocks(rotation(-0.05, 0.3), -0.4, -0.9))
+    found = exponents(system)
+    matrix = system.flow(np.zeros(4), 0.0, PERIOD)[1]
+    np.testing.assert_allclose(matrix @ found.modes, found.modes * np.exp(found.values * PERIOD), atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(found.modes, axis=0), 1.0, rtol=1e-14)
+    peaks = found.modes[np.abs(found.modes).argmax(axis=0), range(4)]
+    assert (peaks.real > 0).all()
+    np.testing.assert_allclose(peaks.imag, 0.0, atol=1e-14)
+
+
+def test_negative_multipliers_have_half_a_turn():
+    """Frequency pi/T: the multipliers are negative, and the imaginary part is +pi/T for both."""
+    found = exponents(exactly(blocks(rotation(-0.1, 0.5), rotation(-0.3, 0.0))))
+    np.testing.assert_allclose(found.values, [-0.1 + 0.5j, -0.1 + 0.5j, -0.3, -0.3], atol=1e-7)
+    assert (found.values.imag <= pi / PERIOD).all()
+
+
+def test_order_is_by_falling_real_part_with_positive_frequency_first():
+    found = exponents(exactly(blocks(-0.9, rotation(-0.05, 0.3), 0.2)))
+    np.testing.assert_allclose(found.values, [0.2, -0.05 + 0.3j, -0.05 - 0.3j, -0.9], atol=1e-12)
+    np.testing.assert_allclose(found.modes[:, 1], found.modes[:, 2].conj(), atol=1e-12)
+
+
+def half_turn(generator, signs):
+    """u' = generator u with the symmetry u -> diag(signs) u of half a period."""
+
+    def flow(x, t0, t1):
+        matrix = expm(generator * (t1 - t0))
+        return matrix @ x, matrix
+
+    n = len(generator)
+    return PeriodicSystem(n, PERIOD, flow, symmetry=np.diag(signs), orbit=np.zeros(n))
+
+
+def test_half_period_gives_the_principal_logarithm_of_the_full_period():
+    generator = blocks(0.05, rotation(-0.1, 0.4), -0.3)
+    found = exponents(half_turn(generator, [-1.0, 1.0, 1.0, 1.0]))
+    np.testing.assert_allclose(found.values, [0.05, -0.1 + 0.4j, -0.1 - 0.4j, -0.3], atol=1e-12)
+    nu = found.multipliers.half_period
+    np.testing.assert_allclose(found.multipliers.values, nu**2, rtol=1e-14)
+    # The first half-period multiplier is negative, its square is not.
+    assert nu[0] == pytest.approx(-np.exp(0.05 * pi), rel=1e-13)
+    assert found.values[0].imag == 0.0
+
+
+def test_a_singular_flow_is_refused():
+    system = PeriodicSystem(2, 1.0, lambda x, t0, t1: (0 * x, np.diag([1.0, 0.0])), orbit=np.zeros(2))
+    with pytest.raises(AnalysisError, match="contracts too strongly"):
+        exponents(system)
