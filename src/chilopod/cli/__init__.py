@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from chilopod.cli import robot
+from chilopod.cli import branch, reproduce, robot, stability
 from chilopod.cli.options import new_app
 from chilopod.errors import ChilopodError, one_line
 
@@ -22,7 +22,12 @@ INTERNAL_ERROR = 1
 INTERRUPTED = 130
 
 app = new_app("Many-legged robots that turn by bifurcation: simulate, analyse and steer them.")
+app.command("reproduce")(reproduce.reproduce)
 app.add_typer(robot.app, name="robot")
+app.command("stability")(stability.stability)
+app.command("bifurcation")(stability.bifurcation)
+app.command("branch")(branch.branch)
+app.add_typer(reproduce.identify_app, name="identify")
 
 
 @app.callback(invoke_without_command=True)

@@ -22,6 +22,13 @@ SetOption = Annotated[
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout instead of text.")]
+ParameterOption = Annotated[
+    str,
+    typer.Option(metavar="PATH", help="What to vary, such as springs.stiffness[0]; springs.stiffness: all springs."),
+]
+BetweenOption = Annotated[
+    tuple[str, str], typer.Option(metavar="LOW HIGH", help='The interval, such as "2 N*mm/deg" "75 N*mm/deg".')
+]
 OutOption = Annotated[Path | None, typer.Option("--out", metavar="FOLDER", help="Write results into this folder.")]
 
 
@@ -47,3 +54,33 @@ def read_robot(robot: str, overrides: Sequence[str] | None) -> Robot:
 def print_json(result: dict[str, Any]) -> None:
     """Print a result as one JSON object; NaN and infinity have no place in JSON and are a fault here."""
     typer.echo(json.dumps(result, indent=2, allow_nan=False))
+
+
+def prepared(folder: Path | None) -> Path | None:
+    """Make the folder of ``--out``, if it was given, before any work is done for it."""
+    if folder is None:
+        return None
+    from chilopod.output import prepare_folder
+
+    return prepare_folder(folder)
+
+
+def save_json(path: Path, result: dict[str, Any]) -> None:
+    """Write a result as a JSON file and say so on stderr."""
+    from chilopod.output import write_atomic
+
+    write_atomic(path, json.dumps(result, indent=2, allow_nan=False) + "\n")
+    typer.echo(f"wrote {path}", err=True)
+
+
+def interval(robot: Robot, parameter: str, between: tuple[str, str]) -> tuple[float, float]:
+    """Read the interval of a parameter, in SI units, and refuse one that is reversed or that the robot cannot have."""
+    from chilopod import units
+    from chilopod.errors import ParameterError
+
+    low, high = (units.parse(text, robot.si_unit_of(parameter)) for text in between)
+    if not low < high:
+        raise ParameterError("must rise from a lower to a higher value", field="between", value=" ".join(between))
+    for value in (low, high):
+        robot.with_value(parameter, value)
+    return low, high

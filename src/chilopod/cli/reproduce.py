@@ -1,0 +1,103 @@
+"""``chilopod reproduce`` and ``chilopod identify``: the paper's results, and the constants it does not print."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from chilopod.cli.options import JsonOption, SetOption, new_app, print_json, read_robot, save_json
+from chilopod.cli.progress import progress_bar
+
+PRESET = "aoi2022-planar"
+
+identify_app = new_app("Find constants of a model from measured or printed numbers.")
+
+
+@identify_app.callback(invoke_without_command=True)
+def _group(ctx: typer.Context) -> None:
+    if ctx.invoked_subcommand is None:
+        typer.echo(ctx.get_help())
+
+
+def reproduce(
+    only: Annotated[
+        list[str] | None, typer.Option("--only", metavar="SECTION", help="Just this section; may be repeated.")
+    ] = None,
+    out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Where the report goes.")] = Path("report"),
+    quick: Annotated[bool, typer.Option("--quick", help="Coarser sweeps; printed numbers as exact as ever.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Compute everything the paper says about its planar model and write a report beside its own numbers."""
+    from chilopod.output import prepare_folder
+    from chilopod.studies.reproduce import SECTIONS, chosen
+
+    chosen(only)  # refuses an unknown section
+    folder = prepare_folder(out)
+    from chilopod import studies
+    from chilopod.report import write_report
+
+    with progress_bar() as show:
+        results = studies.reproduce(
+            read_robot(PRESET, None), only, quick, lambda section, done, words: show(SECTIONS[section], done, words)
+        )
+        show("figures and report", 0.0, "")
+        page = write_report(results, folder)
+        show("figures and report", 1.0, "done")
+    rows = [row.as_json() for row in results.rows]
+    if as_json:
+        print_json({"report": str(page), "rows": rows, "seconds": results.seconds})
+        return
+    _print_table([("", "paper", "computed", "")] + [(r.quantity, r.paper, r.computed, r.verdict) for r in results.rows])
+    typer.echo("")
+    typer.echo(f"The report is {page}")
+    typer.echo("Next, try:")
+    for command in (
+        "chilopod stability aoi2022-planar",
+        'chilopod bifurcation aoi2022-planar --parameter "springs.stiffness[0]" --between "2 N*mm/deg" "75 N*mm/deg"',
+        "chilopod robot new my.toml --modules 8",
+    ):
+        typer.echo(f"  {command}")
+
+
+@identify_app.command()
+def planar(
+    robot: Annotated[str, typer.Argument(metavar="[ROBOT]", help="A robot file or preset.")] = PRESET,
+    overrides: SetOption = None,
+    out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Where results go.")] = Path("identification"),
+    points: Annotated[int, typer.Option(metavar="N", help="Points of the profile, 3 to 200.", min=3, max=200)] = 25,
+    as_json: JsonOption = False,
+) -> None:
+    """Friction, half-width and forward offset of the feet from the paper's printed numbers, and how sure they are.
+
+    Writes the profile over the forward offset as a figure and as data, and the robot with the best constants.
+    """
+    from chilopod.output import prepare_folder, write_atomic
+
+    described = read_robot(robot, overrides)
+    folder = prepare_folder(out)
+    from chilopod.report import write_identification
+    from chilopod.studies import identify_planar
+
+    with progress_bar() as show:
+        found = identify_planar(described, points, lambda done, words: show("identification", done, words))
+    best = found.best.with_(name="identified")
+    write_identification(found, folder)
+    write_atomic(folder / "identified.toml", best.to_toml())
+    result = found.as_json()
+    save_json(folder / "identification.json", result)
+    if as_json:
+        print_json(result)
+        return
+    for name, value in result["constants"].items():
+        typer.echo(f"{name} = {value['text']}  (rounding of the printed numbers allows {value['allowed_text']})")
+    typer.echo(f"largest residual {result['largest_residual']:.2f}: 1 is what rounding of the printed numbers allows")
+    typer.echo(f"profile, figure and robot file are in {folder}")
+
+
+def _print_table(rows: list[tuple[str, str, str, str]]) -> None:
+    """Columns as wide as they need to be; on a narrow terminal the table wraps rather than being cut."""
+    widths = [max(len(row[column]) for row in rows) for column in range(4)]
+    for row in rows:
+        typer.echo("  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip())

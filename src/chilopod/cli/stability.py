@@ -1,0 +1,97 @@
+"""``chilopod stability`` and ``chilopod bifurcation``: when does the straight walk hold, and where does it give way?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import typer
+
+from chilopod.cli.options import (
+    BetweenOption,
+    JsonOption,
+    OutOption,
+    ParameterOption,
+    RobotArg,
+    SetOption,
+    interval,
+    prepared,
+    print_json,
+    read_robot,
+    save_json,
+)
+
+
+def stability(robot: RobotArg, overrides: SetOption = None, as_json: JsonOption = False, out: OutOption = None) -> None:
+    """Floquet multipliers, exponents and modes of the straight walk in the planar model.
+
+    Exponents are the principal logarithms of the full-period multipliers over the period: their imaginary parts lie in
+    (-pi/T, pi/T].
+    """
+    described = read_robot(robot, overrides)
+    folder = prepared(out)
+    from chilopod.studies import straight_walk
+
+    found = straight_walk(described)
+    result = found.as_json()
+    if folder:
+        save_json(folder / "stability.json", result)
+    if as_json:
+        print_json(result)
+        return
+    verdict = "stable" if found.stable else "unstable"
+    typer.echo(f"{described.name}: the straight walk is {verdict} (period {described.gait.period:g} s)")
+    typer.echo("  exponent (1/s)              |multiplier|   joint angles of the mode, front to rear")
+    for exponent, components in zip(found.exponents.values, found.joint_components, strict=True):
+        multiplier = math.exp(exponent.real * described.gait.period)
+        typer.echo(f"  {_complex(exponent, 6):<26}  {multiplier:<12.6g}   {_components(components)}")
+    typer.echo(f"  multipliers are within {found.exponents.multipliers.error_bound:.1e}")
+
+
+def bifurcation(
+    robot: RobotArg,
+    parameter: ParameterOption,
+    between: BetweenOption,
+    overrides: SetOption = None,
+    as_json: JsonOption = False,
+    out: OutOption = None,
+) -> None:
+    """Every bifurcation of the straight walk as one number of the robot varies, with its error bound and direction."""
+    described = read_robot(robot, overrides)
+    low, high = interval(described, parameter, between)
+    folder = prepared(out)
+    from chilopod.studies import bifurcations
+
+    points = bifurcations(described, parameter, (low, high))
+    result = {"points": [point.as_json() for point in points]}
+    if folder:
+        save_json(folder / "bifurcation.json", result)
+    if as_json:
+        print_json(result)
+        return
+    if not points:
+        typer.echo(
+            f"{described.name}: no bifurcation of the straight walk for {parameter} between {' and '.join(between)}"
+        )
+        return
+    for each in points:
+        point = each.point
+        typer.echo(f"{point.kind.label} at {parameter} = {each.value:.12g} {each.unit} (± {each.error_bound:.1e})")
+        typer.echo(f"  {point.kind.sentence}")
+        if point.criticality is not None:
+            typer.echo(
+                f"  {point.criticality.label}: {point.criticality.sentence} (coefficient {each.coefficient:.6g} /rad^2)"
+            )
+        if point.frequency:
+            typer.echo(f"  {point.frequency:.6g} rad/s, a cycle of {2.0 * math.pi / point.frequency:.4g} s")
+        typer.echo(f"  joint angles of the mode, front to rear: {_components(each.joint_components)}")
+
+
+def _components(components: Iterable[complex]) -> str:
+    return "  ".join(_complex(component, 3) for component in components)
+
+
+def _complex(value: complex, digits: int) -> str:
+    if abs(value.imag) < 1e-9:
+        return f"{value.real:.{digits}g}"
+    return f"{value.real:.{digits}g}{value.imag:+.{digits}g}i"

@@ -1,0 +1,77 @@
+"""The chain of modules seen from above."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import FancyBboxPatch
+from matplotlib.transforms import Affine2D
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+SLIMNESS = 0.36
+"""Width of a drawn module over its length; the robot file has none."""
+
+
+def chain(angles: ArrayLike, length: float) -> tuple[Array, Array, Array]:
+    """Modules of one length with given joint angles, about their mean position and heading.
+
+    Parameters
+    ----------
+    angles
+        Heading of each module less that of the module in front of it, rad, shape (N-1,).
+    length
+        Of a module.
+
+    Returns
+    -------
+    centres, headings, joints
+        Shapes (N, 2), (N,), (N-1, 2).
+    """
+    headings = np.concatenate([[0.0], np.cumsum(np.asarray(angles, dtype=np.float64))])
+    headings -= headings.mean()
+    ahead = 0.5 * length * np.stack([np.cos(headings), np.sin(headings)], axis=-1)
+    centres = np.concatenate([np.zeros((1, 2)), -np.cumsum(ahead[:-1] + ahead[1:], axis=0)])
+    centres -= centres.mean(axis=0)
+    return centres, headings, (centres - ahead)[:-1]
+
+
+def turned_about_tail(centres: Array, headings: Array, joints: Array) -> tuple[Array, Array, Array]:
+    """The same chain with its last module at the origin, pointing along x."""
+    angle = -headings[-1]
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    return (centres - centres[-1]) @ turn.T, headings + angle, (joints - centres[-1]) @ turn.T
+
+
+def draw_modules(axes: Axes, centres: Array, headings: Array, length: float, **look: Any) -> None:
+    """Draw modules as rounded boxes; `look` as for a patch."""
+    gap, width = 0.04 * length, SLIMNESS * length
+    for (x, y), heading in zip(centres, headings, strict=True):
+        box = FancyBboxPatch(
+            (-0.5 * length + gap, -0.5 * width),
+            length - 2.0 * gap,
+            width,
+            boxstyle=f"round,pad=0,rounding_size={0.4 * width}",
+            **look,
+        )
+        box.set_transform(Affine2D().rotate(heading).translate(x, y) + axes.transData)
+        axes.add_patch(box)
+
+
+def draw_joints(axes: Axes, joints: Array, color: str, size: float = 4.0) -> None:
+    """Draw yaw joints as dots."""
+    axes.plot(joints[:, 0], joints[:, 1], "o", color="white", markeredgecolor=color, markersize=size, zorder=4)
+
+
+def draw_heading(axes: Axes, centre: Array, heading: float, length: float, color: str) -> None:
+    """Draw the arrow that says which end is the front."""
+    ahead = np.array([np.cos(heading), np.sin(heading)])
+    axes.annotate(
+        "",
+        tuple(centre + 1.15 * length * ahead),
+        tuple(centre + 0.6 * length * ahead),
+        arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.6, "shrinkA": 0, "shrinkB": 0},
+    )

@@ -1,0 +1,176 @@
+"""The page: everything in one HTML file that needs nothing else."""
+
+from __future__ import annotations
+
+import platform
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from importlib.resources import files
+from typing import Any, Final
+
+from jinja2 import Environment, StrictUndefined
+from markupsafe import Markup
+
+from chilopod import units
+from chilopod.report.panel import Panel
+from chilopod.report.words import listing, minus, spring, typeset
+from chilopod.robot import Robot
+from chilopod.studies import SECTIONS, Results, Row
+
+_TITLE: Final = "The straight walk and where it bends: the paper and the computation"
+_VERDICTS: Final[Mapping[str, tuple[str, str]]] = {
+    "agrees": ("agrees", "✓"),
+    "differs": ("differs", "≠"),
+    "not printed": ("open", "–"),
+}
+_LIBRARIES: Final = ("numpy", "numba", "scipy", "xarray", "matplotlib")
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A figure in both layouts, as SVG."""
+
+    panel: Panel
+    wide: bytes
+    narrow: bytes
+
+
+def page(results: Results, figures: Sequence[Drawn], robot_file: str) -> str:
+    """The page as HTML.
+
+    Parameters
+    ----------
+    results
+        What is shown.
+    figures
+        In the order they are shown.
+    robot_file
+        What to type for this robot on the command line: a preset, or the path of a file.
+    """
+    folder = files("chilopod.report")
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    template = environment.from_string(folder.joinpath("page.html.j2").read_text(encoding="utf-8"))
+    return template.render(
+        title=_TITLE,
+        css=Markup(folder.joinpath("page.css").read_text(encoding="utf-8")),
+        summary=summary(results),
+        rows=[_row(row) for row in results.rows],
+        figures=[_figure(drawn) for drawn in figures],
+        commands=commands(robot_file, results),
+        robot=results.robot.name,
+        numbers=_numbers(results.robot),
+        versions=listing(
+            [f"chilopod {version('chilopod')}", f"Python {platform.python_version()}"]
+            + [f"{name} {version(name)}" for name in _LIBRARIES]
+        ),
+        seconds=", ".join(f"{SECTIONS[name]} {value:.1f}" for name, value in results.seconds.items()),
+    )
+
+
+def summary(results: Results) -> str:
+    """What was found, in a few plain sentences."""
+    data, parts = results.datasets, []
+    parts.append(
+        f"A {results.robot.body.modules}-module robot walks straight as long as the springs between its modules are "
+        "stiff enough. Below a critical stiffness the straight walk cannot hold, and the body bends by itself."
+    )
+    if "mode" in data:
+        found = data["mode"].attrs
+        parts.append(
+            f"Softening the front spring alone, that happens at {spring(found['value'], 5)}: a {found['criticality']} "
+            f"{found['kind']}, and the robot turns left or right."
+        )
+    if "uniform" in data:
+        found = data["uniform"].attrs
+        parts.append(
+            f"Softening all springs together, it happens at {spring(found['value'], 5)} and the body undulates, once "
+            f"in {found['oscillation_period_s']:.1f} s."
+        )
+    counted = {word: sum(row.verdict == word for row in results.rows) for word in _VERDICTS}
+    compared = counted["agrees"] + counted["differs"]
+    if compared:
+        differing = [typeset(row.quantity) for row in results.rows if row.verdict == "differs"]
+        parts.append(
+            f"Of {compared} statements of the paper compared, {counted['agrees']} agree"
+            + (
+                f" and {len(differing)} differ: {listing(differing)}. The reasons are given below."
+                if differing
+                else "."
+            )
+        )
+    return " ".join(parts)
+
+
+def commands(robot: str, results: Results) -> list[dict[str, str]]:
+    """Commands that lead on from here."""
+    soft = 10.0
+    if "mode" in results.datasets:
+        soft = float(f"{0.8 * results.datasets['mode'].attrs['value']:.2g}")
+    quoted = f'"{robot}"' if " " in robot else robot
+    both = '--between "2 N*mm/deg" "75 N*mm/deg"'
+    return [
+        {
+            "why": "See every exponent and its mode just below the critical spring.",
+            "line": f'chilopod stability {quoted} --set "springs.stiffness[0]={soft:g} N*mm/deg"',
+        },
+        {
+            "why": "Find every bifurcation of the front spring, with error bounds and verdicts, as JSON.",
+            "line": f'chilopod bifurcation {quoted} --parameter "springs.stiffness[0]" {both} --json',
+        },
+        {
+            "why": "The same with all springs softened together, at a longer stride.",
+            "line": f'chilopod bifurcation {quoted} --set "gait.stride=4 cm" --parameter springs.stiffness {both}',
+        },
+        {
+            "why": "Fit the constants that the paper does not print once more, on their own.",
+            "line": "chilopod identify planar",
+        },
+        {
+            "why": "Describe a robot of your own, and ask the same of it.",
+            "line": "chilopod robot new my-robot.toml\nchilopod stability my-robot.toml",
+        },
+    ]
+
+
+def _row(row: Row) -> dict[str, str]:
+    kind, mark = _VERDICTS[row.verdict]
+    return {
+        "quantity": typeset(row.quantity),
+        "paper": typeset(row.paper),
+        "computed": typeset(row.computed),
+        "where": row.where,
+        "verdict": row.verdict,
+        "remark": typeset(row.remark),
+        "kind": kind,
+        "mark": mark,
+    }
+
+
+def _figure(drawn: Drawn) -> dict[str, Any]:
+    panel = drawn.panel
+    return {
+        "name": panel.name,
+        "letter": panel.letter,
+        "title": panel.title,
+        "alt": panel.alt,
+        "text": [paragraph for paragraph in panel.text if paragraph],
+        "wide": _embedded(drawn.wide),
+        "narrow": _embedded(drawn.narrow),
+    }
+
+
+def _embedded(svg: bytes) -> str:
+    return "data:image/svg+xml;base64," + b64encode(svg).decode("ascii")
+
+
+def _numbers(robot: Robot) -> list[dict[str, str]]:
+    return [
+        {
+            "path": path,
+            "value": minus(units.format(robot.get(path), robot.unit_of(path), digits=6)).replace("*", "·"),
+            "origin": robot.provenance_of(path) or "not said",
+        }
+        for path in robot.parameters()
+    ]

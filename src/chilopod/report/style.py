@@ -1,0 +1,124 @@
+"""One look for all figures: colours, type, sizes, and how a figure becomes bytes."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, Final
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+# Okabe and Ito (2008), told apart with every common colour vision; its yellow is too pale on white.
+BLACK: Final = "#1a1a1a"
+ORANGE: Final = "#e69f00"
+SKY: Final = "#56b4e9"
+GREEN: Final = "#009e73"
+BLUE: Final = "#0072b2"
+VERMILLION: Final = "#d55e00"
+PURPLE: Final = "#cc79a7"
+GREY: Final = "#767676"
+PALE: Final = "#e8e8e8"
+
+CURVES: Final = (BLUE, GREEN, PURPLE, ORANGE, SKY, GREY)
+"""For curves that are only to be told apart; :data:`VERMILLION` is kept for what loses stability."""
+
+SMALL: Final = 9.0
+"""Size of the smallest text, pt."""
+
+WIDE: Final = 9.0
+NARROW: Final = 3.75
+"""Widths of the two layouts, inches: a page on a screen or on paper, and a phone."""
+
+_RC: Final[Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 10.0,
+    "axes.titlesize": 10.0,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 10.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": BLACK,
+    "axes.labelcolor": BLACK,
+    "axes.axisbelow": True,
+    "text.color": BLACK,
+    "xtick.labelsize": SMALL,
+    "ytick.labelsize": SMALL,
+    "legend.fontsize": SMALL,
+    "legend.frameon": False,
+    "lines.linewidth": 1.8,
+    "grid.color": PALE,
+    "figure.facecolor": "white",
+    "savefig.facecolor": "white",
+    "svg.fonttype": "path",  # looks the same where the font is not installed
+}
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the axes of a figure go.
+
+    Attributes
+    ----------
+    mosaic
+        As :meth:`matplotlib.figure.Figure.subplot_mosaic` takes it, such as ``"AB;CC"``.
+    height
+        Inches.
+    heights, widths
+        Of rows and columns, relative; equal if empty.
+    """
+
+    mosaic: str
+    height: float
+    heights: tuple[float, ...] = ()
+    widths: tuple[float, ...] = ()
+
+
+def figure(wide: Layout, narrow: Layout, is_narrow: bool) -> tuple[Figure, dict[str, Axes]]:
+    """An empty figure and its axes by letter, in one of two layouts."""
+    layout = narrow if is_narrow else wide
+    drawn = Figure(figsize=(NARROW if is_narrow else WIDE, layout.height), layout="constrained")
+    drawn.get_layout_engine().set(w_pad=0.08, h_pad=0.08, wspace=0.02, hspace=0.02)  # type: ignore[union-attr, call-arg]
+    axes = drawn.subplot_mosaic(layout.mosaic, height_ratios=layout.heights or None, width_ratios=layout.widths or None)
+    return drawn, axes
+
+
+@contextmanager
+def house_style() -> Iterator[None]:
+    """Within it figures look alike, whatever the user's matplotlib is set to."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_RC)
+        yield
+
+
+def svg(drawn: Figure, name: str) -> bytes:
+    """The figure as SVG, the same bytes every time."""
+    with mpl.rc_context({"svg.hashsalt": name}):
+        return _saved(drawn, "svg", {"Date": None, "Creator": None})
+
+
+def png(drawn: Figure, dpi: float = 160) -> bytes:
+    """The figure as PNG, the same bytes every time."""
+    return _saved(drawn, "png", {"Software": None}, dpi=dpi)
+
+
+def _saved(drawn: Figure, kind: str, metadata: dict[str, None], dpi: float = 100) -> bytes:
+    stream = io.BytesIO()
+    drawn.savefig(stream, format=kind, metadata=metadata, dpi=dpi)
+    return stream.getvalue()
+
+
+def bare(axes: Axes) -> None:
+    """Turn axes into a drawing: equal scales, no frame, on the left of the space there is, under its title."""
+    axes.set_aspect("equal", anchor="W")
+    axes.axis("off")
+
+
+def grid(axes: Axes, which: str = "both") -> None:
+    """Thin lines to read values by."""
+    axes.grid(True, axis="both" if which == "both" else "x" if which == "x" else "y")

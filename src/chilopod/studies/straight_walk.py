@@ -1,0 +1,197 @@
+"""Stability of the straight walk of a robot, and where it changes with a parameter, in the robot's own terms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod import stability, units
+from chilopod.errors import ParameterError
+from chilopod.planar import PlanarModel
+from chilopod.robot import Robot
+
+ComplexArray = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class StraightWalk:
+    """Stability of the straight walk.
+
+    Attributes
+    ----------
+    robot
+        The robot.
+    exponents
+        Exponents, modes and multipliers of the reduced system, 2N+1 of each.
+    joint_components
+        Joint angles of every mode, shape (2N+1, N-1), see :func:`joint_components`.
+    """
+
+    robot: Robot
+    exponents: stability.Exponents
+    joint_components: ComplexArray
+
+    @property
+    def stable(self) -> bool:
+        """Whether every disturbance dies out."""
+        return self.exponents.multipliers.stable
+
+    def as_json(self) -> dict[str, Any]:
+        """The result as plain numbers; complex ones as [real, imaginary]."""
+        multipliers = self.exponents.multipliers
+        half = multipliers.half_period
+        return {
+            "robot": self.robot.name,
+            "period_s": self.robot.gait.period,
+            "stable": self.stable,
+            "exponents_per_s": _pairs(self.exponents.values),
+            "multipliers": _pairs(multipliers.values),
+            "half_period_multipliers": None if half is None else _pairs(half),
+            "error_estimate": multipliers.error_bound,
+            "modes": [
+                {"exponent": _pair(exponent), "joint_components": _numbers(components)}
+                for exponent, components in zip(self.exponents.values, self.joint_components, strict=True)
+            ],
+        }
+
+
+@dataclass(frozen=True)
+class WalkBifurcation:
+    """A bifurcation of the straight walk as one parameter of the robot changes.
+
+    Attributes
+    ----------
+    point
+        What it is and where, in SI units (see :class:`chilopod.stability.BifurcationPoint`).
+    parameter, unit
+        Dotted path of the parameter and the unit it is shown in.
+    joint_components
+        Joint angles of the critical mode, shape (N-1,), see :func:`joint_components`.
+    coefficient
+        Cubic coefficient per period (1/rad^2) for an amplitude measured along ``joint_components``.
+    """
+
+    point: stability.BifurcationPoint
+    parameter: str
+    unit: str
+    joint_components: ComplexArray
+    coefficient: float | None
+
+    @property
+    def value(self) -> float:
+        """The parameter in ``unit``."""
+        return units.from_si(self.point.value, self.unit)
+
+    @property
+    def error_bound(self) -> float:
+        """Bound on the error of ``value``, in ``unit``."""
+        # The difference of two values, in case a unit had an offset, is what an error is.
+        return abs(units.from_si(self.point.error_bound, self.unit))
+
+    def as_json(self) -> dict[str, Any]:
+        """The result as plain numbers; components are real for a real mode, else [real, imaginary]."""
+        point = self.point
+        return {
+            "kind": point.kind.label,
+            "parameter": self.parameter,
+            "value": self.value,
+            "unit": self.unit,
+            "value_si": point.value,
+            "error_bound_si": point.error_bound,
+            "joint_components": _numbers(self.joint_components),
+            "frequency_rad_s": point.frequency,
+            "criticality": None if point.criticality is None else point.criticality.label,
+            "coefficient": self.coefficient,
+        }
+
+
+def straight_walk(robot: Robot) -> StraightWalk:
+    """Floquet analysis of the straight walk in the planar model."""
+    found = stability.exponents(PlanarModel(robot))
+    components = np.array([joint_components(mode, robot.body.modules) for mode in found.modes.T])
+    return StraightWalk(robot, found, components)
+
+
+def family(robot: Robot, parameter: str) -> Callable[[float], PlanarModel]:
+    """The planar model as a function of one parameter in SI units.
+
+    Raises
+    ------
+    ParameterError
+        If the parameter does not vary continuously.
+    """
+    robot.unit_of(parameter)  # refuses what is no parameter
+    if parameter == "body.modules":
+        raise ParameterError("is a whole number, not a continuous parameter", field="parameter", value=parameter)
+    # Where the symmetry of the gait itself changes, only the full period means the same on both sides.
+    symmetric = parameter != "gait.side_phase"
+    return lambda value: PlanarModel(robot.with_value(parameter, value), use_symmetry=symmetric)
+
+
+def bifurcations(
+    robot: Robot, parameter: str, between: tuple[float, float], normal_form: bool = True
+) -> list[WalkBifurcation]:
+    """Every bifurcation of the straight walk in an interval of a parameter.
+
+    Parameters
+    ----------
+    robot
+        The robot; what it has for ``parameter`` does not matter.
+    parameter
+        Dotted path, such as ``springs.stiffness[0]``; ``springs.stiffness`` moves all springs together.
+    between
+        The interval in SI units, rising.
+    normal_form
+        Whether to compute the coefficients and verdicts.
+
+    Returns
+    -------
+    Points by rising parameter; empty if stability does not change.
+    """
+    make = family(robot, parameter)
+    unit = robot.unit_of(parameter)
+    found = []
+    for point in stability.locate(make, between, normal_form=normal_form):
+        components = joint_components(point.mode, robot.body.modules)
+        # The share of the unit mode that is joint angle turns an amplitude of the one into that of the other.
+        share = float(np.linalg.norm(point.mode[_joints(robot.body.modules)]))
+        coefficient = None if point.coefficient is None else point.coefficient / share**2
+        found.append(WalkBifurcation(point, parameter, unit, components, coefficient))
+    return found
+
+
+def joint_components(mode: ComplexArray, modules: int) -> ComplexArray:
+    """Joint angles of a mode, of unit norm.
+
+    The phase is free: the largest component is made real and positive, except that where all components of a real mode
+    have one sign, that is positive.
+    """
+    part = mode[_joints(modules)]
+    peak = part[np.abs(part).argmax()]
+    norm = np.linalg.norm(part)
+    if norm == 0.0:
+        return part
+    unit: ComplexArray = part / norm * (np.abs(peak) / peak)
+    return unit
+
+
+def _joints(modules: int) -> slice:
+    return slice(3, modules + 2)
+
+
+def _pair(value: complex) -> list[float]:
+    return [float(value.real), float(value.imag)]
+
+
+def _pairs(values: ComplexArray) -> list[list[float]]:
+    return [_pair(value) for value in values]
+
+
+def _numbers(values: ComplexArray) -> list[float] | list[list[float]]:
+    if np.abs(values.imag).max() < 1e-9:
+        return [float(value) for value in values.real]
+    return _pairs(values)

@@ -1,0 +1,180 @@
+"""The report is whole, stands on its own, and says what the datasets hold."""
+
+import base64
+import csv
+import re
+from html.parser import HTMLParser
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from chilopod import load_robot
+from chilopod.errors import OutputError
+from chilopod.report import write_identification, write_report
+from chilopod.report.write import panels
+from chilopod.studies import Results
+
+VOID = {"meta", "link", "img", "source", "br", "hr", "input"}
+
+
+class Page(HTMLParser):
+    """Reads a page, insists that tags close in order, and keeps what the tests ask about."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.tags: list[tuple[str, dict[str, str]]] = []
+        self.text = ""
+        self.feed(html)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, {key: value or "" for key, value in attrs}))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if "style" not in self.open:
+            self.text += data
+
+    def attributes(self, name: str) -> list[str]:
+        return [attrs[name] for _, attrs in self.tags if name in attrs]
+
+
+@pytest.fixture(scope="module")
+def folder(full, tmp_path_factory):
+    where = tmp_path_factory.mktemp("report") / "new"
+    assert write_report(full, where) == where / "index.html"
+    return where
+
+
+@pytest.fixture(scope="module")
+def html(folder) -> str:
+    return (folder / "index.html").read_text(encoding="utf-8")
+
+
+def test_every_figure_has_all_its_files(folder, full):
+    names = ["schematic", "exponents", "variants", "modules", "mode", "uniform", "identification"]
+    assert [panel.name for panel in panels(full)] == names
+    assert sorted(path.name for path in (folder / "figures").iterdir()) == sorted(
+        f"{name}.{kind}" for name in names for kind in ("png", "svg")
+    )
+    for name in names:
+        assert (folder / "figures" / f"{name}.png").read_bytes().startswith(b"\x89PNG\r\n")
+        root = ElementTree.parse(folder / "figures" / f"{name}.svg").getroot()
+        assert root.tag == "{http://www.w3.org/2000/svg}svg"
+
+
+def test_page_stands_on_its_own(folder, html):
+    page = Page(html)
+    for address in page.attributes("src") + page.attributes("srcset"):
+        assert address.startswith("data:image/svg+xml;base64,")
+        ElementTree.fromstring(base64.b64decode(address.partition(",")[2]))
+    for address in page.attributes("href"):
+        assert not re.match(r"(https?:)?//", address)
+        if address.startswith("#"):
+            assert address[1:] in page.attributes("id")
+        elif not address.startswith("data:"):
+            assert (folder / address).is_file()
+    assert "@import" not in html
+    assert "url(" not in html
+    assert "<script" not in html
+
+
+def test_page_is_accessible(html, full):
+    page = Page(html)
+    images = [attrs for tag, attrs in page.tags if tag == "img"]
+    assert len(images) == len(panels(full))
+    assert all(len(attrs["alt"]) > 40 for attrs in images)
+    headings = [tag for tag, _ in page.tags if re.fullmatch("h[1-6]", tag)]
+    assert headings[0] == "h1"
+    assert set(headings[1:]) == {"h2"}
+    assert dict(page.tags[0][1])["lang"] == "en"
+    assert len(set(page.attributes("id"))) == len(page.attributes("id"))
+
+
+def test_page_says_what_was_found(html, full):
+    text = " ".join(Page(html).text.split())
+    assert "12.001 N·mm/deg" in text
+    assert "6.5756 N·mm/deg" in text
+    for name, seconds in full.seconds.items():
+        assert f"{seconds:.1f}" in text, name
+    for path in full.robot.parameters():
+        assert path in text
+        assert full.robot.provenance_of(path) in text
+    assert "a <b> & c" in text
+    assert "−2×10⁻¹⁰ N·mm/deg" in text
+    assert "chilopod bifurcation aoi2022-planar" in text
+    assert "supercritical for 4 modules and subcritical for 6 to 8" in text
+    assert "For 5 modules the straight walk is not lost through a pitchfork" in text
+    assert "≠ differs" in text
+    assert "✓ agrees" in text
+
+
+def test_verdict_that_rounding_leaves_open_is_named(fit):
+    (panel,) = [each for each in panels(Results(fit.best, {"identification": fit.profile}, fit)) if each.letter == "G"]
+    words = " ".join(panel.text)
+    assert "changes within the valley" in words
+    assert "near a forward offset of 46.6 mm" in words
+
+
+@pytest.mark.parametrize("name", ["schematic", "exponents", "variants", "modules", "mode", "uniform", "identification"])
+def test_data_read_back(folder, full, name):
+    (data,) = [panel.data for panel in panels(full) if panel.name == name]
+    per = {str(each): str(each).replace("/", " per ") for each in data.variables}
+    with xr.open_dataset(folder / "data" / f"{name}.nc", engine="h5netcdf") as stored:
+        xr.testing.assert_equal(stored.load(), data.rename(per))
+        for each, new in per.items():
+            assert stored[new].attrs.get("units") == data[each].attrs.get("units")
+        assert {key: stored.attrs[key] for key in data.attrs} == data.attrs
+    lines = (folder / "data" / f"{name}.csv").read_text(encoding="utf-8").splitlines()
+    notes = [line for line in lines if line.startswith("#")]
+    assert notes == [f"# {key} = {value}" for key, value in data.attrs.items()]
+    header, *rows = csv.reader(lines[len(notes) :])
+    expected = data.rename(per).to_dataframe().reset_index()
+    units = {new: data[each].attrs.get("units", "") for each, new in per.items()}
+    assert header == [f"{one} [{units[one]}]" if units.get(one) else one for one in expected.columns]
+    for one, column in zip(expected.columns, zip(*rows, strict=True), strict=True):
+        read = [float(text or "nan") for text in column] if expected[one].dtype.kind == "f" else list(column)
+        values = expected[one].to_numpy()
+        np.testing.assert_array_equal(
+            read, values if expected[one].dtype.kind == "f" else [str(each) for each in values]
+        )
+
+
+def test_only_what_was_asked_for(results, tmp_path):
+    robot = results.robot.set_from_text(["gait.swing=0.3 s"])
+    folder = tmp_path / "a b"
+    page = Page(write_report(Results(robot, {"mode": results.datasets["mode"]}), folder).read_text(encoding="utf-8"))
+    assert {path.stem for path in (folder / "figures").iterdir()} == {"schematic", "mode"}
+    assert [attrs["id"] for tag, attrs in page.tags if tag == "section"] == ["schematic", "mode", "next"]
+    assert "6.5756" not in page.text
+    # It is no preset any more, so commands name the file that goes with the report.
+    assert f'chilopod stability "{folder / "data" / "robot.toml"}"' in page.text
+    assert load_robot(folder / "data" / "robot.toml") == robot
+
+
+def test_same_results_same_bytes(folder, full, tmp_path):
+    write_report(Results(full.robot, {"mode": full.datasets["mode"]}, full.identification), tmp_path)
+    written = [path for path in tmp_path.rglob("*.*") if path.name != "index.html"]
+    assert len(written) == 9
+    for path in written:
+        assert (folder / path.relative_to(tmp_path)).read_bytes() == path.read_bytes(), path.name
+
+
+def test_identification_on_its_own(fit, tmp_path):
+    files = write_identification(fit, tmp_path / "new")
+    assert sorted(path.suffix for path in files) == [".csv", ".nc", ".png", ".svg"]
+    assert all(path.stat().st_size > 300 for path in files)
+
+
+def test_unwritable_folder(results, tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(OutputError, match="file"):
+        write_report(results, tmp_path / "file")

@@ -1,0 +1,174 @@
+"""`chilopod stability` and `chilopod bifurcation` as a user and as a hostile user meet them."""
+
+import json
+
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+from chilopod.cli import main
+
+PRESET = "aoi2022-planar"
+K1 = "springs.stiffness[0]"
+WIDE = ("2 N*mm/deg", "75 N*mm/deg")
+
+
+def call(capsys, *arguments):
+    code = main([str(argument) for argument in arguments])
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+def bifurcation(capsys, *extra, parameter=K1, between=WIDE):
+    return call(capsys, "bifurcation", PRESET, "--parameter", parameter, "--between", *between, *extra)
+
+
+def test_stability_json_has_all_reduced_exponents_by_falling_real_part(capsys):
+    code, out, err = call(capsys, "stability", PRESET, "--json")
+    result = json.loads(out)
+    assert (code, err) == (0, "")
+    assert set(result) == {
+        "robot",
+        "period_s",
+        "stable",
+        "exponents_per_s",
+        "multipliers",
+        "half_period_multipliers",
+        "error_estimate",
+        "modes",
+    }
+    real = [exponent[0] for exponent in result["exponents_per_s"]]
+    assert (
+        len(real) == len(result["multipliers"]) == len(result["half_period_multipliers"]) == len(result["modes"]) == 13
+    )
+    assert real == sorted(real, reverse=True)
+    assert result["stable"] is True
+    assert 0 < result["error_estimate"] < 1e-9
+    for mode in result["modes"]:
+        assert len(mode["joint_components"]) == 5
+
+
+def test_stability_changes_where_the_paper_says(capsys):
+    verdicts = {}
+    for k1 in ("11 N*mm/deg", "13 N*mm/deg"):
+        _, out, _ = call(capsys, "stability", PRESET, "--json", "--set", f"{K1}={k1}")
+        verdicts[k1] = json.loads(out)["stable"]
+    assert verdicts == {"11 N*mm/deg": False, "13 N*mm/deg": True}
+
+
+def test_without_the_symmetry_there_are_no_half_period_multipliers(capsys):
+    code, out, _ = call(capsys, "stability", PRESET, "--json", "--set", "gait.side_phase=150 deg")
+    assert code == 0
+    assert json.loads(out)["half_period_multipliers"] is None
+
+
+def test_bifurcation_json_names_the_pitchfork(capsys):
+    code, out, err = bifurcation(capsys, "--json")
+    (point,) = json.loads(out)["points"]
+    assert (code, err) == (0, "")
+    assert point["kind"] == "pitchfork"
+    assert point["parameter"] == K1
+    assert point["unit"] == "N*mm/deg"
+    assert point["value"] == pytest.approx(12.001, abs=0.002)
+    assert point["value_si"] == pytest.approx(point["value"] * 1e-3 * 57.29577951308232)
+    assert point["joint_components"] == pytest.approx([0.635, 0.358, 0.476, 0.465, 0.163], abs=1e-3)
+    assert sum(component**2 for component in point["joint_components"]) == pytest.approx(1.0)
+    assert 0 < point["error_bound_si"] < 1e-9
+    assert point["criticality"] == "supercritical"
+    assert point["coefficient"] < 0
+    assert point["frequency_rad_s"] == 0
+
+
+def test_uniform_springs_give_the_neimark_sacker_point(capsys):
+    _, out, _ = bifurcation(capsys, "--json", parameter="springs.stiffness", between=("6 N*mm/deg", "7 N*mm/deg"))
+    (point,) = json.loads(out)["points"]
+    assert point["kind"] == "Neimark-Sacker"
+    assert point["value"] == pytest.approx(6.5756, abs=1e-4)
+    assert point["frequency_rad_s"] == pytest.approx(0.5767, abs=1e-4)
+    assert all(len(component) == 2 for component in point["joint_components"])
+
+
+def test_no_crossing_is_an_empty_list_and_it_says_so(capsys):
+    stiff = ("20 N*mm/deg", "75 N*mm/deg")
+    code, out, _ = bifurcation(capsys, "--json", between=stiff)
+    assert code == 0
+    assert json.loads(out) == {"points": []}
+    code, out, _ = bifurcation(capsys, between=stiff)
+    assert code == 0
+    assert "no bifurcation" in out
+
+
+def test_the_symmetry_of_the_gait_itself_may_vary(capsys):
+    code, out, _ = bifurcation(capsys, "--json", parameter="gait.side_phase", between=("170 deg", "190 deg"))
+    assert code == 0
+    assert json.loads(out) == {"points": []}
+
+
+def test_out_holds_what_json_prints(capsys, tmp_path):
+    _, out, err = bifurcation(capsys, "--json", "--out", tmp_path / "new")
+    assert json.loads((tmp_path / "new" / "bifurcation.json").read_text()) == json.loads(out)
+    assert "bifurcation.json" in err
+
+
+@pytest.mark.parametrize(
+    ("parameter", "between", "expected"),
+    [
+        ("springs.stifness[0]", WIDE, "springs.stiffness"),
+        ("springs.stiffness[9]", WIDE, "springs.stiffness"),
+        ("name", WIDE, "name"),
+        ("body.modules", ("3", "9"), "body.modules"),
+        (K1, ("75 N*mm/deg", "2 N*mm/deg"), "between"),
+        (K1, ("2 N*mm/deg", "2 N*mm/deg"), "between"),
+        (K1, ("2 kg", "75 kg"), "2 kg"),
+        (K1, ("nan", "1"), "nan"),
+        (K1, ("-1 N*mm/deg", "75 N*mm/deg"), "stiffness"),
+        (K1, ("", "75 N*mm/deg"), "''"),
+    ],
+)
+def test_bad_input_is_one_line_that_names_it(capsys, parameter, between, expected):
+    code, out, err = bifurcation(capsys, parameter=parameter, between=between)
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+    assert expected in err
+    assert "Traceback" not in err
+
+
+def test_an_unwritable_folder_is_refused_before_any_work(capsys, tmp_path):
+    (tmp_path / "file").write_text("")
+    code, out, err = bifurcation(capsys, "--out", tmp_path / "file" / "below")
+    assert (code, out) == (2, "")
+    assert len(err.splitlines()) == 1
+
+
+def test_an_unknown_section_of_the_report_offers_the_nearest(capsys, tmp_path):
+    code, out, err = call(capsys, "reproduce", "--only", "variant", "--out", tmp_path / "report")
+    assert (code, out) == (2, "")
+    assert "variants" in err
+    assert not (tmp_path / "report").exists()
+
+
+# A hostile user: whatever stands in the arguments, one line and exit code 2, or an answer.
+_TEXTS = st.text(max_size=30)
+_QUANTITIES = st.one_of(
+    _TEXTS,
+    st.floats().map(str),
+    st.builds("{} {}".format, st.floats(), st.sampled_from(["N*mm/deg", "kg", "N*m/rad", "deg", "s", "1/0", "m**9"])),
+)
+_PATHS = st.one_of(
+    _TEXTS,
+    st.sampled_from([K1, "springs.stiffness[-1]", "springs", "twin", "gait.stride", "body.length", "ground.friction"]),
+)
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(parameter=_PATHS, low=_QUANTITIES, high=_QUANTITIES)
+@example(parameter="body.length", low="1e9 m", high="1e10 m")
+@example(parameter=K1, low="1e-12", high="1e9")
+@example(parameter="gait.stride", low="1 um", high="1 km")
+def test_random_arguments_never_end_in_a_traceback(capsys, parameter, low, high):
+    code, out, err = call(capsys, "bifurcation", PRESET, f"--parameter={parameter}", "--between", low, high)
+    assert code in (0, 2)
+    assert "Traceback" not in err
+    if code == 2:
+        assert out == ""
+        assert len(err.splitlines()) == 1
