@@ -20,6 +20,10 @@ import mpmath
 import numpy as np
 from scipy.optimize import brentq, linear_sum_assignment
 
+from chilopod import stability
+from chilopod.planar import PlanarModel
+from chilopod.robot import load_robot
+
 from _timing import duration, machine, median_seconds, table, write_section
 from peer_model import N_MM_PER_DEG, Array, PeerRobot, half_period_map, mirror
 from peers import Map, available
@@ -29,6 +33,7 @@ TOLERANCES = [10.0**-k for k in range(8, 14)]
 SWEEP = np.linspace(5.0, 75.0, 64) * N_MM_PER_DEG
 ROBOT = PeerRobot()
 REST = ROBOT.stiffness[1:]
+ROBOT_FILE = load_robot("aoi2022-planar")
 
 
 @dataclass(frozen=True)
@@ -39,24 +44,30 @@ class Run:
     error: float
 
 
-# ---- chilopod: THE ONLY PART OF THIS FILE THAT USES IT -------------------------------------------------------------
-# Each returns a function without arguments, ready to be timed, or None while the library cannot do it yet.
+# ---- chilopod: the only part of this file that uses it ------------------------------------------------------------
 
 
-def ours(periods: float) -> Callable[[], Array] | None:
-    """Computes the multipliers of the half period (periods = 0.5) or the whole one (1.0), any order."""
-    # TO BE FILLED IN, these three
-    return None
+def ours(periods: float) -> Callable[[], Array]:
+    """Multipliers with their error bound, of the half period (periods = 0.5) or the whole one (1.0)."""
+    model = PlanarModel(ROBOT_FILE, use_symmetry=periods == 0.5)
+    if periods == 0.5:
+        return lambda: stability.multipliers(model).half_period
+    return lambda: stability.multipliers(model).values
 
 
-def ours_sweep(first_springs: Array) -> Callable[[], Array] | None:
-    """Computes the half-period multipliers for each stiffness of the first joint (N*m/rad): shape (values, 13)."""
-    return None
+def first_spring(value: float) -> PlanarModel:
+    return PlanarModel(ROBOT_FILE.with_value("springs.stiffness[0]", value))
 
 
-def ours_pitchfork() -> Callable[[], float] | None:
-    """Locates the pitchfork in the first joint's stiffness, with its error bound; returns the value in N*m/rad."""
-    return None
+def ours_sweep(first_springs: Array) -> Callable[[], Array]:
+    """Half-period multipliers for each stiffness of the first joint (N*m/rad): shape (values, 13)."""
+    return lambda: np.array([each.half_period for each in stability.sweep([first_spring(k) for k in first_springs])])
+
+
+def ours_pitchfork(low: float, high: float, normal_form: bool) -> Callable[[], float]:
+    """The pitchfork between two stiffnesses (N*mm/deg), with error bound, kind and mode; its value in N*m/rad."""
+    between = (low * N_MM_PER_DEG, high * N_MM_PER_DEG)
+    return lambda: stability.locate(first_spring, between, normal_form=normal_form)[-1].value
 
 
 # ---- the reference and the errors against it ----------------------------------------------------------------------
@@ -105,49 +116,42 @@ def best_tolerance(prepare: Callable[[PeerRobot, float, float], Map], periods: f
 # ---- the three tables ---------------------------------------------------------------------------------------------
 
 
-def row(name: str, run: Run | None, fastest: float) -> list[str]:
-    if run is None:
-        return [name, "not yet", "", ""]
+def row(name: str, run: Run, fastest: float) -> list[str]:
     ratio = run.seconds / fastest
     return [name, duration(run.seconds), f"{ratio:.0f}" if ratio > 10 else f"{ratio:.1f}", f"{run.error:.0e}"]
 
 
-def render(title: str, runs: dict[str, Run | None]) -> str:
-    fastest = min(run.seconds for run in runs.values() if run is not None)
-    order = sorted(runs.items(), key=lambda item: item[1].seconds if item[1] else 0.0)
+def render(title: str, runs: dict[str, Run]) -> str:
+    fastest = min(run.seconds for run in runs.values())
+    order = sorted(runs.items(), key=lambda item: item[1].seconds)
     return f"**{title}**\n\n" + table(["who", "time", "ratio", "error"], [row(n, r, fastest) for n, r in order])
 
 
-def measure_multipliers(periods: float) -> tuple[dict[str, Run | None], dict[str, Map]]:
-    runs: dict[str, Run | None] = {"**chilopod**": None}
-    maps: dict[str, Map] = {}
+def measure_multipliers(periods: float) -> tuple[dict[str, Run], dict[str, Map]]:
     call = ours(periods)
-    if call is not None:
-        runs["**chilopod**"] = Run(median_seconds(call), error(call(), exact_multipliers(periods)))
+    runs = {"**chilopod**": Run(median_seconds(call), error(call(), exact_multipliers(periods)))}
+    maps: dict[str, Map] = {}
     for name, prepare in available().items():
         runs[name], maps[name] = best_tolerance(prepare, periods)
     return runs, maps
 
 
-def measure_sweep(maps: dict[str, Map]) -> dict[str, Run | None]:
+def measure_sweep(maps: dict[str, Map]) -> dict[str, Run]:
     checked = (0, 31, 63)
     exact = {i: exact_multipliers(0.5, SWEEP[i]) for i in checked}
-    runs: dict[str, Run | None] = {"**chilopod**": None}
 
     def judged(call: Callable[[], Array]) -> Run:
         found = call()
         wrong = max(error(found[i], exact[i]) for i in checked)
         return Run(median_seconds(call, budget=2.0, at_least=3), wrong)
 
-    call = ours_sweep(SWEEP)
-    if call is not None:
-        runs["**chilopod**"] = judged(call)
+    runs = {"**chilopod**": judged(ours_sweep(SWEEP))}
     for name, compute in maps.items():
         runs[name] = judged(lambda f=compute: np.array([multipliers_of(f, (k, *REST), 0.5) for k in SWEEP]))
     return runs
 
 
-def measure_pitchfork(maps: dict[str, Map]) -> dict[str, Run | None]:
+def measure_pitchfork(maps: dict[str, Map]) -> dict[str, Run]:
     def crossing(multipliers: Callable[[float], Array]) -> float:
         def beyond(k: float) -> float:
             nu = multipliers(k)
@@ -163,16 +167,17 @@ def measure_pitchfork(maps: dict[str, Map]) -> dict[str, Run | None]:
         return np.linalg.eigvals(half_period_map(PeerRobot(stiffness=(k, *REST)), np.longdouble).astype(float))
 
     true = crossing(exact)
-    runs: dict[str, Run | None] = {"**chilopod**": None}
-    call = ours_pitchfork()
-    if call is not None:
-        runs["**chilopod**"] = Run(median_seconds(call), abs(call() / true - 1.0))
+    runs = {}
+    for low, high, normal_form in ((11.0, 13.0, False), (2.0, 75.0, False), (2.0, 75.0, True)):
+        call = ours_pitchfork(low, high, normal_form)
+        name = f"**chilopod**, {low:g} to {high:g}, error bound{', verdict' if normal_form else ''}"
+        runs[name] = Run(median_seconds(call), abs(call() / true - 1.0))
     for name, compute in maps.items():
 
         def locate(f: Map = compute) -> float:
             return crossing(lambda k: multipliers_of(f, (k, *REST), 0.5))
 
-        runs[f"{name}, brentq"] = Run(median_seconds(locate, at_least=3), abs(locate() / true - 1.0))
+        runs[f"{name}, brentq, 11 to 13"] = Run(median_seconds(locate, at_least=3), abs(locate() / true - 1.0))
     return runs
 
 
