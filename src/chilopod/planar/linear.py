@@ -184,7 +184,7 @@ def steps(widths: Array, decay: Array, frequency: float) -> float:
 
 
 @njit
-def _propagate(widths: Any, upper: Any, decay: Any, frequency: float, state: Any) -> tuple[float, int]:
+def _propagate(widths: Any, upper: Any, decay: Any, frequency: float, clock: float, state: Any) -> tuple[float, int]:
     """Carry one panel of columns through all intervals, in place; returns (error, orders).
 
     ``state`` has 2N+1 rows and then zeros, up to a multiple of ROWS. The error bounds that of the largest entry of the
@@ -229,10 +229,13 @@ def _propagate(widths: Any, upper: Any, decay: Any, frequency: float, state: Any
                 reach[i] = 0.0
                 for q in range(PANEL - 1):
                     reach[i] = max(reach[i], abs(state[i, q]))
+            # What a step's length multiplies is rounded with it; at a switch, with the clock.
+            rounded = 1.0 if part > 0 else 1.0 + clock / (_CARRIED * h)
             for i in range(n):
                 size = reach[i]
                 for j in range(n):
-                    size += abs(block[i, j]) * reach[j]
+                    entry = abs(block[i, j] - (shift if i == j else 0.0))
+                    size += (rounded * entry + (shift if i == j else 0.0)) * reach[j]
                 bits = (bits * 1103515245 + 12345) & 0x7FFFFFFF
                 state[i, PANEL - 1] += _ROUND_OFF * (size if bits & 0x10000 else -size)
             at = (_KEPT - 3) * rows
@@ -265,7 +268,9 @@ def _propagate(widths: Any, upper: Any, decay: Any, frequency: float, state: Any
 
 
 @njit
-def _propagate_all(widths: Any, upper: Any, decay: Any, frequency: float, matrix: Any) -> tuple[float, int]:
+def _propagate_all(
+    widths: Any, upper: Any, decay: Any, frequency: float, clock: float, matrix: Any
+) -> tuple[float, int]:
     """Carry the columns of ``matrix`` (2N+1, 2N+1) through all intervals, in place, panel by panel."""
     n = matrix.shape[0]
     error = 0.0
@@ -275,7 +280,7 @@ def _propagate_all(widths: Any, upper: Any, decay: Any, frequency: float, matrix
         last = min(first + PANEL - 1, n)
         state[:] = 0.0
         state[:n, : last - first] = matrix[:, first:last]
-        e, k = _propagate(widths, upper, decay, frequency, state)
+        e, k = _propagate(widths, upper, decay, frequency, clock, state)
         error = max(error, e)
         orders += k
         matrix[:, first:last] = state[:n, : last - first]
@@ -283,13 +288,18 @@ def _propagate_all(widths: Any, upper: Any, decay: Any, frequency: float, matrix
 
 
 @parallel_njit
-def propagate_batch(widths: Any, upper: Any, decay: Any, frequency: Any, matrices: Any, errors: Any) -> None:
-    """:func:`propagate` for many robots with the same gait, on all cores: all but ``widths`` have robots in front."""
+def propagate_batch(
+    widths: Any, upper: Any, decay: Any, frequency: Any, clock: float, matrices: Any, errors: Any
+) -> None:
+    """:func:`propagate` for many robots with the same gait, on all cores: all but ``widths`` and ``clock`` have robots
+    in front."""
     for r in numba.prange(matrices.shape[0]):
-        errors[r] = _propagate_all(widths, upper[r], decay[r], frequency[r], matrices[r])[0]
+        errors[r] = _propagate_all(widths, upper[r], decay[r], frequency[r], clock, matrices[r])[0]
 
 
-def propagate(widths: Array, upper: Array, decay: Array, frequency: float, matrix: Array) -> tuple[float, int]:
+def propagate(
+    widths: Array, upper: Array, decay: Array, frequency: float, clock: float, matrix: Array
+) -> tuple[float, int]:
     """Multiply ``matrix`` from the left by the fundamental matrix over all intervals, in place.
 
     Parameters
@@ -302,6 +312,8 @@ def propagate(widths: Array, upper: Array, decay: Array, frequency: float, matri
         Fastest decay in every interval, 1/s, shape (intervals,); it need not be exact.
     frequency
         Highest frequency at which the springs ring, 1/s; likewise.
+    clock
+        The largest time that went into the widths, s: they are rounded to some eps of it.
     matrix
         Shape (2N+1, 2N+1).
 
@@ -309,5 +321,5 @@ def propagate(widths: Array, upper: Array, decay: Array, frequency: float, matri
     -------
     The bound on the error of the largest entry, and the number of Taylor orders computed.
     """
-    error, orders = _propagate_all(widths, upper, decay, frequency, matrix)
+    error, orders = _propagate_all(widths, upper, decay, frequency, clock, matrix)
     return float(error), int(orders)

@@ -75,7 +75,17 @@ def brackets(function: Callable[[Array], Array], low: float, high: float) -> lis
         found += changes + [(p, p) for p in exact]
     unique = sorted(set(found))
     # A zero on the border of two pieces is an end of both.
-    return [pair for i, pair in enumerate(unique) if i == 0 or pair[0] != pair[1] or pair[0] > unique[i - 1][1]]
+    once = [pair for i, pair in enumerate(unique) if i == 0 or pair[0] != pair[1] or pair[0] > unique[i - 1][1]]
+    return [pair for pair in once if pair[0] != pair[1] or _crosses(function, pair[0], low, high)]
+
+
+def _crosses(function: Callable[[Array], Array], zero: float, low: float, high: float) -> bool:
+    """Whether the function changes sign at a zero that was met exactly, or may do so just outside the interval."""
+    reach = 1e-9 * (high - low)
+    if zero - low < reach or high - zero < reach:
+        return True
+    before, after = function(np.array([zero - reach, zero + reach]))
+    return bool(before * after < 0.0)
 
 
 def _roots(coefficients: Array) -> tuple[Array, Array]:
