@@ -5,7 +5,7 @@ from math import exp, pi
 import numpy as np
 import pytest
 
-from chilopod.errors import AnalysisError, ParameterError
+from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.stability import PeriodicSystem, SystemLike, exponents, find_orbit, locate, multipliers, sweep
 
 
@@ -171,3 +171,12 @@ def test_results_are_immutable():
     found = multipliers(Own(), [1.0, 1.0])
     with pytest.raises(AttributeError):
         found.error_bound = 0.0
+
+
+@pytest.mark.parametrize("guess", ["text", [1.0, 2.0], [np.nan], None])
+def test_a_guess_that_is_no_state_is_one_line(guess):
+    system = PeriodicSystem(1, 1.0, lambda x, t0, t1: (x, np.eye(1)))
+    with pytest.raises(ChilopodError) as error:
+        multipliers(system, guess)
+    assert str(error.value).startswith("orbit")
+    assert "\n" not in str(error.value)

@@ -63,7 +63,7 @@ def locate(
         If the orbit cannot be followed through the interval.
     """
     low, high = _interval(between)
-    samples = Samples(family, None if orbit is None else np.asarray(orbit, dtype=np.float64), low, high)
+    samples = Samples(family, orbit, low, high)
     points = []
     if low < samples.end:
         # Over decades a parameter acts by its logarithm.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.stability.fold import Fold, find_fold
@@ -62,7 +62,7 @@ class Samples:
         The fold it ends in, if it does.
     """
 
-    def __init__(self, family: Family, guess: Array | None, low: float, high: float) -> None:
+    def __init__(self, family: Family, guess: ArrayLike | None, low: float, high: float) -> None:
         self.family = family
         self._known = guess is None
         self._by_value: dict[float, Sample] = {}
@@ -87,7 +87,7 @@ class Samples:
         self._by_value[sample.value] = sample
         bisect.insort(self._values, sample.value)
 
-    def _sampled(self, value: float, near: Array) -> Sample:
+    def _sampled(self, value: float, near: ArrayLike) -> Sample:
         orbit, image = find_orbit(self.family(value), near, with_error=False)
         return Sample(value, orbit, image)
 
@@ -104,7 +104,7 @@ class Samples:
                 raise
             return reached[-1]
 
-    def _followed(self, guess: Array, low: float, high: float) -> tuple[float, Fold | None]:
+    def _followed(self, guess: ArrayLike, low: float, high: float) -> tuple[float, Fold | None]:
         """Follow the orbit from the lower end; where it gets to, and the fold it ends in before the upper end."""
         samples = [self._sampled(low, guess)]
         self._keep(samples[0])

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.stability.arguments import finite_array
 
 Array = NDArray[np.float64]
 
@@ -307,9 +308,7 @@ def find_orbit(system: SystemLike, guess: ArrayLike | None = None, with_error: b
     """
     if guess is None:
         return _known_return(system, with_error)
-    x = np.array(guess, dtype=np.float64)
-    if x.shape != (system.dimension,):
-        raise ParameterError("has the wrong shape", field="orbit", value=x.shape, allowed=f"({system.dimension},)")
+    x = finite_array(guess, (system.dimension,), "orbit")
     best = np.inf
     for step in range(15):
         image = return_map(system, x, with_error=False)
