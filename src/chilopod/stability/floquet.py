@@ -98,7 +98,8 @@ class Spectrum:
 def spectrum(image: ReturnMap) -> Spectrum:
     """Eigenvalues of a return map with their condition."""
     values, right = np.linalg.eig(image.jacobian)
-    order = np.lexsort((-values.imag, -np.abs(values)))
+    # The two of a conjugate pair have one modulus but for round-off: positive frequency first.
+    order = np.lexsort((-values.imag, -np.round(np.abs(values), 12)))
     values, right = values[order].astype(np.complex128), right[:, order].astype(np.complex128)
     try:
         left = np.linalg.inv(right).conj().T
