@@ -263,11 +263,10 @@ def test_a_right_hand_side_that_is_not_finite_ends(bad, compiled):
             multipliers(system)
 
 
-@pytest.mark.parametrize("guess", [[10.0, 0.0], [np.nan, 0.0]])
-def test_a_motion_that_diverges_is_one_line(guess):
+def test_a_motion_that_diverges_is_one_line():
     system = from_rhs(lambda t, x: [x[0] * x[0], -x[1]], 2, 1.0)
     with pytest.raises(AnalysisError) as error:
-        multipliers(system, guess)
+        multipliers(system, [10.0, 0.0])
     assert "\n" not in str(error.value)
 
 

@@ -68,13 +68,15 @@ def locate(
     if low < samples.end:
         # Over decades a parameter acts by its logarithm.
         inward, outward = (np.log, np.exp) if low > 0.0 and samples.end > _DECADES * low else (_same, _same)
+        tests = _Tests(samples)
         for event in (_MINUS, _PLUS, _PAIR):
 
             def test(places: Array, event: int = event) -> Array:
-                values = np.clip(outward(places), low, samples.end)
-                return np.array([_test(sample, event) for sample in samples.at(values)])
+                return tests.at(np.clip(outward(places), low, samples.end), event)
 
             for a, b in brackets(test, float(inward(low)), float(inward(samples.end))):
+                if event == _PAIR and not _pair_near(samples, float(outward(a)), float(outward(b))):
+                    continue
                 root = min(max(float(outward(a if a == b else _root(test, a, b))), low), samples.end)
                 point = _describe(samples, root, event, high - low, normal_form)
                 points += [point] if point else []
@@ -101,22 +103,58 @@ def _root(test: Callable[[Array], Array], a: float, b: float) -> float:
     return float(brentq(lambda v: test(np.array([v]))[0], a, b, xtol=1e-300, rtol=4 * np.finfo(float).eps, maxiter=200))
 
 
-def _test(sample: Sample, event: int) -> float:
-    """A function that is analytic in the parameter, of moderate size, and changes sign at the event.
+def _pair_near(samples: Samples, a: float, b: float) -> bool:
+    """Whether a complex pair may be on the circle between two values of the parameter that are close together.
 
-    det(H' + 1), det(H' - 1), or the bialternate product (a pair on the circle has product 1; over all pairs), over a
-    power of det(1 + H'^T H') that keeps it bounded however much H' stretches.
+    The bialternate product also vanishes where two real multipliers have product 1.
     """
-    nu = sample.multipliers
-    if event == _PAIR:
-        first, second = _pairs(nu.size)
-        factors, power = nu[first] * nu[second] - 1.0, nu.size - 1
-    else:
-        factors, power = nu - event, 1
+    one, other = (np.linalg.eigvals(sample.image.jacobian) for sample in samples.at(np.array([a, b])))
+    moved = np.abs(one[:, None] - other).min(axis=1)
+    distance = np.abs(np.abs(one) - 1.0)
+    return bool((distance <= _CRITICAL + 4.0 * moved)[(np.abs(one.imag) > 0.0) | (moved > 1e-3)].any())
+
+
+class _Tests:
+    """Functions of the parameter that are analytic, of moderate size, and change sign at an event.
+
+    det(H' + 1), det(H' - 1), and the bialternate product (a pair on the circle has product 1; over all pairs), over a
+    power of det(1 + H'^T H') that keeps them bounded however much H' stretches.
+    """
+
+    def __init__(self, samples: Samples) -> None:
+        self._samples = samples
+        self._known: dict[float, dict[int, float]] = {}
+
+    def at(self, values: Array, event: int) -> Array:
+        """The function of an event at some values of the parameter."""
+        missing = np.unique([value for value in values.tolist() if value not in self._known])
+        if missing.size:
+            self._compute(missing)
+        return np.array([self._known[value][event] for value in values.tolist()])
+
+    def _compute(self, values: Array) -> None:
+        jacobians = np.stack([sample.image.jacobian for sample in self._samples.at(values)])
+        n = jacobians.shape[-1]
+        nu = np.linalg.eigvals(jacobians).astype(np.complex128)
+        stretch = 0.5 * np.linalg.slogdet(np.eye(n) + np.swapaxes(jacobians, 1, 2) @ jacobians)[1]
+        first, second = _pairs(n)
+        found = {
+            _MINUS: _bounded(nu + 1.0, stretch),
+            _PLUS: _bounded(nu - 1.0, stretch),
+            _PAIR: _bounded(nu[:, first] * nu[:, second] - 1.0, (n - 1) * stretch),
+        }
+        for index, value in enumerate(values.tolist()):
+            self._known[value] = {event: float(results[index]) for event, results in found.items()}
+
+
+def _bounded(factors: NDArray[np.complex128], log_size: Array) -> Array:
+    """Products of the rows of ``factors``, which are real, over exp(log_size)."""
+    sizes = np.abs(factors)
     with np.errstate(divide="ignore"):
-        magnitude = np.log(np.abs(factors)).sum() - power * sample.log_stretch
-    sign = np.prod(factors / np.where(factors == 0.0, 1.0, np.abs(factors))).real
-    return float(np.sign(sign) * np.exp(magnitude))
+        magnitude = np.exp(np.log(sizes).sum(axis=1) - log_size)
+    signs = np.prod(factors / np.where(sizes == 0.0, 1.0, sizes), axis=1).real
+    result: Array = np.sign(signs) * magnitude
+    return result
 
 
 @cache

@@ -5,7 +5,6 @@ from __future__ import annotations
 import bisect
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,17 +28,6 @@ class Sample:
     value: float
     orbit: Array
     image: ReturnMap
-
-    @cached_property
-    def multipliers(self) -> NDArray[np.complex128]:
-        """Eigenvalues of the return map, in any order."""
-        return np.linalg.eigvals(self.image.jacobian).astype(np.complex128)
-
-    @cached_property
-    def log_stretch(self) -> float:
-        """ln det(1 + H'^T H') / 2: how much the return map stretches at most."""
-        jacobian = self.image.jacobian
-        return float(0.5 * np.linalg.slogdet(np.eye(len(jacobian)) + jacobian.T @ jacobian)[1])
 
 
 class Samples:

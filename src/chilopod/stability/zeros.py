@@ -72,11 +72,28 @@ def brackets(function: Callable[[Array], Array], low: float, high: float) -> lis
         if len(changes) + len(exact) != inside.size and not finest:
             stack += [(middle, b), (a, middle)]
             continue
+        if changes and not exact and len(changes) == inside.size:
+            slopes = chebyshev.chebval(inside, chebyshev.chebder(coefficients))
+            changes = _narrowed(function, changes, middle + half * inside, _CLEAR * half * uncertain / np.abs(slopes))
         found += changes + [(p, p) for p in exact]
     unique = sorted(set(found))
     # A zero on the border of two pieces is an end of both.
     once = [pair for i, pair in enumerate(unique) if i == 0 or pair[0] != pair[1] or pair[0] > unique[i - 1][1]]
     return [pair for pair in once if pair[0] != pair[1] or _crosses(function, pair[0], low, high)]
+
+
+def _narrowed(
+    function: Callable[[Array], Array], changes: list[tuple[float, float]], roots: Array, reach: Array
+) -> list[tuple[float, float]]:
+    """Brackets cut down to what the polynomial may be wrong by, where the function changes sign there."""
+    reach = np.maximum(reach, 1e-13 * np.abs(roots))
+    left = np.maximum(roots - reach, [p for p, _ in changes])
+    right = np.minimum(roots + reach, [q for _, q in changes])
+    before, after = np.split(function(np.concatenate([left, right])), 2)
+    return [
+        (float(a), float(b)) if u * v < 0.0 and a < b else change
+        for change, a, b, u, v in zip(changes, left, right, before, after, strict=True)
+    ]
 
 
 def _crosses(function: Callable[[Array], Array], zero: float, low: float, high: float) -> bool:
