@@ -70,7 +70,8 @@ def test_constant_coefficients_seen_from_a_turning_frame(case):
     assert distance(found.values, known) <= found.error_bound + slack
     if np.linalg.cond(np.linalg.eig(matrix)[1]) < 100:  # a bound that is no use would be none
         assert found.error_bound < 1e-9 * max(1.0, np.linalg.norm(system.flow(np.zeros(n), 0.0, 2 * pi)[1]))
-    assert (np.diff(np.abs(found.values)) <= 1e-15 * np.abs(found.values[0])).all()
+    # By falling modulus; what differs by round-off only is equal.
+    assert (np.diff(np.abs(found.values)) <= 2e-12 * np.abs(found.values[0])).all()
     assert found.stable == bool((np.abs(found.values) < 1 - found.error_bound).all())
 
 

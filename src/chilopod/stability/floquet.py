@@ -98,8 +98,9 @@ class Spectrum:
 def spectrum(image: ReturnMap) -> Spectrum:
     """Eigenvalues of a return map with their condition."""
     values, right = np.linalg.eig(image.jacobian)
-    # The two of a conjugate pair have one modulus but for round-off: positive frequency first.
-    order = np.lexsort((-values.imag, -np.round(np.abs(values), 12)))
+    # Moduli that differ by round-off are equal; the two of a pair stand together, positive frequency first.
+    sizes = np.round(np.abs(values) / max(float(np.abs(values).max()), 1e-300), 12)
+    order = np.lexsort((-values.imag, -np.round(np.abs(values.imag), 12), -sizes))
     values, right = values[order].astype(np.complex128), right[:, order].astype(np.complex128)
     try:
         left = np.linalg.inv(right).conj().T
