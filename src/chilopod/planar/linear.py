@@ -159,12 +159,17 @@ def _solve(matrix: Any, right: Any) -> Array:
     return rounded
 
 
-@njit(fastmath={"nnan", "ninf", "nsz", "reassoc"})  # a maximum may then be taken eight at a time
+@njit(fastmath=True)
 def _largest(rows: Any) -> float:
-    size = 0.0
+    # Column by column first: sixteen maxima side by side are vector operations, one after the other they are not.
+    sizes = np.zeros(PANEL)
     for i in range(rows.shape[0]):
         for q in range(PANEL):
-            size = max(size, abs(rows[i, q]))
+            value = abs(rows[i, q])
+            sizes[q] = value if value > sizes[q] else sizes[q]
+    size = 0.0
+    for q in range(PANEL):
+        size = sizes[q] if sizes[q] > size else size
     return size
 
 
