@@ -16,6 +16,7 @@ import functools
 from collections.abc import Callable
 from typing import Any
 
+import numba
 import numpy as np
 from scipy.integrate import DOP853
 
@@ -43,14 +44,19 @@ def _size(value: Any) -> float:
 
 
 @functools.cache
-def integrator(rhs: Callable[..., None]) -> Callable[..., tuple[float, bool]]:
+def integrator(rhs: Callable[..., None], on_disk: bool = True) -> Callable[..., tuple[float, bool]]:
     """The compiled integrator of one right-hand side (numba keeps it on disk, which it cannot for a function argument).
 
-    Args:
-        rhs: compiled function ``rhs(t, x, args, out)`` that writes ``dx/dt`` into ``out``; smooth between ``t0`` and
-        ``t1``.
+    Parameters
+    ----------
+    rhs
+        Compiled function ``rhs(t, x, args, out)`` that writes ``dx/dt`` into ``out``; smooth between ``t0`` and ``t1``.
+    on_disk
+        Whether to keep the compiled code on disk. Not for a function made at run time: its code would never be found
+        again, and leave a file behind at every run.
 
-    Returns:
+    Returns
+    -------
         ``integrate(args, x, t0, t1, h, tolerance, work) -> (h, reached)``, which advances ``x`` in place:
 
         - args: passed through to ``rhs``;
@@ -63,7 +69,7 @@ def integrator(rhs: Callable[..., None]) -> Callable[..., tuple[float, bool]]:
         - reached: whether ``t1`` was reached.
     """
 
-    @njit
+    @(njit if on_disk else numba.njit)
     def integrate(args: Any, x: Any, t0: float, t1: float, h: float, tolerance: float, work: Any) -> tuple[float, bool]:
         n = x.size
         k = work[:13]

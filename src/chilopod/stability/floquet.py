@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.stability.splitting import split_product
-from chilopod.stability.system import ReturnMap, SystemLike, find_orbit, halves, return_map, return_maps
+from chilopod.stability.system import ReturnMap, SystemLike, find_orbit, halves, return_maps
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -196,6 +196,3 @@ def _factors(system: SystemLike, x: Array) -> list[Array]:
     if system.symmetry is not None:
         factors[-1] = system.symmetry @ factors[-1]
     return factors
-
-
-__all__ = ["Exponents", "Multipliers", "Spectrum", "exponents", "multipliers", "return_map", "spectrum", "sweep"]

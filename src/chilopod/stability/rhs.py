@@ -310,7 +310,7 @@ def _compiled_advance(rhs: Any) -> Callable[..., bool]:
         for i in range(x.size):
             out[i] = slope[i]
 
-    integrate = integrator(inside)
+    integrate = integrator(inside, on_disk=False)
 
     @numba.njit
     def advance(batch: Any, a: float, b: float, low: float, high: float, tolerance: float, own: Any) -> bool:
