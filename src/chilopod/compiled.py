@@ -29,6 +29,9 @@ _drop_stale()
 njit = functools.partial(numba.njit, cache=True)
 """``numba.njit`` with the compiled code kept on disk."""
 
+fused_njit = functools.partial(numba.njit, cache=True, fastmath={"contract"})
+"""The same where a product and a sum may become one instruction with one rounding: not for exact error terms."""
+
 parallel_njit = functools.partial(numba.njit, cache=True, parallel=True)
 """The same for loops over ``prange``: one robot an iteration, so the answer does not depend on the number of
 threads."""

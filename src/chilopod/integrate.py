@@ -20,7 +20,7 @@ import numba
 import numpy as np
 from scipy.integrate import DOP853
 
-from chilopod.compiled import njit
+from chilopod.compiled import fused_njit, njit
 
 COMPLEX_STEP = 1e-40
 """Size of the imaginary perturbation; products of two of them underflow harmlessly."""
@@ -69,7 +69,7 @@ def integrator(rhs: Callable[..., None], on_disk: bool = True) -> Callable[..., 
         - reached: whether ``t1`` was reached.
     """
 
-    @(njit if on_disk else numba.njit)
+    @(fused_njit if on_disk else numba.njit(fastmath={"contract"}))
     def integrate(args: Any, x: Any, t0: float, t1: float, h: float, tolerance: float, work: Any) -> tuple[float, bool]:
         n = x.size
         k = work[:13]

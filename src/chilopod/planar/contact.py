@@ -1,52 +1,91 @@
-"""What the stance feet of a module do to it, boiled down to four numbers.
+"""What the stance feet of a module do to it, boiled down to eight numbers.
 
-A viscous foot at (X, Y) in the frame of its module pushes with minus ``friction`` times its velocity relative to the
-floor, so the force and moment of all stance feet of a module depend on them only through four sums, the *contact
-moments*::
+A viscous foot pushes with minus its friction coefficient c times its velocity relative to the floor. Between two
+switching instants every stance foot moves straight back at the speed v of the gait: its place in the frame of its
+module (x ahead of the centre, y to the left of the axis) is ``p - v t d``, where the direction ``d`` is straight ahead,
+``(1, 0)``, unless the leg's yaw turns it by ``e = d - (1, 0)``. Force and moment of all stance feet of a module then
+depend on them only through eight sums, the *contact moments* at the start of the interval::
 
-    [sum c,  sum c X,  sum c Y,  sum c (X^2 + Y^2)]
+    [sum c,  sum c px,  sum c py,  sum c |p|^2,  sum c ex,  sum c ey,  sum c p.d,  sum c p x e]
 
-with X measured ahead of the module's centre and Y to its left. Between two switching instants every stance foot moves
-back at the same constant speed v, so X falls as X0 - v t and the moments at time t follow from those at the start of
-the interval.
+With straight legs the fifth, sixth and eighth are zero, which keeps the straight walk straight to the last bit.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from chilopod.compiled import njit
 
 if TYPE_CHECKING:
     from chilopod.gait import Schedule
 
 Array = NDArray[np.float64]
 
+C_SUM, C_X, C_Y, C_PP, C_EX, C_EY, C_PD, C_PXE = range(8)
+MOMENTS = 8
 
-def contact_moments(forward_offset: float, half_width: float, friction: float, schedule: Schedule) -> Array:
-    """Contact moments at the start of every interval of ``schedule``.
+
+@njit
+def sum_moments(
+    contact: Any,
+    stroke: Any,
+    friction: Any,
+    forward_offset: float,
+    half_width: float,
+    yaw: Any,
+    out: Any,
+) -> None:
+    """Contact moments of every module at one instant.
 
     Parameters
     ----------
+    contact, stroke
+        Whether each foot stands, and where it is ahead of mid-stroke (m), shape (N, 2).
+    friction
+        Of every foot, N*s/m, shape (N, 2).
     forward_offset, half_width
         Foot at mid-stroke, ahead of the module's centre and to the side of its axis, m.
-    friction
-        Of a foot, N*s/m.
+    yaw
+        Of the two legs of module 1 about their feet at mid-stroke, left positive, rad, shape (2,).
+    out
+        Shape (N, 8): N*s/m, N*s, N*s, N*m*s, N*s/m, N*s/m, N*s, N*s.
+    """
+    for i in range(contact.shape[0]):
+        for column in range(MOMENTS):
+            out[i, column] = 0.0
+        for side in range(2):
+            if not contact[i, side]:
+                continue
+            ex, ey = 0.0, 0.0
+            if i == 0:
+                ex, ey = -2.0 * np.sin(0.5 * yaw[side]) ** 2, np.sin(yaw[side])
+            x = forward_offset + stroke[i, side] * (1.0 + ex)
+            y = (half_width if side == 0 else -half_width) + stroke[i, side] * ey
+            c = friction[i, side]
+            out[i, C_SUM] += c
+            out[i, C_X] += c * x
+            out[i, C_Y] += c * y
+            out[i, C_PP] += c * (x * x + y * y)
+            out[i, C_EX] += c * ex
+            out[i, C_EY] += c * ey
+            out[i, C_PD] += c * (x * (1.0 + ex) + y * ey)
+            out[i, C_PXE] += c * (x * ey - y * ex)
+
+
+def contact_moments(forward_offset: float, half_width: float, friction: float, schedule: Schedule) -> Array:
+    """Contact moments at the start of every interval of ``schedule``, all legs straight and all feet alike.
 
     Returns
     -------
-    Shape (intervals, modules, 4): N*s/m, N*s, N*s, N*m*s.
+    Shape (intervals, modules, 8); units as in :func:`sum_moments`.
     """
-    ahead = forward_offset + schedule.stroke
-    side = half_width * np.array([1.0, -1.0])
-    weight = friction * schedule.contact
-    return np.stack(
-        [
-            weight.sum(-1),
-            (weight * ahead).sum(-1),
-            (weight * side).sum(-1),
-            (weight * (ahead**2 + side**2)).sum(-1),
-        ],
-        axis=-1,
-    )
+    intervals, modules, _ = schedule.contact.shape
+    out = np.empty((intervals, modules, MOMENTS))
+    each, straight = np.full((modules, 2), friction), np.zeros(2)
+    for s in range(intervals):
+        sum_moments(schedule.contact[s], schedule.stroke[s], each, forward_offset, half_width, straight, out[s])
+    return out

@@ -19,18 +19,18 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
-from chilopod.compiled import njit
+from chilopod.compiled import fused_njit
+from chilopod.dual import cos_sin, reciprocal
+from chilopod.planar.contact import C_EX, C_EY, C_PD, C_PP, C_PXE, C_SUM, C_X, C_Y
 
 # Rows of ``args[0]``, the scalars of a robot.
 LENGTH, MASS, INERTIA, SPEED = range(4)
 
-# Columns of the contact moments, see ``contact.py``.
-C_SUM, C_X, C_Y, C_XX = range(4)
+SCRATCH = 10
+"""Numbers per module that the right-hand side keeps."""
 
 
-@njit
+@fused_njit
 def rhs(t: float, x: Any, args: Any, out: Any) -> None:
     """Write dx/dt of one robot into ``out``.
 
@@ -42,7 +42,7 @@ def rhs(t: float, x: Any, args: Any, out: Any) -> None:
         Reduced state, shape (2N+1,), real or complex; or with the pose behind it, shape (2N+4,).
     args
         ``(scalars, stiffness, damping, moments, scratch)``: scalars (4,); N*m/rad and N*m*s/rad, shape (N-1,);
-        contact moments at t = 0, shape (N, 4); scratch (N, 10), the dtype of ``x``.
+        contact moments at t = 0, shape (N, 8); scratch (N, SCRATCH), the dtype of ``x``.
     out
         The shape of ``x``.
     """
@@ -54,22 +54,20 @@ def rhs(t: float, x: Any, args: Any, out: Any) -> None:
     speed = scalars[SPEED]
     travel = speed * t
 
-    # Headings (relative to module 1), rates and velocities, head to tail, all in module 1's frame.
-    # Columns of work: cos, sin, rate, vx, vy | hx, hy, j, bias torque, joint torque.
-    angle = x[0] * 0.0
+    # Directions (relative to module 1), rates and velocities, head to tail, all in module 1's frame.
+    # Columns of work: cos, sin, rate, vx, vy | hx, hy, 1/j, bias torque, joint torque.
     rate = x[2]
     vx = x[0]
     vy = x[1]
-    c = angle + 1.0
-    s = angle
+    s = x[0] * 0.0
+    c = s + 1.0
     for i in range(n):
         if i > 0:
             vx += half * rate * s  # to the rear joint of the module in front: v + w x (-half e)
             vy -= half * rate * c
-            angle += x[2 + i]
             rate += x[n + 1 + i]
-            c = np.cos(angle)
-            s = np.sin(angle)
+            bend_c, bend_s = cos_sin(x[2 + i])
+            c, s = c * bend_c - s * bend_s, s * bend_c + c * bend_s
             vx += half * rate * s
             vy -= half * rate * c
         work[i, 0] = c
@@ -90,16 +88,20 @@ def rhs(t: float, x: Any, args: Any, out: Any) -> None:
         c = work[i, 0]
         s = work[i, 1]
         rate = work[i, 2]
-        # Viscous feet: force and moment about the module's centre follow from four moments of the stance feet.
+        # Viscous feet, where they are by now: p - travel d, with d = (1, 0) + e.
         c_sum = moments[i, C_SUM]
-        c_x = moments[i, C_X] - c_sum * travel
-        c_y = moments[i, C_Y]
-        c_xx = moments[i, C_XX] - 2.0 * travel * moments[i, C_X] + c_sum * travel * travel
-        u = c * work[i, 3] + s * work[i, 4]  # velocity of the centre along and across the module
+        c_ex = moments[i, C_EX]
+        c_ey = moments[i, C_EY]
+        c_x = moments[i, C_X] - travel * (c_sum + c_ex)
+        c_y = moments[i, C_Y] - travel * c_ey
+        c_pp = moments[i, C_PP] - travel * (2.0 * moments[i, C_PD] - travel * c_sum)
+        c_pxe = moments[i, C_PXE] - travel * c_ey
+        # Velocity of the centre along the module, less that of the straight walk, and across.
+        u = c * work[i, 3] + s * work[i, 4] - speed
         w = c * work[i, 4] - s * work[i, 3]
-        along = -(c_sum * (u - speed) - c_y * rate)
-        across = -(c_sum * w + c_x * rate)
-        turning = -(c_x * w - c_y * (u - speed) + c_xx * rate)
+        along = c_y * rate - c_sum * u + speed * c_ex
+        across = speed * c_ey - c_sum * w - c_x * rate
+        turning = c_y * u - c_x * w - c_pp * rate + speed * c_pxe
         ground_x = c * along - s * across
         ground_y = s * along + c * across
         # Distance vector from the module's reference point to its centre, and to its rear joint. The reference point
@@ -134,14 +136,14 @@ def rhs(t: float, x: Any, args: Any, out: Any) -> None:
             bt += rx * gy - ry * gx
         work[i, 5] = hx
         work[i, 6] = hy
-        work[i, 7] = j
         work[i, 8] = bt
         if i > 0:
             # Torque of spring and damper on this module; minus that on the module in front.
             torque = -stiffness[i - 1] * x[2 + i] - damping[i - 1] * x[n + 1 + i]
             work[i, 9] = torque
             torque_behind = torque
-            inverse = 1.0 / j
+            inverse = reciprocal(j)
+            work[i, 7] = inverse
             pxx = axx - hx * hx * inverse
             pxy = axy - hx * hy * inverse
             pyy = ayy - hy * hy * inverse
@@ -149,15 +151,15 @@ def rhs(t: float, x: Any, args: Any, out: Any) -> None:
             fy = by + hy * (torque - bt) * inverse
         else:
             # Free base: [axx axy hx; axy ayy hy; hx hy j] [ax; ay; alpha] = -[bx; by; bt], by elimination of alpha.
-            inverse = 1.0 / j
+            inverse = reciprocal(j)
             sxx = axx - hx * hx * inverse
             sxy = axy - hx * hy * inverse
             syy = ayy - hy * hy * inverse
             gx = -bx + hx * bt * inverse
             gy = -by + hy * bt * inverse
-            det = sxx * syy - sxy * sxy
-            ax = (syy * gx - sxy * gy) / det
-            ay = (sxx * gy - sxy * gx) / det
+            determinant = reciprocal(sxx * syy - sxy * sxy)
+            ax = (syy * gx - sxy * gy) * determinant
+            ay = (sxx * gy - sxy * gx) * determinant
             alpha = -(bt + hx * ax + hy * ay) * inverse
             # dv/dt in the turning frame of module 1.
             out[0] = ax + x[2] * x[1]
@@ -177,14 +179,13 @@ def rhs(t: float, x: Any, args: Any, out: Any) -> None:
         ry = -(reach + half) * s
         ax += -alpha * ry - rate * rate * rx
         ay += alpha * rx - rate * rate * ry
-        new = (work[i, 9] - work[i, 8] - work[i, 5] * ax - work[i, 6] * ay) / work[i, 7]
+        new = (work[i, 9] - work[i, 8] - work[i, 5] * ax - work[i, 6] * ay) * work[i, 7]
         out[2 + i] = x[n + 1 + i]
         out[n + 1 + i] = new - alpha
         alpha = new
 
     if x.size > 2 * n + 1:
-        c = np.cos(x[2 * n + 3])
-        s = np.sin(x[2 * n + 3])
+        c, s = cos_sin(x[2 * n + 3])
         out[2 * n + 1] = c * x[0] - s * x[1]
         out[2 * n + 2] = s * x[0] + c * x[1]
         out[2 * n + 3] = x[2]

@@ -14,10 +14,7 @@ import numpy as np
 
 from chilopod.compiled import parallel_njit
 from chilopod.integrate import integrator
-from chilopod.planar.dynamics import rhs
-
-SCRATCH = 10
-"""Columns of scratch per module that the right-hand side needs."""
+from chilopod.planar.dynamics import SCRATCH, rhs
 
 _integrate = integrator(rhs)
 
@@ -44,7 +41,7 @@ def advance(
     scalars, stiffness, damping
         Of the robots, shapes (robots, 4), (robots, N-1), (robots, N-1).
     moments
-        Contact moments at the start of the contact interval of every piece, shape (robots, pieces, N, 4).
+        Contact moments at the start of the contact interval of every piece, shape (robots, pieces, N, 8).
     owner
         Which robot a state belongs to, shape (states,).
     states

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from scipy.linalg import lu_factor, lu_solve
 
 from chilopod.compiled import njit, parallel_njit
+from chilopod.planar.contact import C_PP
 from chilopod.planar.series import PANEL, ROWS, series_term
 
 Array = NDArray[np.float64]
@@ -76,7 +77,7 @@ def system_matrices(
     speed
         Of the straight walk, m/s.
     moments
-        Contact moments at the start of every interval, shape (intervals, N, 4).
+        Contact moments at the start of every interval, shape (intervals, N, 8), all legs straight.
     durations
         Of the intervals, s, shape (intervals,).
 
@@ -99,7 +100,7 @@ def system_matrices(
     extended: Any = np.longdouble if n <= _MOST_EXTENDED else np.float64
     m, lateral = mass_matrix(n, length, mass, inertia, extended)
     mass, speed = extended(mass), extended(speed)
-    c, c_x, c_y, c_xx = np.moveaxis(moments.astype(extended), -1, 0)
+    c, c_x, c_y, c_xx = np.moveaxis(moments[..., : C_PP + 1].astype(extended), -1, 0)
     zero = np.zeros_like(c)
     # Contact moments as polynomials in time, shape (3, intervals, n).
     c_t = np.stack([c, zero, zero])

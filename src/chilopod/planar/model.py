@@ -14,8 +14,9 @@ from chilopod.integrate import COMPLEX_STEP
 from chilopod.planar import linear
 from chilopod.planar.contact import contact_moments
 from chilopod.planar.drift import Drift
+from chilopod.planar.dynamics import SCRATCH
 from chilopod.planar.dynamics import rhs as compiled_rhs
-from chilopod.planar.flow import SCRATCH, advance
+from chilopod.planar.flow import advance
 
 if TYPE_CHECKING:
     from chilopod.gait import Gait, Schedule
