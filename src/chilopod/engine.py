@@ -42,10 +42,13 @@ class Event:
         For the controller to know it by.
     phase
         Time since the start of the cycle over its period, in [0, 1).
+    window
+        Time there is to act, s.
     """
 
     name: str
     phase: float
+    window: float
 
 
 @dataclass(frozen=True)

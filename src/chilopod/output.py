@@ -5,8 +5,12 @@ from __future__ import annotations
 import os
 import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from chilopod.errors import OutputError
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def write_atomic(path: str | Path, content: str | bytes, *, replace: bool = True) -> Path:
@@ -71,6 +75,26 @@ def prepare_folder(path: str | Path) -> Path:
     except (OSError, ValueError) as error:
         raise _refused(path, error) from None
     return path
+
+
+def storable(data: xr.Dataset) -> xr.Dataset:
+    """The dataset with names that files can hold.
+
+    A slash separates groups in netCDF; it becomes " per " and the name as it was stays as ``long_name``.
+    """
+    names = {str(name): str(name).replace("/", " per ") for name in data.variables if "/" in str(name)}
+    renamed = data.rename(names)
+    for name, new in names.items():
+        renamed[new].attrs["long_name"] = name
+    return renamed
+
+
+def netcdf(data: xr.Dataset) -> bytes:
+    """The bytes of a netCDF-4 file."""
+    with tempfile.TemporaryDirectory(prefix="chilopod-") as folder:
+        path = Path(folder) / "data.nc"
+        storable(data).to_netcdf(path, engine="h5netcdf")
+        return path.read_bytes()
 
 
 def _refused(path: Path, error: OSError | ValueError) -> OutputError:

@@ -3,5 +3,6 @@
 from chilopod.planar.drift import Drift
 from chilopod.planar.energy import Powers, energy, powers
 from chilopod.planar.model import PlanarModel
+from chilopod.planar.simulate import initial_states, simulate
 
-__all__ = ["Drift", "PlanarModel", "Powers", "energy", "powers"]
+__all__ = ["Drift", "PlanarModel", "Powers", "energy", "initial_states", "powers", "simulate"]

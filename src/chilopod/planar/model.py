@@ -17,6 +17,7 @@ from chilopod.planar.drift import Drift
 from chilopod.planar.dynamics import SCRATCH
 from chilopod.planar.dynamics import rhs as compiled_rhs
 from chilopod.planar.flow import advance
+from chilopod.planar.pieces import pieces
 
 if TYPE_CHECKING:
     from chilopod.gait import Gait, Schedule
@@ -172,9 +173,9 @@ class PlanarModel:
         """
         if not all(models[0].can_flow_with(model) for model in models[1:]):
             raise ParameterError("must have the same gait and number of modules", field="models")
-        pieces = [model._linear_pieces(t0, t1) for model in models]
-        widths = pieces[0][0]
-        upper, decay, frequency = (np.stack([piece[part] for piece in pieces]) for part in (1, 2, 3))
+        parts = [model._linear_pieces(t0, t1) for model in models]
+        widths = parts[0][0]
+        upper, decay, frequency = (np.stack([each[part] for each in parts]) for part in (1, 2, 3))
         to_joint, from_joint = _joint_rates(models[0].modules)
         matrices = np.tile(from_joint, (len(models), 1, 1))
         errors = np.empty(len(models))
@@ -204,7 +205,7 @@ class PlanarModel:
             raise ParameterError("must be finite", field=field)
 
     def _pieces(self, t0: float, t1: float) -> tuple[Array, Array, NDArray[np.intp]]:
-        return _pieces(self.robot.gait, self.modules, t0, t1)
+        return pieces(self.robot.gait, self.modules, t0, t1)
 
     @cached_property
     def _scalars(self) -> Array:
@@ -295,30 +296,6 @@ def _passive_matrices(
     schedule = gait.schedule(modules)
     moments = contact_moments(forward_offset, half_width, friction, schedule)
     return linear.system_matrices(length, mass, inertia, gait.speed, moments, np.diff(schedule.times))
-
-
-@lru_cache(maxsize=256)
-def _pieces(gait: Gait, modules: int, t0: float, t1: float) -> tuple[Array, Array, NDArray[np.intp]]:
-    """Cut [t0, t1] at the switches.
-
-    Returns
-    -------
-    Where in its contact interval each piece starts (s), how long it lasts (s), and which interval of the period it
-    belongs to.
-    """
-    if not (np.isfinite(t0) and np.isfinite(t1) and t0 <= t1):
-        raise ParameterError("times must be finite and in order", field="t0, t1", value=(t0, t1), allowed="t0 <= t1")
-    period = gait.period
-    times = gait.schedule(modules).times
-    first, last = int(np.floor(t0 / period)), int(np.ceil(t1 / period))
-    switches = (period * np.arange(first, last)[:, None] + times[:-1]).ravel()
-    interval = np.tile(np.arange(len(times) - 1), max(0, last - first))
-    begins = np.maximum(switches, t0)
-    ends = np.minimum(np.append(switches[1:], last * period), t1)
-    # However short, a piece counts: the fastest motion is over in little more than round-off.
-    used = ends > begins
-    starts = (begins - switches)[used]
-    return starts, (ends - begins)[used], interval[used]
 
 
 @lru_cache(maxsize=64)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from chilopod.output import prepare_folder, write_atomic
+from chilopod.output import netcdf, prepare_folder, write_atomic
 from chilopod.report import branch, critical, exponents, identification, mode, schematic, style, tables, uniform
 from chilopod.report.page import Drawn, page
 from chilopod.report.panel import Panel
@@ -109,7 +109,7 @@ def _write(panel: Panel, figures: Path, data: Path) -> bytes:
     write_atomic(figures / f"{panel.name}.svg", vector)
     write_atomic(figures / f"{panel.name}.png", pixels)
     write_atomic(data / f"{panel.name}.csv", tables.csv(panel.data))
-    write_atomic(data / f"{panel.name}.nc", tables.netcdf(panel.data))
+    write_atomic(data / f"{panel.name}.nc", netcdf(panel.data))
     return vector
 
 

@@ -1,0 +1,150 @@
+"""How well a turn went: the paper's three criteria and what became of the robot."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from chilopod.steering.target import ARRIVAL_RADIUS
+
+Array = NDArray[np.float64]
+
+
+class Outcome(enum.Enum):
+    """What became of a turning task; each member's ``sentence`` says it in words."""
+
+    ARRIVED = "arrived", f"came within {ARRIVAL_RADIUS:g} m of the target"
+    OUTSIDE = "bulged outside", "passed the target on the outside of the turn"
+    INSIDE = "turned inside", "passed the target on the inside of the turn"
+    FAILED = "failed", "did not walk to the end"
+
+    def __init__(self, label: str, sentence: str) -> None:
+        self.label = label
+        self.sentence = sentence
+
+
+@dataclass(frozen=True)
+class Criteria:
+    """Criteria of turning tasks, one entry a walk.
+
+    Attributes
+    ----------
+    time
+        At which the first two are taken and up to which the third is, s.
+    distance
+        Of the target, m (epsilon 1).
+    angle
+        Of the target to the heading, unsigned, rad (epsilon 2).
+    effort
+        Integral of the squared leg yaw of both legs over time, rad^2 s (epsilon 3).
+    arrival
+        When the target was first within the arrival radius, s; NaN if never.
+    nearest
+        Smallest distance of the target, m.
+    outcome
+        What became of the task.
+    """
+
+    time: float
+    distance: Array
+    angle: Array
+    effort: Array
+    arrival: Array
+    nearest: Array
+    outcome: tuple[Outcome, ...]
+
+
+def earliest_arrival(record: xr.Dataset) -> float:
+    """The first time at which any walk of a record arrives, s; NaN if none does."""
+    times = arrivals(record)
+    return float(np.nanmin(times)) if np.isfinite(times).any() else float("nan")
+
+
+def arrivals(record: xr.Dataset) -> Array:
+    """When each walk first comes within the arrival radius, between samples by linear interpolation, s; NaN if never.
+
+    Parameters
+    ----------
+    record
+        With ``distance`` over (time, robot).
+    """
+    distance, time = record.distance.transpose("time", "robot").values, record.time.values
+    inside = distance < ARRIVAL_RADIUS
+    first = inside.argmax(0)
+    found = np.full(distance.shape[1], np.nan)
+    for robot in np.flatnonzero(inside.any(0)):
+        i = first[robot]
+        if i == 0:
+            found[robot] = time[0]
+            continue
+        before, after = distance[i - 1, robot], distance[i, robot]
+        found[robot] = time[i - 1] + (before - ARRIVAL_RADIUS) / (before - after) * (time[i] - time[i - 1])
+    return found
+
+
+def evaluate(record: xr.Dataset, time: float) -> Criteria:
+    """Criteria of every walk of a record.
+
+    Parameters
+    ----------
+    record
+        Of turning tasks: ``distance`` and ``bearing`` over (time, robot), ``status`` and, if the legs were steered,
+        ``command`` over (event, robot, side).
+    time
+        The evaluation time: in the paper the earliest at which any robot arrives, 23 s. A model that walks faster
+        has an earlier one.
+    """
+    distance = record.distance.transpose("time", "robot").values
+    bearing = record.bearing.transpose("time", "robot").values
+    walked = np.isfinite(distance).all(0)
+    arrival = arrivals(record)
+    outcomes = []
+    for robot in range(distance.shape[1]):
+        if np.isfinite(arrival[robot]):
+            outcomes.append(Outcome.ARRIVED)
+        elif not walked[robot]:
+            outcomes.append(Outcome.FAILED)
+        else:
+            # Still turned towards the target's side where it is nearest: the target is inside of the path.
+            nearest = int(distance[:, robot].argmin())
+            same = bearing[nearest, robot] * bearing[0, robot] >= 0.0
+            outcomes.append(Outcome.OUTSIDE if same else Outcome.INSIDE)
+    # Where the target is moves smoothly, its bearing does until it jumps from -pi to pi.
+    turning = np.abs(np.array([_at(time, record.time.values, np.unwrap(each)) for each in bearing.T]))
+    away = np.array([_at(time, record.time.values, each) for each in distance.T])
+    angle = np.minimum(turning % (2.0 * np.pi), -turning % (2.0 * np.pi))
+    nearest_ever = np.fmin.reduce(distance, axis=0)
+    return Criteria(time, away, angle, efforts(record, time), arrival, nearest_ever, tuple(outcomes))
+
+
+def _at(time: float, times: Array, values: Array) -> float:
+    """A sampled quantity in between, NaN outside."""
+    return float(np.interp(time, times, values, left=np.nan, right=np.nan))
+
+
+def efforts(record: xr.Dataset, time: float) -> Array:
+    """Integral of the squared commanded leg yaw from 0 to ``time``, exactly: the yaw is piecewise linear, rad^2 s."""
+    count = record.sizes["robot"]
+    total = np.zeros(count)
+    if "command" not in record:
+        return total
+    commands = record.command.transpose("event", "robot", "side").values
+    starts, within = record.event.values, record.within.values
+    for side in range(2):
+        yaw, since = np.zeros(count), 0.0
+        for start, ramp, command in zip(starts, within, commands[:, :, side], strict=True):
+            # An event of the other leg is no break: this leg's own commands change only at its own events.
+            if (command == yaw).all() or start >= time:
+                continue
+            total += yaw**2 * (start - since)
+            end = min(start + ramp, time)
+            part = (end - start) / ramp if ramp > 0.0 else 1.0
+            reached = yaw + part * (command - yaw)
+            total += (yaw**2 + yaw * reached + reached**2) / 3.0 * (end - start)
+            yaw, since = reached, end
+        total += yaw**2 * (time - since)
+    return total

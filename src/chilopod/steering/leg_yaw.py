@@ -1,0 +1,65 @@
+"""The supplementary turning controller of the paper (appendix): the legs of module 1 yaw towards the target."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from chilopod.engine import Command, Event, Observation
+from chilopod.errors import ParameterError
+from chilopod.gait import Gait
+
+_SIDES = ("left", "right")
+
+
+@dataclass(frozen=True)
+class LegYawController:
+    """Once in every swing of each leg of module 1, its yaw moves towards the target's bearing by at most ``step``.
+
+    At ``start`` of the swing the bearing psi is read; until ``end`` of the swing the desired yaw then ramps by psi less
+    the present yaw, or by sign(psi - yaw) times ``step`` if that is less; and it never exceeds ``limit``. The yaw does
+    not move while the foot stands. While the target is not seen it stays as it is.
+
+    Attributes
+    ----------
+    step
+        Largest change in a gait cycle, rad (5 deg in the paper).
+    limit
+        Largest yaw, rad (5 deg in the paper).
+    start, end
+        Of the ramp, as parts of the swing (0.4 and 0.8 in the paper).
+    """
+
+    step: float = math.radians(5.0)
+    limit: float = math.radians(5.0)
+    start: float = 0.4
+    end: float = 0.8
+
+    def __post_init__(self) -> None:
+        for name in ("step", "limit"):
+            value = getattr(self, name)
+            if not 0.0 <= value < 0.5 * math.pi:
+                raise ParameterError("is out of range", field=name, value=value, allowed="0 to a right angle, rad")
+        if not 0.0 <= self.start <= self.end <= 1.0:
+            raise ParameterError(
+                "must be parts of the swing, in order", field="start, end", value=(self.start, self.end)
+            )
+
+    def events(self, gait: Gait) -> Sequence[Event]:
+        """``start`` of the swings of the left and the right leg."""
+        at = gait.duty + self.start * (1.0 - gait.duty)
+        ramp = (self.end - self.start) * gait.swing
+        phases = zip(_SIDES, gait.leg_phases(1)[0], strict=True)
+        return [Event(side, float((at - phase) % 1.0), ramp) for side, phase in phases]
+
+    def act(self, event: Event, seen: Observation) -> Command:
+        """New yaw for the leg whose swing this is."""
+        side = _SIDES.index(event.name)
+        yaw = seen.leg_yaw.copy()
+        change = np.clip(seen.bearing - yaw[:, side], -self.step, self.step)
+        wanted = np.clip(yaw[:, side] + change, -self.limit, self.limit)
+        yaw[:, side] = np.where(np.isnan(wanted), yaw[:, side], wanted)
+        return Command(yaw, event.window)

@@ -1,0 +1,122 @@
+"""Which spring turns how tightly: the radius of the settled curved walk over one parameter, and its inverse."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import PchipInterpolator
+from scipy.optimize import brentq
+
+from chilopod import units
+from chilopod.errors import AnalysisError, ParameterError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RadiusLaw:
+    """Radius of the stable curved walks from the pitchfork on, as long as it falls with the parameter.
+
+    The squared curvature 1/r^2 is interpolated: it leaves zero linearly at the pitchfork, where the radius itself is
+    infinite and has no slope.
+
+    Attributes
+    ----------
+    values
+        Of the parameter, rising, SI units, shape (points,); the last one is the pitchfork.
+    radii
+        m, shape (points,), infinite at the pitchfork.
+    unit
+        For messages: the unit that values are written in.
+    """
+
+    values: Array
+    radii: Array
+    unit: str
+
+    def __post_init__(self) -> None:
+        if not (len(self.values) >= 3 and (np.diff(self.values) > 0.0).all() and (np.diff(self.radii) > 0.0).all()):
+            raise ParameterError("a radius law needs three points or more, rising in value and radius", field="radii")
+
+    @classmethod
+    def of_branch(cls, values: ArrayLike, radii: ArrayLike, stable: ArrayLike, unit: str) -> RadiusLaw:
+        """The law along a branch of curved walks that starts at its pitchfork.
+
+        Parameters
+        ----------
+        values, radii, stable
+            Along the branch, from the pitchfork on (itself included): the parameter in SI units, the radius in m, and
+            whether the walk is stable, shape (points,).
+        unit
+            That values are written in.
+
+        Raises
+        ------
+        AnalysisError
+            If the walks beside the pitchfork are not stable or do not tighten as the parameter falls: then no spring
+            sets the radius of a turn from straight on.
+        """
+        values, radii, stable = np.asarray(values, float), np.asarray(radii, float), np.asarray(stable, bool)
+        curvature = np.where(np.isfinite(radii), 1.0 / radii, 0.0)
+        good = stable[1:] & (np.diff(values) < 0.0) & (np.diff(curvature) > 0.0)
+        count = 1 + (len(good) if good.all() else int(np.argmin(good)))
+        if count < 3:
+            raise AnalysisError(
+                "the curved walks beside the pitchfork are unstable or do not tighten: there is no radius law",
+                field="branch",
+            )
+        bent = np.concatenate([[np.inf], radii[1:count]])
+        return cls(values[:count][::-1].copy(), bent[::-1].copy(), unit)
+
+    @property
+    def pitchfork(self) -> float:
+        """Where the radius becomes infinite, SI units."""
+        return float(self.values[-1])
+
+    @property
+    def tightest(self) -> float:
+        """Smallest radius the law knows, m."""
+        return float(self.radii[0])
+
+    def radius(self, value: float) -> float:
+        """Radius at a value of the parameter (SI units), m; infinite from the pitchfork on.
+
+        Raises
+        ------
+        ParameterError
+            Below the range of the law, which says nothing there.
+        """
+        if value >= self.pitchfork:
+            return float("inf")
+        if not value >= self.values[0]:
+            lowest = units.format(float(self.values[0]), self.unit, digits=4)
+            shown = units.format(value, self.unit, digits=4)
+            raise ParameterError("is below the radius law", field="value", value=shown, allowed=f"{lowest} and more")
+        return float(1.0 / np.sqrt(self._squared_curvature(value)))
+
+    def value(self, radius: float) -> float:
+        """Value of the parameter (SI units) that gives a radius (m): the paper's k1-hat.
+
+        Raises
+        ------
+        AnalysisError
+            If no value within the law does.
+        """
+        if not radius >= self.tightest:
+            softest = units.format(float(self.values[0]), self.unit, digits=4)
+            raise AnalysisError(
+                "no spring turns so tightly",
+                field="radius",
+                value=f"{radius:.4g} m",
+                allowed=f"{self.tightest:.4g} m (at {softest}) and more",
+            )
+        if np.isinf(radius):
+            return self.pitchfork
+        wanted = 1.0 / radius**2
+        low, high = float(self.values[0]), self.pitchfork
+        return float(brentq(lambda value: self._squared_curvature(value) - wanted, low, high, xtol=1e-12 * high))
+
+    def _squared_curvature(self, value: float) -> float:
+        return float(PchipInterpolator(self.values, 1.0 / self.radii**2)(value))

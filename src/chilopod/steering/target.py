@@ -1,0 +1,90 @@
+"""A target on the floor and the circle that leads to it (paper, Fig. "turning" A)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod import units
+from chilopod.errors import ParameterError, UnitError
+
+ARRIVAL_RADIUS = 0.15
+"""m: nearer than this the paper counts the target as reached."""
+
+FARTHEST = 1e4
+"""m: a target farther away is a slip of the pen."""
+
+_FORM = 'a direction and a distance, such as "45 deg, 1.3 m"'
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where a target is, seen from module 1 before the walk.
+
+    Attributes
+    ----------
+    bearing
+        Direction relative to the heading, left positive, rad; ahead of the robot, that is, within a right angle.
+    distance
+        From the centre of module 1, m; farther than :data:`ARRIVAL_RADIUS`.
+
+    Raises
+    ------
+    ParameterError
+        If there is no circle to it: on the robot, behind it, or too far.
+    """
+
+    bearing: float
+    distance: float
+
+    def __post_init__(self) -> None:
+        if not abs(self.bearing) <= 0.5 * math.pi:
+            raise ParameterError(
+                "lies behind the robot",
+                field="target bearing",
+                value=f"{math.degrees(self.bearing):g} deg",
+                allowed="-90 to 90 deg",
+            )
+        if not ARRIVAL_RADIUS < self.distance <= FARTHEST:
+            raise ParameterError(
+                "is no way to go",
+                field="target distance",
+                value=f"{self.distance:g} m",
+                allowed=f"more than the {ARRIVAL_RADIUS:g} m that count as arrived, at most {FARTHEST:g} m",
+            )
+
+    @classmethod
+    def parse(cls, text: str) -> Target:
+        """Read ``"45 deg, 1.3 m"``.
+
+        Raises
+        ------
+        ParameterError, UnitError
+            If it is not that, or there is no circle to it.
+        """
+        bearing, comma, distance = text.partition(",")
+        if not comma:
+            raise ParameterError("is no target", field="target", value=text, allowed=_FORM)
+        try:
+            return cls(units.parse(bearing, "rad"), units.parse(distance, "m"))
+        except UnitError as error:
+            error.field = "target"
+            raise
+
+    @property
+    def radius(self) -> float:
+        """Of the circle that starts along the heading and ends at the target, R / (2 |sin psi|), m; infinite for a
+        target straight ahead."""
+        sine = abs(math.sin(self.bearing))
+        return self.distance / (2.0 * sine) if sine > 0.0 else math.inf
+
+    @property
+    def position(self) -> NDArray[np.float64]:
+        """On the floor, for a robot at the origin that heads along x, m, shape (2,)."""
+        return self.distance * np.array([math.cos(self.bearing), math.sin(self.bearing)])
+
+    def __str__(self) -> str:
+        return f"{math.degrees(self.bearing):g} deg, {self.distance:g} m"
