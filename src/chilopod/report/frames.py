@@ -1,0 +1,308 @@
+"""Where every module and every foot of a recorded walk is, and what else a replay or a movie of it shows.
+
+A *record* is a dataset over ``time`` (s), ``robot``, ``axis`` (x, y), ``joint`` and ``side`` (left, right) with
+``position`` (m, centre of module 1), ``heading`` (rad), ``joint_angle`` (rad, heading of a module less that of the one
+in front of it), ``leg_yaw`` (rad, of the legs of module 1) and ``status`` (text). Where there was a task there are
+``target`` (m) and ``distance`` (m) as well. After a robot stopped its values are NaN. The attribute ``robot`` is the
+text of the robot file.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from chilopod.errors import ParameterError
+from chilopod.robot import Robot
+from chilopod.steering import ARRIVAL_RADIUS, arrivals
+
+Array = NDArray[np.float64]
+
+# Phases such as 0.62/0.31 miss their integer by round-off; a foot nearer than this (in cycles) to a switch has made it.
+_SAME_PHASE: Final = 1e-9
+_MARGIN: Final = 0.06
+_FOOT_ROOM: Final = 0.12  # for the scale bar below all bodies
+_FLATTEST, _TALLEST = 2.4, 0.8
+
+
+@dataclass(frozen=True)
+class BodyFrames:
+    """Bodies seen from above at T times, of R robots with N modules.
+
+    Attributes
+    ----------
+    robot
+        What they have in common.
+    time
+        (T,) s.
+    spine
+        (T, R, N+1, 2) m: front end of module 1, the yaw joints, rear end of module N.
+    centres
+        (T, R, N, 2) m, of the modules.
+    headings
+        (T, R, N) rad, of the modules, left positive.
+    feet
+        (T, R, N, 2, 2) m, by module, side (left, right) and axis.
+    stands
+        (T, R, N, 2) whether the foot is on the floor.
+    walks
+        (T, R) whether the record has the robot then. Once it has not, all of the above stay as they were last; of a
+        robot that never started they are NaN, and no foot stands.
+    """
+
+    robot: Robot
+    time: Array
+    spine: Array
+    centres: Array
+    headings: Array
+    feet: Array
+    stands: NDArray[np.bool_]
+    walks: NDArray[np.bool_]
+
+
+def body_frames(record: xr.Dataset, times: ArrayLike | None = None) -> BodyFrames:
+    """Place modules and feet.
+
+    Standing feet move back along their module as the gait has it, swinging ones forward as a half ellipse looks from
+    above.
+
+    Parameters
+    ----------
+    record
+        As described at the top of this module.
+    times
+        (T,) s; between samples the body is interpolated, while the feet keep the gait's exact clock. By default those
+        of the record.
+
+    Raises
+    ------
+    ParameterError
+        If the record does not go with its robot.
+    """
+    robot = _robot(record)
+    recorded = record["time"].values.astype(np.float64)
+    time = recorded if times is None else np.asarray(times, dtype=np.float64)
+    position, heading, angles, leg_yaw = (
+        _interpolated(record[name].transpose("time", "robot", ...).values, recorded, time)
+        for name in ("position", "heading", "joint_angle", "leg_yaw")
+    )
+    walks = np.isfinite(position).all(-1) & np.isfinite(heading) & np.isfinite(angles).all(-1)
+    walks &= np.isfinite(leg_yaw).all(-1)
+    headings = heading[..., None] + np.concatenate([np.zeros((*heading.shape, 1)), np.cumsum(angles, axis=-1)], axis=-1)
+    ahead = np.stack([np.cos(headings), np.sin(headings)], axis=-1)
+    half = 0.5 * robot.module_length * ahead
+    steps = np.cumsum(half[..., :-1, :] + half[..., 1:, :], axis=-2)
+    centres = position[..., None, :] - np.concatenate([np.zeros_like(steps[..., :1, :]), steps], axis=-2)
+    spine = np.concatenate([centres[..., :1, :] + half[..., :1, :], centres - half], axis=-2)
+    reach, stands = _strokes(robot, time)
+    feet = _feet(robot, centres, headings, reach, leg_yaw)
+
+    # Index of the last sample, at each time, at which the robot walked.
+    last = np.maximum.accumulate(np.where(walks, np.arange(len(time))[:, None], 0), axis=0)
+    rows, started = (last, np.arange(walks.shape[1])), np.maximum.accumulate(walks, axis=0)
+    standing = stands[last] & started[..., None, None]
+    return BodyFrames(robot, time, spine[rows], centres[rows], headings[rows], feet[rows], standing, walks)
+
+
+def _robot(record: xr.Dataset) -> Robot:
+    if "robot" not in record.attrs:
+        raise ParameterError("has no robot", field="record", allowed="the text of a robot file in attrs['robot']")
+    robot = Robot(**tomllib.loads(record.attrs["robot"]))
+    if record.sizes["joint"] != robot.body.modules - 1:
+        raise ParameterError(
+            f"has {record.sizes['joint']} joints",
+            field="record",
+            allowed=f"{robot.body.modules - 1}, those of its robot",
+        )
+    return robot
+
+
+def _interpolated(values: NDArray[Any], recorded: Array, times: Array) -> Array:
+    """Values over time at other times; NaN next to NaN and where a value is infinite."""
+    known = np.where(np.isfinite(values), values, np.nan).astype(np.float64)
+    place = np.interp(times, recorded, np.arange(len(recorded)))
+    below = np.floor(place + _SAME_PHASE).astype(np.intp)
+    above = np.minimum(below + 1, len(recorded) - 1)
+    share = (place - below).reshape(-1, *[1] * (known.ndim - 1))
+    # On a sample its neighbour does not count, not even as 0 times NaN.
+    return np.where(share <= _SAME_PHASE, known[below], (1.0 - share) * known[below] + share * known[above])
+
+
+def _strokes(robot: Robot, time: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """How far every foot is ahead of mid-stroke (m) and whether it stands, both (T, N, 2)."""
+    gait = robot.gait
+    phase = time[:, None, None] / gait.period + gait.leg_phases(robot.body.modules)
+    phase = (phase + _SAME_PHASE) % 1.0
+    stands = phase < gait.duty
+    swung = np.clip((phase - gait.duty) / (1.0 - gait.duty), 0.0, 1.0)
+    share = np.where(stands, 0.5 - phase / gait.duty, -0.5 * np.cos(np.pi * swung))
+    return gait.stride * share, stands
+
+
+def _feet(robot: Robot, centres: Array, headings: Array, reach: Array, leg_yaw: Array) -> Array:
+    """Feet on the floor, (T, R, N, 2, 2); `reach` as from :func:`_strokes`, `leg_yaw` (T, R, 2)."""
+    yaw = np.zeros((*headings.shape, 2))
+    yaw[:, :, 0] = leg_yaw
+    offset, width = robot.legs.forward_offset, robot.legs.half_width
+    along = offset + reach[:, None] * np.cos(yaw)
+    across = np.array([width, -width]) + reach[:, None] * np.sin(yaw)
+    cos, sin = np.cos(headings)[..., None], np.sin(headings)[..., None]
+    return centres[..., None, :] + np.stack([along * cos - across * sin, along * sin + across * cos], axis=-1)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a robot.
+
+    Attributes
+    ----------
+    text
+        Such as "arrived at 18.4 s", "target not reached", or the status; nothing is said before its time.
+    kind
+        "arrived", "stopped" (its record ends early) or "ended" (with the record).
+    time
+        From when on it is known, s.
+    """
+
+    text: str
+    kind: str
+    time: float
+
+
+@dataclass(frozen=True)
+class Floor:
+    """The piece of the floor that is shown, alike for all robots.
+
+    Attributes
+    ----------
+    x0, x1, y0, y1
+        Its edges, m.
+    grid
+        Distance of the grid lines, which pass through the origin, m.
+    """
+
+    x0: float
+    x1: float
+    y0: float
+    y1: float
+    grid: float
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Everything that is drawn.
+
+    Attributes
+    ----------
+    frames
+        The bodies.
+    floor
+        What is seen of the floor.
+    titles, outcomes
+        One for each robot.
+    targets
+        (R, 2) m; NaN where there is none.
+    arrival_radius
+        m; 0 where there are no targets.
+    """
+
+    frames: BodyFrames
+    floor: Floor
+    titles: tuple[str, ...]
+    outcomes: tuple[Outcome, ...]
+    targets: Array
+    arrival_radius: float
+
+
+def scene(record: xr.Dataset, titles: Mapping[Any, str] | Sequence[str], times: ArrayLike | None = None) -> Scene:
+    """Everything that is drawn of a record.
+
+    Parameters
+    ----------
+    record
+        As described at the top of this module.
+    titles
+        What to call each robot: by its label in the record, or in the order of the record.
+    times
+        As for :func:`body_frames`.
+
+    Raises
+    ------
+    ParameterError
+        If the record does not go with its robot, or a robot has no title.
+    """
+    frames = body_frames(record, times)
+    count = record.sizes["robot"]
+    targets = np.full((count, 2), np.nan)
+    if "target" in record:
+        targets = record["target"].transpose("robot", "axis").values.astype(np.float64)
+    radius = ARRIVAL_RADIUS if "target" in record else 0.0
+    arrived = arrivals(record) if "target" in record else np.full(count, np.nan)
+    return Scene(
+        frames,
+        _floor(frames, targets, radius),
+        _titles(record, titles),
+        tuple(_outcome(record, frames, robot, float(arrived[robot])) for robot in range(count)),
+        targets,
+        radius,
+    )
+
+
+def _titles(record: xr.Dataset, titles: Mapping[Any, str] | Sequence[str]) -> tuple[str, ...]:
+    labels = record["robot"].values.tolist()
+    if isinstance(titles, Mapping):
+        missing = [label for label in labels if label not in titles]
+        if missing:
+            raise ParameterError(f"has none for robot {missing[0]!r}", field="titles")
+        return tuple(titles[label] for label in labels)
+    if len(titles) != len(labels):
+        raise ParameterError(f"has {len(titles)} titles", field="titles", allowed=f"{len(labels)}, one for each robot")
+    return tuple(titles)
+
+
+def _outcome(record: xr.Dataset, frames: BodyFrames, robot: int, arrival: float) -> Outcome:
+    status, walks = str(record["status"].values[robot]), frames.walks[:, robot]
+    if np.isfinite(arrival):
+        return Outcome(f"arrived at {arrival:.1f} s", "arrived", arrival)
+    if not walks.any():
+        return Outcome(status, "stopped", float(frames.time[0]))
+    end = float(frames.time[walks][-1])
+    if not walks[-1]:
+        return Outcome(f"{status} at {end:.1f} s", "stopped", end)
+    missed = "target" in record and bool(np.isfinite(record["target"].isel(robot=robot)).all())
+    return Outcome("target not reached" if missed else status, "ended", end)
+
+
+def _floor(frames: BodyFrames, targets: Array, radius: float) -> Floor:
+    """The box around all bodies and targets, a little larger, and neither a slit nor a tower."""
+    robot, n = frames.robot, frames.robot.body.modules
+    flat = np.concatenate([frames.spine, frames.feet.reshape(*frames.centres.shape[:2], 2 * n, 2)], axis=2)
+    seen = frames.walks[..., None] & np.isfinite(flat).all(-1)
+    # A robot that diverges may be anywhere in its last samples, and must not shrink all others to a dot.
+    duration = frames.time[-1] - frames.time[0]
+    furthest = 2.0 * (robot.body.length + robot.gait.speed * duration)
+    start = frames.centres[:1, :, :1]
+    seen &= np.abs(np.where(seen[..., None], flat - start, np.inf)).max(axis=-1) <= furthest
+    aims = targets[np.isfinite(targets).all(-1)]
+    points = np.concatenate([flat[seen], aims - radius, aims + radius, np.zeros((0 if seen.any() else 1, 2))])
+    low, high = points.min(axis=0), points.max(axis=0)
+    low[1] -= _FOOT_ROOM * max(high[1] - low[1], (high[0] - low[0]) / _FLATTEST)
+    middle, size = 0.5 * (low + high), np.maximum(high - low, 0.5 * robot.body.length)
+    size *= 1.0 + 2.0 * _MARGIN
+    size = np.array([max(size[0], _TALLEST * size[1]), max(size[1], size[0] / _FLATTEST)])
+    (x0, y0), (x1, y1) = middle - 0.5 * size, middle + 0.5 * size
+    return Floor(float(x0), float(x1), float(y0), float(y1), _grid(float(size.max())))
+
+
+def _grid(extent: float) -> float:
+    """1 m where that makes a readable grid, otherwise 1, 2 or 5 times the power of ten that does."""
+    if 2.0 <= extent <= 14.0:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(extent / 3.0))
+    return float(max(step * power for step in (1, 2, 5) if step * power <= extent / 3.0 * (1.0 + 1e-9)))
