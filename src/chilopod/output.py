@@ -59,6 +59,23 @@ def write_atomic(path: str | Path, content: str | bytes, *, replace: bool = True
     return path
 
 
+def free_path(path: str | Path, force: bool = False) -> Path:
+    """Make sure, before any work is done for it, that a file can be written; its folder is created.
+
+    Raises
+    ------
+    OutputError
+        If the file exists and ``force`` is not given, or the folder cannot be written.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise OutputError("is a folder, not a file", source=str(path))
+    if path.exists() and not force:
+        raise OutputError("exists and is only replaced with --force", source=str(path))
+    prepare_folder(path.parent)
+    return path
+
+
 def prepare_folder(path: str | Path) -> Path:
     """Create a folder for results where there is none and make sure files can be written into it.
 

@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from chilopod.cli import branch, reproduce, robot, stability
+from chilopod.cli import branch, reproduce, robot, stability, walk
 from chilopod.cli.options import new_app
 from chilopod.errors import ChilopodError, one_line
 
@@ -27,6 +27,8 @@ app.add_typer(robot.app, name="robot")
 app.command("stability")(stability.stability)
 app.command("bifurcation")(stability.bifurcation)
 app.command("branch")(branch.branch)
+app.command("walk")(walk.walk)
+app.command("turn")(walk.turn)
 app.add_typer(reproduce.identify_app, name="identify")
 
 

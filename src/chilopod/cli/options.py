@@ -30,6 +30,14 @@ BetweenOption = Annotated[
     tuple[str, str], typer.Option(metavar="LOW HIGH", help='The interval, such as "2 N*mm/deg" "75 N*mm/deg".')
 ]
 OutOption = Annotated[Path | None, typer.Option("--out", metavar="FOLDER", help="Write results into this folder.")]
+ForceOption = Annotated[bool, typer.Option("--force", help="Replace results that are already there.")]
+SeedOption = Annotated[
+    int | None,
+    typer.Option(metavar="N", min=0, help="Disturb start, feet and sensor at random; without it nothing is disturbed."),
+]
+RepeatsOption = Annotated[
+    int, typer.Option(metavar="N", min=1, max=100_000, help="Walks, with seeds counting up from --seed.")
+]
 
 
 def new_app(help_text: str) -> typer.Typer:

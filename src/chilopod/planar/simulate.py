@@ -136,11 +136,12 @@ def simulate(
     plan = _plan(robots, duration, initial, friction, target, rate, tolerance)
     models, states, count = plan.models, plan.states, len(plan.models)
     gait, n = models[0].robot.gait, models[0].modules
-    samples = np.arange(int(np.floor(duration * rate * (1.0 + 1e-12))) + 1) / rate
-    if samples.size * states.size > MOST_NUMBERS:
+    last_sample = np.floor(duration * rate * (1.0 + 1e-12))
+    if (last_sample + 1) * states.size > MOST_NUMBERS:
         raise ParameterError(
             "the record would be too large", field="rate", value=rate, allowed="fewer robots, samples or seconds"
         )
+    samples = np.arange(int(last_sample) + 1) / rate
     asked = event_times(controller, gait, duration) if controller else []
     noise = np.zeros((count, len(asked))) if bearing_noise is None else np.atleast_2d(np.asarray(bearing_noise, float))
     if noise.ndim != 2 or len(noise) != count or noise.shape[1] < len(asked):

@@ -118,7 +118,9 @@ def evaluate(record: xr.Dataset, time: float) -> Criteria:
     away = np.array([_at(time, record.time.values, each) for each in distance.T])
     angle = np.minimum(turning % (2.0 * np.pi), -turning % (2.0 * np.pi))
     nearest_ever = np.fmin.reduce(distance, axis=0)
-    return Criteria(time, away, angle, efforts(record, time), arrival, nearest_ever, tuple(outcomes))
+    # The last command of a robot that has failed is no effort.
+    effort = np.where(np.isfinite(away), efforts(record, time), np.nan)
+    return Criteria(time, away, angle, effort, arrival, nearest_ever, tuple(outcomes))
 
 
 def _at(time: float, times: Array, values: Array) -> float:

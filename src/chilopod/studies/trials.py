@@ -91,6 +91,8 @@ class Trial:
         How much differs from trial to trial.
     rate
         Samples per second.
+    forces
+        Whether the record has the force on every foot.
     engine
         ``planar``.
     """
@@ -103,6 +105,7 @@ class Trial:
     controller: LegYawController | None = None
     disturbance: Disturbance = field(default_factory=Disturbance)
     rate: float = 100.0
+    forces: bool = False
     engine: str = "planar"
 
     @property
@@ -120,6 +123,7 @@ class Trial:
             "controller": asdict(self.controller) if self.controller else None,
             "disturbance": asdict(self.disturbance),
             "rate": self.rate,
+            "forces": self.forces,
         }
 
     @property
@@ -189,6 +193,7 @@ def _batches(trials: Sequence[tuple[str, Trial]]) -> list[list[tuple[str, Trial]
             trial.target is None,
             trial.controller,
             trial.rate,
+            trial.forces,
             trial.engine,
         )
         groups.setdefault(alike, []).append((name, trial))
@@ -209,6 +214,7 @@ def _walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
         target=None if first.target is None else np.stack([t.target.position for t in trials if t.target]),
         bearing_noise=np.stack([each.bearing for each in drawn]),
         rate=first.rate,
+        forces=first.forces,
     )
     records = []
     for index, trial in enumerate(trials):

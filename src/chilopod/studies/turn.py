@@ -1,0 +1,218 @@
+"""One turn: which spring leads to a target, and how the robot gets there with it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from chilopod import units
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.robot import Robot
+from chilopod.steering import Criteria, RadiusLaw, Strategy, Target, earliest_arrival, evaluate, steered
+from chilopod.studies.curved_walk import curved_walks
+from chilopod.studies.trials import NONE, Disturbance, Trial, run, together
+
+Array = NDArray[np.float64]
+Progress = Callable[[float, str], None]
+
+FRONT = "springs.stiffness[0]"
+
+_WIDEST = (1.0 / 20.0, 3.0)  # of the stiffest spring: where the pitchfork of the first one is looked for
+_POINTS = 60
+_TRIED = 48  # springs a round
+_ROUNDS = 2
+_HASTE = 1.6  # a task lasts so many times what the circle takes at the speed of the straight walk
+_LEAST = 5.0  # s
+_AS_NEAR = 1e-9  # m
+
+
+def radius_law(robot: Robot, *, path: bool = False, progress: Progress = lambda done, words: None) -> RadiusLaw:
+    """Radius of the settled curved walk over the first spring.
+
+    Parameters
+    ----------
+    robot
+        The robot.
+    path
+        Whether to take the true radius of the path of module 1 rather than the paper's (N-1) L / sum |theta|.
+    progress
+        Called with the part done (0 to 1) and a few words.
+
+    Raises
+    ------
+    AnalysisError
+        If the straight walk has no pitchfork in the first spring, or no stable curved walks beside it.
+    """
+    stiffest = max(robot.springs.stiffness)
+    between = (_WIDEST[0] * stiffest, _WIDEST[1] * stiffest)
+    branch = curved_walks(robot, FRONT, between, points=_POINTS, progress=progress)
+    unit = robot.unit_of(FRONT)
+    values = [units.parse(f"{value!r} {unit}", robot.si_unit_of(FRONT)) for value in branch.parameter.values.tolist()]
+    radii = branch.path_radius if path else branch.axis_radius
+    ordinary = branch.mean_angle.max("joint").values <= 0.5 * np.pi  # beyond, modules run into each other
+    return RadiusLaw.of_branch(values, radii.values, branch.stable.values & ordinary, unit)
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A turning task and how it went.
+
+    Attributes
+    ----------
+    robot
+        With the spring it walked with.
+    target, strategy
+        What was asked for.
+    by_law
+        The spring whose settled walk has the radius of the circle to the target, the paper's k1-hat, N*m/rad; None
+        where there is no such spring or none was asked for.
+    stiffness
+        The spring it walked with, N*m/rad; None where the strategy leaves the springs alone.
+    record
+        Of all repeats.
+    criteria
+        At the earliest arrival of any repeat, or at the end if none arrives.
+    """
+
+    robot: Robot
+    target: Target
+    strategy: Strategy
+    by_law: float | None
+    stiffness: float | None
+    record: xr.Dataset
+    criteria: Criteria
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain numbers; null for what there is not."""
+
+        def plain(value: float | None) -> float | None:
+            return float(value) if value is not None and np.isfinite(value) else None
+
+        found = self.criteria
+        return {
+            "robot": self.robot.name,
+            "strategy": self.strategy.name,
+            "target": {"bearing_rad": self.target.bearing, "distance_m": self.target.distance},
+            "circle_radius_m": plain(self.target.radius),
+            "spring_by_law_N_m_rad": plain(self.by_law),
+            "spring_N_m_rad": plain(self.stiffness),
+            "evaluation_time_s": found.time,
+            "walks": [
+                {
+                    "outcome": outcome.label,
+                    "arrival_s": plain(found.arrival[i]),
+                    "nearest_m": plain(found.nearest[i]),
+                    "epsilon1_m": plain(found.distance[i]),
+                    "epsilon2_rad": plain(found.angle[i]),
+                    "epsilon3_rad2_s": plain(found.effort[i]),
+                }
+                for i, outcome in enumerate(found.outcome)
+            ],
+        }
+
+
+def turn(
+    robot: Robot,
+    target: Target,
+    strategy: Strategy,
+    spring: float | str = "auto",
+    *,
+    duration: float | None = None,
+    seed: int | None = None,
+    repeats: int = 1,
+    progress: Progress = lambda done, words: None,
+) -> Turn:
+    """Walk to a target.
+
+    Parameters
+    ----------
+    robot
+        The robot.
+    target
+        Where to.
+    strategy
+        How, one of :data:`chilopod.steering.STRATEGIES`.
+    spring
+        Of the strategy, N*m/rad; or ``law``: the paper's k1-hat, from the radius law; or ``auto``: what comes nearest
+        to the target in undisturbed simulated trials, which takes into account that a walk needs time to bend. Without
+        leg yaw nothing bends undisturbed, and ``auto`` is ``law``.
+    duration
+        s; by default 1.6 times what the circle takes at the speed of the straight walk.
+    seed
+        Of the first repeat's disturbances, the others count up from it; None for no disturbance at all.
+    repeats
+        How many walks.
+    progress
+        Called with the part done (0 to 1) and a few words.
+
+    Raises
+    ------
+    AnalysisError
+        If no spring turns tightly enough.
+    """
+    if spring not in ("auto", "law") and isinstance(spring, str):
+        raise ParameterError("is no spring", field="spring", value=spring, allowed="auto, law, or a stiffness")
+    if repeats < 1:
+        raise ParameterError("must be positive", field="repeats", value=repeats)
+    if repeats > 1 and seed is None:
+        raise ParameterError("are all alike without a seed", field="repeats", value=repeats, allowed="1, or a seed")
+    time = duration if duration is not None else _time_for(robot, target)
+    law = None
+    if isinstance(spring, str) and strategy.springs == FRONT:
+        law = radius_law(robot, progress=lambda done, words: progress(0.4 * done, f"radius law, {words}"))
+    by_law = law.value(target.radius) if law else None
+    if strategy.springs is None:
+        stiffness = None
+    elif not isinstance(spring, str):
+        stiffness = spring
+    elif spring == "law" or not strategy.leg_yaw:
+        if by_law is None:
+            raise AnalysisError("only the first spring has a radius law", field="spring", value=spring)
+        stiffness = by_law
+    else:
+        between = (float(law.values[0]), 1.5 * law.pitchfork) if law else _around(robot)
+        stiffness = best_spring(robot, target, strategy, between, time)
+    progress(0.9, "walk")
+    walker, controller = steered(robot, strategy, stiffness)
+    trial = Trial(walker, time, 0, (), target, controller, Disturbance() if seed is not None else NONE)
+    record = together(run([replace(trial, seed=(seed or 0) + repeat) for repeat in range(repeats)]))
+    when = earliest_arrival(record)
+    criteria = evaluate(record, when if np.isfinite(when) else float(record.time[-1]))
+    return Turn(walker, target, strategy, by_law, stiffness, record, criteria)
+
+
+def best_spring(
+    robot: Robot, target: Target, strategy: Strategy, between: tuple[float, float], duration: float
+) -> float:
+    """The spring of a strategy that comes nearest to the target, by undisturbed trials on ever finer grids, N*m/rad."""
+    low, high = between
+    values = np.geomspace(low, high, _TRIED)
+    best = 0
+    for round_ in range(_ROUNDS):
+        if round_:
+            values = np.linspace(values[max(best - 1, 0)], values[min(best + 1, _TRIED - 1)], _TRIED)
+        trials = []
+        for value in values:
+            walker, controller = steered(robot, strategy, float(value))
+            trials.append(Trial(walker, duration, 0, (), target, controller, NONE, rate=20.0))
+        record = together(run(trials))
+        nearest = evaluate(record, duration).nearest
+        # Of springs that do equally well the stiffest.
+        best = int(np.flatnonzero(nearest <= np.nanmin(nearest) + _AS_NEAR)[-1])
+    return float(values[best])
+
+
+def _around(robot: Robot) -> tuple[float, float]:
+    stiffest = max(robot.springs.stiffness)
+    return _WIDEST[0] * stiffest, stiffest
+
+
+def _time_for(robot: Robot, target: Target) -> float:
+    angle = abs(target.bearing)
+    arc = target.distance * (angle / np.sin(angle) if angle > 0.0 else 1.0)
+    return float(max(_LEAST, _HASTE * arc / robot.gait.speed))

@@ -1,0 +1,97 @@
+"""What a walk came to: its mean shape at the end, how tightly it turned, and where the robot got to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from chilopod.engine import Status
+from chilopod.robot import Robot
+
+Array = NDArray[np.float64]
+
+AVERAGED = 5.0
+"""s at the end of a walk over which the paper averages joint angles."""
+
+_SENTENCES = {status.label: status.sentence for status in Status}
+
+
+@dataclass(frozen=True)
+class WalkSummary:
+    """The end of one walk.
+
+    Attributes
+    ----------
+    status
+        A label of :class:`chilopod.engine.Status`.
+    joint_angles
+        Means over the last :data:`AVERAGED` s, rad, shape (N-1,); NaN if the walk failed.
+    axis_radius
+        The paper's (N-1) L / sum |theta| of these, m; infinite if straight.
+    x, y
+        Of the centre of module 1 at the end, m.
+    """
+
+    status: str
+    joint_angles: Array
+    axis_radius: float
+    x: float
+    y: float
+
+    @property
+    def failed(self) -> bool:
+        """Whether it ended early."""
+        return self.status != Status.WALKED.label
+
+    @property
+    def sentence(self) -> str:
+        """The status in words."""
+        return _SENTENCES[self.status]
+
+    @property
+    def joint_angles_deg(self) -> list[float]:
+        """:attr:`joint_angles` in degrees."""
+        return [float(angle) for angle in np.rad2deg(self.joint_angles)]
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain numbers; null for what a failed walk does not have, and for an infinite radius."""
+
+        def plain(value: float) -> float | None:
+            return float(value) if np.isfinite(value) else None
+
+        return {
+            "status": self.status,
+            "x_m": plain(self.x),
+            "y_m": plain(self.y),
+            "axis_radius_m": plain(self.axis_radius),
+            "mean_joint_angles_rad": [plain(angle) for angle in self.joint_angles],
+        }
+
+
+def mean_joint_angles(record: xr.Dataset, seconds: float = AVERAGED) -> xr.DataArray:
+    """Joint angles averaged over the last ``seconds`` of a record (all of a shorter one), rad, over (robot, joint)."""
+    end = float(record.time[-1])
+    return record.joint_angle.where(record.time >= end - seconds * (1.0 + 1e-9), drop=True).mean("time", skipna=False)
+
+
+def axis_radius(robot: Robot, angles: Array) -> Array:
+    """The paper's (N-1) L / sum |theta|, m, of joint angles over the last axis; infinite where all are zero."""
+    bent = np.abs(angles).sum(-1)
+    with np.errstate(divide="ignore"):
+        return np.asarray((robot.body.modules - 1) * robot.module_length / bent)
+
+
+def summaries(robot: Robot, record: xr.Dataset) -> Sequence[WalkSummary]:
+    """The end of every walk of a record."""
+    angles = mean_joint_angles(record).transpose("robot", "joint").values
+    radii = axis_radius(robot, angles)
+    ends = record.position.isel(time=-1).transpose("robot", "axis").values
+    return [
+        WalkSummary(str(status), angle, float(radius), float(end[0]), float(end[1]))
+        for status, angle, radius, end in zip(record.status.values, angles, radii, ends, strict=True)
+    ]

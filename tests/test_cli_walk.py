@@ -1,0 +1,159 @@
+"""``chilopod walk`` and ``chilopod turn`` as they are typed."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from chilopod.cli import main
+
+ROBOT = "aoi2022-planar"
+SOFT = ["--set", "springs.stiffness[0]=9 N*mm/deg"]
+
+
+def printed(capsys, *arguments):
+    assert main(arguments) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def refused(capsys, *arguments):
+    assert main(arguments) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    message = captured.err.splitlines()[-1]
+    assert message.startswith("error: ")
+    return message
+
+
+def test_walk_writes_its_record_and_never_over_another(capsys, tmp_path):
+    file = tmp_path / "walks" / "a.nc"
+    arguments = ["walk", ROBOT, *SOFT, "--duration", "6 s", "--rate", "10", "--out", str(file)]
+    found = printed(capsys, *arguments, "--seed", "5", "--repeats", "3", "--forces", "--json")
+    assert [walk["seed"] for walk in found["walks"]] == [5, 6, 7]
+    assert {walk["status"] for walk in found["walks"]} == {"walked"}
+    with xr.open_dataset(file, engine="h5netcdf") as record:
+        assert record.sizes["robot"] == 3
+        assert record.sizes["time"] == 61
+        assert record.foot_force.attrs["units"] == "N"
+        angles = record.joint_angle.sel(time=slice(0.95, 6.05)).mean("time")
+        listed = [walk["mean_joint_angles_rad"] for walk in found["walks"]]
+        np.testing.assert_allclose(angles, listed, rtol=0, atol=1e-12)
+    kept = file.read_bytes()
+    assert "--force" in refused(capsys, *arguments)
+    assert file.read_bytes() == kept
+    assert main([*arguments, "--force"]) == 0
+    assert file.read_bytes() != kept
+
+
+def test_the_same_seed_walks_the_same_way_and_no_seed_undisturbed(capsys):
+    arguments = ["walk", ROBOT, *SOFT, "--duration", "3 s", "--json"]
+    assert printed(capsys, *arguments, "--seed", "1") == printed(capsys, *arguments, "--seed", "1")
+    assert printed(capsys, *arguments, "--seed", "1") != printed(capsys, *arguments, "--seed", "2")
+    straight = printed(capsys, *arguments)["walks"][0]
+    assert straight["axis_radius_m"] is None
+    assert straight["y_m"] == 0.0
+    assert straight["x_m"] == pytest.approx(3.0 * 0.03 / 0.31)
+
+
+def test_walk_prints_a_line_a_walk(capsys):
+    assert main(["walk", ROBOT, *SOFT, "--initial-joints", "2,0,0,0,0 deg", "--duration", "1 min"]) == 0
+    out = capsys.readouterr().out.splitlines()
+    assert len(out) == 3
+    assert "1 walk of 60 s" in out[0]
+    angles = [float(word) for word in out[2].split()[-5:]]
+    assert all(angle > 10.0 for angle in angles)
+
+
+def test_a_walk_that_leaves_the_range_says_so(capsys):
+    arguments = ["walk", ROBOT, "--set", "springs.stiffness[0]=2 N*mm/deg", "--initial-joints", "10,0,0,0,0 deg"]
+    assert main(arguments) == 0
+    assert "more than a right angle" in capsys.readouterr().out
+    (walk,) = printed(capsys, *arguments, "--json")["walks"]
+    assert (walk["status"], walk["x_m"]) == ("out of range", None)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--duration", "0 s"], ["duration", "more than 0"]),
+        (["--duration", "-3 s"], ["duration"]),
+        (["--duration", "1e9 s"], ["duration", "100000"]),
+        (["--duration", "3 kg"], ["kg"]),
+        (["--rate", "0"], ["rate"]),
+        (["--repeats", "0"], ["--repeats"]),
+        (["--repeats", "3"], ["repeats", "seed"]),
+        (["--initial-joints", "1,2 deg"], ["2 angles", "5"]),
+        (["--initial-joints", "120 deg"], ["bent too far"]),
+        (["--initial-joints", "1,x,0,0,0 deg"], ["x"]),
+        (["--set", "springs.stiffness=0 N*mm/deg"], ["springs.stiffness", "positive"]),
+    ],
+)
+def test_walk_refuses(capsys, arguments, words):
+    message = refused(capsys, "walk", ROBOT, *arguments)
+    assert all(word in message for word in words), message
+
+
+def test_turn_finds_a_spring_that_arrives(capsys, tmp_path):
+    folder = tmp_path / "there"
+    found = printed(capsys, "turn", ROBOT, "--target", "45 deg, 1.3 m", "--json", "--out", str(folder))
+    assert found["circle_radius_m"] == pytest.approx(1.3 / np.sqrt(2.0))
+    per_unit = np.deg2rad(1.0) * 1000.0  # N*m/rad to N*mm/deg
+    assert found["spring_by_law_N_m_rad"] * per_unit == pytest.approx(11.817, abs=0.01)
+    assert 9.0 < found["spring_N_m_rad"] * per_unit < 10.5
+    (walk,) = found["walks"]
+    assert walk["outcome"] == "arrived"
+    assert walk["nearest_m"] < 0.01
+    assert walk["arrival_s"] == found["evaluation_time_s"]
+    assert {file.name for file in folder.iterdir()} == {"turn.png", "turn.svg", "turn.nc", "turn.html"}
+    again = ["turn", ROBOT, "--target", "45 deg, 1.3 m", "--k1", "10 N*mm/deg", "--out", str(folder)]
+    assert "--force" in refused(capsys, *again)
+    assert main([*again, "--force"]) == 0
+
+
+def test_turn_with_a_given_spring_and_the_other_strategies(capsys):
+    target = ["--target", "-45 deg, 1.3 m", "--json"]
+    outcomes = {
+        (strategy, spring): printed(capsys, "turn", ROBOT, *target, "--strategy", strategy, "--k1", spring)["walks"][0]
+        for strategy, spring in (
+            ("pitchfork", "7 N*mm/deg"),
+            ("pitchfork", "9.8 N*mm/deg"),
+            ("pitchfork", "21 N*mm/deg"),
+            ("hopf", "5 N*mm/deg"),
+            ("leg-yaw", "auto"),
+            ("open-loop", "10 N*mm/deg"),
+        )
+    }
+    assert [walk["outcome"] for walk in outcomes.values()] == [
+        "turned inside",
+        "arrived",
+        "bulged outside",
+        "bulged outside",
+        "bulged outside",
+        "bulged outside",
+    ]
+    assert outcomes["open-loop", "10 N*mm/deg"]["epsilon3_rad2_s"] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--target", "0 deg, 0 m"], ["distance"]),
+        (["--target", "20 deg, 0.1 m"], ["distance", "0.15"]),
+        (["--target", "20 deg, -1 m"], ["distance"]),
+        (["--target", "170 deg, 1 m"], ["behind"]),
+        (["--target", "45"], ["45 deg, 1.3 m"]),
+        (["--target", "45 m, 1.3 m"], ["target"]),
+        (["--target", "80 deg, 0.4 m"], ["no spring turns so tightly"]),
+        (["--target", "45 deg, 1 m", "--strategy", "pitchfrok"], ["did you mean 'pitchfork'"]),
+        (["--target", "45 deg, 1 m", "--k1", "0 N*mm/deg"], ["must be positive"]),
+        (["--target", "45 deg, 1 m", "--k1", "atuo"], ["atuo"]),
+        (["--target", "45 deg, 1 m", "--strategy", "hopf", "--k1", "law"], ["radius law"]),
+        (["--target", "45 deg, 1 m", "--repeats", "2"], ["seed"]),
+        (["--target", "45 deg, 1 m", "--duration", "0 s"], ["duration"]),
+        (["--target", "45 deg, 1 m", "--set", "legs.half_width=0.3 m"], ["no pitchfork"]),
+    ],
+)
+def test_turn_refuses(capsys, arguments, words):
+    message = refused(capsys, "turn", ROBOT, *arguments)
+    assert all(word in message for word in words), message
