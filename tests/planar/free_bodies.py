@@ -1,12 +1,63 @@
 """The planar robot a second way: every module a free body, joints as constraints with Lagrange multipliers.
 
 Positions in the plane, feet one by one, forces from where each foot is; nothing is shared with the package but the
-robot's numbers. Accelerations and joint forces come from one linear system (index-1 form); scipy integrates from switch
-to switch.
+robot's numbers. Joint forces follow from the joints differentiated twice (index-1 form), scipy integrates from switch
+to switch, and after each piece positions and rates are put back onto the joints, so that nothing drifts in long runs.
 """
 
+import numba
 import numpy as np
 from scipy.integrate import solve_ivp
+
+
+@numba.njit(cache=True)
+def joint_rows(heading, half):
+    """Derivative of (rear end of module j) - (front end of module j+1) by (X, Y, heading) of all modules."""
+    n = len(heading)
+    rows = np.zeros((2 * (n - 1), 3 * n))
+    for j in range(n - 1):
+        for module, sign in ((j, 1.0), (j + 1, -1.0)):
+            rows[2 * j, 3 * module] = sign
+            rows[2 * j + 1, 3 * module + 1] = sign
+            rows[2 * j, 3 * module + 2] = half * np.sin(heading[module])
+            rows[2 * j + 1, 3 * module + 2] = -half * np.cos(heading[module])
+    return rows
+
+
+@numba.njit(cache=True)
+def free_bodies_rhs(t, state, standing, touch_down, masses, stiffness, damping, numbers):
+    """Rates and accelerations of all modules; standing feet have been so since their ``touch_down``."""
+    half, forward_offset, half_width, stride, speed, friction = numbers
+    n = len(masses) // 3
+    place, rate = state[: 3 * n], state[3 * n :]
+    load = np.zeros(3 * n)
+    for i in range(n):
+        c, s, w = np.cos(place[3 * i + 2]), np.sin(place[3 * i + 2]), rate[3 * i + 2]
+        for side in range(2):
+            if standing[i, side]:
+                ahead = forward_offset + stride / 2 - speed * (t - touch_down[i, side])
+                left = half_width if side == 0 else -half_width
+                arm_x, arm_y = ahead * c - left * s, ahead * s + left * c
+                push_x = -friction * (rate[3 * i] - w * arm_y - speed * c)
+                push_y = -friction * (rate[3 * i + 1] + w * arm_x - speed * s)
+                load[3 * i] += push_x
+                load[3 * i + 1] += push_y
+                load[3 * i + 2] += arm_x * push_y - arm_y * push_x
+    wanted = np.zeros(2 * (n - 1))  # rows @ acceleration: what the turning ends do by themselves
+    for j in range(n - 1):
+        a, b = 3 * j + 2, 3 * j + 5
+        torque = -stiffness[j] * (place[b] - place[a]) - damping[j] * (rate[b] - rate[a])
+        load[b] += torque
+        load[a] -= torque
+        wanted[2 * j] = -half * (rate[a] ** 2 * np.cos(place[a]) + rate[b] ** 2 * np.cos(place[b]))
+        wanted[2 * j + 1] = -half * (rate[a] ** 2 * np.sin(place[a]) + rate[b] ** 2 * np.sin(place[b]))
+    rows = joint_rows(place[2::3], half)
+    free = load / masses
+    multipliers = np.linalg.solve((rows / masses) @ rows.T, wanted - rows @ free)
+    out = np.empty(6 * n)
+    out[: 3 * n] = rate
+    out[3 * n :] = free + (rows.T @ multipliers) / masses
+    return out
 
 
 class FreeBodies:
@@ -23,6 +74,11 @@ class FreeBodies:
         self.phases = (
             np.stack([i * robot.gait.module_phase, i * robot.gait.module_phase + robot.gait.side_phase]).T / turn
         )
+        legs, gait = robot.legs, robot.gait
+        speed = gait.stride / gait.stance
+        numbers = (self.l / 2, legs.forward_offset, legs.half_width, gait.stride, speed, robot.ground.friction)
+        self.masses = np.tile([self.m, self.m, self.inertia], self.n)
+        self.parts = (self.masses, np.array(robot.springs.stiffness), np.array(robot.springs.damping), numbers)
 
     def from_reduced(self, x, pose=(0.0, 0.0, 0.0)):
         """Place the robot in reduced state ``x`` at a pose of module 1."""
@@ -45,42 +101,19 @@ class FreeBodies:
         front = [c * speed[0, 0] + s * speed[0, 1], c * speed[0, 1] - s * speed[0, 0], speed[0, 2]]
         return np.concatenate([front, np.diff(place[:, 2]), np.diff(speed[:, 2])]), place[0]
 
-    def rhs(self, t, state, standing, touch_down):
-        robot, n, half = self.robot, self.n, self.l / 2
-        place, speed = state.reshape(2, n, 3)
-        heading, rate = place[:, 2], speed[:, 2]
-        e = np.stack([np.cos(heading), np.sin(heading)], -1)
-        normal = np.stack([-e[:, 1], e[:, 0]], -1)
-        load = np.zeros((n, 3))
-        gait = robot.gait
-        for i, side in zip(*np.nonzero(standing), strict=True):
-            since = t - touch_down[i, side]
-            ahead = robot.legs.forward_offset + gait.stride / 2 - gait.stride * since / gait.stance
-            arm = ahead * e[i] + (1 - 2 * side) * robot.legs.half_width * normal[i]
-            slip = speed[i, :2] + rate[i] * np.array([-arm[1], arm[0]]) - gait.stride / gait.stance * e[i]
-            push = -robot.ground.friction * slip
-            load[i, :2] += push
-            load[i, 2] += arm[0] * push[1] - arm[1] * push[0]
-        bend, bending = np.diff(heading), np.diff(rate)
-        torque = -np.array(robot.springs.stiffness) * bend - np.array(robot.springs.damping) * bending
-        load[1:, 2] += torque
-        load[:-1, 2] -= torque
-        # Rear end of i = front end of i+1, differentiated twice: G a = -g.
-        joints = n - 1
-        system = np.zeros((3 * n + 2 * joints, 3 * n + 2 * joints))
-        system[range(3 * n), range(3 * n)] = np.tile([self.m, self.m, self.inertia], n)
-        right = np.zeros(len(system))
-        right[: 3 * n] = load.ravel()
-        for j in range(joints):
-            row, a, b = 3 * n + 2 * j, 3 * j, 3 * (j + 1)
-            g = np.zeros((2, 3 * n))
-            g[:, a : a + 2], g[:, a + 2] = np.eye(2), -half * normal[j]
-            g[:, b : b + 2], g[:, b + 2] = -np.eye(2), -half * normal[j + 1]
-            system[row : row + 2, : 3 * n] = g
-            system[: 3 * n, row : row + 2] = g.T
-            right[row : row + 2] = -half * (rate[j] ** 2 * e[j] + rate[j + 1] ** 2 * e[j + 1])
-        acceleration = np.linalg.solve(system, right)[: 3 * n]
-        return np.concatenate([state[3 * n :], acceleration])
+    def gaps(self, state):
+        """How far the joints are open: rear end of each module less front end of the next, shape (N-1, 2)."""
+        place = state.reshape(2, self.n, 3)[0]
+        end = self.l / 2 * np.stack([np.cos(place[:, 2]), np.sin(place[:, 2])], -1)
+        return (place[:-1, :2] - end[:-1]) - (place[1:, :2] + end[1:])
+
+    def closed(self, state):
+        """Nearest state, by mass, with closed joints and rates that keep them so: one Newton step."""
+        place, rate = state.reshape(2, -1)
+        rows = joint_rows(place[2::3], self.l / 2)
+        back = rows.T / self.masses[:, None] @ np.linalg.inv(rows / self.masses @ rows.T)
+        place = place - back @ self.gaps(state).ravel()
+        return np.concatenate([place, rate - back @ (rows @ rate)])
 
     def carry(self, state, t0, t1, rtol=1e-11):
         """State at t1."""
@@ -92,12 +125,12 @@ class FreeBodies:
         events = np.sort(events * gait.period)
         times = np.concatenate([[t0], events[(events > t0 + 1e-12) & (events < t1 - 1e-12)], [t1]])
         for start, end in zip(times[:-1], times[1:], strict=True):
-            if end - start < 1e-13:
+            if end - start < 1e-12:
                 continue
             middle = (start + end) / 2
             phase = (middle / gait.period + self.phases) % 1.0
-            feet = (phase < gait.duty, middle - phase * gait.period)
-            solution = solve_ivp(self.rhs, (start, end), state, "DOP853", args=feet, rtol=rtol, atol=1e-13)
+            args = (phase < gait.duty, middle - phase * gait.period, *self.parts)
+            solution = solve_ivp(free_bodies_rhs, (start, end), state, "DOP853", args=args, rtol=rtol, atol=1e-13)
             assert solution.success
-            state = solution.y[:, -1]
+            state = self.closed(solution.y[:, -1])
         return state
