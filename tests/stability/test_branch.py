@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from chilopod.errors import ParameterError
-from chilopod.stability import Kind, from_rhs, locate
-from chilopod.stability.branch import Ending, begin, follow, leave_pitchfork
+from chilopod.stability import Kind, PeriodicSystem, from_rhs, locate
+from chilopod.stability.branch import Ending, begin, follow, leave_pitchfork, proceed
 
 PERIOD = 2.0
 
@@ -47,15 +47,70 @@ def test_the_branch_of_a_subcritical_pitchfork_folds_back():
         assert point.value == pytest.approx(square**2 - square, abs=1e-9)
 
 
-def test_a_branch_goes_on_from_its_end():
-    (fork,) = locate(gentle, (-0.1, 0.5))
-    whole = follow(gentle, leave_pitchfork(gentle, fork), (-0.1, 0.5), points=8, step=0.05)
-    half = follow(gentle, leave_pitchfork(gentle, fork), (-0.1, 0.5), points=4, step=0.05)
-    assert half.ending is Ending.ENOUGH_POINTS
-    rest = follow(gentle, half.points[-1], (-0.1, 0.5), points=4, step=0.05)
-    for point in rest.points[1:]:
+def test_in_pieces_as_in_one():
+    (fork,) = locate(abrupt, (-0.3, 0.2))
+    start = leave_pitchfork(abrupt, fork)
+    whole = follow(abrupt, start, (-0.3, 0.2), points=12, step=0.05)
+    piece = follow(abrupt, start, (-0.3, 0.2), points=5, step=0.05)
+    assert piece.ending is Ending.ENOUGH_POINTS
+    pieces = proceed(abrupt, piece, (-0.3, 0.2), points=7)
+    assert (pieces.ending, pieces.scale, pieces.step) == (whole.ending, whole.scale, whole.step)
+    assert [point.value for point in pieces.points] == [point.value for point in whole.points]
+    assert [point.orbit.tolist() for point in pieces.points] == [point.orbit.tolist() for point in whole.points]
+    assert [point.special for point in pieces.points] == [point.special for point in whole.points]
+
+
+def test_a_branch_that_left_goes_on_in_a_wider_interval():
+    (fork,) = locate(gentle, (-0.1, 0.1))
+    branch = follow(gentle, leave_pitchfork(gentle, fork), (-0.1, 0.1), step=0.05)
+    assert branch.ending is Ending.LEFT_INTERVAL
+    with pytest.raises(ParameterError, match="last point"):
+        proceed(gentle, branch, (-0.1, 0.1))
+    wider = proceed(gentle, branch, (-0.1, 0.4))
+    assert wider.points[: len(branch.points)] == branch.points
+    assert wider.points[-1].value > 0.4
+    for point in wider.points[1:]:
         assert point.orbit[0] == pytest.approx(np.sqrt(point.value), abs=1e-9)
-    assert whole.points[4].value == half.points[-1].value
+
+
+def mapped(matrix):
+    """A system whose return map is x -> M x - x^3, M a matrix that depends on the parameter."""
+
+    def family(value):
+        m = np.atleast_2d(matrix(value))
+        return PeriodicSystem(len(m), 1.0, lambda x, t0, t1: (m @ x - x**3, m - np.diag(3.0 * x**2)))
+
+    return family
+
+
+@pytest.mark.parametrize(
+    ("matrix", "kind"),
+    [
+        (lambda mu: [[-1.0 - mu]], Kind.PERIOD_DOUBLING),
+        (lambda mu: [[1.0 + mu]], Kind.BRANCH_POINT),
+        (lambda mu: (1.0 + mu) * np.array([[0.6, -0.8], [0.8, 0.6]]), Kind.NEIMARK_SACKER),
+        (lambda mu: [[1.5, 1.0], [mu, 1.5]], None),  # a pair outside the circle becomes real: nothing happens
+    ],
+)
+def test_special_points_on_the_way_are_named_and_located(matrix, kind):
+    family, between = mapped(matrix), (-0.1, 0.137)
+    start = begin(family, -0.09, np.zeros(len(matrix(0.0))), rising=True, width=0.237)
+    special = follow(family, start, between).special_points
+    assert [point.special for point in special] == ([kind] if kind else [])
+    for point in special:
+        assert point.value == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_step_out_of_what_the_system_can_have_is_shortened():
+    def family(mu):
+        if mu > 0.21:
+            raise ParameterError("cannot be", field="mu", value=mu)
+        return gentle(mu)
+
+    (fork,) = locate(gentle, (-0.1, 0.2))
+    branch = follow(family, leave_pitchfork(gentle, fork), (-0.1, 0.2), step=0.1, longest=1.0)
+    assert branch.ending is Ending.LEFT_INTERVAL
+    assert 0.2 < branch.points[-1].value < 0.21
 
 
 def test_a_branch_begins_at_a_known_orbit():

@@ -2,13 +2,18 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 
-from chilopod.errors import AnalysisError
+from chilopod import stability
+from chilopod.errors import AnalysisError, OutputError, ParameterError
 from chilopod.planar import PlanarModel
+from chilopod.planar.along import walk_means
 from chilopod.report import write_branch
 from chilopod.robot import load_robot
+from chilopod.stability.curve import BranchPoint, Curve
+from chilopod.stability.system import whole_period
 from chilopod.studies import floquet
-from chilopod.studies.curved_walk import as_json, curved_walks
+from chilopod.studies.curved_walk import as_json, curved_walks, read_walks, resumed
 
 ROBOT = load_robot("aoi2022-planar")
 
@@ -18,17 +23,19 @@ def right():
     return curved_walks(ROBOT, floquet.K1, (floquet.stiffness(7.8), floquet.stiffness(20.0)), points=40)
 
 
-def at(data, name, k1):
-    order = np.argsort(data.parameter.values)
-    # Towards the pitchfork the radius is a power: between points its logarithm is nearly straight over the root.
-    x = np.sqrt(np.maximum(data.parameter.values[0] - data.parameter.values[order], 0.0))
-    return float(np.exp(np.interp(-np.sqrt(data.parameter.values[0] - k1), -x, np.log(data[name].values[order]))))
+def radius_at(data, k1):
+    """Of the body axis on the orbit at a spring, found from the nearest point of the branch."""
+    near = data.isel(point=int(np.abs(data.parameter.values - k1).argmin()))
+    model = PlanarModel(ROBOT.with_value(floquet.K1, floquet.stiffness(k1)), tolerance=1e-11)
+    orbit, _ = stability.find_orbit(whole_period(model), near.orbit.values, with_error=False)
+    angles = walk_means([model], orbit[None]).mean_angle[0]
+    return 5 * ROBOT.module_length / np.abs(angles).sum()
 
 
 def test_the_radius_of_the_body_axis(right):
     """Long simulations of an independent program: r = 1.095, 0.680, 0.544, 0.425, 0.318 m at these springs."""
-    found = [at(right, "axis_radius", k1) for k1 in (11.9, 11.5, 11.0, 10.0, 8.0)]
-    assert found == pytest.approx([1.095, 0.680, 0.544, 0.425, 0.318], rel=0.01)
+    found = [radius_at(right, k1) for k1 in (11.9, 11.5, 11.0, 10.0, 8.0)]
+    assert found == pytest.approx([1.095, 0.680, 0.544, 0.425, 0.318], rel=0.005)
 
 
 def test_the_branch_is_stable_and_turns_right(right):
@@ -71,9 +78,68 @@ def test_near_zero_forward_offset_the_branch_folds_back():
     data = curved_walks(robot, floquet.K1, (floquet.stiffness(9.0), floquet.stiffness(20.0)), points=20)
     special = list(data.special.values)
     fold = special.index("fold")
+    assert float(data.parameter[fold]) == pytest.approx(10.3881, abs=1e-4)
+    assert abs(float(data.tangent[fold, -1])) < 1e-6
+    assert data.attrs["criticality"] == data.attrs["direction"] == "subcritical"
+    assert data.attrs["direction_confirms"] == "yes"
     assert float(data.parameter[fold]) > float(data.parameter[0])
     assert not data.stable.values[1:fold].any()
     assert data.stable.values[fold + 1 :].all()
+
+
+def test_nothing_happens_on_the_way_to_very_soft_springs():
+    data = curved_walks(ROBOT, floquet.K1, (floquet.stiffness(1.0), floquet.stiffness(20.0)))
+    assert data.attrs["ending"] == "left the interval"
+    assert list(data.special.values[1:]) == [""] * (data.sizes["point"] - 1)
+    assert data.stable.values[1:].all()
+
+
+def test_the_direction_confirms_the_verdict(right):
+    assert right.attrs["criticality"] == right.attrs["direction"] == "supercritical"
+    assert right.attrs["direction_confirms"] == "yes"
+
+
+def test_orbits_and_multipliers_are_as_good_as_is_said(right):
+    curve = Curve(lambda value: PlanarModel(ROBOT.with_value(floquet.K1, value), tolerance=1e-14), right.attrs["scale"])
+    for index in (3, 8, 12, -1):
+        at = right.isel(point=index)
+        multipliers = at.multiplier_real.values + 1j * at.multiplier_imag.values
+        point = BranchPoint(float(at.parameter_si), at.orbit.values, multipliers, at.tangent.values)
+        image = curve.image(point.orbit, point.value)
+        # How far the point is off the curve, at right angles to it.
+        off = np.linalg.solve(curve.anchor(point).matrix, np.append(image.state - point.orbit, 0.0))
+        assert np.abs(off).max() < 1e-9
+        expected = np.linalg.eigvals(image.jacobian)
+        assert np.abs(expected[:, None] - multipliers).min(axis=0).max() < 1e-8
+
+
+def test_in_pieces_from_files_as_in_one(tmp_path):
+    between = (floquet.stiffness(7.8), floquet.stiffness(20.0))
+    whole = curved_walks(ROBOT, floquet.K1, between, points=9)
+    write_branch(curved_walks(ROBOT, floquet.K1, between, points=5), tmp_path)
+    pieces = resumed(read_walks(tmp_path / "branch.nc"), ROBOT, floquet.K1, points=4)
+    xr.testing.assert_equal(pieces, whole)
+    assert pieces.attrs == whole.attrs
+
+
+def test_only_its_own_branch_is_resumed(tmp_path):
+    between = (floquet.stiffness(7.8), floquet.stiffness(20.0))
+    data = curved_walks(ROBOT, floquet.K1, between, points=2)
+    # What the robot has for the parameter does not matter, nor what it is called.
+    same = ROBOT.with_value(floquet.K1, 0.1).with_(name="renamed")
+    assert resumed(data, same, floquet.K1, points=1).sizes["point"] == data.sizes["point"] + 1
+    for robot, parameter, side, match in (
+        (ROBOT.with_value("ground.friction", 200.0), floquet.K1, None, "another robot: ground"),
+        (ROBOT, "springs.stiffness[1]", None, "saved branch varies"),
+        (ROBOT, floquet.K1, -1, "other side"),
+    ):
+        with pytest.raises(ParameterError, match=match):
+            resumed(data, robot, parameter, side=side)
+    (tmp_path / "text.nc").write_text("no netCDF")
+    xr.Dataset({"a": 1}).to_netcdf(tmp_path / "other.nc", engine="h5netcdf")
+    for name, match in (("text.nc", "can be read"), ("none.nc", "can be read"), ("other.nc", "lacks parameter_si")):
+        with pytest.raises(ParameterError, match=match):
+            read_walks(tmp_path / name)
 
 
 def test_no_pitchfork_is_said():
@@ -88,3 +154,15 @@ def test_written_and_printed(right, tmp_path):
     assert result["points"][0]["axis_radius_m"] is None
     assert result["points"][0]["special"] == "pitchfork"
     assert len(result["points"][3]["mean_joint_angles_rad"]) == 5
+    assert len(result["points"][3]["multipliers"]) == 13
+    assert result["direction_confirms"] is True
+    lines = (tmp_path / "branch.csv").read_text().splitlines()
+    assert len([line for line in lines if not line.startswith("#")]) == 1 + right.sizes["point"]
+
+
+def test_files_are_only_replaced_if_told(right, tmp_path):
+    write_branch(right, tmp_path, replace=False)
+    before = (tmp_path / "branch.nc").read_bytes()
+    with pytest.raises(OutputError, match="not overwritten"):
+        write_branch(right.isel(point=slice(0, 5)), tmp_path, replace=False)
+    assert (tmp_path / "branch.nc").read_bytes() == before

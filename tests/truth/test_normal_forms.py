@@ -95,6 +95,10 @@ def test_neimark_sacker(omega, a, b, modulation):
     )
     principal = abs(np.angle(np.exp(1j * omega * PERIOD))) / PERIOD
     check(point, Kind.NEIMARK_SACKER, -2 * a * PERIOD * iv(0, modulation * PERIOD / pi), principal)
+    # The phase advances by -b times the integral of r^2, counted in the sense in which the frequency is positive.
+    sense = np.sign(np.angle(np.exp(1j * omega * PERIOD)))
+    rotation = -2 * sense * b * PERIOD * iv(0, modulation * PERIOD / pi)
+    assert point.rotation == pytest.approx(rotation, rel=1e-6)
     assert abs(point.multiplier - np.exp(1j * principal * PERIOD)) < 1e-11
     np.testing.assert_allclose(np.abs(point.mode), np.sqrt(0.5), atol=1e-9)
 
@@ -146,3 +150,4 @@ def test_neimark_sacker_with_quadratic_terms():
     mode = basis @ np.array([1.0, -1j])  # z = 1 moves along it: state = Re(z mode) = 2 Re(a mode / |mode|)
     scale = np.linalg.norm(mode) / 2
     check(point, Kind.NEIMARK_SACKER, PERIOD * first.real / scale**2, w)
+    assert point.rotation == pytest.approx(PERIOD * first.imag / scale**2, rel=1e-6)

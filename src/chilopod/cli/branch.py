@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from chilopod.cli.options import (
-    BetweenOption,
     JsonOption,
     OutOption,
     ParameterOption,
@@ -19,55 +19,112 @@ from chilopod.cli.options import (
     read_robot,
 )
 from chilopod.cli.progress import progress_bar
+from chilopod.errors import OutputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_BETWEEN = ("7.5 N*mm/deg", "20 N*mm/deg")
 
 
 def branch(
     robot: RobotArg,
     parameter: ParameterOption = "springs.stiffness[0]",
-    between: BetweenOption = ("7.5 N*mm/deg", "20 N*mm/deg"),
-    points: Annotated[int, typer.Option(metavar="N", min=1, max=10_000, help="At most so many points.")] = 60,
+    between: Annotated[
+        tuple[str, str] | None,
+        typer.Option(
+            metavar="LOW HIGH",
+            help='The interval; by default "7.5 N*mm/deg" "20 N*mm/deg", or that of the branch that is resumed.',
+        ),
+    ] = None,
+    points: Annotated[
+        int, typer.Option(metavar="N", min=1, max=10_000, help="At most so many points (with --resume: more points).")
+    ] = 60,
+    longest: Annotated[
+        float,
+        typer.Option(
+            metavar="STEP", min=1e-4, max=10.0, help="Largest step along the branch; halve it for more points."
+        ),
+    ] = 0.15,
     left: Annotated[
         bool, typer.Option("--left", help="Follow the left turn; it is the mirror image of the right.")
     ] = False,
     overrides: SetOption = None,
     as_json: JsonOption = False,
     out: OutOption = None,
+    resume: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Go on with the branch saved there; without --out it grows in its place."),
+    ] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Overwrite a branch that is already in the folder of --out.")
+    ] = False,
 ) -> None:
     """Follow the curved walks from the pitchfork: radius, speed, stability, folds and what else happens on the way.
 
-    With --out, draws the branch (unstable parts dashed) and writes it as netCDF and CSV.
+    With --out, draws the branch (unstable parts dashed) and writes it as netCDF and CSV; --resume goes on with it.
     """
     described = read_robot(robot, overrides)
-    low, high = interval(described, parameter, between)
+    chosen = between or (None if resume else _BETWEEN)
+    limits = interval(described, parameter, chosen) if chosen else None
     folder = prepared(out)
-    from chilopod.studies.curved_walk import as_json as branch_json
-    from chilopod.studies.curved_walk import curved_walks
+    # A branch that goes on where it is saved holds all it held before.
+    replace = force or (resume is not None and (folder is None or folder.resolve() == resume.resolve()))
+    if folder and not replace and (folder / "branch.nc").exists():
+        raise OutputError("exists and is not overwritten", source=str(folder / "branch.nc"), allowed="--force")
+    from chilopod.studies import curved_walk
 
     with progress_bar() as show:
-        data = curved_walks(
-            described,
-            parameter,
-            (low, high),
-            points=points,
-            side=-1 if left else 1,
-            progress=lambda done, words: show("branch", done, words),
-        )
+
+        def progress(done: float, words: str) -> None:
+            show("branch", done, words)
+
+        if resume is None:
+            assert limits is not None
+            data = curved_walk.curved_walks(
+                described,
+                parameter,
+                limits,
+                points=points,
+                longest=longest,
+                side=-1 if left else 1,
+                progress=progress,
+            )
+        else:
+            data = curved_walk.resumed(
+                curved_walk.read_walks(resume / "branch.nc"),
+                described,
+                parameter,
+                limits,
+                points=points,
+                longest=longest,
+                side=-1 if left else None,
+                progress=progress,
+            )
+            folder = folder or prepared(resume)
     if folder:
         from chilopod.report import write_branch
 
-        for path in write_branch(data, folder):
+        for path in write_branch(data, folder, replace=replace):
             typer.echo(f"wrote {path}", err=True)
     if as_json:
-        print_json(branch_json(data))
+        print_json(curved_walk.as_json(data))
         return
-    unit = data.parameter.attrs["units"]
-    typer.echo(f"{described.name}: curved walks over {parameter}; the branch ends: {data.attrs['ending']}")
+    _print(data)
+
+
+def _print(data: xr.Dataset) -> None:
+    unit, about = data.parameter.attrs["units"], data.attrs
+    typer.echo(f"{about['robot']}: curved walks over {about['varied']}; the branch ends: {about['ending']}")
+    verdict = about["criticality"]
+    agrees = "confirms" if about["direction_confirms"] == "yes" else "does not confirm"
+    typer.echo(f"  the normal form says {verdict}; the direction in which the branch leaves {agrees} it")
     typer.echo(f"  {unit:<12} axis radius  path radius  speed (m/s)  cost of transport  stability")
     for i in range(data.sizes["point"]):
         at = data.isel(point=i)
         special = str(at.special.values)
-        verdict = "stable" if bool(at.stable) else "unstable"
+        stability = "stable" if bool(at.stable) else "unstable"
         typer.echo(
             f"  {float(at.parameter):<12.6g} {float(at.axis_radius):<11.4g}  {float(at.path_radius):<11.4g}  "
-            f"{float(at.speed):<11.4g}  {float(at.cost_of_transport):<17.3g}  {special or verdict}"
+            f"{float(at.speed):<11.4g}  {float(at.cost_of_transport):<17.3g}  {special or stability}"
         )

@@ -125,8 +125,8 @@ def turn(
     from chilopod.studies.turn import turn as walk_there
 
     if folder:
-        from chilopod.report.turn import files_of_turn
         from chilopod.output import free_path
+        from chilopod.report.turn import files_of_turn
 
         for path in files_of_turn(folder):
             free_path(path, force)

@@ -152,7 +152,7 @@ class PlanarModel:
         starts, _, interval = self._pieces(t, t + self.period)
         out = np.empty_like(x)
         scratch = np.empty((self.modules, SCRATCH))
-        args = (self._scalars[0], self.stiffness, self.damping, self._moments(interval[:1])[0], scratch)
+        args = (self.scalars[0], self.stiffness, self.damping, self.moments(interval[:1])[0], scratch)
         compiled_rhs(float(starts[0]), x, args, out)
         return out
 
@@ -162,6 +162,20 @@ class PlanarModel:
         self._advance(batch, 0.0, self.period)
         forward, left, turn = batch[0, -3:].tolist()
         return Drift(forward, left, turn, self.period)
+
+    @cached_property
+    def scalars(self) -> Array:
+        """What the compiled right-hand side wants to know of a module: length (m), mass (kg), yaw inertia (kg*m^2) and
+        the speed of its feet (m/s), shape (1, 4)."""
+        robot = self.robot
+        return np.array([[robot.module_length, robot.module_mass, robot.module_yaw_inertia, robot.gait.speed]])
+
+    def moments(self, interval: NDArray[np.intp]) -> Array:
+        """Contact moments (see :mod:`chilopod.planar.contact`) at the start of intervals of :attr:`schedule`, shape
+        (intervals, N, 8)."""
+        legs = self.robot.legs
+        moments = contact_moments(legs.forward_offset, legs.half_width, self.robot.ground.friction, self.schedule)
+        return moments[interval]
 
     @staticmethod
     def flow_many(models: Sequence[PlanarModel], t0: float, t1: float) -> tuple[Array, Array]:
@@ -207,24 +221,14 @@ class PlanarModel:
     def _pieces(self, t0: float, t1: float) -> tuple[Array, Array, NDArray[np.intp]]:
         return pieces(self.robot.gait, self.modules, t0, t1)
 
-    @cached_property
-    def _scalars(self) -> Array:
-        robot = self.robot
-        return np.array([[robot.module_length, robot.module_mass, robot.module_yaw_inertia, robot.gait.speed]])
-
-    def _moments(self, interval: NDArray[np.intp]) -> Array:
-        legs = self.robot.legs
-        moments = contact_moments(legs.forward_offset, legs.half_width, self.robot.ground.friction, self.schedule)
-        return moments[interval]
-
     def _advance(self, batch: NDArray[np.float64] | NDArray[np.complex128], t0: float, t1: float) -> None:
         starts, widths, interval = self._pieces(t0, t1)
-        moments = self._moments(interval)
+        moments = self.moments(interval)
         ok = np.ones(len(batch), dtype=np.bool_)
         advance(
             starts,
             widths,
-            self._scalars,
+            self.scalars,
             self.stiffness[None],
             self.damping[None],
             moments[None],
@@ -243,7 +247,7 @@ class PlanarModel:
         passive, joint, rates, decay = _passive_matrices(
             robot.gait,
             self.modules,
-            *self._scalars[0, :3].tolist(),
+            *self.scalars[0, :3].tolist(),
             robot.legs.forward_offset,
             robot.legs.half_width,
             robot.ground.friction,

@@ -151,7 +151,7 @@ def simulate(
 
     schedule = models[0].schedule
     parameters = [
-        np.concatenate([model._scalars for model in models]),
+        np.concatenate([model.scalars for model in models]),
         np.array([(m.robot.legs.forward_offset, m.robot.legs.half_width) for m in models]),
         np.stack([model.stiffness for model in models]),
         np.stack([model.damping for model in models]),

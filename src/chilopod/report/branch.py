@@ -30,6 +30,15 @@ def panel(data: xr.Dataset) -> Panel:
     )
 
 
+def table(data: xr.Dataset) -> xr.Dataset:
+    """A branch with one line per point: what it goes on from is left to netCDF, every joint gets a column."""
+    angles = {f"mean_angle_{joint}": data.mean_angle.sel(joint=joint, drop=True) for joint in data.joint.values}
+    single = data[[name for name in data.data_vars if data[name].dims == ("point",)]].drop_vars("parameter_si")
+    found = single.assign(angles)
+    found.attrs = {name: value for name, value in data.attrs.items() if name != "robot_toml"}
+    return found
+
+
 def _draw(data: xr.Dataset, narrow: bool) -> Figure:
     figure, axes = style.figure(*_LAYOUTS, narrow)
     x = data.parameter.values

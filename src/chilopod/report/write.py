@@ -8,7 +8,18 @@ from pathlib import Path
 import xarray as xr
 
 from chilopod.output import netcdf, prepare_folder, write_atomic
-from chilopod.report import branch, critical, exponents, identification, mode, schematic, style, tables, uniform
+from chilopod.report import (
+    branch,
+    critical,
+    exponents,
+    identification,
+    mode,
+    schematic,
+    style,
+    tables,
+    undulation,
+    uniform,
+)
 from chilopod.report.page import Drawn, page
 from chilopod.report.panel import Panel
 from chilopod.robot import Robot, load_robot, presets
@@ -80,8 +91,34 @@ def write_identification(found: Identification, folder: str | Path) -> list[Path
     return _write_alone(identification.panel_of(found), folder)
 
 
-def write_branch(data: xr.Dataset, folder: str | Path) -> list[Path]:
+def write_branch(data: xr.Dataset, folder: str | Path, *, replace: bool = True) -> list[Path]:
     """Write a branch of curved walks as ``branch`` with ``.png``, ``.svg``, ``.csv`` and ``.nc``.
+
+    The netCDF file holds all that the branch goes on from, the table what a reader wants.
+
+    Parameters
+    ----------
+    data
+        From :mod:`chilopod.studies.curved_walk`.
+    folder
+        Created where there is none.
+    replace
+        Whether files of these names may be replaced.
+
+    Returns
+    -------
+    The files.
+
+    Raises
+    ------
+    OutputError
+        If the folder cannot be written, or a file exists and may not be replaced.
+    """
+    return _write_alone(branch.panel(data), folder, branch.table(data), replace)
+
+
+def write_undulation(data: xr.Dataset, folder: str | Path) -> list[Path]:
+    """Write undulating walks as ``undulation`` with ``.png``, ``.svg``, ``.csv`` and ``.nc``.
 
     Returns
     -------
@@ -92,24 +129,25 @@ def write_branch(data: xr.Dataset, folder: str | Path) -> list[Path]:
     OutputError
         If the folder cannot be written.
     """
-    return _write_alone(branch.panel(data), folder)
+    return _write_alone(undulation.panel(data), folder)
 
 
-def _write_alone(panel: Panel, folder: str | Path) -> list[Path]:
+def _write_alone(panel: Panel, folder: str | Path, table: xr.Dataset | None = None, replace: bool = True) -> list[Path]:
     folder = prepare_folder(folder)
-    _write(panel, folder, folder)
+    _write(panel, folder, folder, table, replace)
     return [folder / f"{panel.name}.{kind}" for kind in ("png", "svg", "csv", "nc")]
 
 
-def _write(panel: Panel, figures: Path, data: Path) -> bytes:
-    """Write a figure and its data; returns the SVG."""
+def _write(panel: Panel, figures: Path, data: Path, table: xr.Dataset | None = None, replace: bool = True) -> bytes:
+    """Write a figure, its data, and as a table the data or what is given for them; returns the SVG."""
     with style.house_style():
         drawn = panel.draw(False)
         vector, pixels = style.svg(drawn, panel.name), style.png(drawn)
-    write_atomic(figures / f"{panel.name}.svg", vector)
-    write_atomic(figures / f"{panel.name}.png", pixels)
-    write_atomic(data / f"{panel.name}.csv", tables.csv(panel.data))
-    write_atomic(data / f"{panel.name}.nc", netcdf(panel.data))
+    # The data first: if they may not be replaced, nothing is.
+    write_atomic(data / f"{panel.name}.nc", netcdf(panel.data), replace=replace)
+    write_atomic(data / f"{panel.name}.csv", tables.csv(panel.data if table is None else table), replace=replace)
+    write_atomic(figures / f"{panel.name}.svg", vector, replace=replace)
+    write_atomic(figures / f"{panel.name}.png", pixels, replace=replace)
     return vector
 
 

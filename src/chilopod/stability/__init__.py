@@ -7,7 +7,7 @@
 False
 """
 
-from chilopod.stability.branch import Branch, BranchPoint, Ending, begin, follow, leave_pitchfork
+from chilopod.stability.branch import Branch, BranchPoint, Ending, begin, follow, leave_pitchfork, proceed
 from chilopod.stability.floquet import Exponents, Multipliers, exponents, multipliers, sweep
 from chilopod.stability.jumps import UndeclaredSwitch
 from chilopod.stability.locate import locate
@@ -36,5 +36,6 @@ __all__ = [
     "leave_pitchfork",
     "locate",
     "multipliers",
+    "proceed",
     "sweep",
 ]

@@ -242,7 +242,10 @@ def _point(
         verdict = Criticality.UNDECIDED
     else:
         verdict = Criticality.SUPERCRITICAL if form.cubic < 0 else Criticality.SUBCRITICAL
-    return BifurcationPoint(kind, at.value, bound, at.orbit, mode, nu, frequency, verdict, form.cubic, form.cubic_error)
+    rotation = form.rotation if kind is Kind.NEIMARK_SACKER else None
+    return BifurcationPoint(
+        kind, at.value, bound, at.orbit, mode, nu, frequency, verdict, form.cubic, form.cubic_error, rotation
+    )
 
 
 def _where_it_exists(form: Callable[[float], NormalForm]) -> NormalForm:

@@ -32,13 +32,15 @@ class NormalForm:
 
     With a the amplitude along the unit critical mode: real multiplier 1, a -> a + quadratic a^2 + cubic a^3; flip or
     half-period pitchfork, the same for the map of twice the return; Neimark-Sacker (mode q a + complex conjugate), |a|
-    -> |a| + cubic |a|^3.
+    -> |a| + cubic |a|^3, while the phase of a advances by that of the multiplier + rotation |a|^2.
 
     Attributes
     ----------
     quadratic, cubic
         Coefficients. A negative ``cubic`` bounds the growth: supercritical.
-    quadratic_error, cubic_error
+    rotation
+        rad per period; 0 unless the critical multipliers are complex.
+    quadratic_error, cubic_error, rotation_error
         How far they may be off, from the extrapolation.
     """
 
@@ -46,6 +48,8 @@ class NormalForm:
     quadratic_error: float
     cubic: float
     cubic_error: float
+    rotation: float = 0.0
+    rotation_error: float = 0.0
 
 
 def real_normal_form(
@@ -126,12 +130,14 @@ def complex_normal_form(
     h11 = np.linalg.solve(identity - image.jacobian, b_qc).astype(np.complex128, copy=False)
 
     def third_order(s: Array) -> Array:
-        # |nu a + c a |a|^2| = |a| + Re(conj(nu) c) |a|^3 on the circle, for every return.
-        resonant = harmonics(s, h20, h11)[:, 1] @ left.conj()
-        return (((np.conj(nu) * resonant).real - s) / s**3)[:, None]
+        # nu a + c a |a|^2 = nu a (1 + conj(nu) c |a|^2) on the circle: a growth, and a turn, for every return.
+        resonant = np.conj(nu) * (harmonics(s, h20, h11)[:, 1] @ left.conj()) - s
+        return np.stack([resonant.real, resonant.imag], axis=1) / s[:, None] ** 3
 
-    cubic, error = _limit(third_order, ladder)
-    return NormalForm(0.0, 0.0, image.halves * float(cubic[0]), image.halves * float(error[0]))
+    found, errors = _limit(third_order, ladder)
+    cubic, rotation = (image.halves * found).tolist()
+    cubic_error, rotation_error = (image.halves * errors).tolist()
+    return NormalForm(0.0, 0.0, cubic, cubic_error, rotation, rotation_error)
 
 
 def _limit(measure: Callable[[Array], NDArray[Any]], ladder: Array) -> tuple[NDArray[Any], Array]:

@@ -69,6 +69,8 @@ class BifurcationPoint:
         Verdict and cubic coefficient a -> a + coefficient a^3 of the full-period map, a the amplitude along the unit
         ``mode`` (Neimark-Sacker: state = 2 Re(a mode)); None where it has no meaning (fold, transcritical, branch
         point).
+    rotation
+        Where the mode turns (Neimark-Sacker), the phase per period that an amplitude adds, rad per amplitude^2.
     """
 
     kind: Kind
@@ -81,3 +83,4 @@ class BifurcationPoint:
     criticality: Criticality | None = None
     coefficient: float | None = None
     coefficient_error: float | None = None
+    rotation: float | None = None

@@ -5,25 +5,28 @@ The paper's linear analysis ends at the pitchfork; this follows the nonlinear mo
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from chilopod import units
-from chilopod.errors import AnalysisError
-from chilopod.planar import PlanarModel, powers
+from chilopod import stability, units
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.planar.along import FollowedModel, walk_means
 from chilopod.robot import Robot
-from chilopod.stability import Kind
-from chilopod.stability.branch import Branch, BranchPoint, follow, leave_pitchfork
-from chilopod.studies.straight_walk import bifurcations, family
+from chilopod.stability import Branch, BranchPoint, Criticality, Ending, Kind, follow, leave_pitchfork, proceed
+from chilopod.stability.branch import LONGEST
+from chilopod.studies.straight_walk import WalkBifurcation, bifurcations, family
 
 Array = NDArray[np.float64]
+Progress = Callable[[float, str], None]
 
-TOLERANCE = 1e-11
-"""Of the nonlinear flow along a branch: orbits and radii are good to about 1e-10."""
+TOLERANCE = 1e-10
+"""Of the nonlinear flow along a branch; orbits are then good to about 1e-10 (the tests hold 1e-9 against 1e-14)."""
 
 GRAVITY = 9.80665
 """m/s^2, standard."""
@@ -36,9 +39,11 @@ _SUFFIX = {
     "cost_of_transport": "",
     "multiplier": "",
 }
-_NODES = (
-    16  # Gauss-Legendre, in every interval between two switches: after each one, motion settles within milliseconds
-)
+_SAME = ("body", "springs", "legs", "gait", "ground")  # what must agree for a branch to go on; names may differ
+
+
+def _silent(done: float, words: str) -> None:
+    """A :data:`Progress` that shows nothing."""
 
 
 def curved_walks(
@@ -47,8 +52,9 @@ def curved_walks(
     between: tuple[float, float],
     *,
     points: int = 60,
+    longest: float = LONGEST,
     side: int = 1,
-    progress: Callable[[float, str], None] = lambda done, words: None,
+    progress: Progress = _silent,
 ) -> xr.Dataset:
     """Follow the curved walks from the pitchfork at the upper end of stability through an interval of a parameter.
 
@@ -62,6 +68,9 @@ def curved_walks(
         Interval in SI units; the pitchfork must lie in it, and the branch ends where it leaves it.
     points
         At most so many points along the branch, special ones not counted.
+    longest
+        Largest distance between two of them along the curve, over orbit (SI units) and parameter (over the width of
+        the interval); halve it for twice as many.
     side
         +1: positive joint angles, a right turn; -1: the mirror image.
     progress
@@ -69,36 +78,120 @@ def curved_walks(
 
     Returns
     -------
-    Dataset over point (along the branch): the parameter, ``stable``, ``special`` (kind, or empty), ``multiplier``
-    (modulus of the largest), ``mean_angle`` over (point, joint), ``axis_radius`` (the paper's (N-1) L / sum |theta|),
-    ``path_radius`` (from the drift per period), ``heading_rate`` (left positive), ``speed``, ``floor_power`` and
-    ``leg_power`` (means over a period), ``cost_of_transport`` (leg power over weight times speed), and ``orbit`` over
-    (point, state).
+    Dataset over point (along the branch): the parameter (``parameter_si`` in SI units), ``stable``, ``special`` (kind,
+    or empty), ``multiplier`` (modulus of the largest), ``multiplier_real`` and ``multiplier_imag`` over (point, state),
+    ``mean_angle`` over (point, joint), ``axis_radius`` (the paper's (N-1) L / sum |theta|), ``path_radius`` (from the
+    drift per period), ``heading_rate`` (left positive), ``speed``, ``floor_power`` and ``leg_power`` (means over a
+    period), ``cost_of_transport`` (leg power over weight times speed), ``orbit`` over (point, state) and ``tangent``
+    over (point, component).
+
+    Attributes hold what the branch goes on from (:func:`resumed`), and of the pitchfork its ``criticality`` by the
+    normal form, its ``coefficient`` (1/rad^2), the ``direction`` in which the branch leaves it, and whether that
+    ``direction_confirms`` the verdict.
 
     Raises
     ------
     AnalysisError
         If there is no pitchfork in the interval.
     """
-    forks = [each.point for each in bifurcations(robot, parameter, between) if each.point.kind is Kind.PITCHFORK]
+    forks = [each for each in bifurcations(robot, parameter, between) if each.point.kind is Kind.PITCHFORK]
     if not forks:
         raise AnalysisError("the straight walk has no pitchfork in this interval", field=parameter)
-    make = family(robot, parameter)
-
-    def coarse(value: float) -> PlanarModel:
-        return PlanarModel(make(value).robot, TOLERANCE)
-
-    unit = robot.unit_of(parameter)
-
-    def shown(count: int, point: BranchPoint) -> None:
-        progress(0.8 * count / points, f"{units.format(point.value, unit, digits=4)}")
-
-    # The positive side of the mode is that of positive joint angles.
     fork = forks[-1]
-    angles = fork.mode.real[3 : robot.body.modules + 2]
-    start = leave_pitchfork(coarse, fork, side if angles.sum() >= 0 else -side)
-    branch = follow(coarse, start, between, points=points, progress=shown)
-    return _walked(robot, parameter, branch, coarse, lambda done: progress(0.8 + 0.2 * done, "radii and powers"))
+    make = _followed(robot, parameter)
+    # The positive side of the mode is that of positive joint angles.
+    angles = fork.point.mode.real[3 : robot.body.modules + 2]
+    start = leave_pitchfork(make, fork.point, side if angles.sum() >= 0 else -side)
+    branch = follow(
+        make, start, between, points=points, longest=longest, progress=_shown(robot, parameter, points, progress)
+    )
+    attributes = {"side": side, **_verdict(robot, parameter, fork, branch)}
+    return _walked(robot, parameter, between, branch, attributes)
+
+
+def resumed(
+    data: xr.Dataset,
+    robot: Robot,
+    parameter: str,
+    between: tuple[float, float] | None = None,
+    *,
+    points: int = 60,
+    longest: float = LONGEST,
+    side: int | None = None,
+    progress: Progress = _silent,
+) -> xr.Dataset:
+    """Follow a branch on from where it ends.
+
+    Parameters
+    ----------
+    data
+        From :func:`curved_walks`, from here, or from :func:`read_walks`.
+    robot, parameter, side
+        Must be those of the branch (``side`` None is not compared); what the robot has for the parameter does not
+        matter.
+    between
+        Interval in SI units, by default that of the branch.
+    points
+        At most so many points are added.
+    longest
+        As for :func:`curved_walks`.
+    progress
+        Called with the part done (0 to 1) and a few words.
+
+    Returns
+    -------
+    The dataset with the new points behind; the same points as if they had been followed at once.
+
+    Raises
+    ------
+    ParameterError
+        If the branch is another robot's, of another parameter or side, or has left the interval.
+    """
+    saved = Robot(**tomllib.loads(data.attrs["robot_toml"]))
+    if data.attrs["varied"] != parameter:
+        raise ParameterError(
+            "is not what the saved branch varies", field="parameter", value=parameter, allowed=data.attrs["varied"]
+        )
+    value = float(data.parameter_si[0])
+    here, there = robot.with_value(parameter, value), saved.with_value(parameter, value)
+    for name in _SAME:
+        if getattr(here, name) != getattr(there, name):
+            raise ParameterError(
+                f"the saved branch belongs to another robot: {name} differs", field="robot", value=robot.name
+            )
+    if side is not None and side != data.attrs["side"]:
+        raise ParameterError("the saved branch turns to the other side", field="side")
+    between = (data.attrs["lowest_si"], data.attrs["highest_si"]) if between is None else between
+    branch = proceed(
+        _followed(saved, parameter),
+        _branch_of(data),
+        between,
+        points=points,
+        longest=longest,
+        progress=_shown(saved, parameter, points, progress),
+    )
+    kept = {name: data.attrs[name] for name in _VERDICT}
+    return _walked(saved, parameter, between, branch, {"side": data.attrs["side"], **kept})
+
+
+def read_walks(path: str | Path) -> xr.Dataset:
+    """A branch from the netCDF file that it was written to.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such file, or it holds no branch that can be followed on.
+    """
+    path = Path(path)
+    try:
+        with xr.open_dataset(path, engine="h5netcdf") as stored:
+            data = stored.load()
+    except (OSError, ValueError):
+        raise ParameterError("is no netCDF file that can be read", source=str(path)) from None
+    missing = [name for name in _STORED if name not in data.variables and name not in data.attrs]
+    if missing:
+        raise ParameterError(f"holds no branch of curved walks: it lacks {missing[0]}", source=str(path))
+    return data
 
 
 def as_json(data: xr.Dataset) -> dict[str, Any]:
@@ -107,13 +200,16 @@ def as_json(data: xr.Dataset) -> dict[str, Any]:
     def plain(value: float) -> float | None:
         return float(value) if np.isfinite(value) else None
 
-    unit = data.parameter.attrs["units"]
     columns = ("axis_radius", "path_radius", "heading_rate", "speed", "cost_of_transport", "multiplier")
     return {
         "robot": data.attrs["robot"],
         "parameter": data.attrs["varied"],
-        "unit": unit,
+        "unit": data.parameter.attrs["units"],
         "ending": data.attrs["ending"],
+        "criticality": data.attrs["criticality"],
+        "coefficient_per_rad2": plain(data.attrs["coefficient"]),
+        "direction": data.attrs["direction"],
+        "direction_confirms": data.attrs["direction_confirms"] == "yes",
         "points": [
             {
                 "value": float(at.parameter),
@@ -121,81 +217,122 @@ def as_json(data: xr.Dataset) -> dict[str, Any]:
                 "special": str(at.special.values) or None,
                 "mean_joint_angles_rad": [float(angle) for angle in at.mean_angle],
                 **{f"{name}_{_SUFFIX[name]}".rstrip("_"): plain(float(at[name])) for name in columns},
+                "multipliers": np.column_stack([at.multiplier_real, at.multiplier_imag]).tolist(),
             }
             for at in (data.isel(point=i) for i in range(data.sizes["point"]))
         ],
     }
 
 
+_VERDICT = ("criticality", "coefficient", "direction", "direction_confirms")
+_STORED = (
+    *("parameter_si", "orbit", "tangent", "multiplier_real", "multiplier_imag", "special"),
+    *("robot_toml", "varied", "ending", "scale", "step", "side", "lowest_si", "highest_si", *_VERDICT),
+)
+
+
+def _followed(robot: Robot, parameter: str) -> Callable[[float], FollowedModel]:
+    make = family(robot, parameter)
+    return lambda value: FollowedModel(make(value).robot, TOLERANCE)
+
+
+def _shown(robot: Robot, parameter: str, points: int, progress: Progress) -> Callable[[int, BranchPoint], None]:
+    unit = robot.unit_of(parameter)
+    return lambda count, point: progress(count / points, units.format(point.value, unit, digits=4))
+
+
+def _verdict(robot: Robot, parameter: str, fork: WalkBifurcation, branch: Branch) -> dict[str, Any]:
+    """What the normal form says of the pitchfork, and whether the branch goes that way."""
+    make, critical = family(robot, parameter), fork.point.value
+    gone = next((point.value for point in branch.points[1:] if point.value != critical), critical)
+
+    def largest(value: float) -> float:
+        """Of the multipliers of the straight walk, the modulus of the critical one."""
+        found = stability.multipliers(make(value))
+        nu = found.values if found.half_period is None else found.half_period
+        return float(np.abs(nu[np.abs(nu - fork.point.multiplier).argmin()]))
+
+    # Supercritical: the curved walks are where the straight one has given way.
+    beyond = largest(gone) > largest(2.0 * critical - gone)
+    direction = Criticality.SUPERCRITICAL if beyond else Criticality.SUBCRITICAL
+    verdict = fork.point.criticality
+    return {
+        "criticality": verdict.label if verdict else "",
+        "coefficient": np.nan if fork.coefficient is None else fork.coefficient,
+        "direction": direction.label if gone != critical else "",
+        "direction_confirms": "yes" if gone != critical and verdict is direction else "no",
+    }
+
+
+def _branch_of(data: xr.Dataset) -> Branch:
+    """The branch that a dataset was made from, to the last bit."""
+    kinds = {kind.label: kind for kind in Kind}
+    multipliers = data.multiplier_real.values + 1j * data.multiplier_imag.values
+    points = tuple(
+        BranchPoint(float(value), orbit, row, tangent, kinds.get(str(special)))
+        for value, orbit, row, tangent, special in zip(
+            data.parameter_si.values,
+            data.orbit.values,
+            multipliers,
+            data.tangent.values,
+            data.special.values,
+            strict=True,
+        )
+    )
+    (ending,) = (each for each in Ending if each.label == data.attrs["ending"])
+    return Branch(points, ending, float(data.attrs["scale"]), float(data.attrs["step"]))
+
+
 def _walked(
-    robot: Robot,
-    parameter: str,
-    branch: Branch,
-    model_at: Callable[[float], PlanarModel],
-    progress: Callable[[float], None],
+    robot: Robot, parameter: str, between: tuple[float, float], branch: Branch, attributes: dict[str, Any]
 ) -> xr.Dataset:
     """What the robot does on every orbit of a branch."""
-    rows = []
-    for index, point in enumerate(branch.points):
-        rows.append(_walk(model_at(point.value), point.orbit))
-        progress((index + 1) / len(branch.points))
-    unit = robot.unit_of(parameter)
-    joints = robot.body.modules - 1
+    points, make, unit = branch.points, _followed(robot, parameter), robot.unit_of(parameter)
+    models = [make(point.value) for point in points]
+    means = walk_means(models, [point.orbit for point in points])
+    bent = np.abs(means.mean_angle).sum(axis=1)
+    length = np.array([model.robot.module_length for model in models])
+    weight = np.array([model.robot.body.mass * GRAVITY for model in models])
+    speed = np.array([drift.speed for drift in means.drifts])
+    multipliers = np.array([point.multipliers for point in points])
+    with np.errstate(divide="ignore"):
+        radius = (robot.body.modules - 1) * length / bent
 
-    def column(name: str, what: str) -> tuple[tuple[str, ...], Array, dict[str, str]]:
-        return ("point",), np.array([row[name] for row in rows]), {"units": what}
+    def column(values: Any, what: str | None = None) -> tuple[Any, ...]:
+        return (("point",), np.asarray(values), {} if what is None else {"units": what})
 
     return xr.Dataset(
         {
-            "parameter": (("point",), np.array([units.from_si(p.value, unit) for p in branch.points]), {"units": unit}),
-            "stable": (("point",), np.array([p.stable for p in branch.points])),
-            "special": (
-                ("point",),
-                np.array([p.special.label if p.special else "" for p in branch.points], dtype=object),
+            "parameter": column([units.from_si(point.value, unit) for point in points], unit),
+            "stable": column([point.stable for point in points]),
+            "special": column(
+                np.array([point.special.label if point.special else "" for point in points], dtype=object)
             ),
-            "multiplier": (("point",), np.array([abs(p.multipliers[0]) for p in branch.points])),
-            "mean_angle": (("point", "joint"), np.array([row["mean_angle"] for row in rows]), {"units": "rad"}),
-            "axis_radius": column("axis_radius", "m"),
-            "path_radius": column("path_radius", "m"),
-            "heading_rate": column("heading_rate", "rad/s"),
-            "speed": column("speed", "m/s"),
-            "floor_power": column("floor_power", "W"),
-            "leg_power": column("leg_power", "W"),
-            "cost_of_transport": column("cost_of_transport", "1"),
-            "orbit": (("point", "state"), np.array([p.orbit for p in branch.points])),
+            "multiplier": column(np.abs(multipliers[:, 0])),
+            "mean_angle": (("point", "joint"), means.mean_angle, {"units": "rad"}),
+            "axis_radius": column(radius, "m"),
+            "path_radius": column([drift.radius for drift in means.drifts], "m"),
+            "heading_rate": column([drift.heading_rate for drift in means.drifts], "rad/s"),
+            "speed": column(speed, "m/s"),
+            "floor_power": column(means.floor_power, "W"),
+            "leg_power": column(means.leg_power, "W"),
+            "cost_of_transport": column(means.leg_power / (weight * speed), "1"),
+            "parameter_si": column([point.value for point in points], robot.si_unit_of(parameter)),
+            "orbit": (("point", "state"), np.array([point.orbit for point in points])),
+            "multiplier_real": (("point", "state"), multipliers.real),
+            "multiplier_imag": (("point", "state"), multipliers.imag),
+            "tangent": (("point", "component"), np.array([point.tangent for point in points])),
         },
-        coords={"joint": np.arange(1, joints + 1)},
-        attrs={"robot": robot.name, "varied": parameter, "ending": branch.ending.label},
+        coords={"joint": np.arange(1, robot.body.modules)},
+        attrs={
+            "robot": robot.name,
+            "varied": parameter,
+            "ending": branch.ending.label,
+            **attributes,
+            "lowest_si": float(between[0]),
+            "highest_si": float(between[1]),
+            "scale": branch.scale,
+            "step": branch.step,
+            "robot_toml": robot.to_toml(),
+        },
     )
-
-
-def _walk(model: PlanarModel, orbit: Array) -> dict[str, object]:
-    """Means over one period and the drift of one periodic walk."""
-    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
-    times = model.schedule.times
-    state, now = orbit, 0.0
-    angles = np.zeros(model.modules - 1)
-    floor = legs = 0.0
-    for start, end in zip(times[:-1], times[1:], strict=True):
-        half = 0.5 * (end - start)
-        for node, weight in zip(nodes, weights, strict=True):
-            t = float(start + half * (1.0 + node))
-            state, now = model.flow_states(state[None], now, t)[0], t
-            share = half * weight / model.period
-            power = powers(model, state, t)
-            angles += share * state[3 : model.modules + 2]
-            floor += share * power.floor
-            legs += share * power.legs
-    drift = model.drift(orbit)
-    bent = float(np.abs(angles).sum())
-    weight_force = model.robot.body.mass * GRAVITY
-    return {
-        "mean_angle": angles,
-        "axis_radius": (model.modules - 1) * model.robot.module_length / bent if bent > 0.0 else np.inf,
-        "path_radius": drift.radius,
-        "heading_rate": drift.heading_rate,
-        "speed": drift.speed,
-        "floor_power": floor,
-        "leg_power": legs,
-        "cost_of_transport": legs / (weight_force * drift.speed),
-    }

@@ -1,0 +1,266 @@
+"""Periodic walks that are followed through a parameter: many robots a call, few tangents, means over a period."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import qr
+
+from chilopod.compiled import parallel_njit
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.integrate import COMPLEX_STEP, integrator
+from chilopod.planar.drift import Drift
+from chilopod.planar.dynamics import SCRATCH, rhs
+from chilopod.planar.flow import advance
+from chilopod.planar.model import PlanarModel
+
+Array = NDArray[np.float64]
+
+NODES = 16
+"""Gauss-Legendre nodes in every interval between two switches: after each one, motion settles within milliseconds."""
+
+_DERIVATIVE = 100.0  # tolerance of the derivative over that of the state
+_CUTS = (1 / 6, 1 / 3, 1 / 2)  # of the interval, where tangents that have died out are dropped
+_DEAD = 1e-12  # size of a tangent that no longer matters, relative to the largest
+
+_integrate = integrator(rhs)
+
+
+class FollowedModel(PlanarModel):
+    """The planar model for walks that are followed through a parameter.
+
+    It gives the same answers as :class:`PlanarModel`, with a derivative good to some ten times ``tolerance``, and
+    :meth:`flow_each` on top.
+    """
+
+    def flow(self, x: ArrayLike, t0: float, t1: float) -> tuple[Array, Array]:
+        """:meth:`PlanarModel.flow`, dropping the tangents that die out on the way.
+
+        Velocities settle to the pace of the feet within milliseconds, so after a part of the period the derivative has
+        lost half its rank to round-off. There it is factored, derivative = left right, and only the columns of
+        ``left`` that are still alive are carried on.
+        """
+        x = self._checked(x)
+        if np.array_equal(x, self.orbit):
+            return super().flow(x, t0, t1)
+        switches = self._pieces(t0, t1)[1].cumsum() + t0
+        cuts = [float(switches[np.abs(switches - (t0 + part * (t1 - t0))).argmin()]) for part in _CUTS]
+        times = sorted({t0, *cuts, t1})
+        precise = self.tolerance
+        state, left, right = x.astype(np.complex128), np.eye(self.dimension), np.eye(self.dimension)
+        try:
+            self.tolerance = _DERIVATIVE * precise
+            for start, end in zip(times, times[1:], strict=False):
+                batch = state + 1j * COMPLEX_STEP * left.T
+                self._advance(batch, start, end)
+                state, left = batch[0].real.astype(np.complex128), batch.imag.T / COMPLEX_STEP
+                basis, upper, order = qr(left, mode="economic", pivoting=True)
+                size = np.abs(np.diag(upper))
+                alive = max(1, int((size > _DEAD * size[0]).sum()))
+                if alive < left.shape[1]:
+                    unsorted = np.empty_like(upper)
+                    unsorted[:, order] = upper
+                    left, right = basis[:, :alive], unsorted[:alive] @ right
+        finally:
+            self.tolerance = precise
+        return state.real.copy(), left @ right
+
+    @staticmethod
+    def flow_each(models: Sequence[PlanarModel], states: ArrayLike, t0: float, t1: float) -> Array:
+        """Carry every state by the model of its own robot, on all cores.
+
+        Parameters
+        ----------
+        models
+            As many as states.
+        states
+            Shape (states, 2N+1), or with poses behind, (states, 2N+4).
+        t0, t1
+            Times, s, ``t0 <= t1``.
+
+        Returns
+        -------
+        States at t1, of the shape of ``states``.
+
+        Raises
+        ------
+        AnalysisError
+            If a motion diverges.
+        """
+        batch = np.array(states, dtype=np.float64)
+        if len(batch) != len(models):
+            raise ParameterError("must be one for each model", field="states", value=len(batch))
+        if not _alike(models):
+            return np.concatenate(
+                [
+                    FollowedModel.flow_each([model], state[None], t0, t1)
+                    for model, state in zip(models, batch, strict=True)
+                ]
+            )
+        starts, widths, interval = models[0]._pieces(t0, t1)
+        ok = np.ones(len(batch), dtype=np.bool_)
+        owner = np.arange(len(batch))
+        advance(starts, widths, *_stacked(models, interval), owner, batch, models[0].tolerance, ok)
+        if not ok.all():
+            raise AnalysisError(f"the motion diverges between {t0:g} s and {t1:g} s", field="x")
+        return batch
+
+
+@dataclass(frozen=True)
+class WalkMeans:
+    """What periodic walks amount to over one period.
+
+    Attributes
+    ----------
+    mean_angle
+        Of every joint, rad, shape (walks, N-1).
+    leg_power
+        Mean power the legs deliver, W, shape (walks,).
+    floor_power
+        Mean power lost at the feet, W, never positive, shape (walks,).
+    drifts
+        How each walk moves over the floor.
+    """
+
+    mean_angle: Array
+    leg_power: Array
+    floor_power: Array
+    drifts: tuple[Drift, ...]
+
+
+def walk_means(models: Sequence[PlanarModel], orbits: ArrayLike) -> WalkMeans:
+    """Means over one period of the walk of every robot that starts in its state at time 0.
+
+    All robots run through the period together, stopping at the nodes of Gauss-Legendre quadrature. Powers are those of
+    :func:`chilopod.planar.powers`, written in the frame of each module.
+
+    Parameters
+    ----------
+    models
+        As many as orbits.
+    orbits
+        States at time 0, shape (walks, 2N+1).
+
+    Raises
+    ------
+    AnalysisError
+        If a motion diverges.
+    """
+    orbits = np.asarray(orbits, dtype=np.float64)
+    if not _alike(models):
+        parts = [walk_means([model], orbit[None]) for model, orbit in zip(models, orbits, strict=True)]
+        return WalkMeans(
+            np.concatenate([part.mean_angle for part in parts]),
+            np.concatenate([part.leg_power for part in parts]),
+            np.concatenate([part.floor_power for part in parts]),
+            tuple(drift for part in parts for drift in part.drifts),
+        )
+    first, schedule = models[0], models[0].schedule
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    fractions, widths = 0.5 * (1.0 + nodes), np.diff(schedule.times)
+    states = np.concatenate([orbits, np.zeros((len(orbits), 3))], axis=1)
+    recorded = np.empty((len(orbits), len(widths), NODES, first.dimension))
+    ok = np.ones(len(orbits), dtype=np.bool_)
+    _record(widths, fractions, *_stacked(models, np.arange(len(widths))), states, first.tolerance, recorded, ok)
+    if not ok.all():
+        raise AnalysisError("the motion diverges within a period", field="orbits")
+    share = 0.5 * weights * widths[:, None] / first.period
+    mean_angle = np.einsum("sn,wsnj->wj", share, recorded[..., 3 : first.modules + 2])
+    legs, floor = _powers(models, recorded, widths[:, None] * fractions)
+    drifts = tuple(Drift(ahead, left, turn, first.period) for ahead, left, turn in states[:, -3:].tolist())
+    return WalkMeans(mean_angle, np.einsum("sn,wsn->w", share, legs), np.einsum("sn,wsn->w", share, floor), drifts)
+
+
+def _alike(models: Sequence[PlanarModel]) -> bool:
+    return all(models[0].can_flow_with(model) for model in models[1:])
+
+
+def _stacked(models: Sequence[PlanarModel], interval: NDArray[np.intp]) -> tuple[Array, Array, Array, Array]:
+    """Scalars, stiffness, damping and moments of robots of one gait, as :func:`chilopod.planar.flow.advance` takes
+    them."""
+    return (
+        np.concatenate([model.scalars for model in models]),
+        np.stack([model.stiffness for model in models]),
+        np.stack([model.damping for model in models]),
+        np.stack([model.moments(interval) for model in models]),
+    )
+
+
+@parallel_njit
+def _record(
+    widths: Any,
+    fractions: Any,
+    scalars: Any,
+    stiffness: Any,
+    damping: Any,
+    moments: Any,
+    states: Any,
+    tolerance: float,
+    recorded: Any,
+    ok: Any,
+) -> None:
+    """Carry every row of ``states``, with its pose, through one period in place; ``recorded[row, piece, node]`` is the
+    reduced state on the way, at ``fractions`` of each piece."""
+    for r in numba.prange(states.shape[0]):
+        x = states[r].copy()
+        work = np.empty((16, x.size), x.dtype)
+        scratch = np.empty((moments.shape[2], SCRATCH), x.dtype)
+        h = 0.0
+        for s in range(widths.size):
+            args = (scalars[r], stiffness[r], damping[r], moments[r, s], scratch)
+            t = 0.0
+            for node in range(fractions.size + 1):
+                end = widths[s] * fractions[node] if node < fractions.size else widths[s]
+                h, reached = _integrate(args, x, t, end, h, tolerance, work)
+                if not reached:
+                    ok[r] = False
+                    break
+                t = end
+                if node < fractions.size:
+                    recorded[r, s, node] = x[: recorded.shape[3]]
+            if not ok[r]:
+                break
+        states[r] = x
+
+
+def _powers(models: Sequence[PlanarModel], x: Array, since: Array) -> tuple[Array, Array]:
+    """Powers of legs and floor, W, shape (walks, pieces, nodes), in states x, shape (walks, pieces, nodes, 2N+1),
+    ``since`` (s), shape (pieces, nodes), the start of each piece."""
+    n, gait, schedule = models[0].modules, models[0].robot.gait, models[0].schedule
+    legs_of = [model.robot.legs for model in models]
+    half, friction, offset, half_width = (
+        np.array(values)[:, None, None, None]
+        for values in (
+            [0.5 * model.robot.module_length for model in models],
+            [model.robot.ground.friction for model in models],
+            [legs.forward_offset for legs in legs_of],
+            [legs.half_width for legs in legs_of],
+        )
+    )
+    none = np.zeros((*x.shape[:-1], 1))
+    heading = np.concatenate([none, x[..., 3 : n + 2].cumsum(-1)], axis=-1)
+    rate = x[..., 2:3] + np.concatenate([none, x[..., n + 2 :].cumsum(-1)], axis=-1)
+    c, s = np.cos(heading), np.sin(heading)
+    # From the centre of a module to its rear joint and on to the next centre: v + rate x r.
+    vx = x[..., 0:1] + half * np.concatenate(
+        [none, (rate[..., :-1] * s[..., :-1] + rate[..., 1:] * s[..., 1:]).cumsum(-1)], -1
+    )
+    vy = x[..., 1:2] - half * np.concatenate(
+        [none, (rate[..., :-1] * c[..., :-1] + rate[..., 1:] * c[..., 1:]).cumsum(-1)], -1
+    )
+    along, across = c * vx + s * vy - gait.speed, c * vy - s * vx
+    legs, floor = np.zeros(x.shape[:-1]), np.zeros(x.shape[:-1])
+    for side, sign in enumerate((1.0, -1.0)):
+        weight = friction * schedule.contact[:, None, :, side]
+        ahead = offset + schedule.stroke[:, None, :, side] - gait.speed * since[..., None]
+        slip_x = along - sign * half_width * rate
+        slip_y = across + ahead * rate
+        # A motor moves its foot back at the gait's speed, against friction that points ahead if the foot slips back.
+        legs -= gait.speed * (weight * slip_x).sum(-1)
+        floor -= (weight * (slip_x**2 + slip_y**2)).sum(-1)
+    return legs, floor
