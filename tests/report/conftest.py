@@ -1,17 +1,23 @@
 """Results small enough to draw in a moment; sweeps and profiles are made up where only their shape matters."""
 
+import runpy
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
 
 from chilopod import load_robot
 from chilopod.studies import Identification, Results, Row, reproduce
+from chilopod.studies.movies import Movie
+
+WALK = runpy.run_path(str(Path(__file__).with_name("walks.py")))["walk"]
 
 
 @pytest.fixture(scope="session")
 def results() -> Results:
     found = reproduce(load_robot("aoi2022-planar"), only=["mode", "variants", "uniform"], quick=True)
-    found.rows.append(Row("a <b> & c", "1 N*mm/deg", "-2e-10 N*mm/deg", "nowhere", "differs", "for <script>"))
+    found.rows["mode"].append(Row("a <b> & c", "1 N*mm/deg", "-2e-10 N*mm/deg", "nowhere", "differs", "for <script>"))
     # What a sweep and a count of modules look like, without computing them.
     k1 = np.geomspace(75.0, 2.0, 40)
     square = np.log(13.0 / k1) * 0.02
@@ -64,5 +70,10 @@ def fit() -> Identification:
 @pytest.fixture(scope="session")
 def full(results, fit) -> Results:
     return Results(
-        results.robot, {**results.datasets, "identification": fit.profile}, fit, results.rows, {**results.seconds}
+        results.robot,
+        {**results.datasets, "identification": fit.profile},
+        fit,
+        movies=[Movie("movie-1", "Two walks", ("left", "right"), WALK(0.5, -0.5, duration=1.0), 2.0)],
+        rows=results.rows,
+        seconds={**results.seconds},
     )

@@ -47,6 +47,10 @@ class Page(HTMLParser):
         return [attrs[name] for _, attrs in self.tags if name in attrs]
 
 
+def figures(results):
+    return [panel for of_chapter in panels(results).values() for panel in of_chapter]
+
+
 @pytest.fixture(scope="module")
 def folder(full, tmp_path_factory):
     where = tmp_path_factory.mktemp("report") / "new"
@@ -61,7 +65,7 @@ def html(folder) -> str:
 
 def test_every_figure_has_all_its_files(folder, full):
     names = ["schematic", "exponents", "variants", "modules", "mode", "uniform", "identification"]
-    assert [panel.name for panel in panels(full)] == names
+    assert [panel.name for panel in figures(full)] == names
     assert sorted(path.name for path in (folder / "figures").iterdir()) == sorted(
         f"{name}.{kind}" for name in names for kind in ("png", "svg")
     )
@@ -73,7 +77,12 @@ def test_every_figure_has_all_its_files(folder, full):
 
 def test_page_stands_on_its_own(folder, html):
     page = Page(html)
-    for address in page.attributes("src") + page.attributes("srcset"):
+    shown = page.attributes("src") + page.attributes("srcset")
+    assert [address for address in shown if address.startswith("movies/")] == ["movies/movie-1.mp4"]
+    for address in shown:
+        if address.startswith("movies/"):
+            assert (folder / address).is_file()
+            continue
         assert address.startswith("data:image/svg+xml;base64,")
         ElementTree.fromstring(base64.b64decode(address.partition(",")[2]))
     for address in page.attributes("href"):
@@ -90,11 +99,12 @@ def test_page_stands_on_its_own(folder, html):
 def test_page_is_accessible(html, full):
     page = Page(html)
     images = [attrs for tag, attrs in page.tags if tag == "img"]
-    assert len(images) == len(panels(full))
+    assert len(images) == len(figures(full))
     assert all(len(attrs["alt"]) > 40 for attrs in images)
     headings = [tag for tag, _ in page.tags if re.fullmatch("h[1-6]", tag)]
     assert headings[0] == "h1"
-    assert set(headings[1:]) == {"h2"}
+    assert set(headings[1:]) == {"h2", "h3"}
+    assert headings.index("h2") < headings.index("h3")
     assert dict(page.tags[0][1])["lang"] == "en"
     assert len(set(page.attributes("id"))) == len(page.attributes("id"))
 
@@ -118,7 +128,7 @@ def test_page_says_what_was_found(html, full):
 
 
 def test_verdict_that_rounding_leaves_open_is_named(fit):
-    (panel,) = [each for each in panels(Results(fit.best, {"identification": fit.profile}, fit)) if each.letter == "G"]
+    (panel,) = [each for each in figures(Results(fit.best, {"identification": fit.profile}, fit)) if each.letter == "G"]
     words = " ".join(panel.text)
     assert "changes within the valley" in words
     assert "near a forward offset of 46.6 mm" in words
@@ -126,7 +136,7 @@ def test_verdict_that_rounding_leaves_open_is_named(fit):
 
 @pytest.mark.parametrize("name", ["schematic", "exponents", "variants", "modules", "mode", "uniform", "identification"])
 def test_data_read_back(folder, full, name):
-    (data,) = [panel.data for panel in panels(full) if panel.name == name]
+    (data,) = [panel.data for panel in figures(full) if panel.name == name]
     per = {str(each): str(each).replace("/", " per ") for each in data.variables}
     with xr.open_dataset(folder / "data" / f"{name}.nc", engine="h5netcdf") as stored:
         xr.testing.assert_equal(stored.load(), data.rename(per))
@@ -153,7 +163,12 @@ def test_only_what_was_asked_for(results, tmp_path):
     folder = tmp_path / "a b"
     page = Page(write_report(Results(robot, {"mode": results.datasets["mode"]}), folder).read_text(encoding="utf-8"))
     assert {path.stem for path in (folder / "figures").iterdir()} == {"schematic", "mode"}
-    assert [attrs["id"] for tag, attrs in page.tags if tag == "section"] == ["schematic", "mode", "next"]
+    assert [attrs["id"] for tag, attrs in page.tags if tag == "section"] == [
+        "chapter-1",
+        "schematic",
+        "mode",
+        "next",
+    ]
     assert "6.5756" not in page.text
     # It is no preset any more, so commands name the file that goes with the report.
     assert f'chilopod stability "{folder / "data" / "robot.toml"}"' in page.text

@@ -114,7 +114,7 @@ def test_rows_put_the_paper_beside_what_was_computed():
     seen = []
     results = reproduce(ROBOT, ["mode", "uniform"], progress=lambda section, done, words: seen.append((section, done)))
     assert list(results.datasets) == ["mode", "uniform"]
-    verdicts = {row.quantity: row.verdict for row in results.rows}
+    verdicts = {row.quantity: row.verdict for row in results.all_rows}
     assert verdicts["critical k1 of the planar model"] == "agrees"
     # Honest to the last digit: 0.6349 is not 0.64 within rounding.
     assert verdicts["critical mode, joint 1"] == "differs"

@@ -26,10 +26,13 @@ def reproduce(
         list[str] | None, typer.Option("--only", metavar="SECTION", help="Just this section; may be repeated.")
     ] = None,
     out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Where the report goes.")] = Path("report"),
-    quick: Annotated[bool, typer.Option("--quick", help="Coarser sweeps; printed numbers as exact as ever.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Coarser sweeps, fewer trials.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Compute everything the paper says about its planar model and write a report beside its own numbers."""
+    """Compute the paper's results with its planar model and write a report beside its own numbers.
+
+    Trials are kept in the folder, so a run that was stopped goes on where it was.
+    """
     from chilopod.output import prepare_folder
     from chilopod.studies.reproduce import SECTIONS, chosen
 
@@ -40,22 +43,30 @@ def reproduce(
 
     with progress_bar() as show:
         results = studies.reproduce(
-            read_robot(PRESET, None), only, quick, lambda section, done, words: show(SECTIONS[section], done, words)
+            read_robot(PRESET, None),
+            only,
+            quick,
+            prepare_folder(folder / "trials"),
+            lambda section, done, words: show(SECTIONS[section], done, words),
         )
         show("figures and report", 0.0, "")
         page = write_report(results, folder)
         show("figures and report", 1.0, "done")
-    rows = [row.as_json() for row in results.rows]
+    rows = [row.as_json() for row in results.all_rows]
     if as_json:
         print_json({"report": str(page), "rows": rows, "seconds": results.seconds})
         return
-    _print_table([("", "paper", "computed", "")] + [(r.quantity, r.paper, r.computed, r.verdict) for r in results.rows])
+    for row in results.all_rows:
+        typer.echo(f"{row.verdict:<12} {row.quantity}")
+        typer.echo(f"{'':<12}   paper: {row.paper}")
+        typer.echo(f"{'':<12}   here:  {row.computed}")
     typer.echo("")
     typer.echo(f"The report is {page}")
     typer.echo("Next, try:")
     for command in (
         "chilopod stability aoi2022-planar",
         'chilopod bifurcation aoi2022-planar --parameter "springs.stiffness[0]" --between "2 N*mm/deg" "75 N*mm/deg"',
+        'chilopod turn aoi2022-planar --target "30 deg, 2 m" --out turn',
         "chilopod robot new my.toml --modules 8",
     ):
         typer.echo(f"  {command}")
@@ -94,10 +105,3 @@ def planar(
         typer.echo(f"{name} = {value['text']}  (rounding of the printed numbers allows {value['allowed_text']})")
     typer.echo(f"largest residual {result['largest_residual']:.2f}: 1 is what rounding of the printed numbers allows")
     typer.echo(f"profile, figure and robot file are in {folder}")
-
-
-def _print_table(rows: list[tuple[str, str, str, str]]) -> None:
-    """Columns as wide as they need to be; on a narrow terminal the table wraps rather than being cut."""
-    widths = [max(len(row[column]) for row in rows) for column in range(4)]
-    for row in rows:
-        typer.echo("  ".join(f"{cell:<{width}}" for cell, width in zip(row, widths, strict=True)).rstrip())

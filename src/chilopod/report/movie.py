@@ -86,7 +86,8 @@ def movie(
     if any(side % 2 or not _SMALLEST <= side <= _LARGEST for side in size):
         allowed = f"two even numbers from {_SMALLEST} to {_LARGEST}"
         raise ParameterError("is no size of a film", field="size", value=size, allowed=allowed)
-    _require_encoder()
+    if not has_encoder():
+        raise OutputError(f"PyAV was built without the encoder {_ENCODER}, which movies need")
     path = Path(path)
     prepare_folder(path.parent)
     recorded = record["time"].values.astype(np.float64)
@@ -96,11 +97,13 @@ def movie(
     return write_atomic(path, _encoded(_frames(shown, heading, size, speed), fps, size))
 
 
-def _require_encoder() -> None:
+def has_encoder() -> bool:
+    """Whether :func:`movie` can encode its films here."""
     try:
         av.codec.Codec(_ENCODER, "w")
     except (av.FFmpegError, av.codec.codec.UnknownCodecError):
-        raise OutputError(f"PyAV was built without the encoder {_ENCODER}, which movies need") from None
+        return False
+    return True
 
 
 def _encoded(frames: Iterator[NDArray[np.uint8]], fps: int, size: tuple[int, int]) -> bytes:

@@ -17,14 +17,15 @@ from chilopod import units
 from chilopod.report.panel import Panel
 from chilopod.report.words import listing, minus, spring, typeset
 from chilopod.robot import Robot
-from chilopod.studies import SECTIONS, Results, Row
+from chilopod.studies import CHAPTERS, SECTIONS, Results, Row
 
-_TITLE: Final = "The straight walk and where it bends: the paper and the computation"
+_TITLE: Final = "A robot that turns by bifurcation: the paper and the computation"
 _VERDICTS: Final[Mapping[str, tuple[str, str]]] = {
     "agrees": ("agrees", "✓"),
     "differs": ("differs", "≠"),
     "not printed": ("open", "–"),
 }
+_MOST_LISTED: Final = 4
 _LIBRARIES: Final = ("numpy", "numba", "scipy", "xarray", "matplotlib")
 
 
@@ -37,7 +38,29 @@ class Drawn:
     narrow: bytes
 
 
-def page(results: Results, figures: Sequence[Drawn], robot_file: str) -> str:
+@dataclass(frozen=True)
+class Film:
+    """A film beside the page.
+
+    Attributes
+    ----------
+    name
+        Of its files.
+    title
+        What it shows.
+    speed
+        Seconds of the walk per second of the film.
+    encoded
+        Whether there is an mp4 beside the replay.
+    """
+
+    name: str
+    title: str
+    speed: float
+    encoded: bool
+
+
+def page(results: Results, figures: Mapping[str, Sequence[Drawn]], films: Sequence[Film], robot_file: str) -> str:
     """The page as HTML.
 
     Parameters
@@ -45,7 +68,9 @@ def page(results: Results, figures: Sequence[Drawn], robot_file: str) -> str:
     results
         What is shown.
     figures
-        In the order they are shown.
+        By chapter, in the order they are shown.
+    films
+        Shown in the last chapter.
     robot_file
         What to type for this robot on the command line: a preset, or the path of a file.
     """
@@ -56,8 +81,8 @@ def page(results: Results, figures: Sequence[Drawn], robot_file: str) -> str:
         title=_TITLE,
         css=Markup(folder.joinpath("page.css").read_text(encoding="utf-8")),
         summary=summary(results),
-        rows=[_row(row) for row in results.rows],
-        figures=[_figure(drawn) for drawn in figures],
+        tables=_tables(results),
+        chapters=_chapters(figures, films),
         commands=commands(robot_file, results),
         robot=results.robot.name,
         numbers=_numbers(results.robot),
@@ -88,17 +113,20 @@ def summary(results: Results) -> str:
             f"Softening all springs together, it happens at {spring(found['value'], 5)} and the body undulates, once "
             f"in {found['oscillation_period_s']:.1f} s."
         )
-    counted = {word: sum(row.verdict == word for row in results.rows) for word in _VERDICTS}
+    if results.turning:
+        task = results.turning.tasks["A"]
+        parts.append(
+            f"Sent to a target at {task.target}, it arrives with a front spring of {spring(task.best, 3)}; stiffer "
+            "ones carry it past outside, softer ones inside."
+        )
+    counted = {word: sum(row.verdict == word for row in results.all_rows) for word in _VERDICTS}
     compared = counted["agrees"] + counted["differs"]
     if compared:
-        differing = [typeset(row.quantity) for row in results.rows if row.verdict == "differs"]
+        differing = [typeset(row.quantity) for row in results.all_rows if row.verdict == "differs"]
+        listed = f": {listing(differing)}" if len(differing) <= _MOST_LISTED else ""
         parts.append(
             f"Of {compared} statements of the paper compared, {counted['agrees']} agree"
-            + (
-                f" and {len(differing)} differ: {listing(differing)}. The reasons are given below."
-                if differing
-                else "."
-            )
+            + (f" and {len(differing)} differ{listed}. The reasons are given below." if differing else ".")
         )
     return " ".join(parts)
 
@@ -124,6 +152,14 @@ def commands(robot: str, results: Results) -> list[dict[str, str]]:
             "line": f'chilopod bifurcation {quoted} --set "gait.stride=4 cm" --parameter springs.stiffness {both}',
         },
         {
+            "why": "Follow the curved walks: how tightly they turn, and at what cost.",
+            "line": f"chilopod branch {quoted} --out curved",
+        },
+        {
+            "why": "Send the robot to a target of your choice, and watch it go in a browser.",
+            "line": f'chilopod turn {quoted} --target "30 deg, 2 m" --out turn',
+        },
+        {
             "why": "Fit the constants that the paper does not print once more, on their own.",
             "line": "chilopod identify planar",
         },
@@ -132,6 +168,28 @@ def commands(robot: str, results: Results) -> list[dict[str, str]]:
             "line": "chilopod robot new my-robot.toml\nchilopod stability my-robot.toml",
         },
     ]
+
+
+def _tables(results: Results) -> list[dict[str, Any]]:
+    """The table paper | computed, one part a chapter."""
+    parts = {
+        chapter: [_row(row) for name in sections for row in results.rows.get(name, ())]
+        for chapter, sections in CHAPTERS.items()
+    }
+    return [{"title": chapter, "rows": rows} for chapter, rows in parts.items() if rows]
+
+
+def _chapters(figures: Mapping[str, Sequence[Drawn]], films: Sequence[Film]) -> list[dict[str, Any]]:
+    found = [
+        {
+            "title": chapter,
+            "anchor": f"chapter-{number}",
+            "figures": [_figure(drawn) for drawn in figures.get(chapter, ())],
+            "films": films if number == len(CHAPTERS) else (),
+        }
+        for number, chapter in enumerate(CHAPTERS, 1)
+    ]
+    return [chapter for chapter in found if chapter["figures"] or chapter["films"]]
 
 
 def _row(row: Row) -> dict[str, str]:

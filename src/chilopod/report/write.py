@@ -11,21 +11,26 @@ from chilopod.output import netcdf, prepare_folder, write_atomic
 from chilopod.report import (
     branch,
     critical,
+    curved_trials,
+    curved_variants,
     exponents,
     identification,
     mode,
     schematic,
     style,
     tables,
+    turning,
     undulation,
     uniform,
 )
-from chilopod.report.page import Drawn, page
+from chilopod.report.movie import has_encoder, movie
+from chilopod.report.page import Drawn, Film, page
 from chilopod.report.panel import Panel
+from chilopod.report.replay import replay
 from chilopod.robot import Robot, load_robot, presets
-from chilopod.studies import Identification, Results
+from chilopod.studies import CHAPTERS, Identification, Results
 
-_PANELS: Mapping[str, Callable[[Results], Panel]] = {
+_STRAIGHT: Mapping[str, Callable[[Results], Panel]] = {
     "exponents": exponents.panel,
     "variants": critical.variants,
     "modules": critical.modules,
@@ -33,18 +38,35 @@ _PANELS: Mapping[str, Callable[[Results], Panel]] = {
     "uniform": uniform.panel,
     "identification": identification.panel,
 }
+_FILM_SIZE = (1280, 320)  # three panels in a row
 
 
-def panels(results: Results) -> list[Panel]:
-    """The schematic, and a figure for every section that was computed."""
-    return [schematic.panel(results), *(make(results) for name, make in _PANELS.items() if name in results.datasets)]
+def panels(results: Results) -> dict[str, list[Panel]]:
+    """The figures of every chapter, those of the sections that were computed."""
+    straight, curved, turns = CHAPTERS
+    study, data = results.curved, results.datasets
+    found: dict[str, list[Panel]] = {
+        straight: [schematic.panel(results), *(make(results) for name, make in _STRAIGHT.items() if name in data)],
+        curved: [],
+        turns: [] if results.turning is None else list(turning.panels(results.turning)),
+    }
+    if study:
+        found[curved] += [curved_trials.walks(study), curved_trials.joints(study)]
+    if "branch" in data:
+        found[curved].append(branch.panel(data["branch"]))
+    if study:
+        found[curved] += [curved_trials.onset(study), curved_variants.panel(study)]
+    if "undulation" in data:
+        found[curved].append(undulation.panel(data["undulation"]))
+    return {chapter: figures for chapter, figures in found.items() if figures}
 
 
 def write_report(results: Results, folder: str | Path) -> Path:
-    """Draw what was found and write it as a page that opens from disk and needs no other file.
+    """Draw what was found and write it as a page that opens from disk and shows all figures without any other file.
 
     Beside ``index.html`` there are ``figures/NAME.png`` and ``.svg``, ``data/NAME.csv`` and ``.nc`` for every figure,
-    and ``data/robot.toml``. Files of these names are replaced, each as a whole; the page comes last.
+    ``movies/NAME.mp4`` and ``.html``, and ``data/robot.toml``. Files of these names are replaced, each as a whole; the
+    page comes last. Where films cannot be encoded, the replays are there without them.
 
     Parameters
     ----------
@@ -65,15 +87,30 @@ def write_report(results: Results, folder: str | Path) -> Path:
     """
     folder = prepare_folder(folder)
     figures, data = prepare_folder(folder / "figures"), prepare_folder(folder / "data")
-    drawn = []
-    for panel in panels(results):
-        wide = _write(panel, figures, data)
-        with style.house_style():
-            narrow = style.svg(panel.draw(True), panel.name)
-        drawn.append(Drawn(panel, wide, narrow))
+    drawn: dict[str, list[Drawn]] = {}
+    for chapter, of_chapter in panels(results).items():
+        for panel in of_chapter:
+            wide = _write(panel, figures, data)
+            with style.house_style():
+                narrow = style.svg(panel.draw(True), panel.name)
+            drawn.setdefault(chapter, []).append(Drawn(panel, wide, narrow))
+    films = _write_films(results, folder / "movies")
     robot_file = write_atomic(data / "robot.toml", results.robot.to_toml())
     name = results.robot.name if _is_preset(results.robot) else str(robot_file)
-    return write_atomic(folder / "index.html", page(results, drawn, name))
+    return write_atomic(folder / "index.html", page(results, drawn, films, name))
+
+
+def _write_films(results: Results, folder: Path) -> list[Film]:
+    written = []
+    for each in results.movies:
+        prepare_folder(folder)
+        write_atomic(folder / f"{each.name}.html", replay(each.record, titles=each.titles, heading=each.heading))
+        encoded = has_encoder()
+        if encoded:
+            file = folder / f"{each.name}.mp4"
+            movie(each.record, file, titles=each.titles, heading=each.heading, speed=each.speed, size=_FILM_SIZE)
+        written.append(Film(each.name, each.heading, each.speed, encoded))
+    return written
 
 
 def write_identification(found: Identification, folder: str | Path) -> list[Path]:

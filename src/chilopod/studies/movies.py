@@ -12,11 +12,11 @@ import xarray as xr
 from chilopod import units
 from chilopod.robot import Robot
 from chilopod.steering import LegYawController, Target
+from chilopod.studies.floquet import K1
 from chilopod.studies.trials import NONE, Trial, run, together
 
 Progress = Callable[[float, str], None]
 
-FRONT = "springs.stiffness[0]"
 TASK_A = Target(float(np.deg2rad(45.0)), 1.3)
 
 _WALK = 45.0  # s
@@ -75,7 +75,7 @@ def movies(
     """
 
     def with_spring(value: float) -> Robot:
-        return robot.with_value(FRONT, value)
+        return robot.with_value(K1, value)
 
     def named(value: float) -> str:
         return f"k1 = {units.format(value, 'N*mm/deg', digits=3).replace('*', '·')}"
@@ -84,9 +84,7 @@ def movies(
     bend = (_BEND + (0.0,) * joints)[:joints]
     walks = [Trial(with_spring(value), _WALK, 0, bend, disturbance=NONE, rate=25.0) for value in springs]
     tried = (4.0 * best, best, 0.7 * best)
-    tasks = [
-        Trial(with_spring(value), _TASK, 0, (), TASK_A, LegYawController(), NONE, rate=25.0) for value in tried
-    ]
+    tasks = [Trial(with_spring(value), _TASK, 0, (), TASK_A, LegYawController(), NONE, rate=25.0) for value in tried]
     records = run([*walks, *tasks], folder, progress)
     kinds = ("straight", "curved a little", "curved a lot")
     ends = ("too stiff", "best", "too soft")

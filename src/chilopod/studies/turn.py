@@ -10,52 +10,22 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from chilopod import units
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.robot import Robot
-from chilopod.steering import Criteria, RadiusLaw, Strategy, Target, earliest_arrival, evaluate, steered
-from chilopod.studies.curved_walk import curved_walks
+from chilopod.steering import Criteria, Strategy, Target, earliest_arrival, evaluate, steered
+from chilopod.studies.floquet import K1
+from chilopod.studies.radius_laws import radius_laws
 from chilopod.studies.trials import NONE, Disturbance, Trial, run, together
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
-FRONT = "springs.stiffness[0]"
-
-_WIDEST = (1.0 / 20.0, 3.0)  # of the stiffest spring: where the pitchfork of the first one is looked for
-_POINTS = 60
+_SOFTEST = 1.0 / 20.0  # of the stiffest spring: where a strategy without a radius law starts to look
 _TRIED = 48  # springs a round
 _ROUNDS = 2
 _HASTE = 1.6  # a task lasts so many times what the circle takes at the speed of the straight walk
 _LEAST = 5.0  # s
 _AS_NEAR = 1e-9  # m
-
-
-def radius_law(robot: Robot, *, path: bool = False, progress: Progress = lambda done, words: None) -> RadiusLaw:
-    """Radius of the settled curved walk over the first spring.
-
-    Parameters
-    ----------
-    robot
-        The robot.
-    path
-        Whether to take the true radius of the path of module 1 rather than the paper's (N-1) L / sum |theta|.
-    progress
-        Called with the part done (0 to 1) and a few words.
-
-    Raises
-    ------
-    AnalysisError
-        If the straight walk has no pitchfork in the first spring, or no stable curved walks beside it.
-    """
-    stiffest = max(robot.springs.stiffness)
-    between = (_WIDEST[0] * stiffest, _WIDEST[1] * stiffest)
-    branch = curved_walks(robot, FRONT, between, points=_POINTS, progress=progress)
-    unit = robot.unit_of(FRONT)
-    values = [units.parse(f"{value!r} {unit}", robot.si_unit_of(FRONT)) for value in branch.parameter.values.tolist()]
-    radii = branch.path_radius if path else branch.axis_radius
-    ordinary = branch.mean_angle.max("joint").values <= 0.5 * np.pi  # beyond, modules run into each other
-    return RadiusLaw.of_branch(values, radii.values, branch.stable.values & ordinary, unit)
 
 
 @dataclass(frozen=True)
@@ -163,8 +133,8 @@ def turn(
         raise ParameterError("are all alike without a seed", field="repeats", value=repeats, allowed="1, or a seed")
     time = duration if duration is not None else _time_for(robot, target)
     law = None
-    if isinstance(spring, str) and strategy.springs == FRONT:
-        law = radius_law(robot, progress=lambda done, words: progress(0.4 * done, f"radius law, {words}"))
+    if isinstance(spring, str) and strategy.springs == K1:
+        law = radius_laws(robot, lambda done, words: progress(0.4 * done, f"radius law, {words}")).axis
     by_law = law.value(target.radius) if law else None
     if strategy.springs is None:
         stiffness = None
@@ -209,7 +179,7 @@ def best_spring(
 
 def _around(robot: Robot) -> tuple[float, float]:
     stiffest = max(robot.springs.stiffness)
-    return _WIDEST[0] * stiffest, stiffest
+    return _SOFTEST * stiffest, stiffest
 
 
 def _time_for(robot: Robot, target: Target) -> float:

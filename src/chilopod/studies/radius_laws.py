@@ -1,0 +1,76 @@
+"""The radius of the settled curved walk over the first spring, of any robot whose straight walk ends in a pitchfork."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from chilopod import units
+from chilopod.robot import Robot
+from chilopod.steering import RadiusLaw
+from chilopod.studies.curved_walk import curved_walks
+from chilopod.studies.floquet import K1, PAPER_UNIT, silent, stiffness
+
+_BETWEEN = (1.0 / 20.0, 3.0)
+"""Of the stiffest spring: where the pitchfork of the first one is looked for and its branch followed."""
+
+
+@dataclass(frozen=True)
+class RadiusLaws:
+    """Which k1 turns how tightly, by two measures of a radius.
+
+    Attributes
+    ----------
+    axis, path
+        By the paper's (N-1) L / sum |theta|, with mean angles, and by the path that module 1 really walks.
+    walks
+        The branch they come from, of left turns.
+    """
+
+    axis: RadiusLaw
+    path: RadiusLaw
+    walks: xr.Dataset
+
+    def k_hat(self, radius: float) -> tuple[float, float]:
+        """The springs for a radius (m) by both laws, N*mm/deg."""
+        by_axis, by_path = (units.from_si(law.value(radius), PAPER_UNIT) for law in (self.axis, self.path))
+        return by_axis, by_path
+
+    def joint_angles(self, spring: float) -> tuple[float, ...]:
+        """Of the settled left turn at phase 0 with a spring (N*mm/deg), rad, (N-1,)."""
+        walks = self.walks
+        # Beside the pitchfork angles grow as the square root of the distance.
+        root = np.sqrt(np.maximum(walks.parameter_si.values[0] - walks.parameter_si.values, 0.0))
+        wanted = np.sqrt(walks.parameter_si.values[0] - stiffness(spring))
+        joints = range(3, 3 + walks.sizes["joint"])
+        return tuple(float(np.interp(wanted, root, walks.orbit.values[:, joint])) for joint in joints)
+
+
+def radius_laws(robot: Robot, progress: Callable[[float, str], None] = silent) -> RadiusLaws:
+    """The laws from the branch of curved walks, from the pitchfork down to where a joint bends by a right angle.
+
+    Parameters
+    ----------
+    robot
+        The robot.
+    progress
+        Called with the part done (0 to 1) and a few words.
+
+    Raises
+    ------
+    AnalysisError
+        If the straight walk has no pitchfork in the first spring, or the curved walks beside it are no law.
+    """
+    stiffest = max(robot.springs.stiffness)
+    low, high = (part * stiffest for part in _BETWEEN)
+    walks = curved_walks(robot, K1, (low, high), side=-1, progress=progress)
+    # Bent further, modules run into each other.
+    possible = walks.stable.values & (np.abs(walks.mean_angle.values).max(axis=1) <= 0.5 * np.pi)
+    axis, path = (
+        RadiusLaw.of_branch(walks.parameter_si.values, walks[name].values, possible, robot.unit_of(K1))
+        for name in ("axis_radius", "path_radius")
+    )
+    return RadiusLaws(axis, path, walks)

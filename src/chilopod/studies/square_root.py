@@ -1,0 +1,156 @@
+"""Where a pitchfork is, from trials beside it: the square-root law that the paper fits to its robot's walks.
+
+Beside a supercritical pitchfork the bend grows as |angle| = a sqrt(1/k - 1/kc). The law is the first term of a series:
+it holds near the point only, so a fit over a wide range of springs is off however many trials there are, and what its
+error bars say of repeated trials does not cover that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import minimize_scalar
+
+from chilopod.errors import AnalysisError, ParameterError
+
+Array = NDArray[np.float64]
+
+RESAMPLED = 1000
+"""Sets of trials that the bootstrap draws by default."""
+
+_GRID = 2000
+_CLOSEST, _FARTHEST = 1e-3, 0.999  # to the springs fitted: of their distance, and on the way to an infinite kc
+
+
+@dataclass(frozen=True)
+class SquareRootFit:
+    """|angle| = amplitude * sqrt(1/k - 1/critical).
+
+    Attributes
+    ----------
+    critical
+        The spring kc, in the unit of the springs that were fitted.
+    error
+        Its standard error from the covariance of the least squares: what the residuals say, lack of fit included, as
+        if they were independent and of one size.
+    bootstrap_error
+        Its standard error from drawing trials anew at every spring: how well another set of trials at the same springs
+        would repeat it, whatever the law; NaN where every spring has one trial only, or none are
+        drawn.
+    amplitude
+        In the unit of the angles times the root of that of the springs.
+    residual
+        Root mean square of the residuals, in the unit of the angles.
+    trials
+        How many were fitted.
+    """
+
+    critical: float
+    error: float
+    bootstrap_error: float
+    amplitude: float
+    residual: float
+    trials: int
+
+    def angle(self, inverse: ArrayLike) -> Array:
+        """The law at values of 1/k; zero on the stiff side."""
+        return self.amplitude * _root(np.asarray(inverse, dtype=np.float64), 1.0 / self.critical)
+
+
+def square_root_fit(inverse: ArrayLike, angle: ArrayLike, resampled: int = RESAMPLED, seed: int = 0) -> SquareRootFit:
+    """Fit the square-root law to trials by least squares in the angle.
+
+    Parameters
+    ----------
+    inverse
+        1/k of every trial, positive, shape (trials,); trials at one spring have equal values.
+    angle
+        Their mean angles, shape (trials,); the sign is ignored.
+    resampled
+        How many times trials are drawn anew for the bootstrap; 0 for no bootstrap.
+    seed
+        Of the drawing.
+
+    Raises
+    ------
+    ParameterError
+        If the arrays do not go together.
+    AnalysisError
+        If the trials do not determine the point: fewer than three, at fewer than two springs that bend, or with angles
+        that do not fall towards it.
+    """
+    x, y = np.asarray(inverse, dtype=np.float64), np.abs(np.asarray(angle, dtype=np.float64))
+    if x.ndim != 1 or x.shape != y.shape:
+        raise ParameterError("must be one for each spring", field="angle", value=y.shape, allowed=f"{x.shape}")
+    if not (np.isfinite(y).all() and (x > 0.0).all() and np.isfinite(x).all()):
+        raise ParameterError("must be finite, and the springs positive", field="angle")
+    bent = np.unique(x[y > 0.0])
+    if x.size < 3 or bent.size < 2:
+        raise AnalysisError("two springs that bend and three trials are the least", field="angle", value=bent.size)
+    # Given 1/kc the amplitude follows, so only 1/kc is searched: at least two springs have to lie beyond it.
+    grid = bent[-2] - np.geomspace(_CLOSEST * (bent[-1] - bent[-2]), _FARTHEST * bent[-2], _GRID)
+    basis = _root(x, grid[:, None])
+    best = int(_lost(basis, y[:, None])[:, 0].argmin())
+    if best in (0, len(grid) - 1):
+        raise AnalysisError("the angles do not fall to zero as a square root: they determine no point", field="angle")
+    found = minimize_scalar(
+        lambda at: _lost(_root(x, at)[None], y[:, None])[0, 0],
+        bounds=(grid[best + 1], grid[best - 1]),
+        method="bounded",
+        options={"xatol": 1e-13 * grid[best]},
+    )
+    at = float(found.x)
+    root = _root(x, at)
+    amplitude = float(root @ y / (root @ root))
+    residuals = y - amplitude * root
+    beyond = root > 0.0
+    slopes = np.stack([root[beyond], -0.5 * amplitude / root[beyond]], axis=1)
+    # Trials on the stiff side say nothing of how far the law is off: they do not count.
+    spread = float(residuals[beyond] @ residuals[beyond]) / max(int(beyond.sum()) - 2, 1)
+    covariance = spread * np.linalg.inv(slopes.T @ slopes)
+    return SquareRootFit(
+        critical=1.0 / at,
+        error=float(np.sqrt(covariance[1, 1])) / at**2,
+        bootstrap_error=_bootstrap(x, y, grid, basis, resampled, seed),
+        amplitude=amplitude,
+        residual=float(np.sqrt(np.mean(residuals**2))),
+        trials=x.size,
+    )
+
+
+def _root(inverse: Array, critical: ArrayLike) -> Array:
+    return np.sqrt(np.maximum(inverse - np.asarray(critical), 0.0))
+
+
+def _lost(basis: Array, angles: Array) -> Array:
+    """Sum of squares that the best amplitude leaves, shape (values of 1/kc, sets of trials), for the law without its
+    amplitude, shape (values, trials), and angles, shape (trials, sets)."""
+    return (angles**2).sum(axis=0) - (basis @ angles) ** 2 / (basis**2).sum(axis=1, keepdims=True)
+
+
+def _bootstrap(x: Array, y: Array, grid: Array, basis: Array, resampled: int, seed: int) -> float:
+    """Standard error of kc when trials are drawn anew at every spring."""
+    rng = np.random.default_rng(seed)
+    drawn = np.repeat(y[:, None], resampled, axis=1)
+    repeated = False
+    for value in np.unique(x):
+        here = np.flatnonzero(x == value)
+        if here.size > 1:
+            repeated = True
+            # Deviations from the mean of n trials are too small by this factor on average.
+            wider = np.sqrt(here.size / (here.size - 1.0))
+            spread = wider * (y[here] - y[here].mean())
+            drawn[here] = y[here].mean() + rng.choice(spread, size=(here.size, resampled))
+    if not repeated or resampled < 2:
+        return float("nan")
+    lost = _lost(basis, drawn)
+    best = np.clip(lost.argmin(axis=0), 1, len(grid) - 2)
+    sets = np.arange(resampled)
+    left, middle, right = lost[best - 1, sets], lost[best, sets], lost[best + 1, sets]
+    bend = left - 2.0 * middle + right
+    # The lowest point of the parabola through three neighbours on the grid; at a kink it may lie outside of them.
+    shift = np.clip(np.where(bend > 0.0, 0.5 * (left - right) / np.where(bend > 0.0, bend, 1.0), 0.0), -1.0, 1.0)
+    critical = 1.0 / np.interp(best + shift, np.arange(len(grid)), grid)
+    return float(np.std(critical, ddof=1))
