@@ -162,6 +162,15 @@ def resumed(
     if side is not None and side != data.attrs["side"]:
         raise ParameterError("the saved branch turns to the other side", field="side")
     between = (data.attrs["lowest_si"], data.attrs["highest_si"]) if between is None else between
+    (low, high), end = sorted(between), float(data.parameter_si[-1])
+    if not low <= end <= high:
+        unit = robot.unit_of(parameter)
+        raise ParameterError(
+            "does not hold the saved branch's last point, beyond which nothing is left to follow",
+            field="between",
+            value=" to ".join(units.format(each, unit, digits=4) for each in (low, high)),
+            allowed=f"an interval with {units.format(end, unit, digits=6)} in it",
+        )
     branch = proceed(
         _followed(saved, parameter),
         _branch_of(data),
