@@ -92,7 +92,7 @@ def test_new_overwrites_only_when_told(folder):
         ["."],
         ["x.toml", "--modules", "1"],
         ["x.toml", "--modules", "many"],
-        ["x.toml", "--preset", "aoi2022"],
+        ["x.toml", "--preset", "aoi2023"],
         ["x.toml", "--set", "gait.stride=3 kg"],
         ["\udcff.toml"],
         ["\x1b.toml"],

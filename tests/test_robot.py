@@ -97,30 +97,27 @@ def test_round_trip_through_toml_is_exact(described):
     assert Robot(**tomllib.loads(described.to_toml())) == described
 
 
-def test_reserved_table_and_provenance_survive(robot):
-    text = (
-        robot.to_toml()
-        + """
-[twin]
-hip_height = "98 mm"
-on = true
-"odd key" = [1, 2.5, -0.0, inf, 0xFFFFFFFFFFFFFFFFFFFFFF]
-when = 2022-01-01T00:00:00
-servo = {kp = 7.5, deep = {er = ["a\\u007fb", 'c"d']}}
-[[twin.links]]
-length = 6
-[[twin.links]]
-[twin.empty]
-"""
-    )
-    first = Robot(**tomllib.loads(text))
+def test_the_twin_and_provenance_survive():
+    first = load_robot("aoi2022")
     again = Robot(**tomllib.loads(first.to_toml()))
     assert again == first
     assert hash(again) == hash(first)
     assert pickle.loads(pickle.dumps(first)) == first
-    assert first.twin["servo"]["deep"]["er"] == ("a\x7fb", 'c"d')
-    assert len(first.twin["links"]) == 2
-    assert first.provenance == robot.provenance
+    assert again.twin.hip_height == 0.098
+    assert first.provenance_of("twin.clearance")
+
+
+def test_a_twin_is_overridden_and_checked_like_all_else(robot):
+    whole = load_robot("aoi2022")
+    assert whole.override("twin.clearance", "8 mm").twin.clearance == 0.008
+    assert "twin.clearance" in whole.parameters()
+    assert "twin.clearance" not in robot.parameters()
+    with pytest.raises(ParameterError, match=r"twin.clearance: this robot has no \[twin\]"):
+        robot.get("twin.clearance")
+    with pytest.raises(ParameterError, match="whole number of times"):
+        whole.with_value("twin.timestep", 0.0015)
+    with pytest.raises(ParameterError, match="did you mean 'twin.clearance'"):
+        whole.get("twin.clearence")
 
 
 def test_provenance_keys_need_no_quotes():
@@ -303,7 +300,7 @@ def test_an_integer_too_long_to_print_is_refused_like_any_other():
         (b"name = ", "is not valid TOML"),
         (b"a = " + b"[" * 5000, "nested too deeply"),
         (b"a" + b".a" * 5000 + b" = 1", "unknown key"),
-        (b"twin.a" + b".a" * 5000 + b" = 1", "nested too deeply"),
+        (b"provenance.a" + b".a" * 5000 + b" = 1", "nested too deeply"),
         (b"x = " + b"9" * 5000, "is not valid TOML"),
         (b"# " + b"x" * 1_000_001, "too large"),
         (b"name = 'x'", "body: is missing"),

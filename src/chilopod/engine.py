@@ -26,6 +26,7 @@ class Status(enum.Enum):
     WALKED = "walked", "walked to the end"
     DIVERGED = "diverged", "the motion became too fast to follow or infinite"
     OUT_OF_RANGE = "out of range", "a yaw joint bent by more than a right angle, where modules run into each other"
+    FALLEN = "fallen", "module 1 tipped over"
 
     def __init__(self, label: str, sentence: str) -> None:
         self.label = label

@@ -9,12 +9,13 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chilopod.planar.model import PlanarModel
+from chilopod.record import walk_record
 
 Array = NDArray[np.float64]
 
 
-def walk_record(model: PlanarModel, samples: Array, states: Array, leg_yaw: Array) -> xr.Dataset:
-    """States over time as named quantities on the floor.
+def planar_record(model: PlanarModel, samples: Array, states: Array, leg_yaw: Array) -> xr.Dataset:
+    """States over time as named quantities on the floor, see :func:`chilopod.record.walk_record`.
 
     Parameters
     ----------
@@ -31,24 +32,15 @@ def walk_record(model: PlanarModel, samples: Array, states: Array, leg_yaw: Arra
     heading = states[..., 2 * n + 3]
     c, s = np.cos(heading), np.sin(heading)
     velocity = np.stack([c * states[..., 0] - s * states[..., 1], s * states[..., 0] + c * states[..., 1]], axis=-1)
-    over = ("time", "robot")
-    return xr.Dataset(
-        {
-            "position": ((*over, "axis"), states[..., 2 * n + 1 : 2 * n + 3], {"units": "m"}),
-            "heading": (over, heading, {"units": "rad"}),
-            "velocity": ((*over, "axis"), velocity, {"units": "m/s"}),
-            "heading_rate": (over, states[..., 2], {"units": "rad/s"}),
-            "joint_angle": ((*over, "joint"), states[..., 3 : n + 2], {"units": "rad"}),
-            "joint_rate": ((*over, "joint"), states[..., n + 2 : 2 * n + 1], {"units": "rad/s"}),
-            "leg_yaw": ((*over, "side"), leg_yaw, {"units": "rad"}),
-        },
-        coords={
-            "time": ("time", samples, {"units": "s"}),
-            "robot": np.arange(states.shape[1]),
-            "joint": np.arange(1, n),
-            "side": ["left", "right"],
-            "axis": ["x", "y"],
-        },
+    return walk_record(
+        samples,
+        position=states[..., 2 * n + 1 : 2 * n + 3],
+        heading=heading,
+        velocity=velocity,
+        heading_rate=states[..., 2],
+        joint_angle=states[..., 3 : n + 2],
+        joint_rate=states[..., n + 2 : 2 * n + 1],
+        leg_yaw=leg_yaw,
     )
 
 

@@ -9,12 +9,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.engine import Controller, Event, Observation, Status, bearing_and_distance, event_times
+from chilopod.engine import Controller, Observation, Status, bearing_and_distance, event_times
 from chilopod.errors import ParameterError
 from chilopod.planar import stretch
 from chilopod.planar.model import PlanarModel
 from chilopod.planar.pieces import pieces
-from chilopod.planar.record import foot_forces, walk_record
+from chilopod.planar.record import foot_forces, planar_record
+from chilopod.record import MOST_NUMBERS, add_outcome, leg_yaw_at
 from chilopod.robot import Robot
 
 Array = NDArray[np.float64]
@@ -27,9 +28,6 @@ RATE = 100.0
 
 LONGEST = 1e5
 """s, more than a day: anything longer is a slip of the pen."""
-
-MOST_NUMBERS = 5e8
-"""Of a record (4 GB)."""
 
 _STATUS = {
     stretch.WALKING: Status.WALKED,
@@ -181,18 +179,10 @@ def simulate(
                 *cut, schedule.contact, schedule.stroke, *parameters, yaw, tolerance, states, step, status, record
             )
         progress((index + 1) / (len(cuts) - 1), f"{end:.1f} s")
-    leg_yaw = _leg_yaw_at(samples, asked, commands, reached_within, count)
-    data = walk_record(models[0], samples, record, leg_yaw)
-    data["status"] = ("robot", np.array([_STATUS[int(each)].label for each in status], dtype=object))
-    if plan.target is not None:
-        data["target"] = (("robot", "axis"), plan.target, {"units": "m"})
-        angle, away = bearing_and_distance(data.position.values, data.heading.values, plan.target)
-        data["distance"] = (("time", "robot"), away, {"units": "m"})
-        data["bearing"] = (("time", "robot"), angle, {"units": "rad"})
-    if controller:
-        data = data.assign_coords(event=("event", np.array([t for t, _ in asked]), {"units": "s"}))
-        data["command"] = (("event", "robot", "side"), commands, {"units": "rad"})
-        data["within"] = ("event", reached_within, {"units": "s"})
+    leg_yaw = leg_yaw_at(samples, asked, commands, reached_within, count)
+    data = planar_record(models[0], samples, record, leg_yaw)
+    statuses = [_STATUS[int(each)] for each in status]
+    add_outcome(data, statuses, plan.target, asked if controller else None, commands, reached_within)
     if forces:
         data["foot_force"] = foot_forces(models, samples, record, leg_yaw, plan.friction)
     data.attrs = {"engine": "planar", "robot": models[0].robot.to_toml(), "duration": duration, "tolerance": tolerance}
@@ -285,16 +275,3 @@ def _cut(
     sample = np.full(len(cuts) - 1, -1)
     sample[np.searchsorted(cuts, inside) - 1] = np.arange(low, high)
     return starts[parent] + (cuts[:-1] - edges[parent]), np.diff(cuts), interval[parent], sample
-
-
-def _leg_yaw_at(
-    samples: Array, asked: Sequence[tuple[float, Event]], commands: Array, within: Array, count: int
-) -> Array:
-    """Leg yaw at the samples, shape (samples, robots, 2): ramps from command to command."""
-    yaw = np.zeros((len(samples), count, 2))
-    previous = np.zeros((count, 2))
-    for (t, _), command, duration in zip(asked, commands, within, strict=True):
-        part = np.clip((samples - t) / duration if duration > 0.0 else samples >= t, 0.0, 1.0)
-        yaw += part[:, None, None] * (command - previous)
-        previous = command
-    return yaw

@@ -8,7 +8,7 @@
 
 from chilopod.robot.files import Table, presets
 from chilopod.robot.model import Robot, load_robot
-from chilopod.robot.parts import Body, Legs, Springs
+from chilopod.robot.parts import Body, Legs, Springs, Twin
 from chilopod.robot.remarks import remarks
 
-__all__ = ["Body", "Legs", "Robot", "Springs", "Table", "load_robot", "presets", "remarks"]
+__all__ = ["Body", "Legs", "Robot", "Springs", "Table", "Twin", "load_robot", "presets", "remarks"]

@@ -13,7 +13,7 @@ from chilopod.gait import Gait
 from chilopod.ground import Ground
 from chilopod.robot.files import Table, read_table, to_toml
 from chilopod.robot.parameters import QUANTITIES, Place, place_of, spring_index
-from chilopod.robot.parts import MODULES, Body, Legs, Springs, spread
+from chilopod.robot.parts import MODULES, Body, Legs, Springs, Twin, spread
 from chilopod.units import Description, format, quantities
 
 _OVERRIDDEN: Final = "set by override"
@@ -64,7 +64,7 @@ class Robot(Description):
     body, springs, legs, gait, ground
         The parts of the description, in SI units and radians.
     twin
-        What only the three-dimensional model reads; kept as it stands.
+        What only the three-dimensional model reads; None for a robot that only the planar model knows.
     provenance
         Where numbers come from: text by dotted path.
 
@@ -80,7 +80,7 @@ class Robot(Description):
     legs: Legs
     gait: Gait
     ground: Ground
-    twin: Annotated[Table, PlainValidator(_table)] = Table()
+    twin: Twin | None = None
     provenance: Annotated[Table, PlainValidator(_provenance)] = Table()
 
     @classmethod
@@ -136,12 +136,11 @@ class Robot(Description):
                     allowed=f"{joints}, one fewer than body.modules, or a single value for all",
                 )
         for path in self.provenance:
-            if not path.startswith("twin."):
-                try:
-                    self._locate(path)
-                except ParameterError as error:
-                    error.field = f"provenance.{path}"
-                    raise
+            try:
+                self._locate(path)
+            except ParameterError as error:
+                error.field = f"provenance.{path}"
+                raise
         return self
 
     @property
@@ -165,6 +164,8 @@ class Robot(Description):
         """Return the path of every number of this robot, springs one by one."""
         paths: list[str] = []
         for path, quantity in QUANTITIES.items():
+            if self.twin is None and path.startswith("twin."):
+                continue
             count = self.body.modules - 1
             paths += [f"{path}[{index}]" for index in range(count)] if quantity.each else [path]
         return tuple(paths)
@@ -268,7 +269,7 @@ class Robot(Description):
         table: dict[str, Any] = {"name": self.name}
         for path, quantity in QUANTITIES.items():
             section, key = path.split(".")
-            value = getattr(getattr(self, section), key)
+            value = getattr(getattr(self, section), key, None)
             if value is None:
                 continue
             if quantity.integer:
@@ -280,19 +281,20 @@ class Robot(Description):
             else:
                 text = format(value, quantity.display)
             table.setdefault(section, {})[key] = text
-        for name in ("twin", "provenance"):
-            if getattr(self, name):
-                table[name] = getattr(self, name)
+        if self.provenance:
+            table["provenance"] = self.provenance
         return to_toml(table)
 
     def _locate(self, path: str) -> Place:
         place = place_of(path)
+        if place.section == "twin" and self.twin is None:
+            raise ParameterError("this robot has no [twin], only the planar model knows it", field=path)
         if place.index is not None and place.index >= self.body.modules - 1:
             raise ParameterError("there is no such spring", field=path, allowed=f"0 to {self.body.modules - 2}")
         return place
 
     def _replaced(self, path: str, place: Place, value: float) -> Self:
-        # Every field is checked on its own and the counts keep, so nothing needs validating again.
+        # Every field is checked on its own and the counts keep, so little needs validating again.
         section: Description = getattr(self, place.section)
         old = getattr(section, place.key)
         new: Any = value
@@ -300,7 +302,10 @@ class Robot(Description):
             new = tuple(value if place.index in (None, index) else item for index, item in enumerate(old))
         if new == old:
             return self
-        changes: dict[str, Any] = {place.section: section.model_copy(update={place.key: new})}
+        changed = section.model_copy(update={place.key: new})
+        if place.section == "twin":
+            changed = Twin(**dict(changed))
+        changes: dict[str, Any] = {place.section: changed}
         # What was said of single springs no longer holds when all are set, nor when their joints are gone.
         joints = 0 if place.quantity.each and place.index is None else self.body.modules - 1
         if place.quantity is MODULES:

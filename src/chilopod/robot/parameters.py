@@ -10,7 +10,7 @@ from typing import Final
 from chilopod.errors import ParameterError, nearest_name
 from chilopod.gait import Gait
 from chilopod.ground import Ground
-from chilopod.robot.parts import Body, Legs, Springs
+from chilopod.robot.parts import Body, Legs, Springs, Twin
 from chilopod.units import Description, Quantity, quantities
 
 _PATH: Final = re.compile(r"([a-z_]+\.[a-z_]+)(?:\[([0-9]{1,6})\])?")
@@ -32,6 +32,7 @@ SECTIONS: Final[dict[str, type[Description]]] = {
     "legs": Legs,
     "gait": Gait,
     "ground": Ground,
+    "twin": Twin,
 }
 QUANTITIES: Final = {
     f"{section}.{key}": quantity for section, model in SECTIONS.items() for key, quantity in quantities(model).items()

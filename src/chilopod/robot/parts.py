@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Self
 
 from pydantic import model_validator
 
+from chilopod.errors import ParameterError
 from chilopod.units import Description, Quantity
 from chilopod.units.quantity import is_list
 
@@ -69,6 +71,90 @@ class Legs(Description):
 
     forward_offset: Annotated[float, Quantity("m", "m", at_least=-1e9)]
     half_width: Annotated[float, Quantity("m", "m", at_least=0.0)]
+
+
+class Twin(Description):
+    """What only the three-dimensional model reads.
+
+    Attributes
+    ----------
+    hip_height
+        Of the leg's pitch axis at the body above the centre of its foot in stance, m.
+    upper_link, lower_link
+        Lengths of the two links of a leg, from pitch axis to pitch axis and from there to the foot's centre, m.
+    link_mass
+        Of each link, kg; taken from the mass of the whole robot.
+    foot_radius
+        Of the round foot, m.
+    body_width, body_height
+        Of the box that a module's body is, m; its length is that of the module.
+    clearance
+        Height of the tip path's half ellipse, m.
+    servo_stiffness, servo_damping
+        Of every leg joint's position servo, N*m/rad and N*m*s/rad.
+    joint_inertia
+        Reflected inertia of every servo's motor, kg*m^2.
+    sliding_friction
+        Coulomb coefficient between foot and floor.
+    contact_time
+        Time constant in which the floor pushes a foot out, s (MuJoCo: first number of solref).
+    impedance_ratio
+        Of frictional to normal contact constraints; the higher, the less feet creep (MuJoCo: impratio).
+    control_interval
+        Time between two servo targets, s.
+    timestep
+        Of the simulation, s; a whole number of them makes a control interval.
+    scanner_view, scanner_step
+        Whole angle the scanner sees, centred ahead, and between two of its beams, rad.
+    scanner_period
+        Between two scans, s.
+    scanner_nearest, scanner_range
+        Distances within which it measures, m.
+    scanner_resolution, scanner_noise
+        Step of its distances, and standard deviation of their error, m.
+    scanner_offset
+        Of the scanner ahead of the centre of module 1, m.
+    pole_radius
+        Of the pole that marks a target, m.
+    """
+
+    hip_height: Annotated[float, Quantity("m", "mm")]
+    upper_link: Annotated[float, Quantity("m", "mm")]
+    lower_link: Annotated[float, Quantity("m", "mm")]
+    link_mass: Annotated[float, Quantity("kg", "kg")]
+    foot_radius: Annotated[float, Quantity("m", "mm")]
+    body_width: Annotated[float, Quantity("m", "mm")]
+    body_height: Annotated[float, Quantity("m", "mm")]
+    clearance: Annotated[float, Quantity("m", "mm")]
+    servo_stiffness: Annotated[float, Quantity("N*m/rad", "N*m/rad", at_most=1e4)]
+    servo_damping: Annotated[float, Quantity("N*m*s/rad", "N*m*s/rad", at_most=1e3)]
+    joint_inertia: Annotated[float, Quantity("kg*m^2", "kg*m^2", at_least=0.0)]
+    sliding_friction: Annotated[float, Quantity("", "", at_most=1e3)]
+    contact_time: Annotated[float, Quantity("s", "s")]
+    impedance_ratio: Annotated[float, Quantity("", "", at_least=1e-3, at_most=1e4)]
+    control_interval: Annotated[float, Quantity("s", "s")]
+    timestep: Annotated[float, Quantity("s", "s", at_least=1e-5, at_most=2e-2)]
+    scanner_view: Annotated[float, Quantity("rad", "deg", at_most=2.0 * math.pi)]
+    scanner_step: Annotated[float, Quantity("rad", "deg", at_least=1e-4)]
+    scanner_period: Annotated[float, Quantity("s", "s")]
+    scanner_nearest: Annotated[float, Quantity("m", "m", at_least=0.0)]
+    scanner_range: Annotated[float, Quantity("m", "m")]
+    scanner_resolution: Annotated[float, Quantity("m", "mm", at_least=0.0)]
+    scanner_noise: Annotated[float, Quantity("m", "mm", at_least=0.0)]
+    scanner_offset: Annotated[float, Quantity("m", "m", at_least=-1e9)]
+    pole_radius: Annotated[float, Quantity("m", "m")]
+
+    @model_validator(mode="after")
+    def _whole_steps(self) -> Self:
+        steps = self.control_interval / self.timestep
+        if not (steps > 0.5 and abs(steps - round(steps)) < 1e-6):
+            raise ParameterError(
+                "does not go into twin.control_interval a whole number of times",
+                field="timestep",
+                value=f"{self.timestep:g} s",
+                allowed=f"{self.control_interval:g} s over a whole number",
+            )
+        return self
 
 
 def spread(table: Mapping[str, Any], key: str, count: int) -> Mapping[str, Any]:

@@ -1,0 +1,140 @@
+"""How a leg is driven: the path of its tip, the two pitch joints that put the tip there, the servo targets over time.
+
+The tip stands for a straight line from the AEP to the PEP at constant speed, and swings back along the upper half of
+an ellipse (paper, section Robot). Angles are measured from a straight leg that hangs down: the hip's swings the leg
+forward, the knee's swings the lower link forward of the upper one; it is negative here, knees point ahead.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chilopod.errors import ParameterError
+from chilopod.robot import Robot, Twin
+
+Array = NDArray[np.float64]
+
+
+def tip_path(robot: Robot, phase: ArrayLike) -> Array:
+    """Where the tip of a leg is to be.
+
+    Parameters
+    ----------
+    robot
+        With a twin.
+    phase
+        In cycles, any shape; 0 is touch-down at the AEP.
+
+    Returns
+    -------
+    Ahead of and above the middle of the stance line, m, shape (..., 2).
+    """
+    gait, clearance = robot.gait, twin_of(robot).clearance
+    cycles = np.asarray(phase, dtype=np.float64) % 1.0
+    standing = cycles < gait.duty
+    swung = np.pi * (cycles - gait.duty) / (1.0 - gait.duty)
+    ahead = np.where(standing, 0.5 - cycles / gait.duty, -0.5 * np.cos(swung)) * gait.stride
+    above = np.where(standing, 0.0, clearance * np.sin(swung))
+    return np.stack([ahead, above], axis=-1)
+
+
+def joint_angles(twin: Twin, ahead: ArrayLike, below: ArrayLike) -> Array:
+    """Inverse kinematics of the two pitch joints.
+
+    Parameters
+    ----------
+    twin
+        Lengths of the links.
+    ahead, below
+        Where the foot's centre is relative to the hip, m.
+
+    Returns
+    -------
+    Hip and knee, rad, shape (..., 2).
+
+    Raises
+    ------
+    ParameterError
+        If the leg is too short, or its links too unlike, to get there.
+    """
+    x, z = np.broadcast_arrays(np.asarray(ahead, dtype=np.float64), np.asarray(below, dtype=np.float64))
+    upper, lower = twin.upper_link, twin.lower_link
+    distance = np.hypot(x, z)
+    for wrong, worst, allowed in (
+        (distance > upper + lower, distance.max(), f"at most {1e3 * (upper + lower):g} mm, both links"),
+        (distance < abs(upper - lower), distance.min(), f"at least {1e3 * abs(upper - lower):g} mm"),
+    ):
+        if wrong.any():
+            raise ParameterError(
+                "the leg cannot reach its path", field="twin.hip_height", value=f"{1e3 * worst:.4g} mm", allowed=allowed
+            )
+    knee = -np.arccos(np.clip((distance**2 - upper**2 - lower**2) / (2.0 * upper * lower), -1.0, 1.0))
+    hip = np.arctan2(x, z) - np.arctan2(lower * np.sin(knee), upper + lower * np.cos(knee))
+    return np.stack([hip, knee], axis=-1)
+
+
+def tip_place(twin: Twin, angles: ArrayLike) -> Array:
+    """Forward kinematics: the foot's centre ahead of and below the hip, m, for hip and knee angles, shape (..., 2)."""
+    hip, knee = np.moveaxis(np.asarray(angles, dtype=np.float64), -1, 0)
+    return np.stack(
+        [
+            twin.upper_link * np.sin(hip) + twin.lower_link * np.sin(hip + knee),
+            twin.upper_link * np.cos(hip) + twin.lower_link * np.cos(hip + knee),
+        ],
+        axis=-1,
+    )
+
+
+def servo_targets(robot: Robot, times: ArrayLike) -> Array:
+    """Hip and knee of every leg over time.
+
+    Parameters
+    ----------
+    robot
+        With a twin.
+    times
+        s, shape (T,).
+
+    Returns
+    -------
+    rad, shape (T, modules, 2 sides, 2 joints).
+
+    Raises
+    ------
+    ParameterError
+        If the legs cannot follow.
+    """
+    twin = twin_of(robot)
+    cycles = np.asarray(times, dtype=np.float64) / robot.gait.period
+    tip = tip_path(robot, cycles[:, None, None] + robot.gait.leg_phases(robot.body.modules))
+    return joint_angles(twin, tip[..., 0], twin.hip_height - tip[..., 1])
+
+
+def check_reach(robot: Robot) -> None:
+    """Make sure, before anything is simulated, that the legs reach all of their path.
+
+    Raises
+    ------
+    ParameterError
+        If they do not.
+    """
+    tip = tip_path(robot, np.linspace(0.0, 1.0, 721))
+    joint_angles(twin_of(robot), tip[:, 0], twin_of(robot).hip_height - tip[:, 1])
+
+
+def twin_of(robot: Robot) -> Twin:
+    """The robot's [twin].
+
+    Raises
+    ------
+    ParameterError
+        If it has none.
+    """
+    if robot.twin is None:
+        raise ParameterError(
+            "this robot has none, so the three-dimensional model cannot be built",
+            field="twin",
+            allowed="the keys of [twin] in the robot file; the preset aoi2022 has them",
+        )
+    return robot.twin

@@ -1,0 +1,273 @@
+"""The whole robot as a MuJoCo model, built from its description.
+
+Modules are boxes in a row, joined by passive yaw joints with springs. Every leg has two links on two pitch joints, on
+module 1 a yaw joint above them; every leg joint has a position servo. Only round feet touch the floor. The frame of a
+module is at its centre, at the height of the hips.
+
+Every constant has one owner: springs and their damping the yaw joints, servo gains the actuators, friction and contact
+settings the feet (their priority is above the floor's), ``impratio`` the options.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.errors import ParameterError
+from chilopod.robot import Robot, Twin
+from chilopod.twin.legs import check_reach, servo_targets, twin_of
+
+Array = NDArray[np.float64]
+
+SIDES = ("left", "right")
+
+POLE_GROUP = 4
+"""Geom group of the pole that marks a target, the only thing that the scanner sees."""
+
+_POLE_HEIGHT = 0.4  # m
+_SCANNER_ABOVE = 0.03  # m, of its beams above the body
+_ROLLING = (0.0, 0.0)  # feet do not resist turning on the spot nor rolling
+
+
+class TwinModel:
+    """A robot compiled for MuJoCo, and where its parts are in MuJoCo's arrays.
+
+    Parameters
+    ----------
+    robot
+        With a twin.
+    forces
+        Whether to measure the force on every foot (sensors, in the order of :attr:`feet`).
+
+    Attributes
+    ----------
+    robot, twin
+        As given.
+    model
+        Compiled; not to be changed.
+    yaw_joints
+        Index of the yaw joints among the joints, front to rear, (N-1,).
+    yaw_positions, yaw_rates
+        Of the yaw joints in ``qpos`` and ``qvel``, (N-1,).
+    feet
+        Geom of every foot, (N, 2).
+    leg_positions
+        Of hip and knee in ``qpos``, (N, 2, 2).
+    leg_controls
+        Of their servos in ``ctrl``, (N, 2, 2).
+    leg_yaw_positions, leg_yaw_controls
+        Of the leg yaw joints of module 1, (2,).
+
+    Raises
+    ------
+    ParameterError
+        If there is no such robot: legs that cannot reach, bodies that touch the floor, masses that do not add up.
+    """
+
+    def __init__(self, robot: Robot, forces: bool = False) -> None:
+        self.robot, self.twin = robot, twin_of(robot)
+        self.model = build(robot, forces).compile()
+        count = robot.body.modules
+
+        def joint(name: str) -> int:
+            return int(self.model.joint(name).id)
+
+        yaw = [joint(f"yaw{i}") for i in range(1, count)]
+        legs = [[[joint(f"{leg}_{part}") for part in ("hip", "knee")] for leg in _legs(i)] for i in range(count)]
+        leg_yaw = [joint(f"{leg}_yaw") for leg in _legs(0)]
+        at, rate = self.model.jnt_qposadr, self.model.jnt_dofadr
+        servo_of = {int(self.model.actuator_trnid[i, 0]): i for i in range(self.model.nu)}
+        self.yaw_joints = np.array(yaw)
+        self.yaw_positions, self.yaw_rates = at[yaw], rate[yaw]
+        self.leg_positions, self.leg_yaw_positions = at[legs], at[leg_yaw]
+        self.leg_controls = np.vectorize(servo_of.__getitem__)(legs)
+        self.leg_yaw_controls = np.array([servo_of[i] for i in leg_yaw])
+        self.feet = np.array([[int(self.model.geom(f"{leg}_foot").id) for leg in _legs(i)] for i in range(count)])
+
+    @property
+    def steps_per_control(self) -> int:
+        """Simulation steps between two servo targets."""
+        return round(self.twin.control_interval / self.twin.timestep)
+
+    def initial_positions(self) -> Array:
+        """``qpos`` of the robot at time 0: straight, at the origin along x, feet where the gait has them."""
+        positions = np.array(self.model.qpos0)
+        positions[self.leg_positions] = servo_targets(self.robot, np.zeros(1))[0]
+        return positions
+
+
+def build(robot: Robot, forces: bool = False) -> mujoco.MjSpec:
+    """The robot as an editable MuJoCo description; see :class:`TwinModel`."""
+    twin = twin_of(robot)
+    check_reach(robot)
+    _check_bodies(robot, twin)
+    spec = mujoco.MjSpec()
+    spec.modelname = robot.name
+    spec.compiler.degree = False
+    spec.option.timestep = twin.timestep
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.impratio = twin.impedance_ratio
+    # A robot that blows up is to be seen to, not put back to where it started.
+    spec.option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    world = spec.worldbody
+    world.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 0.05], contype=0, conaffinity=1)
+    pole = world.add_body(name="pole", mocap=True, pos=[0.0, 0.0, -10.0])
+    pole.add_geom(
+        name="pole",
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        size=[twin.pole_radius, 0.5 * _POLE_HEIGHT, 0.0],
+        pos=[0.0, 0.0, 0.5 * _POLE_HEIGHT],
+        contype=0,
+        conaffinity=0,
+        mass=0.0,
+        group=POLE_GROUP,
+        rgba=[0.84, 0.37, 0.0, 1.0],
+    )
+    parent, length = world, robot.module_length
+    for i in range(robot.body.modules):
+        ahead = [0.0, 0.0, twin.hip_height + twin.foot_radius] if i == 0 else [-length, 0.0, 0.0]
+        body = parent.add_body(name=f"module{i + 1}", pos=ahead)
+        if i == 0:
+            body.add_freejoint(name="root")
+            body.add_site(name="scanner", pos=scanner_place(twin), size=[0.005] * 3)
+        else:
+            body.add_joint(
+                name=f"yaw{i}",
+                type=mujoco.mjtJoint.mjJNT_HINGE,
+                axis=[0.0, 0.0, 1.0],
+                pos=[0.5 * length, 0.0, 0.0],
+                stiffness=[robot.springs.stiffness[i - 1], 0.0, 0.0],
+                damping=[robot.springs.damping[i - 1], 0.0, 0.0],
+            )
+        _add_box(body, robot, twin)
+        for side, leg in enumerate(_legs(i)):
+            _add_leg(spec, body, leg, robot, twin, side, steered=i == 0)
+        parent = body
+    if forces:
+        for i in range(robot.body.modules):
+            for leg in _legs(i):
+                _add_force_sensor(spec, leg)
+    return spec
+
+
+def scanner_place(twin: Twin) -> Array:
+    """Where the beams of the scanner come from, in the frame of module 1, m."""
+    return np.array([twin.scanner_offset, 0.0, 0.5 * twin.body_height + _SCANNER_ABOVE])
+
+
+@lru_cache(maxsize=64)
+def compiled(robot: Robot, forces: bool = False) -> TwinModel:
+    """The model of a robot, shared between calls with the same arguments."""
+    return TwinModel(robot, forces)
+
+
+def _legs(module: int) -> list[str]:
+    return [f"leg{module + 1}_{side}" for side in SIDES]
+
+
+def _check_bodies(robot: Robot, twin: Twin) -> None:
+    if 4.0 * twin.link_mass >= robot.module_mass:
+        raise ParameterError(
+            "leaves no mass for the bodies: a module has four links",
+            field="twin.link_mass",
+            value=f"{twin.link_mass:g} kg",
+            allowed=f"less than {0.25 * robot.module_mass:.4g} kg",
+        )
+    if 0.5 * twin.body_height >= twin.hip_height + twin.foot_radius:
+        raise ParameterError(
+            "the body would touch the floor",
+            field="twin.body_height",
+            value=f"{1e3 * twin.body_height:g} mm",
+            allowed=f"less than {2e3 * (twin.hip_height + twin.foot_radius):g} mm",
+        )
+
+
+def _add_box(body: mujoco.MjsBody, robot: Robot, twin: Twin) -> None:
+    """What a module weighs without its legs, as a uniform box, or with the yaw inertia that is given."""
+    mass = robot.module_mass - 4.0 * twin.link_mass
+    length, width, height = robot.module_length, twin.body_width, twin.body_height
+    yaw = mass * (length**2 + width**2) / 12.0
+    if robot.body.yaw_inertia is not None:
+        yaw = robot.body.yaw_inertia * mass / robot.module_mass
+    roll, pitch = mass * (width**2 + height**2) / 12.0, mass * (length**2 + height**2) / 12.0
+    body.explicitinertial = True
+    body.mass, body.inertia, body.ipos = mass, [roll, pitch, yaw], [0.0, 0.0, 0.0]
+    # A little shorter than it is, so that a bend shows.
+    body.add_geom(
+        name=f"{body.name}_box",
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        size=[0.46 * length, 0.5 * width, 0.5 * height],
+        contype=0,
+        conaffinity=0,
+        rgba=[0.62, 0.68, 0.74, 1.0],
+    )
+
+
+def _add_leg(
+    spec: mujoco.MjSpec, body: mujoco.MjsBody, leg: str, robot: Robot, twin: Twin, side: int, steered: bool
+) -> None:
+    width = robot.legs.half_width if side == 0 else -robot.legs.half_width
+    upper = body.add_body(name=f"{leg}_upper", pos=[robot.legs.forward_offset, width, 0.0])
+    if steered:
+        _add_servo(spec, upper, f"{leg}_yaw", [0.0, 0.0, 1.0], twin)
+    _add_servo(spec, upper, f"{leg}_hip", [0.0, -1.0, 0.0], twin)
+    lower = upper.add_body(name=f"{leg}_lower", pos=[0.0, 0.0, -twin.upper_link])
+    _add_servo(spec, lower, f"{leg}_knee", [0.0, -1.0, 0.0], twin)
+    for link, length in ((upper, twin.upper_link), (lower, twin.lower_link)):
+        # Of a uniform rod; about its own axis a tenth of a foot's radius thick or more, so that nothing is singular.
+        across = twin.link_mass * length**2 / 12.0
+        link.explicitinertial = True
+        link.mass, link.ipos = twin.link_mass, [0.0, 0.0, -0.5 * length]
+        link.inertia = [across, across, min(across, 0.5 * twin.link_mass * twin.foot_radius**2)]
+        link.add_geom(
+            name=link.name,
+            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+            fromto=[0.0, 0.0, 0.0, 0.0, 0.0, -length],
+            size=[0.8 * twin.foot_radius, 0.0, 0.0],
+            contype=0,
+            conaffinity=0,
+            rgba=[0.25, 0.29, 0.34, 1.0],
+        )
+    lower.add_geom(
+        name=f"{leg}_foot",
+        type=mujoco.mjtGeom.mjGEOM_SPHERE,
+        size=[twin.foot_radius, 0.0, 0.0],
+        pos=[0.0, 0.0, -twin.lower_link],
+        contype=1,
+        conaffinity=0,
+        condim=3,
+        priority=1,
+        friction=[twin.sliding_friction, *_ROLLING],
+        solref=[twin.contact_time, 1.0],
+        rgba=[0.0, 0.45, 0.70, 1.0],
+    )
+
+
+def _add_servo(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, axis: list[float], twin: Twin) -> None:
+    """A hinge and the position servo that drives it: torque = stiffness * (target - angle) - damping * rate."""
+    body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis, armature=twin.joint_inertia)
+    spec.add_actuator(
+        name=name,
+        target=name,
+        trntype=mujoco.mjtTrn.mjTRN_JOINT,
+        gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+        biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+        gainprm=[twin.servo_stiffness] + [0.0] * 9,
+        biasprm=[0.0, -twin.servo_stiffness, -twin.servo_damping] + [0.0] * 7,
+    )
+
+
+def _add_force_sensor(spec: mujoco.MjSpec, leg: str) -> None:
+    spec.add_sensor(
+        name=f"{leg}_force",
+        type=mujoco.mjtSensor.mjSENS_CONTACT,
+        objtype=mujoco.mjtObj.mjOBJ_GEOM,
+        objname=f"{leg}_foot",
+        reftype=mujoco.mjtObj.mjOBJ_GEOM,
+        refname="floor",
+        intprm=[1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE), 3, 1],
+    )
