@@ -116,7 +116,7 @@ def test_a_twin_is_overridden_and_checked_like_all_else(robot):
         robot.get("twin.clearance")
     with pytest.raises(ParameterError, match="whole number of times"):
         whole.with_value("twin.timestep", 0.0015)
-    with pytest.raises(ParameterError, match="did you mean 'twin.clearance'"):
+    with pytest.raises(ParameterError, match=r"did you mean 'twin\.clearance'"):
         whole.get("twin.clearence")
 
 

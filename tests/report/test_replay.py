@@ -4,7 +4,6 @@ import base64
 import json
 import re
 import runpy
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
@@ -15,27 +14,7 @@ from chilopod.report.frames import body_frames
 from chilopod.report.replay import replay
 
 walk = runpy.run_path(str(Path(__file__).with_name("walks.py")))["walk"]
-
-
-class Page(HTMLParser):
-    """Keeps the tags, and the data that the script reads."""
-
-    def __init__(self, html: str) -> None:
-        super().__init__()
-        self.tags: list[tuple[str, dict[str, str]]] = []
-        self.data = ""
-        self.feed(html)
-        self.close()
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.append((tag, {key: value or "" for key, value in attrs}))
-
-    def handle_data(self, data):
-        if self.tags and self.tags[-1] == ("script", {"type": "application/json", "id": "data"}):
-            self.data += data
-
-    def all(self, tag: str) -> list[dict[str, str]]:
-        return [attrs for name, attrs in self.tags if name == tag]
+Page = runpy.run_path(str(Path(__file__).with_name("html_page.py")))["Page"]
 
 
 def unpacked(data: dict, robot: int) -> tuple[np.ndarray, np.ndarray]:

@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from chilopod.cli import branch, reproduce, robot, stability, walk
+from chilopod.cli import branch, doctor, reproduce, robot, stability, walk
 from chilopod.cli.options import new_app
 from chilopod.errors import ChilopodError, one_line
 
@@ -30,6 +30,7 @@ app.command("branch")(branch.branch)
 app.command("walk")(walk.walk)
 app.command("turn")(walk.turn)
 app.add_typer(reproduce.identify_app, name="identify")
+app.command("doctor")(doctor.doctor)
 
 
 @app.callback(invoke_without_command=True)

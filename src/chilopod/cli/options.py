@@ -35,6 +35,10 @@ SeedOption = Annotated[
     int | None,
     typer.Option(metavar="N", min=0, help="Disturb start, feet and sensor at random; without it nothing is disturbed."),
 ]
+EngineOption = Annotated[
+    str,
+    typer.Option(metavar="NAME", help="planar: the paper's model; twin: the whole robot in three dimensions (MuJoCo)."),
+]
 RepeatsOption = Annotated[
     int, typer.Option(metavar="N", min=1, max=100_000, help="Walks, with seeds counting up from --seed.")
 ]

@@ -1,4 +1,4 @@
-"""``chilopod robot``: make, show and check robot files."""
+"""``chilopod robot``: make, show, check and export robot files."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import typer
 
 from chilopod.cli.options import JsonOption, RobotArg, SetOption, new_app, print_json, read_robot
 
-app = new_app("Make, show and check robot files.")
+app = new_app("Make, show, check and export robot files.")
 
 
 @app.callback(invoke_without_command=True)
@@ -103,3 +103,26 @@ def check(robot: RobotArg, overrides: SetOption = None, as_json: JsonOption = Fa
     typer.echo(f"{described.name}: valid, {described.body.modules} modules")
     for remark in found:
         typer.echo(f"  {remark}")
+
+
+@app.command()
+def export(
+    robot: RobotArg,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE", help="The file to write: .xml for MJCF (MuJoCo), .urdf for URDF.")
+    ],
+    overrides: SetOption = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite the file if it exists.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Write the three-dimensional model of a robot for other programs."""
+    from chilopod.output import write_atomic
+    from chilopod.twin.export import format_of
+
+    name, write = format_of(out.suffix)
+    described = read_robot(robot, overrides)
+    write_atomic(out, write(described), replace=force)
+    if as_json:
+        print_json({"robot": described.name, "file": str(out), "format": name})
+    else:
+        typer.echo(f"wrote {out}: {name}")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from chilopod.cli.options import (
+    EngineOption,
     ForceOption,
     JsonOption,
     OutOption,
@@ -38,12 +39,13 @@ def walk(
     repeats: RepeatsOption = 1,
     rate: Annotated[float, typer.Option(metavar="HZ", help="Samples per second.")] = 100.0,
     forces: Annotated[bool, typer.Option("--forces", help="Record the force on every foot.")] = False,
+    engine: EngineOption = "planar",
     overrides: SetOption = None,
     as_json: JsonOption = False,
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE.nc", help="Write the record as netCDF.")] = None,
     force: ForceOption = False,
 ) -> None:
-    """Let a robot walk on the plane, once or many times, and say where it gets to.
+    """Let a robot walk, once or many times, and say where it gets to.
 
     Radius and joint angles are means over the last 5 s, as in the paper.
     """
@@ -57,12 +59,22 @@ def walk(
     if repeats > 1 and seed is None:
         raise ParameterError("are all alike without --seed", field="repeats", value=repeats, allowed="1")
     path = None if out is None else free_path(out, force)
-    from chilopod.studies.trials import NONE, Disturbance, Trial, run, together
+    from chilopod.studies.trials import NONE, Disturbance, Trial, check_engine, run, together
     from chilopod.studies.walks import summaries
 
+    check_engine(engine, described)
     disturbance = NONE if seed is None else Disturbance()
     trials = [
-        Trial(described, seconds, (seed or 0) + i, angles, disturbance=disturbance, rate=rate, forces=forces)
+        Trial(
+            described,
+            seconds,
+            (seed or 0) + i,
+            angles,
+            disturbance=disturbance,
+            rate=rate,
+            forces=forces,
+            engine=engine,
+        )
         for i in range(repeats)
     ]
     with progress_bar() as show:
@@ -73,9 +85,10 @@ def walk(
         typer.echo(f"wrote {path}", err=True)
     if as_json:
         walks = [{"seed": trial.seed, **each.as_json()} for trial, each in zip(trials, found, strict=True)]
-        print_json({"robot": described.name, "duration_s": seconds, "seeded": seed is not None, "walks": walks})
+        result = {"robot": described.name, "engine": engine, "duration_s": seconds, "seeded": seed is not None}
+        print_json({**result, "walks": walks} | creep(described, engine))
         return
-    typer.echo(f"{described.name}: {repeats} walk{'s' if repeats > 1 else ''} of {seconds:g} s")
+    typer.echo(f"{described.name}, {engine}: {repeats} walk{'s' if repeats > 1 else ''} of {seconds:g} s")
     typer.echo("  seed    x (m)     y (m)     radius (m)  joint angles, mean of the last 5 s (deg)")
     for trial, each in zip(trials, found, strict=True):
         label = "-" if seed is None else str(trial.seed)
@@ -84,6 +97,17 @@ def walk(
             continue
         bends = "  ".join(f"{angle:+7.2f}" for angle in each.joint_angles_deg)
         typer.echo(f"  {label:<6}  {each.x:<8.3f}  {each.y:<8.3f}  {each.axis_radius:<10.4g}  {bends}")
+    for value in creep(described, engine).values():
+        typer.echo(f"  standing feet creep like viscous ones of {value:.0f} N*s/m")
+
+
+def creep(robot: Robot, engine: str) -> dict[str, float]:
+    """How firmly the floor of the twin holds standing feet, for every run to show; nothing for another engine."""
+    if engine != "twin":
+        return {}
+    from chilopod.twin.creep import foot_creep
+
+    return {"foot_creep_N_s_m": foot_creep(robot).across}
 
 
 def turn(
@@ -105,6 +129,7 @@ def turn(
     ] = None,
     seed: SeedOption = None,
     repeats: RepeatsOption = 1,
+    engine: EngineOption = "planar",
     overrides: SetOption = None,
     as_json: JsonOption = False,
     out: OutOption = None,
@@ -139,6 +164,7 @@ def turn(
             duration=seconds,
             seed=seed,
             repeats=repeats,
+            engine=engine,
             progress=lambda part, words: show("turn", part, words),
         )
     if folder:
@@ -147,9 +173,11 @@ def turn(
         for path in write_turn(done, folder):
             typer.echo(f"wrote {path}", err=True)
     if as_json:
-        print_json(done.as_json())
+        print_json(done.as_json() | creep(described, engine))
         return
     _print_turn(done, seed)
+    for value in creep(described, engine).values():
+        typer.echo(f"  standing feet creep like viscous ones of {value:.0f} N*s/m")
 
 
 def _print_turn(done: Turn, seed: int | None) -> None:
@@ -159,7 +187,7 @@ def _print_turn(done: Turn, seed: int | None) -> None:
         return units.format(value, "N*mm/deg", digits=4)
 
     found = done.criteria
-    typer.echo(f"{done.robot.name}, {done.strategy.name}: {done.strategy.sentence}")
+    typer.echo(f"{done.robot.name}, {done.engine}, {done.strategy.name}: {done.strategy.sentence}")
     typer.echo(f"  target {done.target}: a circle of {done.target.radius:.3f} m")
     if done.by_law is not None:
         typer.echo(f"  spring by the settled radius (the paper's k1-hat): {shown(done.by_law)}")

@@ -94,7 +94,7 @@ def movie(
     # The last frame is at or before the last sample; the tolerance is for round-off in the duration.
     count = int((recorded[-1] - recorded[0]) * fps / speed + 1e-6) + 1
     shown = scene(record, titles, recorded[0] + np.arange(count) * (speed / fps))
-    return write_atomic(path, _encoded(_frames(shown, heading, size, speed), fps, size))
+    return write_atomic(path, encoded(_frames(shown, heading, size, speed), fps, size))
 
 
 def has_encoder() -> bool:
@@ -106,7 +106,7 @@ def has_encoder() -> bool:
     return True
 
 
-def _encoded(frames: Iterator[NDArray[np.uint8]], fps: int, size: tuple[int, int]) -> bytes:
+def encoded(frames: Iterator[NDArray[np.uint8]], fps: int, size: tuple[int, int]) -> bytes:
     """The bytes of an mp4 of frames of shape (height, width, 4)."""
     # Moving the index to the front takes a file: it is read again while it is written.
     with tempfile.TemporaryDirectory(prefix="chilopod-") as folder:
@@ -125,12 +125,12 @@ def _encoded(frames: Iterator[NDArray[np.uint8]], fps: int, size: tuple[int, int
 def _frames(shown: Scene, heading: str, size: tuple[int, int], speed: float) -> Iterator[NDArray[np.uint8]]:
     """Every frame, (height, width, 4); the next one overwrites it."""
     with style.house_style():
-        stage = _Stage(shown, heading, size, speed)
+        stage = Stage(shown, heading, size, speed)
         for index in range(len(shown.frames.time)):
             yield stage.drawn(index)
 
 
-class _Stage:
+class Stage:
     """The panels, and what moves in them drawn anew over what does not."""
 
     def __init__(self, shown: Scene, heading: str, size: tuple[int, int], speed: float) -> None:
@@ -221,7 +221,7 @@ class _Stage:
         floor, width = self.shown.floor, self.size[0] - 2.0 * _GAP
         count, aspect = len(self.shown.titles), (floor.y1 - floor.y0) / (floor.x1 - floor.x0)
         titles = [self._text(0.0, 0.0, title, weight="bold", va="top") for title in self.shown.titles]
-        outcomes = [self._text(0.0, 0.0, _says(outcome), weight="bold", va="top") for outcome in self.shown.outcomes]
+        outcomes = [self._text(0.0, 0.0, says(outcome), weight="bold", va="top") for outcome in self.shown.outcomes]
         longest = max(self._extent(a) + self._extent(b) for a, b in zip(titles, outcomes, strict=True)) + self.font
         for lines in (1, 2):
             caption = (0.35 + 1.35 * lines) * self.font
@@ -250,10 +250,10 @@ class _Stage:
             self._fit(outcome, across)
             box = (x, y - caption - across * aspect, across, across * aspect)
             axes = self.figure.add_axes(tuple(np.array(box) / np.tile(self.size, 2)))
-            self.panels.append(_Panel(self.shown, index, axes, across / (floor.x1 - floor.x0), self.font, outcome))
+            self.panels.append(FilmPanel(self.shown, index, axes, across / (floor.x1 - floor.x0), self.font, outcome))
 
 
-class _Panel:
+class FilmPanel:
     """One robot on its floor; `zoom` in pixels per metre."""
 
     def __init__(self, shown: Scene, robot: int, axes: Axes, zoom: float, font: float, label: Text) -> None:
@@ -334,7 +334,8 @@ class _Panel:
         axes.text(x + bar + 6.0 / zoom, y, f"{bar:g} m", va="center_baseline", fontsize=small, path_effects=halo)
 
 
-def _says(outcome: Outcome) -> str:
+def says(outcome: Outcome) -> str:
+    """An outcome in words, behind its mark."""
     return _MARKS[outcome.kind][0] + outcome.text
 
 

@@ -18,6 +18,7 @@ from chilopod.report.panel import Panel
 from chilopod.report.words import listing, minus, spring, typeset
 from chilopod.robot import Robot
 from chilopod.studies import CHAPTERS, SECTIONS, Results, Row
+from chilopod.studies.robot_rows import PREDICTED, RobotRow
 
 _TITLE: Final = "A robot that turns by bifurcation: the paper and the computation"
 _VERDICTS: Final[Mapping[str, tuple[str, str]]] = {
@@ -25,6 +26,7 @@ _VERDICTS: Final[Mapping[str, tuple[str, str]]] = {
     "differs": ("differs", "≠"),
     "not printed": ("open", "–"),
 }
+_ROBOT_VERDICTS: Final[Mapping[str, tuple[str, str]]] = {"within": ("agrees", "✓"), "outside": ("differs", "≠")}
 _MOST_LISTED: Final = 4
 _LIBRARIES: Final = ("numpy", "numba", "scipy", "xarray", "matplotlib")
 
@@ -52,15 +54,23 @@ class Film:
         Seconds of the walk per second of the film.
     encoded
         Whether there is an mp4 beside the replay.
+    pictured
+        Whether there is a png with moments of it.
     """
 
     name: str
     title: str
     speed: float
     encoded: bool
+    pictured: bool = False
 
 
-def page(results: Results, figures: Mapping[str, Sequence[Drawn]], films: Sequence[Film], robot_file: str) -> str:
+def page(
+    results: Results,
+    figures: Mapping[str, Sequence[Drawn]],
+    films: Mapping[str, Sequence[Film]],
+    robot_file: str,
+) -> str:
     """The page as HTML.
 
     Parameters
@@ -70,7 +80,7 @@ def page(results: Results, figures: Mapping[str, Sequence[Drawn]], films: Sequen
     figures
         By chapter, in the order they are shown.
     films
-        Shown in the last chapter.
+        By chapter, shown behind its figures.
     robot_file
         What to type for this robot on the command line: a preset, or the path of a file.
     """
@@ -82,6 +92,7 @@ def page(results: Results, figures: Mapping[str, Sequence[Drawn]], films: Sequen
         css=Markup(folder.joinpath("page.css").read_text(encoding="utf-8")),
         summary=summary(results),
         tables=_tables(results),
+        robot_rows=[_robot_row(row) for row in results.all_robot_rows],
         chapters=_chapters(figures, films),
         commands=commands(robot_file, results),
         robot=results.robot.name,
@@ -119,13 +130,20 @@ def summary(results: Results) -> str:
             f"Sent to a target at {task.target}, it arrives with a front spring of {spring(task.best, 3)}; stiffer "
             "ones carry it past outside, softer ones inside."
         )
+    if results.robot_rows:
+        predicted = [row for row in results.all_robot_rows if row.kind == PREDICTED]
+        within = sum(row.verdict == "within" for row in predicted)
+        parts.append(
+            "The same robot in three dimensions, its unknown constants fitted to the paper's base series of walks "
+            f"alone, meets {within} of {len(predicted)} further statements about the robot that it was not fitted to."
+        )
     counted = {word: sum(row.verdict == word for row in results.all_rows) for word in _VERDICTS}
     compared = counted["agrees"] + counted["differs"]
     if compared:
         differing = [typeset(row.quantity) for row in results.all_rows if row.verdict == "differs"]
         listed = f": {listing(differing)}" if len(differing) <= _MOST_LISTED else ""
         parts.append(
-            f"Of {compared} statements of the paper compared, {counted['agrees']} agree"
+            f"Of {compared} statements of the paper compared with the planar model, {counted['agrees']} agree"
             + (f" and {len(differing)} differ{listed}. The reasons are given below." if differing else ".")
         )
     return " ".join(parts)
@@ -160,6 +178,14 @@ def commands(robot: str, results: Results) -> list[dict[str, str]]:
             "line": f'chilopod turn {quoted} --target "30 deg, 2 m" --out turn',
         },
         {
+            "why": "Let the whole robot walk in three dimensions, and see it in a browser.",
+            "line": 'chilopod turn aoi2022 --engine twin --target "45 deg, 1.3 m" --k1 "21 N*mm/deg" --out turn-3d',
+        },
+        {
+            "why": "Take the whole robot into another simulator.",
+            "line": "chilopod robot export aoi2022 --out aoi2022.xml",
+        },
+        {
             "why": "Fit the constants that the paper does not print once more, on their own.",
             "line": "chilopod identify planar",
         },
@@ -179,13 +205,13 @@ def _tables(results: Results) -> list[dict[str, Any]]:
     return [{"title": chapter, "rows": rows} for chapter, rows in parts.items() if rows]
 
 
-def _chapters(figures: Mapping[str, Sequence[Drawn]], films: Sequence[Film]) -> list[dict[str, Any]]:
+def _chapters(figures: Mapping[str, Sequence[Drawn]], films: Mapping[str, Sequence[Film]]) -> list[dict[str, Any]]:
     found = [
         {
             "title": chapter,
             "anchor": f"chapter-{number}",
             "figures": [_figure(drawn) for drawn in figures.get(chapter, ())],
-            "films": films if number == len(CHAPTERS) else (),
+            "films": films.get(chapter, ()),
         }
         for number, chapter in enumerate(CHAPTERS, 1)
     ]
@@ -204,6 +230,12 @@ def _row(row: Row) -> dict[str, str]:
         "kind": kind,
         "mark": mark,
     }
+
+
+def _robot_row(row: RobotRow) -> dict[str, str]:
+    kind, mark = _ROBOT_VERDICTS[row.verdict]
+    words = {name: typeset(text) for name, text in row.as_json().items() if name not in ("verdict", "kind")}
+    return {**words, "origin": row.kind, "verdict": row.verdict, "kind": kind, "mark": mark}
 
 
 def _figure(drawn: Drawn) -> dict[str, Any]:

@@ -2,33 +2,18 @@
 (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
   const { time, floor, scale, body, colors } = data;
-  const byId = (id) => document.getElementById(id);
-  const play = byId("play"), scrub = byId("scrub"), clock = byId("clock"), speed = byId("speed"), follow = byId("follow");
-  const panels = byId("panels");
   const values = 2 * (3 * body.modules + 1);  // of one frame: x and y of the spine and of all feet
   const flags = Math.ceil(2 * body.modules / 8);
   const nowhere = -32768;
-  const aspect = (floor.y1 - floor.y0) / (floor.x1 - floor.x0);
   const last = time.count - 1;
-  const end = time.start + last * time.step;
+  const player = replayPlayer(data, (floor.y1 - floor.y0) / (floor.x1 - floor.x0));
+  const { robots, follow, bytes } = player;
 
-  const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
-  const robots = data.robots.map((robot, index) => {
-    const figure = panels.children[index];
-    return {
-      ...robot,
-      points: new Int16Array(bytes(robot.points).buffer),
-      stands: bytes(robot.stands),
-      canvas: figure.querySelector("canvas"),
-      caption: figure.querySelector("figcaption"),
-      label: figure.querySelector(".outcome"),
-    };
-  });
-
+  for (const robot of robots) {
+    robot.points = new Int16Array(bytes(robot.points).buffer);
+    robot.stands = bytes(robot.stands);
+  }
   const closest = smallest();
-  let now = time.start, playing = false, previous = 0;
-
-  // ------------------------------------------------------------------------------------------------ one panel
 
   function at(robot, frame, point) {
     const index = frame * values + 2 * point;
@@ -60,7 +45,7 @@
     return size;
   }
 
-  function draw(robot, frame) {
+  function draw(robot, frame, now) {
     const context = robot.canvas.getContext("2d");
     const ratio = robot.canvas.width / robot.width;
     const shown = robot.points[frame * values] !== nowhere;
@@ -78,7 +63,7 @@
     context.clearRect(0, 0, robot.width, robot.height);
     context.globalAlpha = 1;
     drawGrid(context, robot, X, Y, left, top, zoom);
-    if (robot.target) drawTarget(context, robot, X, Y, zoom);
+    if (robot.target) drawTarget(context, robot, now, X, Y, zoom);
     if (shown) {
       if (robot.outcome.kind === "stopped" && now > robot.outcome.time) context.globalAlpha = 0.45;
       const feet = drawModules(context, robot, frame, on, zoom);
@@ -105,7 +90,7 @@
     context.stroke();
   }
 
-  function drawTarget(context, robot, X, Y, zoom) {
+  function drawTarget(context, robot, now, X, Y, zoom) {
     const [x, y] = [X(robot.target[0]), Y(robot.target[1])];
     const arrived = robot.outcome.kind === "arrived" && now >= robot.outcome.time;
     context.strokeStyle = context.fillStyle = colors.target;
@@ -215,95 +200,5 @@
     context.fillText(text, x + length + 6, y);
   }
 
-  // ------------------------------------------------------------------------------------------------ all panels
-
-  function show() {
-    const frame = Math.max(0, Math.min(last, Math.floor((now - time.start) / time.step + 1e-6)));
-    scrub.value = frame;
-    clock.value = `${now.toFixed(1)} s of ${end.toFixed(1)} s`;
-    scrub.setAttribute("aria-valuetext", `${now.toFixed(1)} seconds`);
-    for (const robot of robots) {
-      draw(robot, frame);
-      const known = now >= robot.outcome.time - 0.5 * time.step;
-      robot.label.textContent = known ? robot.outcome.text : "walking";
-      robot.label.className = `outcome ${known ? robot.outcome.kind : ""}`;
-    }
-  }
-
-  // As many columns as make the panels largest while all of them fit into the window.
-  function layOut() {
-    const width = panels.clientWidth, count = robots.length, gap = 28;
-    const spare = document.documentElement.clientHeight - panels.offsetTop - byId("controls").offsetHeight - 28;
-    const captions = Math.max(...robots.map((robot) => robot.caption.offsetHeight)) + 16;
-    let columns = 1, best = 0;
-    for (let tried = count; tried >= 1; tried--) {
-      const rows = Math.ceil(count / tried), wide = (width - gap * (tried - 1)) / tried;
-      const fitting = Math.min(wide, Math.max(0, spare / rows - captions) / aspect);
-      // Below this nothing can be seen: better scroll.
-      const size = Math.max(fitting, Math.min(wide, 300));
-      if (size > best * 1.02) [columns, best] = [tried, size];
-    }
-    panels.style.setProperty("--columns", columns);
-    const ratio = window.devicePixelRatio || 1;
-    for (const robot of robots) {
-      robot.width = Math.floor(best) - 2;
-      robot.height = Math.round(robot.width * aspect);
-      robot.canvas.style.width = `${robot.width + 2}px`;
-      robot.canvas.style.height = `${robot.height + 2}px`;
-      robot.caption.style.width = `${robot.width + 2}px`;
-      robot.canvas.width = Math.round(robot.width * ratio);
-      robot.canvas.height = Math.round(robot.height * ratio);
-    }
-    show();
-  }
-
-  function step(stamp) {
-    if (!playing) return;
-    now = Math.min(end, now + Number(speed.value) * Math.min(0.25, (stamp - previous) / 1000));
-    previous = stamp;
-    show();
-    if (now >= end) setPlaying(false);
-    else requestAnimationFrame(step);
-  }
-
-  function setPlaying(wanted) {
-    if (wanted && now >= end) now = time.start;
-    if (wanted && !playing) requestAnimationFrame((stamp) => { previous = stamp; step(stamp); });
-    playing = wanted;
-    play.textContent = playing ? "Pause" : "Play";
-  }
-
-  function goTo(wanted) {
-    now = Math.max(time.start, Math.min(end, wanted));
-    show();
-  }
-
-  function onKey(event) {
-    if (event.ctrlKey || event.altKey || event.metaKey || event.target === speed) return;
-    const reach = event.shiftKey ? time.step : 1;
-    const actions = {
-      " ": () => setPlaying(!playing),
-      ArrowLeft: () => goTo(now - reach),
-      ArrowRight: () => goTo(now + reach),
-      Home: () => goTo(time.start),
-      End: () => goTo(end),
-      ArrowUp: () => { speed.selectedIndex = Math.min(speed.selectedIndex + 1, speed.length - 1); },
-      ArrowDown: () => { speed.selectedIndex = Math.max(speed.selectedIndex - 1, 0); },
-    };
-    // On a button or a box the space bar presses that.
-    if (!(event.key in actions) || (event.key === " " && [play, follow].includes(event.target))) return;
-    event.preventDefault();
-    actions[event.key]();
-  }
-
-  scrub.max = last;
-  scrub.addEventListener("input", () => goTo(time.start + Number(scrub.value) * time.step));
-  play.addEventListener("click", () => setPlaying(!playing));
-  follow.addEventListener("change", show);
-  document.addEventListener("keydown", onKey);
-  window.addEventListener("resize", layOut);
-  const asked = /[#&]t=([0-9.]+)/.exec(location.hash);
-  if (asked) now = Math.max(time.start, Math.min(end, Number(asked[1]) || time.start));
-  layOut();
-  if (!asked && !matchMedia("(prefers-reduced-motion: reduce)").matches) setPlaying(true);
+  player.start(draw);
 })();

@@ -15,6 +15,7 @@ from chilopod.output import netcdf, prepare_folder, write_atomic
 from chilopod.report import style
 from chilopod.report.frames import body_frames
 from chilopod.report.replay import replay
+from chilopod.report.replay_3d import replay_3d
 from chilopod.steering import ARRIVAL_RADIUS
 from chilopod.studies.turn import Turn
 
@@ -51,7 +52,8 @@ def write_turn(done: Turn, folder: str | Path) -> list[Path]:
     labels = [
         f"walk {i + 1}" if done.record.sizes["robot"] > 1 else done.strategy.name for i in range(len(shown.robot))
     ]
-    write_atomic(page, replay(shown, titles=labels, heading=_title(done)))
+    page_of = replay_3d if "pose" in shown else replay
+    write_atomic(page, page_of(shown, titles=labels, heading=_title(done)))
     return [pixels, vector, record, page]
 
 

@@ -20,7 +20,7 @@ from chilopod.report.words import SPRING_UNIT, k, listing, number, spring
 from chilopod.robot import Robot
 from chilopod.steering import ARRIVAL_RADIUS
 from chilopod.studies.paper import printed
-from chilopod.studies.turning import springs_by_outcome
+from chilopod.studies.turning import TurningTask, springs_by_outcome
 from chilopod.studies.turning_findings import Turning
 
 Array = NDArray[np.float64]
@@ -30,6 +30,7 @@ _TURNING = (
     style.Layout("A;B;C;D", 12.6, heights=(1.0, 1.3, 0.9, 0.9)),
 )
 _WITHOUT = (style.Layout("AB", 4.0), style.Layout("A;B", 7.4))
+_WITHOUT_ONE = (style.Layout("A", 4.4), style.Layout("A", 4.2))
 _WHY = (style.Layout("AB", 4.0), style.Layout("A;B", 7.8))
 _SHOWN = (style.ORANGE, style.GREEN, style.BLUE)
 _DASHES = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)), (0, (5, 1.5, 1.2, 1.5)))
@@ -64,7 +65,7 @@ def turning(found: Turning) -> Panel:
         name="turning",
         letter="",
         title="Turning task A: a target ahead to the left",
-        draw=lambda narrow: _draw_turning(found, narrow),
+        draw=lambda narrow: draw_turning(found.robot, task, narrow),
         alt=f"A circle from the robot to a target {away:g} m away at {psi:g} degrees; walks with three springs, "
         f"of which that with {number(springs[1])} {SPRING_UNIT} comes nearest; distance and angle of the target over "
         "time.",
@@ -84,10 +85,10 @@ def turning(found: Turning) -> Panel:
     )
 
 
-def _draw_turning(found: Turning, narrow: bool) -> Figure:
+def draw_turning(robot: Robot, task: TurningTask, narrow: bool) -> Figure:
+    """Circle, paths, distance and angle of a task, as in the paper's Fig. "turning" A to D."""
     figure, axes = style.figure(*_TURNING, narrow)
-    task = found.tasks["A"]
-    _geometry(axes["A"], found.robot, *task.target.position)
+    _geometry(axes["A"], robot, *task.target.position)
     data, arrival = task.paths, task.criteria.arrival.sel(spring=task.paths.shown).values
     for row, (spring_, color) in enumerate(zip(data.shown.values, _SHOWN, strict=True)):
         for repeat in range(data.sizes["repeat"]):
@@ -211,7 +212,7 @@ def without(found: Turning) -> Panel:
         name="turning-without",
         letter="",
         title="With and without leg yaw",
-        draw=lambda narrow: _draw_without(data, narrow),
+        draw=lambda narrow: draw_without(data, narrow),
         alt="Paths of module 1: without leg yaw they go almost straight, some to the left and some to the right; with "
         "leg yaw they turn to the target.",
         text=(
@@ -232,9 +233,11 @@ def without(found: Turning) -> Panel:
     )
 
 
-def _draw_without(data: xr.Dataset, narrow: bool) -> Figure:
-    figure, axes = style.figure(*_WITHOUT, narrow)
-    for case, letter in zip(map(int, np.flatnonzero(~data.leg_yaw.values)), "AB", strict=True):
+def draw_without(data: xr.Dataset, narrow: bool) -> Figure:
+    """Paths with and without leg yaw, a panel for each spring."""
+    alone = np.flatnonzero(~data.leg_yaw.values)
+    figure, axes = style.figure(*(_WITHOUT if len(alone) > 1 else _WITHOUT_ONE), narrow)
+    for case, letter in zip(map(int, alone), "AB", strict=False):
         for index, color in ((case, style.ORANGE), (case + 1, style.GREEN)):
             one = data.isel(case=index)
             for trial in range(data.sizes["trial"]):

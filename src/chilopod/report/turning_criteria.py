@@ -13,7 +13,7 @@ from chilopod.report.panel import Panel
 from chilopod.report.words import SPRING_UNIT, listing, number, spring
 from chilopod.steering import Outcome
 from chilopod.studies.paper import printed
-from chilopod.studies.turning import minima, springs_by_outcome
+from chilopod.studies.turning import TurningTask, minima, springs_by_outcome
 from chilopod.studies.turning_findings import Turning
 from chilopod.studies.turning_rows import NAMES, SCALES
 
@@ -36,7 +36,7 @@ def criteria(found: Turning) -> Panel:
         name="turning-criteria",
         letter="",
         title="Task A: the paper's three criteria over the spring",
-        draw=lambda narrow: _draw(found, "A", narrow),
+        draw=lambda narrow: draw_criteria(task, found.laws.k_hat(task.target.radius)[0], narrow),
         alt=_alt(found, "A"),
         text=(
             _said(found, "A"),
@@ -57,7 +57,7 @@ def another(found: Turning) -> Panel:
         name="turning-another",
         letter="",
         title=f"Task B ({task.target.bearing * 180.0 / np.pi:g}°, {task.target.distance:g} m): the criteria again",
-        draw=lambda narrow: _draw(found, "B", narrow),
+        draw=lambda narrow: draw_criteria(task, found.laws.k_hat(task.target.radius)[0], narrow),
         alt=_alt(found, "B"),
         text=(_said(found, "B"),),
         data=task.criteria,
@@ -74,7 +74,7 @@ def comparison(found: Turning) -> Panel:
         name="turning-hopf",
         letter="",
         title="Pitchfork against Hopf",
-        draw=lambda narrow: _draw_comparison(found, narrow),
+        draw=lambda narrow: draw_comparison(task, found.hopf, narrow),
         alt="The three criteria over the spring for the two strategies; the pitchfork's smallest values lie below.",
         text=(
             "The earlier strategy softens all springs together, so that the straight walk gives way to an undulation "
@@ -140,17 +140,16 @@ def _said(found: Turning, letter: str) -> str:
     )
 
 
-def _draw(found: Turning, letter: str, narrow: bool) -> Figure:
+def draw_criteria(task: TurningTask, k_hat: float, narrow: bool, top: tuple[float, ...] = _TOP) -> Figure:
+    """The three criteria over 1/k1, with the spring of a radius law (N*mm/deg) and springs to mark on the top axis."""
     figure, axes = style.figure(*_LAYOUTS, narrow)
-    task = found.tasks[letter]
-    k_hat = found.laws.k_hat(task.target.radius)[0]
     arrived = springs_by_outcome(task.criteria)[Outcome.ARRIVED.label]
     for place, name in zip("ABC", NAMES, strict=True):
         if arrived:
             axes[place].axvspan(1.0 / max(arrived), 1.0 / min(arrived), color=style.PALE, zorder=0)
         _points(axes[place], task.criteria, name, style.BLUE, "o")
         axes[place].axvline(1.0 / k_hat, color=style.VERMILLION, lw=1.2, linestyle=(0, (4, 2)))
-        _finish(axes[place], name, place)
+        _finish(axes[place], name, place, top)
     handles = [
         Line2D([], [], color=style.BLUE, marker="o", markersize=5),
         Line2D([], [], color=style.VERMILLION, lw=1.2, linestyle=(0, (4, 2))),
@@ -165,14 +164,17 @@ def _draw(found: Turning, letter: str, narrow: bool) -> Figure:
     return figure
 
 
-def _draw_comparison(found: Turning, narrow: bool) -> Figure:
+def draw_comparison(
+    task: TurningTask, hopf: TurningTask, narrow: bool, top: tuple[float, ...] = (41, 10, 5, 3, 2)
+) -> Figure:
+    """The three criteria over 1/k of the two strategies."""
     figure, axes = style.figure(*_LAYOUTS, narrow)
     for place, name in zip("ABC", NAMES, strict=True):
-        _points(axes[place], found.tasks["A"].criteria, name, style.BLUE, "o")
-        _points(axes[place], found.hopf.criteria, name, style.ORANGE, "s")
-        low = minima(found.tasks["A"].criteria)
+        _points(axes[place], task.criteria, name, style.BLUE, "o")
+        _points(axes[place], hopf.criteria, name, style.ORANGE, "s")
+        low = minima(task.criteria)
         axes[place].axhline(_shown(low, name), color=style.BLUE, lw=0.9, linestyle=(0, (1, 1.5)))
-        _finish(axes[place], name, place, top=(41, 10, 5, 3, 2))
+        _finish(axes[place], name, place, top)
         axes[place].set_xlabel("1/k (deg/(N·mm))")
     handles = [
         Line2D([], [], color=style.BLUE, marker="o", markersize=5),
@@ -198,7 +200,7 @@ def _points(axes: Axes, data: xr.Dataset, name: str, color: str, marker: str) ->
     )
 
 
-def _finish(axes: Axes, name: str, place: str, top: tuple[int, ...] = _TOP) -> None:
+def _finish(axes: Axes, name: str, place: str, top: tuple[float, ...] = _TOP) -> None:
     axes.set_title(f"{place}  {_AXES[name].partition(' (')[0]}")
     axes.set_ylabel(_AXES[name].partition(": ")[2])
     axes.set_xlabel("1/k₁ (deg/(N·mm))")

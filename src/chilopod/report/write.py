@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import xarray as xr
 
+from chilopod.errors import OutputError
 from chilopod.output import netcdf, prepare_folder, write_atomic
 from chilopod.report import (
     branch,
@@ -16,6 +17,9 @@ from chilopod.report import (
     exponents,
     identification,
     mode,
+    robot_turning,
+    robot_walks,
+    robot_why,
     schematic,
     style,
     tables,
@@ -26,9 +30,12 @@ from chilopod.report import (
 from chilopod.report.movie import has_encoder, movie
 from chilopod.report.page import Drawn, Film, page
 from chilopod.report.panel import Panel
+from chilopod.report.render import film_3d, stills
 from chilopod.report.replay import replay
+from chilopod.report.replay_3d import replay_3d
 from chilopod.robot import Robot, load_robot, presets
 from chilopod.studies import CHAPTERS, Identification, Results
+from chilopod.studies.movies import Movie
 
 _STRAIGHT: Mapping[str, Callable[[Results], Panel]] = {
     "exponents": exponents.panel,
@@ -39,16 +46,18 @@ _STRAIGHT: Mapping[str, Callable[[Results], Panel]] = {
     "identification": identification.panel,
 }
 _FILM_SIZE = (1280, 320)  # three panels in a row
+_STILLS = {"robot-movie-1": (2.0, 20.0, 40.0, 58.0), "robot-movie-2": (0.5, 6.0, 12.0, 17.0)}  # s, of films in 3-D
 
 
 def panels(results: Results) -> dict[str, list[Panel]]:
     """The figures of every chapter, those of the sections that were computed."""
-    straight, curved, turns = CHAPTERS
+    straight, curved, turns, whole = CHAPTERS
     study, data = results.curved, results.datasets
     found: dict[str, list[Panel]] = {
         straight: [schematic.panel(results), *(make(results) for name, make in _STRAIGHT.items() if name in data)],
         curved: [],
         turns: [] if results.turning is None else list(turning.panels(results.turning)),
+        whole: [],
     }
     if study:
         found[curved] += [curved_trials.walks(study), curved_trials.joints(study)]
@@ -58,6 +67,14 @@ def panels(results: Results) -> dict[str, list[Panel]]:
         found[curved] += [curved_trials.onset(study), curved_variants.panel(study)]
     if "undulation" in data:
         found[curved].append(undulation.panel(data["undulation"]))
+    if results.robot_walks:
+        found[whole] += robot_walks.panels(results.robot_walks)
+    if results.robot_turning:
+        found[whole] += robot_turning.panels(results.robot_turning, results.robot_walks)
+    if "robot-spread" in data and results.whole:
+        found[whole].append(robot_why.spread(data["robot-spread"], results.whole))
+    if "robot-why" in data:
+        found[whole].append(robot_why.why(data["robot-why"]))
     return {chapter: figures for chapter, figures in found.items() if figures}
 
 
@@ -94,22 +111,43 @@ def write_report(results: Results, folder: str | Path) -> Path:
             with style.house_style():
                 narrow = style.svg(panel.draw(True), panel.name)
             drawn.setdefault(chapter, []).append(Drawn(panel, wide, narrow))
-    films = _write_films(results, folder / "movies")
+    films = {
+        list(CHAPTERS)[2]: _write_films(results.movies, folder / "movies"),
+        list(CHAPTERS)[3]: _write_films(results.robot_movies, folder / "movies"),
+    }
     robot_file = write_atomic(data / "robot.toml", results.robot.to_toml())
+    if results.whole:
+        write_atomic(data / "robot-3d.toml", results.whole.to_toml())
     name = results.robot.name if _is_preset(results.robot) else str(robot_file)
     return write_atomic(folder / "index.html", page(results, drawn, films, name))
 
 
-def _write_films(results: Results, folder: Path) -> list[Film]:
+def _write_films(movies: Sequence[Movie], folder: Path) -> list[Film]:
     written = []
-    for each in results.movies:
+    for each in movies:
         prepare_folder(folder)
-        write_atomic(folder / f"{each.name}.html", replay(each.record, titles=each.titles, heading=each.heading))
-        encoded = has_encoder()
+        solid = "pose" in each.record
+        page_of = replay_3d if solid else replay
+        write_atomic(folder / f"{each.name}.html", page_of(each.record, titles=each.titles, heading=each.heading))
+        encoded, pictured = has_encoder(), False
         if encoded:
             file = folder / f"{each.name}.mp4"
-            movie(each.record, file, titles=each.titles, heading=each.heading, speed=each.speed, size=_FILM_SIZE)
-        written.append(Film(each.name, each.heading, each.speed, encoded))
+            encoded_solid = False
+            if solid:
+                try:
+                    film_3d(each.record, file, titles=each.titles, heading=each.heading, speed=each.speed)
+                    encoded_solid = True
+                except OutputError:
+                    pass  # no graphics here: the film from above needs none, and `chilopod doctor` says what is missing
+            if not encoded_solid:
+                movie(each.record, file, titles=each.titles, heading=each.heading, speed=each.speed, size=_FILM_SIZE)
+        if solid:
+            try:
+                stills(each.record, _STILLS[each.name], folder / f"{each.name}.png", titles=each.titles)
+                pictured = True
+            except OutputError:
+                pass
+        written.append(Film(each.name, each.heading, each.speed, encoded, pictured))
     return written
 
 

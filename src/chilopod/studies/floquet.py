@@ -35,7 +35,7 @@ def silent(done: float, words: str) -> None:
 
 def stiffness(value: float) -> float:
     """A spring constant in N*mm/deg as SI."""
-    return units.parse(f"{value!r} {PAPER_UNIT}", "N*m/rad")
+    return units.parse(f"{float(value)!r} {PAPER_UNIT}", "N*m/rad")
 
 
 def first_loss(

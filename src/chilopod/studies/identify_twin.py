@@ -4,9 +4,11 @@ The base series is what the paper prints of the walks with k2 to k5 = 41 N*mm/de
 k1 = 75 and 41, curved at 28, 21, 17 and 15, set in at 34 by a square-root fit to the bend of joint 1, radius 1.2 m at
 26 and 0.88 m at 21. Everything else (other springs, strides and phases, uniform springs, turning) is left to predict.
 
-Three numbers and six yes-or-no answers do not determine eight constants, so the search is for all sets that do equally
-well: evolution strategies from several starts, every evaluation kept. The best of them is the preset; the spread of the
-others says how well the data determine each constant, and how far to trust what is predicted.
+Three numbers and six yes-or-no answers do not determine eight constants. Every constant therefore has a plausible
+range, and where the data leave it open the middle of the range is preferred: what is minimised is the misfit to the
+data plus a weak prior, by evolution strategies from several starts, with every evaluation kept. The best of them is the
+preset. All others that meet the data as well say how far the data determine each constant, and how far to trust what
+is predicted.
 """
 
 from __future__ import annotations
@@ -30,6 +32,7 @@ from chilopod.studies.floquet import K1, PAPER_UNIT, Progress, silent, stiffness
 from chilopod.studies.paper import printed
 from chilopod.studies.square_root import square_root_fit
 from chilopod.twin import initial_states, simulate
+from chilopod.twin.simulate import TOLERANCE
 
 Array = NDArray[np.float64]
 
@@ -90,6 +93,17 @@ SPRINGS = (15.0, 17.0, 21.0, 26.0, 28.0, 41.0, 75.0)
 GOOD = 1.0
 """A set of constants does as well as any if its misfit is below this: then each datum is within its tolerance."""
 
+RESIDUALS = (
+    "radius at 21",
+    "radius at 26",
+    "onset",
+    "straight at 41",
+    "straight at 75",
+    "curved at 28",
+    "steady",
+)
+"""What the data are."""
+
 _CURVED = (15.0, 17.0, 21.0, 28.0)
 _STRAIGHT = (41.0, 75.0)
 _DURATION = 36.0  # s
@@ -98,6 +112,7 @@ _TOLERANCE = 0.05  # of printed numbers: half of what the report calls agreeing
 _STEADY = 0.1  # rad that the summed bend may move between the last two averages
 _LAW = (9.7, 0.030)  # rad*sqrt(N*mm/deg), deg/(N*mm): summed bend over 1/k1 that meets both printed radii; a start only
 _SHAPE = np.array([0.64, 0.36, 0.48, 0.46, 0.16]) / 2.10
+_PRIOR = 0.25  # of its range: standard deviation of a constant about the middle
 _LOST = 30.0  # misfit of constants with which the robot does not walk
 _POPULATION = 10
 
@@ -123,8 +138,15 @@ class Fit:
 
     @property
     def misfit(self) -> float:
-        """Root mean square of the residuals of the three printed numbers and the worst of the others."""
+        """Root mean square of the residuals."""
         return float(np.sqrt(np.mean(self.residuals**2)))
+
+    @property
+    def objective(self) -> float:
+        """What the search makes small: sum of the squared residuals, and of the constants' distances from the middle of
+        their ranges over a quarter of them."""
+        parts = np.array([each.part(value) for each, value in zip(FREE, self.constants, strict=True)])
+        return float(np.sum(self.residuals**2) + np.sum(((parts - 0.5) / _PRIOR) ** 2))
 
     def as_json(self) -> dict[str, Any]:
         """Plain numbers."""
@@ -133,6 +155,61 @@ class Fit:
             "bends_rad": self.bends.tolist(),
             "residuals": self.residuals.tolist(),
             "misfit": self.misfit,
+            "objective": self.objective,
+        }
+
+
+@dataclass(frozen=True)
+class TwinIdentification:
+    """What a search found.
+
+    Attributes
+    ----------
+    given
+        The robot, for what is not fitted.
+    fits
+        All evaluations, best first.
+    """
+
+    given: Robot
+    fits: list[Fit]
+
+    @property
+    def best(self) -> Robot:
+        """The robot with the best constants."""
+        return with_constants(self.given, self.fits[0].constants)
+
+    @property
+    def good(self) -> list[Fit]:
+        """Those that meet the data within their tolerance."""
+        return [fit for fit in self.fits if fit.misfit <= GOOD]
+
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """From the smallest to the largest value of each constant among the good fits, SI."""
+        values = np.array([fit.constants for fit in self.good or self.fits[:1]])
+        return {
+            each.path: (float(low), float(high))
+            for each, low, high in zip(FREE, values.min(axis=0), values.max(axis=0), strict=True)
+        }
+
+    def as_json(self) -> dict[str, Any]:
+        """Constants with the ranges of the good fits, and the best fits, as plain numbers and text."""
+        constants = {}
+        for (path, (low, high)), value in zip(self.ranges().items(), self.fits[0].constants, strict=True):
+            unit = self.given.unit_of(path)
+            constants[path] = {
+                "value_si": float(value),
+                "text": units.format(float(value), unit, digits=3),
+                "good_fits_si": [low, high],
+                "good_fits_text": f"{units.format(low, unit, digits=2)} to {units.format(high, unit, digits=2)}",
+            }
+        return {
+            "constants": constants,
+            "misfit": self.fits[0].misfit,
+            "residuals": dict(zip(RESIDUALS, self.fits[0].residuals.tolist(), strict=True)),
+            "evaluations": len(self.fits),
+            "good": len(self.good),
+            "fits": [fit.as_json() for fit in (self.good or self.fits[:1])],
         }
 
 
@@ -148,7 +225,9 @@ def constants_of(robot: Robot) -> Array:
     return np.array([robot.get(each.path) for each in FREE])
 
 
-def base_series(robot: Robot, springs: Sequence[float] = SPRINGS, duration: float = _DURATION) -> Array:
+def base_series(
+    robot: Robot, springs: Sequence[float] = SPRINGS, duration: float = _DURATION, tolerance: float = TOLERANCE
+) -> Array:
     """Bends that the walks of the base series end in, begun near those that the paper's numbers ask for.
 
     Returns
@@ -159,7 +238,7 @@ def base_series(robot: Robot, springs: Sequence[float] = SPRINGS, duration: floa
     law = _LAW[0] * np.sqrt(np.maximum(1.0 / np.array(springs) - _LAW[1], 0.0))
     start = np.maximum(law, 0.1)[:, None] * _SHAPE
     rate = 6.0 / robot.gait.period
-    walked = simulate(robots, duration, initial=initial_states(robot, start), rate=rate)
+    walked = simulate(robots, duration, initial=initial_states(robot, start), rate=rate, tolerance=tolerance)
     angles, samples = walked.joint_angle.transpose("time", "robot", "joint").values, round(_AVERAGED * rate)
     return np.stack([angles[-2 * samples : -samples].mean(0), angles[-samples:].mean(0)])
 
@@ -223,14 +302,14 @@ def evaluate(robot: Robot, constants: Array, folder: Path | None = None) -> Fit:
     except ChilopodError:  # legs too short, say
         bends = np.full((2, len(SPRINGS), given.body.modules - 1), np.nan)
     if path is not None:
-        write_atomic(path, json.dumps({"bends": bends.tolist()}))
+        write_atomic(path, json.dumps({"constants": constants.tolist(), "bends": bends.tolist()}))
     return Fit(constants, bends[1], residuals(given, bends))
 
 
 def search(
     robot: Robot,
     starts: int = 3,
-    generations: int = 16,
+    generations: int = 9,
     seed: int = 1,
     folder: str | Path | None = None,
     progress: Progress = silent,
@@ -263,7 +342,7 @@ def search(
         mean = np.full(len(FREE), 0.5) if start == 0 else rng.uniform(0.25, 0.75, len(FREE))
         strategy = CMA(
             mean=mean,
-            sigma=0.25,
+            sigma=0.15,
             bounds=np.tile([0.0, 1.0], (len(FREE), 1)),
             population_size=_POPULATION,
             seed=seed + start,
@@ -275,10 +354,22 @@ def search(
                 fit = evaluate(
                     robot, np.array([each.value(part) for each, part in zip(FREE, parts, strict=True)]), kept
                 )
-                told.append((parts, fit.misfit))
+                told.append((parts, fit.objective))
                 fits.append(fit)
-                best = min(each.misfit for each in fits)
+                best = min(fits, key=lambda each: each.objective)
                 done = len(fits) / (starts * generations * _POPULATION)
-                progress(done, f"start {start + 1}, generation {generation + 1}: best misfit {best:.2f}")
+                progress(done, f"start {start + 1}, generation {generation + 1}: best misfit {best.misfit:.2f}")
             strategy.tell(told)
-    return sorted(fits, key=lambda fit: fit.misfit)
+    return sorted(fits, key=lambda fit: fit.objective)
+
+
+def identify_twin(
+    robot: Robot,
+    starts: int = 3,
+    generations: int = 9,
+    seed: int = 1,
+    folder: str | Path | None = None,
+    progress: Progress = silent,
+) -> TwinIdentification:
+    """Find the constants; see :func:`search`."""
+    return TwinIdentification(robot, search(robot, starts, generations, seed, folder, progress))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +20,7 @@ Progress = Callable[[float, str], None]
 TASK_A = Target(float(np.deg2rad(45.0)), 1.3)
 
 _WALK = 45.0  # s
+_ROBOT_WALK = 60.0
 _TASK = 24.0
 _BEND = tuple(float(angle) for angle in np.deg2rad([20.0, 10.0, 14.0, 12.0, 4.0]))
 
@@ -74,33 +75,53 @@ def movies(
         Called with the part done (0 to 1) and a few words.
     """
 
-    def with_spring(value: float) -> Robot:
-        return robot.with_value(K1, value)
-
-    def named(value: float) -> str:
-        return f"k1 = {units.format(value, 'N*mm/deg', digits=3).replace('*', '·')}"
-
     joints = robot.body.modules - 1
     bend = (_BEND + (0.0,) * joints)[:joints]
-    walks = [Trial(with_spring(value), _WALK, 0, bend, disturbance=NONE, rate=25.0) for value in springs]
+    walks = [Trial(robot.with_value(K1, value), _WALK, 0, bend, disturbance=NONE, rate=25.0) for value in springs]
     tried = (4.0 * best, best, 0.7 * best)
-    tasks = [Trial(with_spring(value), _TASK, 0, (), TASK_A, LegYawController(), NONE, rate=25.0) for value in tried]
+    records = run([*walks, *_tasks(robot, tried)], folder, progress)
+    return _movies("", (*springs, *tried), records)
+
+
+def robot_movies(
+    robot: Robot,
+    springs: tuple[float, float, float],
+    tried: tuple[float, float, float],
+    folder: str | Path | None = None,
+    progress: Progress = lambda done, words: None,
+) -> list[Movie]:
+    """The same of the whole robot: the walks of movie 1 start straight but for their disturbance, as the paper's do.
+
+    Parameters
+    ----------
+    robot
+        With a twin.
+    springs
+        As for :func:`movies`.
+    tried
+        First springs for task A, N*m/rad: too stiff, best, too soft.
+    folder, progress
+        As for :func:`movies`.
+    """
+    walks = [
+        Trial(robot.with_value(K1, value), _ROBOT_WALK, 1, rate=25.0, engine="twin", poses=True) for value in springs
+    ]
+    tasks = [replace(each, engine="twin", poses=True) for each in _tasks(robot, tried)]
     records = run([*walks, *tasks], folder, progress)
-    kinds = ("straight", "curved a little", "curved a lot")
-    ends = ("too stiff", "best", "too soft")
+    return _movies("robot-", (*springs, *tried), records)
+
+
+def _tasks(robot: Robot, tried: tuple[float, float, float]) -> list[Trial]:
     return [
-        Movie(
-            "movie-1",
-            "One spring decides how the robot walks",
-            tuple(f"{named(value)}: {kind}" for value, kind in zip(springs, kinds, strict=True)),
-            together(records[:3]),
-            2.0,
-        ),
-        Movie(
-            "movie-2",
-            f"Turning to a target, {TASK_A}",
-            tuple(f"{named(value)}: {end}" for value, end in zip(tried, ends, strict=True)),
-            together(records[3:]),
-            1.0,
-        ),
+        Trial(robot.with_value(K1, value), _TASK, 0, (), TASK_A, LegYawController(), NONE, rate=25.0) for value in tried
+    ]
+
+
+def _movies(prefix: str, springs: tuple[float, ...], records: list[xr.Dataset]) -> list[Movie]:
+    kinds = ("straight", "curved a little", "curved a lot", "too stiff", "best", "too soft")
+    names = [units.format(value, "N*mm/deg", digits=3).replace("*", "·") for value in springs]
+    titles = tuple(f"k1 = {name}: {kind}" for name, kind in zip(names, kinds, strict=True))
+    return [
+        Movie(f"{prefix}movie-1", "One spring decides how the robot walks", titles[:3], together(records[:3]), 2.0),
+        Movie(f"{prefix}movie-2", f"Turning to a target, {TASK_A}", titles[3:], together(records[3:]), 1.0),
     ]

@@ -16,14 +16,23 @@ from chilopod.studies import (
     floquet,
     floquet_rows,
     identify,
+    robot_rows,
     turning_rows,
+    twin_numerics,
 )
+from chilopod.studies.ablation import ablation
 from chilopod.studies.curved_findings import CurvedStudy, curved_study
 from chilopod.studies.curved_walk import curved_walks
 from chilopod.studies.floquet import K1, stiffness
-from chilopod.studies.movies import Movie, movies
+from chilopod.studies.movies import Movie, movies, robot_movies
+from chilopod.studies.planar_words import planar_words
+from chilopod.studies.robot_rows import RobotRow
+from chilopod.studies.robot_turning import RobotTurning, robot_turning
+from chilopod.studies.robot_walks import RobotWalks, robot_walks
 from chilopod.studies.table import Row
 from chilopod.studies.turning_findings import Turning, turning
+from chilopod.studies.twin_spread import COUNT as SPREAD
+from chilopod.studies.twin_spread import twin_spread
 from chilopod.studies.undulation import undulating_walks
 
 Progress = Callable[[str, float, str], None]
@@ -41,6 +50,12 @@ SECTIONS: Mapping[str, str] = {
     "undulation": "undulating walks of uniform springs",
     "turning": "turning to targets",
     "movies": "the paper's two movies",
+    "robot-walks": "the whole robot in 3-D: its walks",
+    "robot-turning": "the whole robot in 3-D: turning to targets",
+    "robot-spread": "the whole robot in 3-D: other constants that fit as well",
+    "robot-numerics": "the whole robot in 3-D: finer steps",
+    "robot-why": "why the robot bends earlier than the planar model",
+    "robot-movies": "the paper's two movies in 3-D",
 }
 """What can be asked for with ``--only``, and what it is."""
 
@@ -48,11 +63,21 @@ CHAPTERS: Mapping[str, tuple[str, ...]] = {
     "The straight walk and where it bends": ("mode", "exponents", "variants", "modules", "uniform", "identification"),
     "Curved walks": ("branch", "curved", "undulation"),
     "Turning to a target": ("turning", "movies"),
+    "The whole robot in three dimensions": (
+        "robot-walks",
+        "robot-turning",
+        "robot-spread",
+        "robot-numerics",
+        "robot-why",
+        "robot-movies",
+    ),
 }
 """The sections of every chapter of the report."""
 
 _BRANCH = (6.0, 20.0)  # N*mm/deg
 _FILMED = (41.0, 11.0, 8.0)  # N*mm/deg: straight, curved a little, curved a lot
+_ROBOT_FILMED = (41.0, 26.0, 15.0)  # N*mm/deg, the paper's large, small and very small
+_ROBOT_TRIED = (41.0, 21.0, 15.0)  # N*mm/deg, the paper's of task A
 _BEST = (
     9.8  # N*mm/deg: what `chilopod turn` finds for task A; the movie takes the best of the trials where there are any
 )
@@ -68,10 +93,14 @@ class Results:
         The robot everything was computed for.
     datasets
         By section, see :data:`SECTIONS`, where a section is one dataset.
-    identification, curved, turning, movies
+    identification, curved, turning, movies, robot_walks, robot_turning, robot_movies
         The sections of these names, if they were asked for.
+    whole
+        The robot that walks in three dimensions, if any does.
     rows
         The table paper | computed, by section.
+    robot_rows
+        The table robot | twin | planar model, by section.
     seconds
         How long each section took.
     """
@@ -82,13 +111,23 @@ class Results:
     curved: CurvedStudy | None = None
     turning: Turning | None = None
     movies: list[Movie] = field(default_factory=list)
+    whole: Robot | None = None
+    robot_walks: RobotWalks | None = None
+    robot_turning: RobotTurning | None = None
+    robot_movies: list[Movie] = field(default_factory=list)
     rows: dict[str, list[Row]] = field(default_factory=dict)
+    robot_rows: dict[str, list[RobotRow]] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
 
     @property
     def all_rows(self) -> list[Row]:
         """The whole table."""
         return [row for name in SECTIONS for row in self.rows.get(name, ())]
+
+    @property
+    def all_robot_rows(self) -> list[RobotRow]:
+        """The whole table of the robot."""
+        return [row for name in SECTIONS for row in self.robot_rows.get(name, ())]
 
 
 def chosen(only: Iterable[str] | None) -> list[str]:
@@ -118,6 +157,8 @@ def reproduce(
     quick: bool = False,
     folder: str | Path | None = None,
     progress: Progress = lambda section, done, words: None,
+    *,
+    whole: Robot | None = None,
 ) -> Results:
     """Compute the sections of the report.
 
@@ -135,16 +176,23 @@ def reproduce(
         kept.
     progress
         Called as the work goes on.
+    whole
+        The robot of the sections in three dimensions, with a twin, such as ``aoi2022``; without one these are left out.
     """
-    results = Results(robot)
+    results = Results(robot, whole=whole)
     for name in chosen(only):
+        if name.startswith("robot-") and whole is None:
+            continue
         started = time.perf_counter()
         progress(name, 0.0, SECTIONS[name])
 
         def report(done: float, words: str, name: str = name) -> None:
             progress(name, done, words)
 
-        results.rows[name] = _section(results, name, quick, folder, report)
+        if name.startswith("robot-"):
+            results.robot_rows[name] = _robot_section(results, name, quick, folder, report)
+        else:
+            results.rows[name] = _section(results, name, quick, folder, report)
         results.seconds[name] = time.perf_counter() - started
         progress(name, 1.0, "done")
     return results
@@ -190,4 +238,31 @@ def _section(
     best = results.turning.tasks["A"].best if results.turning else _BEST
     first, second, third = (stiffness(value) for value in _FILMED)
     results.movies = movies(robot, (first, second, third), stiffness(best), folder, report)
+    return []
+
+
+def _robot_section(
+    results: Results, name: str, quick: bool, folder: str | Path | None, report: Callable[[float, str], None]
+) -> list[RobotRow]:
+    """Compute a section in three dimensions, leave it in ``results``, and return its lines of the robot's table."""
+    whole = results.whole
+    assert whole is not None
+    if name == "robot-walks":
+        results.robot_walks = robot_walks(whole, folder, quick, report)
+        return robot_rows.walk_rows(results.robot_walks, planar_words(results))
+    if name == "robot-turning":
+        results.robot_turning = robot_turning(whole, folder, quick, report)
+        return robot_rows.turning_rows(results.robot_turning, results.robot_walks, planar_words(results))
+    if name == "robot-spread":
+        results.datasets[name] = twin_spread(whole, folder, 2 if quick else SPREAD, report)
+        return []
+    if name == "robot-numerics":
+        results.datasets[name] = twin_numerics.twin_numerics(whole, report)
+        return twin_numerics.rows(results.datasets[name])
+    if name == "robot-why":
+        results.datasets[name] = ablation(whole, results.robot, folder, quick, report)
+        return []
+    straight, little, lot = (stiffness(value) for value in _ROBOT_FILMED)
+    stiff, best, soft = (stiffness(value) for value in _ROBOT_TRIED)
+    results.robot_movies = robot_movies(whole, (straight, little, lot), (stiff, best, soft), folder, report)
     return []

@@ -18,19 +18,22 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from chilopod import planar
 from chilopod.engine import event_times
-from chilopod.errors import ParameterError
+from chilopod.errors import ParameterError, nearest_name
 from chilopod.output import prepare_folder, write_atomic
-from chilopod.planar import initial_states, simulate
 from chilopod.robot import Robot
 from chilopod.steering import LegYawController, Target
 
 Array = NDArray[np.float64]
 
-RECORD_VERSION = 2
+RECORD_VERSION = 3
 """Goes up whenever the same trial would give another record; files of other versions are left alone."""
 
-_BATCH = 32
+ENGINES = ("planar", "twin")
+"""What walks: the planar model, or the whole robot in three dimensions."""
+
+_BATCH = {"planar": 32, "twin": 8}
 """Trials that run, and are lost, together; a few seconds' work."""
 
 
@@ -51,7 +54,7 @@ class Disturbance:
     friction
         Of the logarithm of every foot's friction coefficient.
     bearing
-        Of every measured bearing, rad.
+        Of every measured bearing, rad. The twin's scanner has noise of its own instead, if this is not zero.
     """
 
     joint_angle: float = float(np.deg2rad(0.5))
@@ -94,7 +97,9 @@ class Trial:
     forces
         Whether the record has the force on every foot.
     engine
-        ``planar``.
+        One of :data:`ENGINES`.
+    poses
+        Whether the record has the positions of all joints, to be drawn (twin only).
     """
 
     robot: Robot
@@ -107,6 +112,10 @@ class Trial:
     rate: float = 100.0
     forces: bool = False
     engine: str = "planar"
+    poses: bool = False
+
+    def __post_init__(self) -> None:
+        check_engine(self.engine, self.robot)
 
     @property
     def description(self) -> dict[str, Any]:
@@ -124,6 +133,7 @@ class Trial:
             "disturbance": asdict(self.disturbance),
             "rate": self.rate,
             "forces": self.forces,
+            "poses": self.poses,
         }
 
     @property
@@ -151,7 +161,8 @@ def run(
 
     Returns
     -------
-    The record of every trial, see :func:`chilopod.planar.simulate`, with one ``robot`` and the trial in the attributes.
+    The record of every trial, see :func:`chilopod.planar.simulate` and :func:`chilopod.twin.simulate`, with one
+    ``robot`` and the trial in the attributes.
     """
     if folder is not None:
         folder = prepare_folder(folder)
@@ -192,12 +203,24 @@ def _batches(trials: Sequence[tuple[str, Trial]]) -> list[list[tuple[str, Trial]
             trial.duration,
             trial.target is None,
             trial.controller,
+            # Whether its sensor is noisy is said once for a batch.
+            trial.disturbance.bearing > 0.0,
             trial.rate,
             trial.forces,
             trial.engine,
+            trial.poses,
+            # Robots of the twin share a model, in which only springs differ.
+            (trial.robot.body, trial.robot.legs, trial.robot.ground, trial.robot.twin)
+            if trial.engine == "twin"
+            else None,
         )
         groups.setdefault(alike, []).append((name, trial))
-    return [group[i : i + _BATCH] for group in groups.values() for i in range(0, len(group), _BATCH)]
+    return [
+        group[i : i + size]
+        for group in groups.values()
+        for size in [_BATCH[group[0][1].engine]]
+        for i in range(0, len(group), size)
+    ]
 
 
 def _walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
@@ -205,17 +228,33 @@ def _walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
     first = trials[0]
     asked = event_times(first.controller, first.robot.gait, first.duration) if first.controller else []
     drawn = [_drawn(trial, len(asked)) for trial in trials]
-    data = simulate(
-        [trial.robot for trial in trials],
-        first.duration,
-        initial=np.concatenate([each.state for each in drawn]),
-        friction=np.stack([each.friction for each in drawn]),
-        controller=first.controller,
-        target=None if first.target is None else np.stack([t.target.position for t in trials if t.target]),
-        bearing_noise=np.stack([each.bearing for each in drawn]),
-        rate=first.rate,
-        forces=first.forces,
-    )
+    target = None if first.target is None else np.stack([t.target.position for t in trials if t.target])
+    given: dict[str, Any] = {
+        "robots": [trial.robot for trial in trials],
+        "duration": first.duration,
+        "friction": np.stack([each.friction for each in drawn]),
+        "controller": first.controller,
+        "target": target,
+        "rate": first.rate,
+        "forces": first.forces,
+    }
+    angles, heading = np.stack([each.joint_angles for each in drawn]), np.array([each.heading for each in drawn])
+    if first.engine == "twin":
+        from chilopod import twin  # MuJoCo takes a moment to load
+
+        noisy = target is not None and first.disturbance.bearing > 0.0
+        data = twin.simulate(
+            **given,
+            initial=twin.initial_states(first.robot, angles, heading),
+            scan_seeds=[each.scan_seed for each in drawn] if noisy else None,
+            poses=first.poses,
+        )
+    else:
+        data = planar.simulate(
+            **given,
+            initial=planar.initial_states(first.robot, angles, heading),
+            bearing_noise=np.stack([each.bearing for each in drawn]),
+        )
     records = []
     for index, trial in enumerate(trials):
         record = data.isel(robot=[index]).assign_coords(robot=[0])
@@ -227,28 +266,51 @@ def _walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
 
 @dataclass(frozen=True)
 class _Drawn:
-    state: Array
+    joint_angles: Array
+    heading: float
     friction: Array
     bearing: Array
+    scan_seed: int
 
 
 def _drawn(trial: Trial, events: int) -> _Drawn:
     """What a trial's seed makes of its disturbance; each kind has its own stream of numbers."""
     n, spread = trial.robot.body.modules, trial.disturbance
-    joints, heading, friction, bearing = (
-        np.random.default_rng(each) for each in np.random.SeedSequence(trial.seed).spawn(4)
-    )
+    streams = np.random.SeedSequence(trial.seed).spawn(5)
+    joints, heading, friction, bearing = (np.random.default_rng(each) for each in streams[:4])
     nominal = np.array(trial.joint_angles) if trial.joint_angles else np.zeros(n - 1)
-    state = initial_states(
-        trial.robot,
-        nominal + spread.joint_angle * joints.standard_normal(n - 1),
-        spread.heading * heading.standard_normal(),
-    )
     return _Drawn(
-        state,
+        nominal + spread.joint_angle * joints.standard_normal(n - 1),
+        float(spread.heading * heading.standard_normal()),
         np.exp(spread.friction * friction.standard_normal((n, 2))),
         spread.bearing * bearing.standard_normal(events),
+        int(streams[4].generate_state(1)[0]),
     )
+
+
+def check_engine(engine: str, robot: Robot) -> None:
+    """Make sure that there is such an engine and that it knows such a robot.
+
+    Raises
+    ------
+    ParameterError
+        If not.
+    """
+    if engine not in ENGINES:
+        raise ParameterError(
+            "there is no such engine",
+            field="engine",
+            value=engine,
+            allowed=", ".join(ENGINES),
+            nearest=nearest_name(engine, ENGINES),
+        )
+    if engine == "twin" and robot.twin is None:
+        raise ParameterError(
+            "the robot has no [twin], only the planar model knows it",
+            field="engine",
+            value=engine,
+            allowed="planar, or a robot file with a [twin], such as the preset aoi2022",
+        )
 
 
 def _bytes(record: xr.Dataset) -> bytes:

@@ -15,15 +15,17 @@ from chilopod.robot import Robot
 from chilopod.steering import Criteria, Strategy, Target, earliest_arrival, evaluate, steered
 from chilopod.studies.floquet import K1
 from chilopod.studies.radius_laws import radius_laws
-from chilopod.studies.trials import NONE, Disturbance, Trial, run, together
+from chilopod.studies.robot_walks import twin_radius_law
+from chilopod.studies.trials import NONE, Disturbance, Trial, check_engine, run, together
 
 Array = NDArray[np.float64]
 Progress = Callable[[float, str], None]
 
 _SOFTEST = 1.0 / 20.0  # of the stiffest spring: where a strategy without a radius law starts to look
-_TRIED = 48  # springs a round
+_TRIED = {"planar": 48, "twin": 8}  # springs a round
 _ROUNDS = 2
-_HASTE = 1.6  # a task lasts so many times what the circle takes at the speed of the straight walk
+# A task lasts so many times what the circle takes at the speed of the straight walk without slipping; the twin slips.
+_HASTE = {"planar": 1.6, "twin": 1.9}
 _LEAST = 5.0  # s
 _AS_NEAR = 1e-9  # m
 
@@ -36,7 +38,7 @@ class Turn:
     ----------
     robot
         With the spring it walked with.
-    target, strategy
+    target, strategy, engine
         What was asked for.
     by_law
         The spring whose settled walk has the radius of the circle to the target, the paper's k1-hat, N*m/rad; None
@@ -52,6 +54,7 @@ class Turn:
     robot: Robot
     target: Target
     strategy: Strategy
+    engine: str
     by_law: float | None
     stiffness: float | None
     record: xr.Dataset
@@ -67,6 +70,7 @@ class Turn:
         return {
             "robot": self.robot.name,
             "strategy": self.strategy.name,
+            "engine": self.engine,
             "target": {"bearing_rad": self.target.bearing, "distance_m": self.target.distance},
             "circle_radius_m": plain(self.target.radius),
             "spring_by_law_N_m_rad": plain(self.by_law),
@@ -95,6 +99,7 @@ def turn(
     duration: float | None = None,
     seed: int | None = None,
     repeats: int = 1,
+    engine: str = "planar",
     progress: Progress = lambda done, words: None,
 ) -> Turn:
     """Walk to a target.
@@ -112,11 +117,14 @@ def turn(
         to the target in undisturbed simulated trials, which takes into account that a walk needs time to bend. Without
         leg yaw nothing bends undisturbed, and ``auto`` is ``law``.
     duration
-        s; by default 1.6 times what the circle takes at the speed of the straight walk.
+        s; by default 1.6 times (twin: 1.9 times) what the circle takes at the speed of the straight walk without slip.
     seed
         Of the first repeat's disturbances, the others count up from it; None for no disturbance at all.
     repeats
         How many walks.
+    engine
+        Of :data:`chilopod.studies.trials.ENGINES`. The radius law of the planar model is that of its exact branch, the
+        twin's that of trials.
     progress
         Called with the part done (0 to 1) and a few words.
 
@@ -131,10 +139,15 @@ def turn(
         raise ParameterError("must be positive", field="repeats", value=repeats)
     if repeats > 1 and seed is None:
         raise ParameterError("are all alike without a seed", field="repeats", value=repeats, allowed="1, or a seed")
-    time = duration if duration is not None else _time_for(robot, target)
+    check_engine(engine, robot)
+    time = duration if duration is not None else _time_for(robot, target, engine)
     law = None
     if isinstance(spring, str) and strategy.springs == K1:
-        law = radius_laws(robot, lambda done, words: progress(0.4 * done, f"radius law, {words}")).axis
+
+        def shown(done: float, words: str) -> None:
+            progress(0.4 * done, f"radius law, {words}")
+
+        law = twin_radius_law(robot, shown) if engine == "twin" else radius_laws(robot, shown).axis
     by_law = law.value(target.radius) if law else None
     if strategy.springs is None:
         stiffness = None
@@ -146,30 +159,38 @@ def turn(
         stiffness = by_law
     else:
         between = (float(law.values[0]), 1.5 * law.pitchfork) if law else _around(robot)
-        stiffness = best_spring(robot, target, strategy, between, time)
+        progress(0.4, "trials with many springs")
+        stiffness = best_spring(robot, target, strategy, between, time, engine)
     progress(0.9, "walk")
     walker, controller = steered(robot, strategy, stiffness)
-    trial = Trial(walker, time, 0, (), target, controller, Disturbance() if seed is not None else NONE)
+    spread = Disturbance() if seed is not None else NONE
+    trial = Trial(walker, time, 0, (), target, controller, spread, engine=engine, poses=engine == "twin")
     record = together(run([replace(trial, seed=(seed or 0) + repeat) for repeat in range(repeats)]))
     when = earliest_arrival(record)
     criteria = evaluate(record, when if np.isfinite(when) else float(record.time[-1]))
-    return Turn(walker, target, strategy, by_law, stiffness, record, criteria)
+    return Turn(walker, target, strategy, engine, by_law, stiffness, record, criteria)
 
 
 def best_spring(
-    robot: Robot, target: Target, strategy: Strategy, between: tuple[float, float], duration: float
+    robot: Robot,
+    target: Target,
+    strategy: Strategy,
+    between: tuple[float, float],
+    duration: float,
+    engine: str = "planar",
 ) -> float:
     """The spring of a strategy that comes nearest to the target, by undisturbed trials on ever finer grids, N*m/rad."""
     low, high = between
-    values = np.geomspace(low, high, _TRIED)
+    tried = _TRIED[engine]
+    values = np.geomspace(low, high, tried)
     best = 0
     for round_ in range(_ROUNDS):
         if round_:
-            values = np.linspace(values[max(best - 1, 0)], values[min(best + 1, _TRIED - 1)], _TRIED)
+            values = np.linspace(values[max(best - 1, 0)], values[min(best + 1, tried - 1)], tried)
         trials = []
         for value in values:
             walker, controller = steered(robot, strategy, float(value))
-            trials.append(Trial(walker, duration, 0, (), target, controller, NONE, rate=20.0))
+            trials.append(Trial(walker, duration, 0, (), target, controller, NONE, rate=20.0, engine=engine))
         record = together(run(trials))
         nearest = evaluate(record, duration).nearest
         # Of springs that do equally well the stiffest.
@@ -182,7 +203,7 @@ def _around(robot: Robot) -> tuple[float, float]:
     return _SOFTEST * stiffest, stiffest
 
 
-def _time_for(robot: Robot, target: Target) -> float:
+def _time_for(robot: Robot, target: Target, engine: str) -> float:
     angle = abs(target.bearing)
     arc = target.distance * (angle / np.sin(angle) if angle > 0.0 else 1.0)
-    return float(max(_LEAST, _HASTE * arc / robot.gait.speed))
+    return float(max(_LEAST, _HASTE[engine] * arc / robot.gait.speed))

@@ -98,6 +98,7 @@ def turning_task(
     duration: float = DURATION,
     disturbance: Disturbance | None = None,
     shown: Sequence[float] | None = None,
+    engine: str = "planar",
     folder: str | Path | None = None,
     progress: Progress = silent,
 ) -> TurningTask:
@@ -124,6 +125,8 @@ def turning_task(
         How much differs from trial to trial; by default what all studies have.
     shown
         Springs of ``paths``, N*mm/deg.
+    engine
+        Of :data:`chilopod.studies.trials.ENGINES`.
     folder
         Where records are kept, so that a study that was stopped goes on where it was.
     progress
@@ -134,7 +137,13 @@ def turning_task(
     for spring in springs:
         walker, controller = steered(robot, plan, stiffness(float(spring)))
         walk = Trial(
-            walker, duration, target=target, controller=controller, disturbance=disturbance or Disturbance(), rate=RATE
+            walker,
+            duration,
+            target=target,
+            controller=controller,
+            disturbance=disturbance or Disturbance(),
+            rate=RATE,
+            engine=engine,
         )
         asked += [replace(walk, seed=seed) for seed in range(repeats)]
     record = trials.together(trials.run(asked, folder, progress))
@@ -300,6 +309,7 @@ def without_leg_yaw(
     target: Target,
     springs: Mapping[str, float],
     *,
+    engine: str = "planar",
     folder: str | Path | None = None,
     progress: Progress = silent,
 ) -> xr.Dataset:
@@ -307,7 +317,7 @@ def without_leg_yaw(
 
     Parameters
     ----------
-    robot, target, folder, progress
+    robot, target, engine, folder, progress
         As for :func:`turning_task`.
     springs
         k1 by name, N*mm/deg.
@@ -323,7 +333,7 @@ def without_leg_yaw(
         strategy = "pitchfork" if leg_yaw else "open-loop"
         walker, controller = steered(robot, STRATEGIES[strategy], stiffness(spring))
         asked = [
-            Trial(walker, DURATION, seed, target=target, controller=controller, rate=RATE)
+            Trial(walker, DURATION, seed, target=target, controller=controller, rate=RATE, engine=engine)
             for seed in range(REPEATS if leg_yaw else most)
         ]
         record = trials.together(trials.run(asked, folder))

@@ -1,6 +1,13 @@
 """The whole robot in three dimensions, in MuJoCo: bodies, legs with servos, feet on the floor, scanner."""
 
-from chilopod.twin.model import TwinModel
-from chilopod.twin.simulate import initial_states, simulate
+from chilopod.twin import gl
 
-__all__ = ["TwinModel", "initial_states", "simulate"]
+# A graphics backend that is not there must not keep the physics from being imported.
+gl.import_mujoco()
+
+from chilopod.twin.creep import Creep, foot_creep  # noqa: E402
+from chilopod.twin.model import TwinModel  # noqa: E402
+from chilopod.twin.plan import initial_states  # noqa: E402
+from chilopod.twin.simulate import simulate  # noqa: E402
+
+__all__ = ["Creep", "TwinModel", "foot_creep", "initial_states", "simulate"]

@@ -10,6 +10,8 @@ settings the feet (their priority is above the floor's), ``impratio`` the option
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 
 import mujoco
@@ -29,6 +31,7 @@ POLE_GROUP = 4
 
 _POLE_HEIGHT = 0.4  # m
 _SCANNER_ABOVE = 0.03  # m, of its beams above the body
+_SUNK = 1e-6  # m, of feet at the start, where else round-off would decide which of them touch the floor
 _ROLLING = (0.0, 0.0)  # feet do not resist turning on the spot nor rolling
 
 
@@ -69,7 +72,11 @@ class TwinModel:
 
     def __init__(self, robot: Robot, forces: bool = False) -> None:
         self.robot, self.twin = robot, twin_of(robot)
-        self.model = build(robot, forces).compile()
+        spec = build(robot, forces)
+        try:
+            self.model = spec.compile()
+        except ValueError as error:  # in MuJoCo's words; ours have no better ones
+            raise ParameterError(f"MuJoCo cannot build this robot ({error})", field="twin") from None
         count = robot.body.modules
 
         def joint(name: str) -> int:
@@ -95,6 +102,7 @@ class TwinModel:
     def initial_positions(self) -> Array:
         """``qpos`` of the robot at time 0: straight, at the origin along x, feet where the gait has them."""
         positions = np.array(self.model.qpos0)
+        positions[2] -= _SUNK
         positions[self.leg_positions] = servo_targets(self.robot, np.zeros(1))[0]
         return positions
 
@@ -165,6 +173,25 @@ def compiled(robot: Robot, forces: bool = False) -> TwinModel:
     return TwinModel(robot, forces)
 
 
+def without_springs(robot: Robot) -> Robot:
+    """The robot as far as the model is concerned that a batch shares."""
+    joints = robot.body.modules - 1
+    same = robot.springs.model_copy(update={"stiffness": (1.0,) * joints, "damping": (0.0,) * joints})
+    return robot.model_copy(update={"name": "robot", "springs": same, "provenance": type(robot.provenance)()})
+
+
+@contextmanager
+def silence() -> Iterator[None]:
+    """Keep MuJoCo from telling of robots that blow up: on stderr, and in a file in the present folder."""
+    before, silent = mujoco.MjLogConfig.get(), mujoco.MjLogConfig.get()
+    silent.logto_console = silent.logto_file = False
+    silent.set()
+    try:
+        yield
+    finally:
+        before.set()
+
+
 def _legs(module: int) -> list[str]:
     return [f"leg{module + 1}_{side}" for side in SIDES]
 
@@ -194,6 +221,14 @@ def _add_box(body: mujoco.MjsBody, robot: Robot, twin: Twin) -> None:
     if robot.body.yaw_inertia is not None:
         yaw = robot.body.yaw_inertia * mass / robot.module_mass
     roll, pitch = mass * (width**2 + height**2) / 12.0, mass * (length**2 + height**2) / 12.0
+    if not abs(pitch - roll) <= yaw <= pitch + roll:
+        low, high = (part * robot.module_mass / mass for part in (abs(pitch - roll), pitch + roll))
+        raise ParameterError(
+            "no body of this mass and size has it",
+            field="body.yaw_inertia",
+            value=f"{robot.body.yaw_inertia:g} kg*m^2",
+            allowed=f"{low:.4g} to {high:.4g} kg*m^2",
+        )
     body.explicitinertial = True
     body.mass, body.inertia, body.ipos = mass, [roll, pitch, yaw], [0.0, 0.0, 0.0]
     # A little shorter than it is, so that a bend shows.

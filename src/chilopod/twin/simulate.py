@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from itertools import groupby
+from operator import itemgetter
 
 import numpy as np
 import xarray as xr
@@ -11,11 +12,11 @@ from mujoco.batch import Batch
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.engine import Controller, Event, Observation, Status, event_times
-from chilopod.errors import ParameterError
-from chilopod.record import MOST_NUMBERS, add_outcome, walk_record
+from chilopod.record import add_outcome, walk_record
 from chilopod.robot import Robot
 from chilopod.twin.legs import servo_targets
-from chilopod.twin.model import SIDES, TwinModel, compiled
+from chilopod.twin.model import SIDES, silence
+from chilopod.twin.plan import Plan, checked_plan
 from chilopod.twin.scanner import beams, detect, rotation, scan
 
 Array = NDArray[np.float64]
@@ -23,49 +24,14 @@ Array = NDArray[np.float64]
 RATE = 100.0
 """Default sampling rate of records, Hz."""
 
-LONGEST = 1e5
-"""s, more than a day: anything longer is a slip of the pen."""
+TOLERANCE = 1e-8
+"""Default of the contact solver, MuJoCo's own."""
 
 _FASTEST = 100.0  # m/s and rad/s: a robot that moves faster than that has blown up
 _FARTHEST = 1e6  # m and rad, likewise
 _UPRIGHT = 0.5  # cosine of the tilt of module 1 beyond which it has fallen over
 _LONGEST_STRETCH = 0.6  # s that are stepped without a look, and kept step by step meanwhile
-
-
-def initial_states(
-    robot: Robot,
-    joint_angles: ArrayLike = 0.0,
-    heading: ArrayLike = 0.0,
-    position: ArrayLike = (0.0, 0.0),
-) -> Array:
-    """States of robots that are about to walk: at rest, feet where the gait has them at time 0.
-
-    Parameters
-    ----------
-    robot
-        With a twin.
-    joint_angles
-        Of the yaw joints, rad, shape (N-1,) or (robots, N-1).
-    heading
-        Of module 1, rad, a number or shape (robots,).
-    position
-        Of its centre, m, shape (2,) or (robots, 2).
-
-    Returns
-    -------
-    Positions of all joints (MuJoCo's ``qpos``), shape (robots, nq).
-    """
-    plan = compiled(robot)
-    joints = len(plan.yaw_positions)
-    angles = np.atleast_2d(np.asarray(joint_angles, dtype=np.float64))
-    angles = np.broadcast_to(angles, (len(angles), joints))
-    heading, position = np.atleast_1d(np.asarray(heading, float)), np.atleast_2d(np.asarray(position, float))
-    count = np.broadcast_shapes(angles.shape[:1], heading.shape, position.shape[:1])[0]
-    states = np.tile(plan.initial_positions(), (count, 1))
-    states[:, :2] = position
-    states[:, 3], states[:, 6] = np.cos(0.5 * heading), np.sin(0.5 * heading)
-    states[:, plan.yaw_positions] = angles
-    return states
+_TARGETS_AHEAD = 2048  # ticks for which servo targets are computed at a time
 
 
 def simulate(
@@ -81,6 +47,7 @@ def simulate(
     forces: bool = False,
     poses: bool = False,
     threads: int = 0,
+    tolerance: float = TOLERANCE,
     progress: Callable[[float, str], None] = lambda done, words: None,
 ) -> xr.Dataset:
     """Let robots walk on the floor; each one alone, all of them at the same time.
@@ -110,6 +77,8 @@ def simulate(
         Whether to add the positions of all joints, from which the robot can be drawn.
     threads
         At most; 0 for all cores. Results are the same to the bit at any number.
+    tolerance
+        At which MuJoCo's solver of contact forces stops, relative.
     progress
         Called with the part done (0 to 1) and a few words.
 
@@ -124,31 +93,21 @@ def simulate(
     ParameterError
         If an argument has the wrong shape or is out of range, or the robots do not go together.
     """
-    plan = _plan(robots, duration, initial, friction, target, scan_seeds, rate, forces)
+    plan = checked_plan(robots, duration, initial, friction, target, scan_seeds, rate, forces)
     walk = _Walk(plan, controller, duration, rate, forces, threads)
-    for tick in walk.cuts[1:]:
-        walk.step_to(tick)
-        progress(tick / walk.cuts[-1], f"{tick * plan.model.twin.control_interval:.1f} s")
+    walk.batch.expand("opt.tolerance")[:] = tolerance
+    with silence():
+        for tick in walk.cuts[1:]:
+            walk.step_to(tick)
+            progress(tick / walk.cuts[-1], f"{tick * plan.model.twin.control_interval:.1f} s")
     return walk.record(poses)
-
-
-@dataclass(frozen=True)
-class _Plan:
-    """Checked arguments, one row a walk."""
-
-    model: TwinModel
-    robots: list[Robot]
-    states: Array
-    friction: Array
-    target: Array | None
-    scan_seeds: list[int] | None
 
 
 class _Walk:
     """Robots under way, and what has been recorded of them so far; time is counted in servo targets (ticks)."""
 
     def __init__(
-        self, plan: _Plan, controller: Controller | None, duration: float, rate: float, forces: bool, threads: int
+        self, plan: Plan, controller: Controller | None, duration: float, rate: float, forces: bool, threads: int
     ) -> None:
         self.plan, self.controller = plan, controller
         robot, model, twin = plan.model.robot, plan.model.model, plan.model.twin
@@ -166,12 +125,15 @@ class _Walk:
 
         asked = event_times(controller, robot.gait, duration) if controller else []
         ticks = [int(np.ceil(t / twin.control_interval - 1e-9)) for t, _ in asked]
-        self.asked = {tick: (t, event) for tick, (t, event) in zip(ticks, asked, strict=True) if tick < self.ticks}
-        self.events = list(self.asked.values())
-        self.scans = self._scans(ticks) if plan.target is not None else {}
+        # Several events may fall on one tick: those of both legs, in a gait that has them in phase.
+        pairs = [(tick, each) for tick, each in zip(ticks, asked, strict=True) if tick < self.ticks]
+        self.events = [each for _, each in pairs]
+        self.asked = {tick: [each for _, each in group] for tick, group in groupby(pairs, key=itemgetter(0))}
+        self.scans = self._scans(list(self.asked)) if plan.target is not None else {}
         longest = max(1, int(_LONGEST_STRETCH / twin.control_interval))
-        cuts = sorted({*range(0, self.ticks, longest), self.ticks, *self.asked, *self.scans})
-        self.cuts = [tick for tick in cuts if tick <= self.ticks]
+        needed = sorted({0, self.ticks, *self.asked, *self.scans})
+        self.cuts = [tick for a, b in zip(needed, needed[1:], strict=False) for tick in range(a, b, longest)]
+        self.cuts.append(self.ticks)
 
         per_tick = plan.model.steps_per_control
         samples = np.arange(int(np.floor(duration * rate * (1.0 + 1e-12))) + 1) / rate
@@ -179,12 +141,14 @@ class _Walk:
         shape = (len(samples), self.count)
         self.positions = np.full((*shape, model.nq), np.nan)
         self.rates = np.full((*shape, model.nv), np.nan)
-        self.positions[0], self.rates[0] = plan.states, 0.0
+        at_start = self.sample_steps == 0  # several, if sampled more often than stepped
+        self.positions[at_start], self.rates[at_start] = plan.states, 0.0
         self.forces = np.full((*shape, model.nsensordata), np.nan) if forces else None
         self.status = [Status.WALKED] * self.count
         self.walking = np.arange(self.count)
-        self.yaw = np.zeros((self.count, 2))
-        self.ramps = [(0, 1, np.zeros((self.count, 2)), self.yaw)]
+        self.yaw, self.yaw_reached = np.zeros((2, self.count, 2))
+        self.ramps: list[tuple[int, int, Array]] = []
+        self.targets_from, self.targets = 0, np.empty((0, plan.model.leg_controls.size))
         self.seen = np.full((2, self.count), np.nan)
         self.answers: list[tuple[Array, float, Array]] = []
 
@@ -199,8 +163,8 @@ class _Walk:
         """Look and ask, if it is time to, then walk on."""
         if self.tick in self.scans:
             self._look(self.scans[self.tick])
-        if self.tick in self.asked:
-            self._ask(*self.asked[self.tick])
+        for t, event in self.asked.get(self.tick, ()):
+            self._ask(t, event)
         if len(self.walking):
             self._walk(tick)
         self.tick = tick
@@ -224,55 +188,68 @@ class _Walk:
         walking = np.isin(np.arange(self.count), self.walking)[:, None]
         before, self.yaw = self.yaw, np.where(walking, command.leg_yaw, self.yaw)
         ramp = max(1, round(command.within / self.plan.model.twin.control_interval))
-        self.ramps.append((self.tick, ramp, before, self.yaw))
+        self.ramps.append((self.tick, ramp, self.yaw - before))
         self.answers.append((self.yaw, command.within, seen))
 
     def _walk(self, tick: int) -> None:
-        plan, per_tick = self.plan.model, self.plan.model.steps_per_control
-        ticks = np.arange(self.tick, tick)
+        plan, per_tick, ticks = self.plan.model, self.plan.model.steps_per_control, np.arange(self.tick, tick)
         # Both legs at the knees and hips, then the yaw of module 1's.
         control = np.zeros((len(self.walking), len(ticks), plan.model.nu))
-        targets = servo_targets(plan.robot, ticks * plan.twin.control_interval)
-        control[..., plan.leg_controls.ravel()] = targets.reshape(len(ticks), -1)
-        control[..., plan.leg_yaw_controls] = self._yaw_targets(ticks)[self.walking]
+        control[..., plan.leg_controls.ravel()] = self._leg_targets(ticks)
+        if self.controller is not None:
+            control[..., plan.leg_yaw_controls] = self._yaw_targets(ticks)[self.walking]
         record = ["qpos", "qvel"] + (["sensordata"] if self.forces is not None else [])
         out = self.batch.rollout(
             len(ticks) * per_tick, np.repeat(control, per_tick, axis=1), record=record, ids=self.walking
         )
-        first = self.tick * per_tick
-        here = np.flatnonzero((self.sample_steps > first) & (self.sample_steps <= tick * per_tick))
-        at = self.sample_steps[here] - first - 1
+        step = self.sample_steps - self.tick * per_tick
+        here = np.flatnonzero((step > 0) & (step <= len(ticks) * per_tick))
+        at = step[here] - 1
         kept = [self.positions, self.rates] + ([self.forces] if self.forces is not None else [])
         for name, array in zip(record, kept, strict=True):
             array[np.ix_(here, self.walking)] = np.swapaxes(out[name][:, at], 0, 1)
+        if self.forces is not None and self.tick == 0:  # forces are of the step before, at time 0 of the step after
+            self.forces[np.ix_(step == 0, self.walking)] = out["sensordata"][:, 0]
         self._find_failures(out["qpos"], out["qvel"], here, at)
+
+    def _leg_targets(self, ticks: NDArray[np.intp]) -> Array:
+        """Servo targets of all hips and knees, shape (ticks, legs times 2)."""
+        if ticks[-1] >= self.targets_from + len(self.targets):
+            self.targets_from = int(ticks[0])
+            ahead = np.arange(ticks[0], max(ticks[-1] + 1, min(ticks[0] + _TARGETS_AHEAD, self.ticks)))
+            targets = servo_targets(self.plan.model.robot, ahead * self.plan.model.twin.control_interval)
+            self.targets = targets.reshape(len(ahead), -1)
+        return self.targets[ticks - self.targets_from]
 
     def _yaw_targets(self, ticks: NDArray[np.intp]) -> Array:
         """Leg yaw asked for at every tick, shape (robots, ticks, 2); ramps end before the legs' next events."""
-        yaw = np.zeros((self.count, len(ticks), 2))
-        for start, length, before, after in self.ramps:
+        while self.ramps and self.ramps[0][0] + self.ramps[0][1] <= ticks[0]:
+            self.yaw_reached = self.yaw_reached + self.ramps.pop(0)[2]
+        yaw = np.repeat(self.yaw_reached[:, None], len(ticks), axis=1)
+        for start, length, change in self.ramps:
             part = np.clip((ticks - start) / length, 0.0, 1.0)[None, :, None]
-            yaw += part * (after - before)[:, None, :]
+            yaw += part * change[:, None, :]
         return yaw
 
     def _find_failures(self, positions: Array, rates: Array, here: NDArray[np.intp], at: NDArray[np.intp]) -> None:
         """Give robots that no longer walk their status, and blank their records from then on."""
-        with np.errstate(invalid="ignore"):
-            quiet = (np.abs(rates).max(2) < _FASTEST) & (np.abs(positions).max(2) < _FARTHEST)
-            upright = rotation(positions[..., 3:7])[..., 2, 2] > _UPRIGHT
-            straight = np.abs(positions[..., self.plan.model.yaw_positions]).max(2) <= 0.5 * np.pi
         # MuJoCo stops a simulation that it warns of and repeats its last state.
-        warned = self.batch.warning.sum(axis=tuple(range(1, self.batch.warning.ndim))) > 0
+        warned = self.batch.warning.any(axis=tuple(range(1, self.batch.warning.ndim)))
+        bends = positions[..., self.plan.model.yaw_positions]
+        with np.errstate(invalid="ignore", over="ignore"):
+            # Cosine of the tilt, from the quaternion.
+            upright = 1.0 - 2.0 * (positions[..., 4] ** 2 + positions[..., 5] ** 2)
+            most = (np.abs(rates).max(), np.abs(positions).max(), np.abs(bends).max(), -upright.min())
+            if not warned.any() and np.less(most, (_FASTEST, _FARTHEST, 0.5 * np.pi, -_UPRIGHT)).all():
+                return  # as nearly always, and that takes no time
+            quiet = (np.abs(rates).max(2) < _FASTEST) & (np.abs(positions).max(2) < _FARTHEST)
+            straight, standing = np.abs(bends).max(2) <= 0.5 * np.pi, upright > _UPRIGHT
         for row, robot in enumerate(self.walking):
-            for good, status in ((quiet, Status.DIVERGED), (straight, Status.OUT_OF_RANGE), (upright, Status.FALLEN)):
-                if not np.all(good[row]):
-                    self.status[robot] = status
-                    failed = int(np.argmin(good[row]))
-                    break
-            else:
-                if not warned[robot]:
-                    continue
-                self.status[robot], failed = Status.DIVERGED, 0
+            signs = ((quiet, Status.DIVERGED), (straight, Status.OUT_OF_RANGE), (standing, Status.FALLEN))
+            bad = [(int(np.argmin(good[row])), status) for good, status in signs if not good[row].all()]
+            if not bad and not warned[robot]:
+                continue
+            failed, self.status[robot] = bad[0] if bad else (0, Status.DIVERGED)
             lost = here[at >= failed]
             for array in (self.positions, self.rates, self.forces):
                 if array is not None:
@@ -281,8 +258,7 @@ class _Walk:
 
     def record(self, poses: bool) -> xr.Dataset:
         """What has been recorded, under the names that every engine gives it."""
-        plan, twin = self.plan.model, self.plan.model.twin
-        positions, rates = self.positions, self.rates
+        plan, twin, positions, rates = self.plan.model, self.plan.model.twin, self.positions, self.rates
         turn = rotation(positions[..., 3:7])
         data = walk_record(
             self.sample_steps * twin.timestep,
@@ -314,68 +290,3 @@ class _Walk:
             data["pose"] = (("time", "robot", "coordinate"), positions, {"units": "m, 1, rad: MuJoCo's qpos"})
         data.attrs = {"engine": "twin", "robot": plan.robot.to_toml(), "duration": self.ticks * twin.control_interval}
         return data
-
-
-def _plan(
-    robots: Robot | Sequence[Robot],
-    duration: float,
-    initial: ArrayLike | None,
-    friction: ArrayLike | None,
-    target: ArrayLike | None,
-    scan_seeds: Sequence[int] | None,
-    rate: float,
-    forces: bool,
-) -> _Plan:
-    for name, value, most in (("duration", duration, LONGEST), ("rate", rate, 1e6)):
-        if not 0.0 < value <= most:
-            raise ParameterError("is out of range", field=name, value=value, allowed=f"more than 0, at most {most:g}")
-    given = [robots] if isinstance(robots, Robot) else list(robots)
-    if not given:
-        raise ParameterError("there are none", field="robots", allowed="at least one")
-    first = given[0]
-    if any(_without_springs(each) != _without_springs(first) for each in given):
-        raise ParameterError("may differ in their springs only", field="robots")
-    model = compiled(_without_springs(first), forces)
-    shapes = {"initial": (model.model.nq,), "friction": (first.body.modules, 2), "target": (2,)}
-    rows: dict[str, Array] = {}
-    counts = {len(given), 1 if scan_seeds is None else len(scan_seeds)}
-    for name, argument in (("initial", initial), ("friction", friction), ("target", target)):
-        if argument is None:
-            continue
-        array, shape = np.asarray(argument, dtype=np.float64), shapes[name]
-        if array.shape[array.ndim - len(shape) :] != shape or array.ndim > len(shape) + 1 or array.size == 0:
-            allowed = f"{shape} or (walks, {', '.join(map(str, shape))})"
-            raise ParameterError("has the wrong shape", field=name, value=array.shape, allowed=allowed)
-        if not np.isfinite(array).all():
-            raise ParameterError("must be finite", field=name)
-        rows[name] = array if array.ndim > len(shape) else array[None]
-        counts.add(len(rows[name]))
-    counts.discard(1)
-    if len(counts) > 1:
-        raise ParameterError("do not agree in number", field="robots, initial, friction, target", value=sorted(counts))
-    count = counts.pop() if counts else 1
-    if count * duration * rate * (model.model.nq + model.model.nv) > MOST_NUMBERS:
-        raise ParameterError(
-            "the record would be too large", field="rate", value=rate, allowed="fewer robots, samples or seconds"
-        )
-    if "friction" in rows and not (rows["friction"] > 0.0).all():
-        raise ParameterError("must be positive", field="friction")
-
-    def spread(name: str, default: Array) -> Array:
-        return np.array(np.broadcast_to(rows.get(name, default[None]), (count, *shapes[name])))
-
-    return _Plan(
-        model,
-        given * (count if len(given) == 1 else 1),
-        spread("initial", initial_states(first)[0]),
-        spread("friction", np.ones(shapes["friction"])),
-        spread("target", np.zeros(2)) if target is not None else None,
-        None if scan_seeds is None else list(scan_seeds) * (count if len(scan_seeds) == 1 else 1),
-    )
-
-
-def _without_springs(robot: Robot) -> Robot:
-    """The robot as far as the model is concerned that a batch shares."""
-    joints = robot.body.modules - 1
-    same = robot.springs.model_copy(update={"stiffness": (1.0,) * joints, "damping": (0.0,) * joints})
-    return robot.model_copy(update={"name": "robot", "springs": same, "provenance": type(robot.provenance)()})

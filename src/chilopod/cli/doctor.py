@@ -1,0 +1,218 @@
+"""``chilopod doctor``: is everything here that chilopod needs, and what mends it if not?"""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import typer
+
+from chilopod.cli.options import JsonOption, print_json
+
+_PACKAGES = {
+    "numpy": "numpy",
+    "scipy": "scipy",
+    "numba": "numba",
+    "mujoco": "mujoco-core",
+    "xarray": "xarray",
+    "matplotlib": "matplotlib",
+    "av": "av",
+}
+"""What is imported, and what it is called where it comes from."""
+
+_BROKEN = 1  # exit code
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked at.
+
+    Attributes
+    ----------
+    name
+        What it is.
+    says
+        What was found.
+    mend
+        The line that mends it; empty if nothing is missing.
+    essential
+        Whether nothing works without it.
+    looked
+        Whether it could be looked at.
+    """
+
+    name: str
+    says: str
+    mend: str = ""
+    essential: bool = False
+    looked: bool = True
+
+    @property
+    def mark(self) -> str:
+        """For those who skim."""
+        return "✗" if self.mend else "✓" if self.looked else "?"
+
+
+def doctor(as_json: JsonOption = False) -> None:
+    """Say what is here that chilopod needs, and of everything that is missing the one line that mends it.
+
+    The exit code is 0 unless something is missing that nothing works without.
+    """
+    found = [finding for look in (_versions, _cores, _cache, _drawing, _encoder, _fonts) for finding in look()]
+    broken = any(each.mend and each.essential for each in found)
+    if as_json:
+        findings = [
+            {
+                "name": each.name,
+                "found": each.says if each.looked else None,
+                "mend": each.mend or None,
+                "essential": each.essential,
+            }
+            for each in found
+        ]
+        print_json({"healthy": not broken, "findings": findings})
+    else:
+        width = max(len(each.name) for each in found)
+        for each in found:
+            typer.echo(f"{each.mark} {each.name:<{width}}  {each.says}")
+            if each.mend:
+                typer.echo(f"  {'':<{width}}  to mend it: {each.mend}")
+    if broken:
+        raise typer.Exit(_BROKEN)
+
+
+def _versions() -> list[Finding]:
+    import chilopod
+
+    found = [
+        Finding("chilopod", chilopod.__version__),
+        Finding("python", f"{platform.python_version()} ({platform.system()} {platform.machine()})"),
+    ]
+    for module, package in _PACKAGES.items():
+        # What uses MuJoCo here may be able to import it where it cannot be imported alone.
+        fault = _fault("chilopod.twin" if module == "mujoco" else module)
+        if fault:
+            # With a backend that is not there, MuJoCo cannot be imported.
+            wish = module == "mujoco" and "MUJOCO_GL" in os.environ and "No module" not in fault
+            mend = "unset MUJOCO_GL" if wish else _again(package)
+            found.append(Finding(module, f"cannot be imported: {fault}", mend, essential=True))
+        else:
+            found.append(Finding(module, _version(package)))
+    return found
+
+
+def _version(package: str) -> str:
+    from importlib import metadata
+
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "of unknown version"
+
+
+def _fault(module: str) -> str:
+    """Why a package cannot be imported; empty if it can."""
+    from importlib import import_module
+
+    from chilopod.errors import one_line
+
+    try:
+        import_module(module)
+    except Exception as error:  # packages with compiled parts fail in many ways
+        return one_line(f"{type(error).__name__}: {error}")
+    return ""
+
+
+def _cores() -> list[Finding]:
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    found = [Finding("cores", f"{cores} to be used")]
+
+    def threads() -> Finding:
+        import numba
+
+        return Finding("numba threads", str(numba.get_num_threads()))
+
+    return [*found, _guarded("numba threads", threads)]
+
+
+def _cache() -> list[Finding]:
+    def cache() -> Finding:
+        mend = "set NUMBA_CACHE_DIR to a folder that can be written"
+        try:
+            from chilopod.planar.linear import propagate_batch
+
+            folder = prepare_folder(propagate_batch.stats.cache_path)
+        except RuntimeError as error:
+            # Numba's answer where it finds no place to keep what it compiles.
+            return Finding("compile cache", one_line(f"nowhere: {error}"), mend, essential=True)
+        except OutputError as error:
+            return Finding("compile cache", f"{error}, so every start compiles anew", mend)
+        return Finding("compile cache", str(folder))
+
+    from chilopod.errors import OutputError, one_line
+    from chilopod.output import prepare_folder
+
+    return [_guarded("compile cache", cache)]
+
+
+def _drawing() -> list[Finding]:
+    def drawing() -> Finding:
+        from chilopod.twin import gl
+
+        found = gl.find()
+        if found.backend is None:
+            return Finding("OpenGL", f"{found.missing}; all but films and stills in 3-D works", found.mend)
+        return Finding("OpenGL", f"{found.backend}: {found.renderer}")
+
+    return [_guarded("OpenGL", drawing)]
+
+
+def _encoder() -> list[Finding]:
+    def encoder() -> Finding:
+        from chilopod.report.movie import has_encoder
+
+        if not has_encoder():
+            return Finding("mp4 encoder", "PyAV has no H.264; all but mp4 films works", _again("av"))
+        return Finding("mp4 encoder", "H.264")
+
+    return [_guarded("mp4 encoder", encoder)]
+
+
+def _fonts() -> list[Finding]:
+    def fonts() -> Finding:
+        import matplotlib as mpl
+        from matplotlib.font_manager import FontProperties, findfont
+
+        from chilopod.report.style import house_style
+
+        with house_style():
+            families = list(mpl.rcParams["font.family"])
+        missing = []
+        for family in families:
+            try:
+                findfont(FontProperties(family=[family]), fallback_to_default=False)
+            except ValueError:
+                missing.append(family)
+        if missing:
+            return Finding("fonts", f"no {', '.join(missing)}; figures take another", _again("matplotlib"))
+        return Finding("fonts", ", ".join(families))
+
+    return [_guarded("fonts", fonts)]
+
+
+def _again(package: str) -> str:
+    return f"{Path(sys.executable).name or 'python'} -m pip install --force-reinstall {package}"
+
+
+def _guarded(name: str, look: Callable[[], Finding]) -> Finding:
+    """What was found, even where a package that it takes is not there."""
+    from chilopod.errors import one_line
+
+    try:
+        return look()
+    except Exception as error:  # said once more, among the versions, with what mends it
+        return Finding(name, one_line(f"cannot be looked at: {type(error).__name__}: {error}"), looked=False)

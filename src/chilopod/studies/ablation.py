@@ -1,0 +1,247 @@
+"""Why the robot bends at 34 and the planar model says 12: from the planar model's assumptions to the twin's.
+
+The twin has a planar limit: legs as stiff as the step allows that lift their feet high and put them down on the point,
+and feet that never reach the Coulomb limit, so that the floor's hold on them is a viscous one with the coefficient of
+the planar model (see :mod:`chilopod.twin.creep`). There the two engines have to agree. Each :class:`Factor` then takes
+one assumption back. Factors are switched on alone in the planar limit, switched off alone in the twin, and switched on
+one after the other.
+
+The measure is linear: how fast a bend of one degree grows. Two walks that start bent to opposite sides are subtracted,
+so that what the start of the gait does to both alike cancels. The point is where the growth changes sign.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from chilopod.robot import Robot, Twin
+from chilopod.studies import trials
+from chilopod.studies.floquet import K1, PAPER_UNIT, Progress, silent, stiffness
+from chilopod.studies.paper import printed
+from chilopod.studies.robot_walks import sign_change
+from chilopod.studies.trials import NONE, Trial
+from chilopod.twin.creep import foot_creep
+from chilopod.twin.legs import twin_of
+
+Array = NDArray[np.float64]
+
+SPRINGS = (7.0, 10.0, 14.0, 20.0, 28.0, 40.0, 60.0)
+"""k1 at which growth is measured first, N*mm/deg."""
+
+PLANAR = {
+    "twin.sliding_friction": 1000.0,
+    "twin.servo_stiffness": 300.0,
+    "twin.servo_damping": 0.75,
+    "twin.joint_inertia": 3e-4,
+    "twin.clearance": 0.03,
+    "twin.contact_time": 0.002,
+    "twin.foot_radius": 5e-4,
+    "twin.link_mass": 0.01,
+    "twin.timestep": 5e-4,
+}
+"""What the planar limit has instead of the twin's constants, SI."""
+
+FINER = {
+    **PLANAR,
+    "twin.servo_stiffness": 1000.0,
+    "twin.servo_damping": 2.0,
+    "twin.contact_time": 0.001,
+    "twin.control_interval": 0.001,
+    "twin.timestep": 2e-4,
+}
+"""A planar limit that is nearer still, at 2.5 times the work."""
+
+
+@dataclass(frozen=True)
+class Factor:
+    """What the planar model leaves out.
+
+    Attributes
+    ----------
+    name, sentence
+        In a word, and what it means.
+    paths
+        Numbers of the robot that go from those of the planar limit to the twin's.
+    """
+
+    name: str
+    sentence: str
+    paths: tuple[str, ...]
+
+
+FACTORS = (
+    Factor("feet", "where the feet are", ("legs.forward_offset", "legs.half_width")),
+    Factor("grip", "how firmly the floor holds a foot that does not slide", ()),
+    Factor("dry friction", "feet slide beyond the Coulomb limit", ("twin.sliding_friction",)),
+    Factor(
+        "soft legs",
+        "servos give way under load",
+        ("twin.servo_stiffness", "twin.servo_damping", "twin.joint_inertia"),
+    ),
+    Factor("dragging feet", "swing feet are hardly lifted and touch the floor", ("twin.clearance",)),
+    Factor("joint damping", "friction in the yaw joints", ("springs.damping",)),
+    Factor(
+        "legs and floor",
+        "mass of the legs, size of the feet, softness of the floor",
+        ("twin.link_mass", "twin.foot_radius", "twin.contact_time"),
+    ),
+)
+"""In the order in which they are switched on one after the other."""
+
+_BEND = float(np.deg2rad(1.0))
+_DURATION, _SKIPPED = 18.0, 6.0  # s
+_SAMPLES = 6  # per period
+_SOFT_STEP = 2e-3  # s, enough for soft legs
+
+
+def planar_limit(robot: Robot, planar: Robot, constants: Mapping[str, float] = PLANAR) -> Robot:
+    """The twin under the assumptions of the planar model, with that model's feet and friction."""
+    # All at once: not every step goes into every control interval.
+    own = {key.partition(".")[2]: value for key, value in constants.items()}
+    changed = robot.with_(twin=Twin(**{**dict(twin_of(robot)), **own})).with_value("springs.damping", 0.0)
+    for path in FACTORS[0].paths:
+        changed = changed.with_value(path, planar.get(path))
+    return with_grip(changed, planar.ground.friction)
+
+
+def with_grip(robot: Robot, coefficient: float) -> Robot:
+    """The robot with feet that creep like viscous ones of a coefficient, N*s/m; it is in proportion to impratio."""
+    ratio = robot.get("twin.impedance_ratio")
+    return robot.with_value("twin.impedance_ratio", ratio * coefficient / foot_creep(robot).across)
+
+
+def with_factors(robot: Robot, planar: Robot, names: Sequence[str]) -> Robot:
+    """The planar limit with some factors switched on."""
+    limit = planar_limit(robot, planar)
+    for factor in FACTORS:
+        if factor.name in names:
+            for path in factor.paths:
+                limit = limit.with_value(path, robot.get(path))
+    if "soft legs" in names:
+        limit = limit.with_value("twin.timestep", min(_SOFT_STEP, robot.get("twin.timestep")))
+    return with_grip(limit, foot_creep(robot).across if "grip" in names else planar.ground.friction)
+
+
+def growth(
+    robot: Robot, springs: Sequence[float], folder: str | Path | None = None, duration: float = _DURATION
+) -> xr.Dataset:
+    """How fast a small bend grows.
+
+    Parameters
+    ----------
+    robot
+        With a twin.
+    springs
+        Values of k1, N*mm/deg.
+    folder
+        Where trials are kept.
+    duration
+        Of the walks, s.
+
+    Returns
+    -------
+    Dataset over spring: ``growth`` (1/s) of the bend averaged over gait cycles, NaN where a walk failed, and
+    ``undulates``, whether it changes sides meanwhile.
+    """
+    shape = _shape(robot)
+    asked = [
+        Trial(
+            robot.with_value(K1, stiffness(spring)),
+            duration,
+            joint_angles=tuple(sign * _BEND * shape),
+            disturbance=NONE,
+            rate=_SAMPLES / robot.gait.period,
+            engine="twin",
+        )
+        for spring in springs
+        for sign in (1.0, -1.0)
+    ]
+    angles = [each.joint_angle.isel(robot=0).transpose("time", "joint").values for each in trials.run(asked, folder)]
+    rates, undulates = [], []
+    for one, other in zip(angles[::2], angles[1::2], strict=True):
+        bend = 0.5 * (one - other)
+        cycles = bend[: len(bend) // _SAMPLES * _SAMPLES].reshape(-1, _SAMPLES, bend.shape[1]).mean(axis=1)
+        times = (np.arange(len(cycles)) + 0.5) * robot.gait.period
+        late = times > _SKIPPED
+        rates.append(np.polyfit(times[late], np.log(np.linalg.norm(cycles[late], axis=1)), 1)[0])
+        undulates.append(bool(np.ptp(np.sign(cycles[late] @ shape)) > 0.0))
+    return xr.Dataset(
+        {"growth": ("spring", np.array(rates), {"units": "1/s"}), "undulates": ("spring", np.array(undulates))},
+        coords={"spring": ("spring", np.asarray(springs, float), {"units": PAPER_UNIT})},
+    )
+
+
+def onset_by_growth(robot: Robot, folder: str | Path | None = None) -> float:
+    """The spring at which a small bend neither grows nor dies out, N*mm/deg; infinite if it grows at all springs tried,
+    NaN if at none."""
+    first = growth(robot, SPRINGS, folder)
+    point = sign_change(first.spring.values, first.growth.values)
+    if np.isnan(point):
+        return float("inf") if first.growth.values[-1] > 0.0 else float("nan")
+    second = growth(robot, [round(point * part, 2) for part in (0.9, 1.0, 1.1)], folder)
+    finer = sign_change(second.spring.values, second.growth.values)
+    return point if np.isnan(finer) else finer
+
+
+def ablation(
+    robot: Robot, planar: Robot, folder: str | Path | None = None, quick: bool = False, progress: Progress = silent
+) -> xr.Dataset:
+    """The point with factors switched on and off.
+
+    Parameters
+    ----------
+    robot
+        With a twin.
+    planar
+        What the planar limit takes feet and friction from.
+    folder
+        Where trials are kept.
+    quick
+        Only the path from the planar limit to the twin.
+    progress
+        Called as the work goes on.
+
+    Returns
+    -------
+    Dataset over factor: ``alone``, the point in the planar limit with only this one (N*mm/deg); ``without``, in the
+    twin without it; ``path``, with it and all before it; and the attributes ``limit`` and ``twin``, with none and all,
+    and ``grip``, the twin's creep coefficient (N*s/m). Infinite where bends grow at all springs tried, NaN where at
+    none.
+    """
+    names = [factor.name for factor in FACTORS]
+    wanted: dict[str, list[list[str]]] = {"path": [names[: i + 1] for i in range(len(names))]}
+    if not quick:
+        wanted["alone"] = [[name] for name in names]
+        wanted["without"] = [[other for other in names if other != name] for name in names]
+    sets = [frozenset(), *(frozenset(on) for rows in wanted.values() for on in rows)]
+    points: dict[frozenset[str], float] = {}
+    for on in sets:
+        if on not in points:
+            progress(len(points) / len(set(sets)), ", ".join(sorted(on)) or "planar limit")
+            points[on] = onset_by_growth(with_factors(robot, planar, sorted(on)), folder)
+    data = xr.Dataset(coords={"factor": names})
+    for name in ("alone", "without", "path"):
+        values = [points[frozenset(on)] for on in wanted[name]] if name in wanted else [np.nan] * len(names)
+        data[name] = ("factor", np.array(values), {"units": PAPER_UNIT})
+    data["about"] = ("factor", np.array([factor.sentence for factor in FACTORS], dtype=object))
+    data.attrs = {
+        "robot": robot.name,
+        "limit": points[frozenset()],
+        "twin": points[frozenset(names)],
+        "grip": foot_creep(robot).across,
+    }
+    return data
+
+
+def _shape(robot: Robot) -> Array:
+    """Of the bend that is started with: the paper's critical mode, or all joints alike."""
+    mode = np.array(printed()["pitchfork"]["joint_components"])
+    if robot.body.modules - 1 != len(mode):
+        mode = np.ones(robot.body.modules - 1)
+    return mode / np.linalg.norm(mode)

@@ -1,0 +1,78 @@
+"""What the planar model does where the robot and its twin are compared, in a few words each."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chilopod.steering import Outcome
+from chilopod.studies.curved_findings import CurvedStudy, axis_radius, bent
+from chilopod.studies.paper import printed
+from chilopod.studies.turning import minima, springs_by_outcome
+from chilopod.studies.turning_findings import Turning
+from chilopod.studies.turning_rows import NAMES, SCALES
+
+if TYPE_CHECKING:
+    from chilopod.studies.reproduce import Results
+
+
+def planar_words(results: Results) -> dict[str, str]:
+    """By the keys that :mod:`chilopod.studies.robot_rows` asks for; only what was computed."""
+    words: dict[str, str] = {}
+    if "uniform" in results.datasets:
+        words["uniform"] = f"{results.datasets['uniform'].attrs['value']:.2f} N*mm/deg"
+    if results.curved:
+        words |= _curved(results.curved)
+    if results.turning:
+        words |= _turning(results.turning)
+    return words
+
+
+def _curved(study: CurvedStudy) -> dict[str, str]:
+    trials, here = study.trials, bent(study.trials)
+    sides = [int((trials.direction == side).sum()) for side in ("left", "right")]
+    curving = [float(k) for k, row in zip(trials.spring.values, here, strict=True) if row.any()]
+    means = np.nanmean(np.where(here[..., None], np.abs(trials.mean_angle.values), np.nan), axis=1)[: len(curving), 0]
+    words = {
+        "straight": f"straight from {min(set(trials.spring.values) - set(curving)):g} N*mm/deg up",
+        "curved": f"curved up to {max(curving):g} N*mm/deg",
+        "sides": f"{sides[0]} and {sides[1]}",
+        "onset": f"{study.fit.critical:.2f} N*mm/deg; the point is at {trials.attrs['critical_k1']:.2f}",
+        "rising": "increases" if (np.diff(means) < 0.0).all() else "not throughout",
+    }
+    ratio = trials.attrs["critical_k1"] / float(printed()["pitchfork"]["robot_critical_k1"].split()[0])
+    for spring in printed()["curved"]["radius"]:
+        radius = axis_radius(study.branch, ratio * float(spring))
+        words[f"radius {spring}"] = f"{radius:.2f} m at the same share of its point"
+    for name in study.comparison.variant.values[1:]:
+        at = study.comparison.sel(variant=name)
+        words[str(name)] = f"{float(at.fitted_k1):.2f} N*mm/deg; the point is at {float(at.exact_k1):.2f}"
+        words[f"radius {name}"] = f"{100.0 * (float(at.equal_spring) - 1.0):+.0f} % at the same spring"
+    return words
+
+
+def _turning(found: Turning) -> dict[str, str]:
+    words = {"arrival": f"{found.tasks['A'].time:.1f} s"}
+    for letter, task in found.tasks.items():
+        words[f"k_hat {letter}"] = f"{found.laws.k_hat(task.target.radius)[0]:.1f} N*mm/deg"
+        outcomes = springs_by_outcome(task.criteria)
+        words[f"outcomes {letter}"] = "; ".join(
+            f"{label} at {min(outcomes[label]):g} to {max(outcomes[label]):g}"
+            for label in (Outcome.OUTSIDE.label, Outcome.ARRIVED.label, Outcome.INSIDE.label)
+            if outcomes[label]
+        )
+        low = minima(task.criteria)
+        for name in NAMES:
+            factor, unit = SCALES[name]
+            at = low.sel(criterion=name)
+            words[f"{name} {letter}"] = f"{factor * float(at['mean']):.3g} {unit} at k1 = {float(at['at']):.3g}"
+    ours, other = minima(found.tasks["A"].criteria), minima(found.hopf.criteria)
+    lower = [bool(ours["mean"].sel(criterion=name) < other["mean"].sel(criterion=name)) for name in NAMES]
+    words["hopf"] = "all three lower" if all(lower) else f"{sum(lower)} of three lower"
+    alone, helped = found.without.isel(case=0), found.without.isel(case=1)
+    words["without"] = (
+        f"{int(np.nansum(alone.arrived))} of {int(np.isfinite(alone.arrived).sum())} arrive, with it "
+        f"{int(np.nansum(helped.arrived))} of {int(np.isfinite(helped.arrived).sum())} (k1 = {float(alone.spring):g})"
+    )
+    return words

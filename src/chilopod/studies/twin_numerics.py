@@ -1,0 +1,75 @@
+"""Whether what the twin finds hangs on numerics: the base series with finer steps and a tighter solver."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from chilopod.errors import AnalysisError
+from chilopod.robot import Robot
+from chilopod.studies.floquet import Progress, silent
+from chilopod.studies.identify_twin import base_series
+from chilopod.studies.robot_rows import CHECKED, RobotRow
+from chilopod.studies.square_root import square_root_fit
+from chilopod.twin.simulate import TOLERANCE
+
+SPRINGS = (15.0, 17.0, 21.0, 26.0, 28.0)
+"""k1 of the walks, N*mm/deg."""
+
+CASES = {"2 ms": (2e-3, TOLERANCE), "1 ms": (1e-3, TOLERANCE), "0.5 ms": (5e-4, TOLERANCE), "tight": (2e-3, 1e-13)}
+"""Step (s) and tolerance of the contact solver, the first what all studies have."""
+
+ALLOWED = 0.05
+
+
+def twin_numerics(robot: Robot, progress: Progress = silent) -> xr.Dataset:
+    """Onset and radii with finer steps and a tighter solver.
+
+    Returns
+    -------
+    Dataset over case and spring: ``axis_radius`` (m); over case: ``onset`` by the paper's method (N*mm/deg).
+    """
+    radii, onsets = [], []
+    for index, (name, (step, tolerance)) in enumerate(CASES.items()):
+        progress(index / len(CASES), name)
+        angles = base_series(robot.with_value("twin.timestep", step), SPRINGS, tolerance=tolerance)[1]
+        radii.append((robot.body.modules - 1) * robot.module_length / np.abs(angles).sum(axis=1))
+        try:
+            onsets.append(square_root_fit(1.0 / np.array(SPRINGS), np.abs(angles[:, 0]), resampled=0).critical)
+        except AnalysisError:
+            onsets.append(np.nan)
+    return xr.Dataset(
+        {
+            "axis_radius": (("case", "spring"), np.array(radii), {"units": "m"}),
+            "onset": ("case", np.array(onsets), {"units": "N*mm/deg"}),
+        },
+        coords={"case": list(CASES), "spring": ("spring", np.array(SPRINGS), {"units": "N*mm/deg"})},
+        attrs={"robot": robot.name},
+    )
+
+
+def largest_move(data: xr.Dataset) -> float:
+    """Largest relative change of the onset or a radius against the first case; NaN if a walk failed."""
+    moves = [data[name].values / data[name].values[0] - 1.0 for name in ("axis_radius", "onset")]
+    return float(max(np.abs(each).max() for each in moves))
+
+
+def rows(data: xr.Dataset) -> list[RobotRow]:
+    """The line of the robot's table."""
+    moved = data.onset.values / data.onset.values[0] - 1.0
+    at_21 = data.axis_radius.sel(spring=21.0).values
+    said = "; ".join(
+        f"{name}: onset {100.0 * onset:+.1f} %, radius at 21 {100.0 * radius:+.1f} %"
+        for name, onset, radius in zip(data.case.values[1:], moved[1:], (at_21 / at_21[0] - 1.0)[1:], strict=True)
+    )
+    return [
+        RobotRow(
+            "numerics: steps of 1 and 0.5 ms, tight contact solver",
+            "no counterpart",
+            f"{said}; largest move of onset and radii at 15 to 28 N*mm/deg {100.0 * largest_move(data):.1f} %",
+            "",
+            CHECKED,
+            "within" if largest_move(data) < ALLOWED else "outside",
+            f"less than {100.0 * ALLOWED:.0f} %",
+        )
+    ]

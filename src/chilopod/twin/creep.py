@@ -1,0 +1,66 @@
+"""How fast standing feet creep: MuJoCo's friction holds nothing still, it lets it slip a little, like a viscous damper.
+
+Below the Coulomb limit a foot that is pushed sideways slips at a speed in proportion to the push. The coefficient
+depends on the contact settings and on the inertia that the leg shows the floor, so it is measured, on the robot as it
+is: standing on all feet at mid-stroke, pushed at the centre of every module by a few per cent of its weight.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from chilopod.robot import Robot
+from chilopod.twin.legs import joint_angles
+from chilopod.twin.model import compiled
+
+_PUSH = 0.05  # of the weight
+_SETTLING, _MEASURED = 1.5, 0.5  # s
+
+
+@dataclass(frozen=True)
+class Creep:
+    """What standing feet do under a push.
+
+    Attributes
+    ----------
+    along, across
+        Viscous coefficient of one foot, push ahead and to the side, N*s/m.
+    """
+
+    along: float
+    across: float
+
+    def speed(self, force: float) -> float:
+        """How fast a foot creeps sideways under a force (N), m/s."""
+        return force / self.across
+
+
+def foot_creep(robot: Robot) -> Creep:
+    """Push the standing robot ahead and to the side and see how fast it slips."""
+    return Creep(*(_coefficient(robot, axis) for axis in range(2)))
+
+
+def _coefficient(robot: Robot, axis: int) -> float:
+    plan = compiled(robot)
+    model, data = plan.model, mujoco.MjData(plan.model)
+    data.qpos[:] = plan.initial_positions()
+    stance = joint_angles(plan.twin, 0.0, plan.twin.hip_height)
+    data.qpos[plan.leg_positions] = stance
+    data.ctrl[plan.leg_controls] = stance
+    modules = [model.body(f"module{i}").id for i in range(1, robot.body.modules + 1)]
+    # Both ways: what drifts by itself cancels.
+    start, speeds = data.qpos.copy(), []
+    push = _PUSH * robot.module_mass * 9.81
+    for sign in (1.0, -1.0):
+        mujoco.mj_resetData(model, data)
+        data.qpos[:] = start
+        data.ctrl[plan.leg_controls] = stance
+        data.xfrc_applied[modules, axis] = sign * push
+        mujoco.mj_step(model, data, round(_SETTLING / model.opt.timestep))
+        before = data.geom_xpos[plan.feet][..., axis].mean()
+        mujoco.mj_step(model, data, round(_MEASURED / model.opt.timestep))
+        speeds.append(sign * (data.geom_xpos[plan.feet][..., axis].mean() - before) / _MEASURED)
+    return float(0.5 * push / np.mean(speeds))

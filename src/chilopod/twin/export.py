@@ -1,0 +1,258 @@
+"""The robot as a file for other programs: MJCF, the same model to the bit, and URDF, as far as that goes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike
+
+from chilopod.errors import ParameterError
+from chilopod.robot import Robot
+from chilopod.twin.legs import twin_of
+from chilopod.twin.model import SIDES, TwinModel, build
+
+# A link of URDF has one joint only, so that one more stands between the yaw and the hip of a leg; programs want it to
+# have a mass: this part of the upper link's, which loses it.
+_CARRIER = 1e-6
+_FASTEST = 100.0  # rad/s: URDF wants a limit, the model has none
+
+# What MuJoCo writes of each named element, with its name in the compiled model where that differs.
+_NUMBERS = {
+    "body": {"pos": "pos"},
+    "inertial": {"pos": "ipos", "mass": "mass", "diaginertia": "inertia"},
+    "joint": {name: name for name in ("pos", "axis", "stiffness", "damping", "armature")},
+    "geom": {name: name for name in ("size", "pos", "friction", "solref")},
+    "site": {"size": "size", "pos": "pos"},
+    "general": {"gainprm": "gainprm", "biasprm": "biasprm"},
+    "key": {"qpos": "qpos", "ctrl": "ctrl"},
+}
+_KINDS = {"inertial": "body", "general": "actuator"}
+
+
+def mjcf(robot: Robot) -> str:
+    """The robot as the text of an MJCF file.
+
+    MuJoCo makes of it the model that :func:`chilopod.twin.simulate` uses, every number to the bit. For the viewer there
+    are a floor one can see, a light, a camera that follows, and the keyframe ``start``: the robot before it walks, with
+    the servo targets of that instant.
+
+    Parameters
+    ----------
+    robot
+        With a twin.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such robot.
+    """
+    twin = TwinModel(robot)
+    spec = build(robot)
+    _decorate(spec, robot)
+    start = twin.initial_positions()
+    targets = np.zeros(twin.model.nu)
+    targets[twin.leg_controls] = start[twin.leg_positions]
+    spec.add_key(name="start", qpos=start, ctrl=targets)
+    model = spec.compile()
+    root = ET.fromstring(spec.to_xml())
+    _write_all_digits(root, model)
+    return _text(root)
+
+
+def urdf(robot: Robot) -> str:
+    """The robot as the text of a URDF file.
+
+    Links are named as in MuJoCo; that of module 1 is the root and floats. Feet alone collide. URDF has no springs, no
+    servos and no friction of the floor: a comment in the file says what they are.
+
+    Parameters
+    ----------
+    robot
+        With a twin.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such robot.
+    """
+    twin, model = twin_of(robot), TwinModel(robot).model
+    root = ET.Element("robot", name=robot.name)
+    stiffness = " ".join(map(repr, robot.springs.stiffness))
+    root.append(
+        ET.Comment(
+            " SI units. The root link floats. URDF cannot say, and this file does not:\n"
+            f"       stiffness of the passive joints yaw1 to yaw{robot.body.modules - 1}, N*m/rad: {stiffness};\n"
+            f"       position servos of all other joints: {twin.servo_stiffness!r} N*m/rad, {twin.servo_damping!r} "
+            f"N*m*s/rad, rotor inertia {twin.joint_inertia!r} kg*m^2;\n"
+            f"       Coulomb friction between feet and floor: {twin.sliding_friction!r}.\n"
+            "       Effort and velocity limits are not known; the numbers are there because URDF asks for them. "
+        )
+    )
+    # MuJoCo's own extension, which other programs pass over: keep the root a link of its own, and what is to be seen.
+    ET.SubElement(ET.SubElement(root, "mujoco"), "compiler", fusestatic="false", discardvisual="false")
+    length = robot.module_length
+    for i in range(robot.body.modules):
+        # The frame of a link is at its joint: for modules behind the first that is their front end.
+        back = 0.0 if i == 0 else -0.5 * length
+        name = f"module{i + 1}"
+        _add_link(root, model, name, [back, 0.0, 0.0])
+        if i:
+            ahead = -0.5 * length if i == 1 else -length
+            joint = _add_joint(root, f"yaw{i}", f"module{i}", name, [ahead, 0.0, 0.0], model)
+            _limit(joint, 0.5 * math.pi, effort=0.0)
+            ET.SubElement(joint, "dynamics", damping=repr(robot.springs.damping[i - 1]), friction="0")
+        for side in SIDES:
+            _add_leg(root, model, f"leg{i + 1}_{side}", name, back, steered=i == 0)
+    ET.indent(root)
+    return _text(root)
+
+
+FORMATS: dict[str, tuple[str, Callable[[Robot], str]]] = {".xml": ("MJCF", mjcf), ".urdf": ("URDF", urdf)}
+"""By suffix of the file: the name of the format, and what writes it."""
+
+
+def format_of(suffix: str) -> tuple[str, Callable[[Robot], str]]:
+    """The format that goes with a suffix, such as ``.urdf``.
+
+    Raises
+    ------
+    ParameterError
+        If none does.
+    """
+    if suffix.lower() not in FORMATS:
+        allowed = " or ".join(f"{end} ({name})" for end, (name, _) in FORMATS.items())
+        raise ParameterError("is the suffix of no format", field="out", value=suffix, allowed=allowed)
+    return FORMATS[suffix.lower()]
+
+
+def _decorate(spec: mujoco.MjSpec, robot: Robot) -> None:
+    """Add what is only to be looked at."""
+    spec.add_texture(
+        name="floor",
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+        rgb1=[0.93, 0.93, 0.91],
+        rgb2=[0.87, 0.87, 0.85],
+        width=256,
+        height=256,
+    )
+    textures = [""] * int(mujoco.mjtTextureRole.mjNTEXROLE)
+    textures[int(mujoco.mjtTextureRole.mjTEXROLE_RGB)] = "floor"
+    # Squares of 10 cm: a texture has two by two.
+    spec.add_material(name="floor", textures=textures, texrepeat=[5.0, 5.0], texuniform=True)
+    spec.geom("floor").material = "floor"
+    light = spec.worldbody.add_light(name="sun", pos=[0.0, 0.0, 5.0], dir=[0.2, 0.3, -1.0])
+    light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
+    away = robot.body.length
+    spec.body("module1").add_camera(
+        name="follow",
+        mode=mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM,
+        pos=[-0.4 * away, -1.2 * away, 0.9 * away],
+        xyaxes=[1.0, 0.0, 0.0, 0.0, 0.6, 0.8],
+    )
+    spec.stat.center, spec.stat.extent = [-0.4 * away, 0.0, 0.0], away
+
+
+def _write_all_digits(root: ET.Element, model: mujoco.MjModel) -> None:
+    """Put the numbers of the compiled model in the place of those that MuJoCo rounded to six digits."""
+    option = root.find("option")
+    assert option is not None
+    option.set("timestep", repr(float(model.opt.timestep)))
+    option.set("impratio", repr(float(model.opt.impratio)))
+    for parent in root.iter():
+        for element in parent:
+            attributes = _NUMBERS.get(element.tag)
+            # Without a name there are the class defaults, and the inertia of the body it stands in.
+            name = parent.get("name") if element.tag == "inertial" else element.get("name")
+            if attributes is None or name is None:
+                continue
+            compiled = getattr(model, _KINDS.get(element.tag, element.tag))(name)
+            for attribute, field in attributes.items():
+                if attribute in element.attrib:
+                    count = len(element.attrib[attribute].split())
+                    element.set(attribute, _numbers(np.ravel(getattr(compiled, field))[:count]))
+
+
+def _add_leg(root: ET.Element, model: mujoco.MjModel, leg: str, module: str, back: float, steered: bool) -> None:
+    upper, lower, parent = f"{leg}_upper", f"{leg}_lower", module
+    place = np.add(model.body(upper).pos, [back, 0.0, 0.0])
+    rest = 1.0
+    if steered:
+        parent, rest = f"{leg}_carrier", 1.0 - _CARRIER
+        link = ET.SubElement(root, "link", name=parent)
+        _inertial(link, [0.0] * 3, _CARRIER * model.body(upper).mass[0], _CARRIER * model.body(upper).inertia)
+        _servo_limit(_add_joint(root, f"{leg}_yaw", module, parent, place, model), model)
+        place = np.zeros(3)
+    _add_link(root, model, upper, [0.0] * 3, rest)
+    _servo_limit(_add_joint(root, f"{leg}_hip", parent, upper, place, model), model)
+    _add_link(root, model, lower, [0.0] * 3)
+    _servo_limit(_add_joint(root, f"{leg}_knee", upper, lower, model.body(lower).pos, model), model)
+
+
+def _add_link(root: ET.Element, model: mujoco.MjModel, name: str, shift: Sequence[float], part: float = 1.0) -> None:
+    """Add a body of the model as a link, `shift` (m) from its frame, with a part of its mass."""
+    link, body = ET.SubElement(root, "link", name=name), model.body(name)
+    _inertial(link, body.ipos + shift, part * body.mass[0], part * body.inertia)
+    for number in range(int(body.geomadr[0]), int(body.geomadr[0] + body.geomnum[0])):
+        geom = model.geom(number)
+        for kind in ("visual", "collision") if geom.name.endswith("_foot") else ("visual",):
+            # Names are for collisions; MuJoCo warns where something to be seen has the same one.
+            element = ET.SubElement(link, kind, {"name": geom.name} if kind == "collision" else {})
+            ET.SubElement(element, "origin", xyz=_numbers(geom.pos + shift), rpy="0 0 0")
+            _shape(ET.SubElement(element, "geometry"), geom)
+            if kind == "visual":
+                material = ET.SubElement(element, "material", name=f"{geom.name}_colour")
+                ET.SubElement(material, "color", rgba=" ".join(f"{number:.3g}" for number in geom.rgba))
+
+
+def _shape(parent: ET.Element, geom: Any) -> None:
+    size = geom.size
+    if geom.type[0] == mujoco.mjtGeom.mjGEOM_BOX:
+        ET.SubElement(parent, "box", size=_numbers(2.0 * size))
+    elif geom.type[0] == mujoco.mjtGeom.mjGEOM_SPHERE:
+        ET.SubElement(parent, "sphere", radius=repr(float(size[0])))
+    else:  # URDF has no capsules
+        ET.SubElement(parent, "cylinder", radius=repr(float(size[0])), length=repr(float(2.0 * size[1])))
+
+
+def _inertial(link: ET.Element, place: ArrayLike, mass: float, inertia: ArrayLike) -> None:
+    element = ET.SubElement(link, "inertial")
+    ET.SubElement(element, "origin", xyz=_numbers(place), rpy="0 0 0")
+    ET.SubElement(element, "mass", value=repr(float(mass)))
+    ixx, iyy, izz = _numbers(inertia).split()
+    ET.SubElement(element, "inertia", ixx=ixx, iyy=iyy, izz=izz, ixy="0", ixz="0", iyz="0")
+
+
+def _add_joint(
+    root: ET.Element, name: str, parent: str, child: str, place: ArrayLike, model: mujoco.MjModel
+) -> ET.Element:
+    joint = ET.SubElement(root, "joint", name=name, type="revolute")
+    ET.SubElement(joint, "parent", link=parent)
+    ET.SubElement(joint, "child", link=child)
+    ET.SubElement(joint, "origin", xyz=_numbers(place), rpy="0 0 0")
+    ET.SubElement(joint, "axis", xyz=_numbers(model.joint(name).axis))
+    return joint
+
+
+def _servo_limit(joint: ET.Element, model: mujoco.MjModel) -> None:
+    """A whole turn, and the torque of the servo when it is half a turn off."""
+    _limit(joint, math.pi, effort=math.pi * float(model.actuator(joint.get("name")).gainprm[0]))
+
+
+def _limit(joint: ET.Element, most: float, effort: float) -> None:
+    limits = {"lower": -most, "upper": most, "effort": effort, "velocity": _FASTEST}
+    ET.SubElement(joint, "limit", {name: repr(value) for name, value in limits.items()})
+
+
+def _numbers(values: ArrayLike) -> str:
+    """All digits that it takes to read the same numbers back; no negative zeros."""
+    return " ".join(repr(float(value) + 0.0).removesuffix(".0") for value in np.ravel(values))
+
+
+def _text(root: ET.Element) -> str:
+    return f'<?xml version="1.0" encoding="utf-8"?>\n{ET.tostring(root, encoding="unicode")}\n'

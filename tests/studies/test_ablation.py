@@ -1,0 +1,67 @@
+import numpy as np
+import pytest
+
+from chilopod import load_robot
+from chilopod.studies import ablation
+from chilopod.studies.ablation import FACTORS, FINER, growth, planar_limit, with_factors, with_grip
+from chilopod.studies.floquet import pitchfork
+from chilopod.studies.robot_walks import sign_change
+from chilopod.twin import foot_creep
+
+ROBOT, PLANAR = load_robot("aoi2022"), load_robot("aoi2022-planar")
+
+
+def test_sign_change_is_the_stiffest_and_linear_in_the_inverse():
+    springs = np.array([10.0, 12.0, 15.0, 20.0, 30.0])
+    assert sign_change(springs, 1.0 / springs - 1.0 / 14.0) == pytest.approx(14.0)
+    assert sign_change(springs, np.array([1.0, -1.0, 1.0, -1.0, -1.0])) == pytest.approx(1.0 / (0.5 / 15 + 0.5 / 20))
+    assert np.isnan(sign_change(springs, -np.ones(5)))
+
+
+@pytest.mark.slow
+def test_the_two_engines_vouch_for_each_other():
+    """The planar limit of the twin loses the straight walk where the planar model does, within 3 %."""
+    limit = planar_limit(ROBOT, PLANAR, FINER)
+    assert foot_creep(limit).across == pytest.approx(PLANAR.ground.friction, rel=1e-3)
+    springs = (11.4, 12.6)
+    found = growth(limit, springs)
+    exact = pitchfork(PLANAR, normal_form=False).value
+    assert sign_change(np.array(springs), found.growth.values) == pytest.approx(exact, rel=0.03)
+    assert not found.undulates.any()
+
+
+def test_factors_take_every_constant_from_the_limit_to_the_twin():
+    every = with_factors(ROBOT, PLANAR, [factor.name for factor in FACTORS])
+    for factor in FACTORS:
+        for path in factor.paths:
+            assert every.get(path) == ROBOT.get(path)
+    # Proportion holds up to 0.1 % over a factor of twenty.
+    assert foot_creep(every).across == pytest.approx(foot_creep(ROBOT).across, rel=5e-3)
+    none = with_factors(ROBOT, PLANAR, [])
+    assert none == planar_limit(ROBOT, PLANAR)
+    soft = with_factors(ROBOT, PLANAR, ["soft legs"])
+    assert soft.get("twin.servo_stiffness") == ROBOT.get("twin.servo_stiffness")
+    assert soft.get("twin.clearance") == none.get("twin.clearance")
+
+
+def test_creep_is_in_proportion_to_the_impedance_ratio():
+    once = foot_creep(ROBOT)
+    assert once.along == pytest.approx(once.across, rel=0.02)
+    assert foot_creep(with_grip(ROBOT, 3000.0)).across == pytest.approx(3000.0, rel=1e-3)
+    assert once.speed(1.0) == 1.0 / once.across
+
+
+def test_points_that_are_not_there_are_said_to_be(monkeypatch):
+    def growing(robot, springs, folder=None, duration=0.0):
+        return real(springs, sign)
+
+    def real(springs, value):
+        import xarray as xr
+
+        return xr.Dataset({"growth": ("spring", np.full(len(springs), value))}, coords={"spring": list(springs)})
+
+    monkeypatch.setattr(ablation, "growth", growing)
+    sign = 1.0
+    assert ablation.onset_by_growth(ROBOT) == np.inf
+    sign = -1.0
+    assert np.isnan(ablation.onset_by_growth(ROBOT))

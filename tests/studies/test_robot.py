@@ -1,0 +1,145 @@
+"""The whole robot's studies, shortened: what they find has the shape that rows and figures need."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from chilopod import load_robot
+from chilopod.report import robot_turning as turning_figures
+from chilopod.report import robot_walks as walk_figures
+from chilopod.report import style
+from chilopod.steering import Target
+from chilopod.studies import robot_rows, robot_walks
+from chilopod.studies.robot_turning import RobotTurning
+from chilopod.studies.robot_walks import (
+    RobotWalks,
+    end_of_walk,
+    is_curved,
+    onset,
+    radius_at,
+    spring_for,
+    undulations,
+    walk_trials,
+)
+from chilopod.studies.trials import Trial
+from chilopod.studies.turning import turning_task, without_leg_yaw
+from chilopod.twin import simulate
+
+ROBOT = load_robot("aoi2022")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("trials")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def short():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(robot_walks, "DURATION", 40.0)
+        yield
+
+
+@pytest.fixture(scope="module")
+def base(folder):
+    return walk_trials(ROBOT, robot_walks.SPRINGS, 2, folder=folder)
+
+
+@pytest.fixture(scope="module")
+def walks(base, folder):
+    uniform = undulations(ROBOT, (8.7, 11.0, 15.0, 30.0), 1, folder=folder)
+    examples = xr.Dataset(
+        {"joint_angle": (("time", "spring", "joint"), np.linspace(-0.1, 0.3, 30).reshape(3, 2, 5))},
+        coords={"time": [0.0, 1.0, 2.0], "spring": [41.0, 15.0], "joint": np.arange(1, 6)},
+    )
+    names = list(robot_walks.variant_robots(ROBOT))[1:]
+    return RobotWalks(ROBOT, base, dict.fromkeys(names, base), examples, uniform)
+
+
+@pytest.fixture(scope="module")
+def tasks(folder):
+    target, springs = Target.parse("45 deg, 1.3 m"), (15.0, 21.0, 41.0)
+    task = turning_task(ROBOT, target, springs, 2, shown=springs, engine="twin", duration=19.0, folder=folder)
+    hopf = dataclasses.replace(task)
+    without = without_leg_yaw(ROBOT, target, {"paper's spring": 21.0}, engine="twin", folder=folder)
+    return RobotTurning(ROBOT, {"A": task, "B": task}, hopf, without)
+
+
+@pytest.mark.slow
+def test_soft_springs_curve_and_stiff_ones_do_not(base):
+    curved = is_curved(base).mean(axis=1)
+    assert curved[0] == 1.0
+    assert (curved[-2:] == 0.0).all()
+    assert (base.status == "walked").all()
+    assert radius_at(base, 15.0)[0] < radius_at(base, 21.0)[0]
+    assert np.isnan(radius_at(base, 75.0)[0])
+    fit = onset(base)
+    assert fit is not None
+    assert 26.0 < fit.critical < 45.0
+    # The spring for the radius of a spring's own walks is that spring.
+    assert spring_for(base, 5 * 0.225 / float(base.bend.sel(spring=21.0).mean())) == pytest.approx(21.0)
+    assert np.isnan(spring_for(base, 0.05))
+
+
+@pytest.mark.slow
+def test_softer_uniform_springs_undulate_more(walks):
+    swing = np.rad2deg(walks.uniform.amplitude.values[:, 0])
+    assert (np.diff(swing) < 0.0).all()
+    assert swing[0] > 10.0
+    assert swing[-1] < 5.0
+    assert 15.0 < walks.uniform.attrs["critical_k"] < 26.0
+
+
+@pytest.mark.slow
+def test_rows_and_figures_of_the_walks(walks):
+    rows = robot_rows.walk_rows(walks, {"onset": "12"})
+    assert {row.verdict for row in rows} <= {"within", "outside"}
+    assert {row.kind for row in rows} == {"fitted", "predicted"}
+    assert next(row for row in rows if row.quantity.startswith("where curved walks set in (")).planar == "12"
+    with style.house_style():
+        for panel in walk_figures.panels(walks):
+            assert style.svg(panel.draw(False), panel.name)
+            assert style.svg(panel.draw(True), panel.name)
+            assert all(panel.text)
+
+
+@pytest.mark.slow
+def test_rows_and_figures_of_the_tasks(tasks, walks):
+    outcome = tasks.tasks["A"].criteria.outcome
+    assert (outcome.sel(spring=21.0) == "arrived").all()
+    assert (outcome.sel(spring=41.0) == "bulged outside").all()
+    rows = robot_rows.turning_rows(tasks, walks, {})
+    assert all(row.kind == "predicted" for row in rows)
+    assert rows[0].quantity.startswith("task A")
+    with style.house_style():
+        for panel in turning_figures.panels(tasks, walks):
+            assert style.svg(panel.draw(False), panel.name)
+            assert style.svg(panel.draw(True), panel.name)
+
+
+def test_the_end_of_a_circle_is_its_radius():
+    """Angles that do not change give the paper's radius, and module 1's pace is its speed."""
+    record = simulate(ROBOT, 0.6, rate=50.0)
+    time = np.arange(0.0, 20.0, 0.02)
+    made = xr.Dataset(
+        {
+            "joint_angle": (("time", "robot", "joint"), np.full((time.size, 1, 5), 0.2)),
+            "position": (("time", "robot", "axis"), np.stack([0.05 * time, 0.0 * time], -1)[:, None]),
+            "status": ("robot", np.array(["walked"], dtype=object)),
+        },
+        coords={"time": time, "robot": [0], "joint": record.joint, "axis": record.axis},
+    )
+    end = end_of_walk(made, ROBOT)
+    assert float(end.axis_radius) == pytest.approx(5 * 0.225)
+    assert float(end.speed) == pytest.approx(0.05)
+    assert end.direction.item() == "right"
+    assert float(end.moved) == pytest.approx(0.0)
+
+
+def test_a_trial_of_the_twin_is_not_one_of_the_planar_model():
+    one = Trial(ROBOT, 1.0)
+    other = Trial(ROBOT, 1.0, engine="twin")
+    assert one.file_name != other.file_name
+    assert other.file_name.startswith("twin-")

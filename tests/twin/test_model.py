@@ -1,0 +1,191 @@
+"""The compiled model: everything that was described is in it, once."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from chilopod import load_robot
+from chilopod.errors import ParameterError
+from chilopod.twin import TwinModel
+from chilopod.twin.legs import tip_place
+
+PRESET = load_robot("aoi2022")
+
+OVERRIDES = [
+    [],
+    [
+        "springs.stiffness[0]=12.3 N*mm/deg",
+        "springs.stiffness[3]=77 N*mm/deg",
+        "springs.damping=0.0123",
+        "twin.servo_stiffness=3.21",
+        "twin.servo_damping=0.0456",
+        "twin.joint_inertia=0.00078",
+        "twin.sliding_friction=0.91",
+        "twin.contact_time=0.0123 s",
+        "twin.impedance_ratio=7.7",
+        "twin.timestep=0.5 ms",
+    ],
+    ["body.modules=9", "springs.damping=0", "twin.joint_inertia=0"],
+]
+
+
+@pytest.mark.parametrize("modules", range(2, 21))
+def test_mass_and_length_add_up(modules):
+    robot = PRESET.set_from_text([f"body.modules={modules}", "body.mass=8.123456789 kg", "body.length=1.2345 m"])
+    twin = TwinModel(robot)
+    model, data = twin.model, mujoco.MjData(twin.model)
+    mujoco.mj_forward(model, data)
+    assert model.body_mass.sum() == pytest.approx(robot.body.mass, rel=1e-14)
+    first, last = model.body("module1").id, model.body(f"module{modules}").id
+    between = data.xpos[first, 0] - data.xpos[last, 0]
+    assert between + robot.module_length == pytest.approx(robot.body.length, rel=1e-14)
+    assert model.jnt_pos[twin.yaw_joints].tolist() == [[0.5 * robot.module_length, 0.0, 0.0]] * (modules - 1)
+    # Whatever a module is made of, all are alike.
+    of_module = [model.body_subtreemass[model.body(f"module{i + 1}").id] for i in range(modules)]
+    np.testing.assert_allclose(-np.diff([*of_module, 0.0]), robot.module_mass, rtol=1e-12)
+    assert model.nq == 7 + (modules - 1) + 4 * modules + 2
+    assert model.nu == 4 * modules + 2
+
+
+def test_yaw_inertia_is_that_of_the_body_or_the_one_given():
+    twin = PRESET.twin
+    mass = PRESET.module_mass - 4.0 * twin.link_mass
+    box = mass * (PRESET.module_length**2 + twin.body_width**2) / 12.0
+    assert TwinModel(PRESET).model.body("module2").inertia[2] == pytest.approx(box)
+    given = TwinModel(PRESET.set_from_text(["body.yaw_inertia=0.006"])).model
+    assert given.body("module2").inertia[2] == pytest.approx(0.006 * mass / PRESET.module_mass)
+
+
+@pytest.mark.parametrize("overrides", OVERRIDES)
+def test_every_constant_has_one_owner(overrides):
+    robot = PRESET.set_from_text(overrides)
+    compiled, twin = TwinModel(robot), robot.twin
+    model = compiled.model
+    # Springs and their damping: the yaw joints and nothing else.
+    stiffness, damping = np.zeros(model.njnt), np.zeros(model.nv)
+    stiffness[compiled.yaw_joints] = robot.springs.stiffness
+    damping[compiled.yaw_rates] = robot.springs.damping
+    np.testing.assert_array_equal(model.jnt_stiffness, stiffness)
+    np.testing.assert_array_equal(model.dof_damping, damping)
+    for nothing in (model.dof_frictionloss, model.jnt_limited, model.body_gravcomp, model.qpos_spring[7:]):
+        assert not nothing.any()
+    assert model.ntendon == model.neq == model.npair == 0
+    # Motors: the actuators have the gains, the leg joints the inertia.
+    legs = np.concatenate([compiled.leg_positions.ravel(), compiled.leg_yaw_positions]) - 1
+    inertia = np.zeros(model.nv)
+    inertia[legs] = twin.joint_inertia
+    np.testing.assert_array_equal(model.dof_armature, inertia)
+    assert (model.actuator_gainprm[:, 0] == twin.servo_stiffness).all()
+    expected = [0.0, -twin.servo_stiffness, -twin.servo_damping]
+    np.testing.assert_array_equal(model.actuator_biasprm[:, :3], np.tile(expected, (model.nu, 1)))
+    assert not model.actuator_gainprm[:, 1:].any()
+    assert not model.actuator_biasprm[:, 3:].any()
+    assert sorted(model.actuator_trnid[:, 0]) == sorted(set(range(model.njnt)) - {0, *compiled.yaw_joints})
+    # Options.
+    assert model.opt.timestep == twin.timestep
+    assert model.opt.impratio == twin.impedance_ratio
+    assert compiled.steps_per_control == round(twin.control_interval / twin.timestep)
+
+
+@pytest.mark.parametrize("overrides", OVERRIDES)
+def test_contacts_are_those_of_feet_and_theirs_is_the_friction(overrides):
+    robot = PRESET.set_from_text(overrides)
+    compiled = TwinModel(robot)
+    model, data = compiled.model, mujoco.MjData(compiled.model)
+    data.qpos[:] = compiled.initial_positions()
+    data.qpos[2] -= robot.twin.clearance + 1e-3  # all feet on the floor, swinging ones too
+    mujoco.mj_forward(model, data)
+    contact = data.contact
+    assert sorted(contact.geom2) == sorted(compiled.feet.ravel())
+    assert (contact.geom1 == model.geom("floor").id).all()
+    assert (contact.dim == 3).all()
+    np.testing.assert_array_equal(contact.friction[:, :2], robot.twin.sliding_friction)
+    np.testing.assert_array_equal(contact.solref, np.tile([robot.twin.contact_time, 1.0], (len(contact), 1)))
+    # Rolled over, it falls through the floor: bodies and links touch nothing.
+    data.qpos[2:7] = [0.0, 0.0, 1.0, 0.0, 0.0]
+    mujoco.mj_forward(model, data)
+    assert data.ncon == 0
+
+
+def test_feet_are_where_the_leg_kinematics_say():
+    compiled = TwinModel(PRESET)
+    model, data = compiled.model, mujoco.MjData(compiled.model)
+    data.qpos[:] = compiled.initial_positions()
+    angles = np.random.default_rng(0).uniform(-1.0, 1.0, (6, 2, 2))
+    data.qpos[compiled.leg_positions] = angles
+    mujoco.mj_kinematics(model, data)
+    tip = tip_place(PRESET.twin, angles)
+    module = -PRESET.module_length * np.arange(6)[:, None]
+    expected = [
+        module + PRESET.legs.forward_offset + tip[..., 0],
+        np.tile([PRESET.legs.half_width, -PRESET.legs.half_width], (6, 1)),
+        data.qpos[2] - tip[..., 1],
+    ]
+    np.testing.assert_allclose(data.geom_xpos[compiled.feet], np.stack(expected, -1), rtol=0, atol=1e-14)
+
+
+def test_standing_feet_touch_the_floor_and_swinging_ones_do_not():
+    compiled = TwinModel(PRESET)
+    data = mujoco.MjData(compiled.model)
+    data.qpos[:] = compiled.initial_positions()
+    mujoco.mj_kinematics(compiled.model, data)
+    below = data.geom_xpos[compiled.feet][..., 2] - PRESET.twin.foot_radius
+    phases = PRESET.gait.leg_phases(6)
+    standing = phases < PRESET.gait.duty
+    np.testing.assert_allclose(below[standing], -1e-6, rtol=0, atol=1e-12)  # firmly, whatever round-off says
+    assert (below[~standing] > 1e-4).all()
+
+
+@pytest.mark.parametrize(
+    ("override", "field"),
+    [
+        ("twin.hip_height=130 mm", "twin.hip_height"),
+        ("twin.upper_link=1 mm", "twin.hip_height"),
+        ("twin.link_mass=0.36 kg", "twin.link_mass"),
+        ("body.modules=60", "twin.link_mass"),
+        ("body.mass=0.9 kg", "twin.link_mass"),
+        ("twin.body_height=208.1 mm", "twin.body_height"),
+        ("body.yaw_inertia=1e-4", "body.yaw_inertia"),
+        ("body.yaw_inertia=1", "body.yaw_inertia"),
+    ],
+)
+def test_robots_that_cannot_be_are_refused(override, field):
+    with pytest.raises(ParameterError) as caught:
+        TwinModel(PRESET.set_from_text([override]))
+    assert caught.value.field == field
+    assert caught.value.allowed
+    assert "\n" not in str(caught.value)
+
+
+def test_what_mujoco_itself_refuses_is_one_line_of_its_words():
+    with pytest.raises(ParameterError, match="larger than mjMINVAL") as caught:
+        TwinModel(PRESET.set_from_text(["twin.foot_radius=1e-8 m"]))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "override",
+    [
+        "twin.servo_stiffness=0",
+        "twin.servo_stiffness=1e5",
+        "twin.servo_damping=-1",
+        "twin.sliding_friction=0",
+        "twin.timestep=0.03 s",
+        "twin.timestep=1.5 ms",  # does not go into 2 ms
+        "twin.timestep=4 ms",
+        "twin.control_interval=3.3 ms",
+        "twin.foot_radius=0",
+        "twin.joint_inertia=-1e-3",
+        "springs.stiffness=0",
+    ],
+)
+def test_numbers_out_of_range_are_refused_when_set(override):
+    with pytest.raises(ParameterError) as caught:
+        PRESET.set_from_text([override])
+    assert override.partition("=")[0].endswith(caught.value.field)
+
+
+def test_a_robot_without_a_twin_cannot_be_built():
+    with pytest.raises(ParameterError) as caught:
+        TwinModel(load_robot("aoi2022-planar"))
+    assert caught.value.field == "twin"
