@@ -105,9 +105,10 @@ def creep(robot: Robot, engine: str) -> dict[str, float]:
     """How firmly the floor of the twin holds standing feet, for every run to show; nothing for another engine."""
     if engine != "twin":
         return {}
-    from chilopod.twin.creep import foot_creep
+    from chilopod.twin import foot_creep
 
-    return {"foot_creep_N_s_m": foot_creep(robot).across}
+    found = foot_creep(robot).across
+    return {"foot_creep_N_s_m": found} if math.isfinite(found) else {}
 
 
 def turn(

@@ -102,12 +102,16 @@ _SOFT_STEP = 2e-3  # s, enough for soft legs
 
 def planar_limit(robot: Robot, planar: Robot, constants: Mapping[str, float] = PLANAR) -> Robot:
     """The twin under the assumptions of the planar model, with that model's feet and friction."""
+    return with_grip(_limit(robot, planar, constants), planar.ground.friction)
+
+
+def _limit(robot: Robot, planar: Robot, constants: Mapping[str, float]) -> Robot:
     # All at once: not every step goes into every control interval.
     own = {key.partition(".")[2]: value for key, value in constants.items()}
     changed = robot.with_(twin=Twin(**{**dict(twin_of(robot)), **own})).with_value("springs.damping", 0.0)
     for path in FACTORS[0].paths:
         changed = changed.with_value(path, planar.get(path))
-    return with_grip(changed, planar.ground.friction)
+    return changed
 
 
 def with_grip(robot: Robot, coefficient: float) -> Robot:
@@ -118,7 +122,7 @@ def with_grip(robot: Robot, coefficient: float) -> Robot:
 
 def with_factors(robot: Robot, planar: Robot, names: Sequence[str]) -> Robot:
     """The planar limit with some factors switched on."""
-    limit = planar_limit(robot, planar)
+    limit = _limit(robot, planar, PLANAR)
     for factor in FACTORS:
         if factor.name in names:
             for path in factor.paths:

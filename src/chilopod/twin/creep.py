@@ -14,10 +14,12 @@ import numpy as np
 
 from chilopod.robot import Robot
 from chilopod.twin.legs import joint_angles
-from chilopod.twin.model import compiled
+from chilopod.twin.model import compiled, silence
 
 _PUSH = 0.05  # of the weight
 _SETTLING, _MEASURED = 1.5, 0.5  # s
+_LOOKS = 50  # at whether it still stands, while it settles
+_FASTEST = 100.0  # m/s and rad/s
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,7 @@ class Creep:
     Attributes
     ----------
     along, across
-        Viscous coefficient of one foot, push ahead and to the side, N*s/m.
+        Viscous coefficient of one foot, push ahead and to the side, N*s/m; NaN if the robot cannot stand.
     """
 
     along: float
@@ -40,7 +42,8 @@ class Creep:
 
 def foot_creep(robot: Robot) -> Creep:
     """Push the standing robot ahead and to the side and see how fast it slips."""
-    return Creep(*(_coefficient(robot, axis) for axis in range(2)))
+    with silence():
+        return Creep(*(_coefficient(robot, axis) for axis in range(2)))
 
 
 def _coefficient(robot: Robot, axis: int) -> float:
@@ -59,7 +62,10 @@ def _coefficient(robot: Robot, axis: int) -> float:
         data.qpos[:] = start
         data.ctrl[plan.leg_controls] = stance
         data.xfrc_applied[modules, axis] = sign * push
-        mujoco.mj_step(model, data, round(_SETTLING / model.opt.timestep))
+        for _ in range(_LOOKS):
+            mujoco.mj_step(model, data, round(_SETTLING / _LOOKS / model.opt.timestep))
+            if not np.abs(data.qvel).max() < _FASTEST:
+                return float("nan")
         before = data.geom_xpos[plan.feet][..., axis].mean()
         mujoco.mj_step(model, data, round(_MEASURED / model.opt.timestep))
         speeds.append(sign * (data.geom_xpos[plan.feet][..., axis].mean() - before) / _MEASURED)

@@ -1,0 +1,126 @@
+"""The whole robot on the command line: ``walk`` and ``turn`` with ``--engine twin``, ``identify twin``."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from chilopod import load_robot
+from chilopod.cli import main
+from chilopod.studies import identify_twin
+from chilopod.studies.trials import Trial, run
+from chilopod.studies.twin_spread import known_fits
+
+ROBOT = "aoi2022"
+SOFT = ["--set", "springs.stiffness[0]=15 N*mm/deg"]
+
+
+def printed(capsys, *arguments):
+    assert main(arguments) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_a_walk_in_three_dimensions(capsys, tmp_path):
+    file = tmp_path / "walk.nc"
+    arguments = ["walk", ROBOT, *SOFT, "--engine", "twin", "--duration", "6 s", "--seed", "3", "--repeats", "2"]
+    found = printed(capsys, *arguments, "--forces", "--out", str(file), "--json")
+    assert found["engine"] == "twin"
+    assert found["foot_creep_N_s_m"] > 100.0
+    assert [walk["status"] for walk in found["walks"]] == ["walked", "walked"]
+    with xr.open_dataset(file, engine="h5netcdf") as record:
+        assert record.attrs["engine"] == "twin"
+        load = record.foot_load.sum(("module", "side")).mean()
+        assert float(load) == pytest.approx(8.5 * 9.81, rel=0.02)
+    assert main(arguments) == 0
+    assert "feet creep like viscous ones" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_a_turn_in_three_dimensions_comes_with_a_replay(capsys, tmp_path):
+    out = tmp_path / "turn"
+    arguments = ["turn", ROBOT, "--engine", "twin", "--target", "45 deg, 1.3 m", "--k1", "21 N*mm/deg"]
+    found = printed(capsys, *arguments, "--seed", "1", "--out", str(out), "--json")
+    assert found["engine"] == "twin"
+    assert found["walks"][0]["outcome"] == "arrived"
+    page = (out / "turn.html").read_text(encoding="utf-8")
+    assert "webgl" in page.lower()
+    assert (out / "turn.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["walk", "aoi2022-planar", "--engine", "twin"], "the robot has no [twin]"),
+        (["walk", ROBOT, "--engine", "twn"], "did you mean 'twin'?"),
+        (["walk", ROBOT, "--engine", "twin", "--set", "twin.hip_height=130 mm"], "cannot reach its path"),
+        (["walk", ROBOT, "--engine", "twin", "--set", "twin.link_mass=1 kg"], "leaves no mass for the bodies"),
+        (["walk", ROBOT, "--engine", "twin", "--set", "twin.servo_stiffness=0 N*m/rad"], "must be positive"),
+        (["walk", ROBOT, "--engine", "twin", "--set", "twin.timestep=0.003 s"], "whole number of times"),
+        (["identify", "twin", "aoi2022-planar"], "[twin]"),
+    ],
+)
+def test_what_cannot_walk_is_refused_in_one_line(capsys, arguments, complaint, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    message = capsys.readouterr().err.splitlines()[-1]
+    assert message.startswith("error: ")
+    assert complaint in message
+
+
+def test_a_robot_that_blows_up_says_so(capsys):
+    found = printed(
+        capsys, "walk", ROBOT, "--engine", "twin", "--duration", "2 s", "--json",
+        "--set", "twin.servo_stiffness=9000 N*m/rad", "--set", "twin.servo_damping=1e-6 N*m*s/rad",
+    )  # fmt: skip
+    assert found["walks"][0]["status"] == "diverged"
+
+
+def test_identify_twin_keeps_what_it_has_tried(capsys, tmp_path, monkeypatch):
+    bends = known_fits()[0].bends
+    asked = []
+
+    def series(robot):
+        asked.append(robot)
+        return np.stack([bends, bends])
+
+    monkeypatch.setattr(identify_twin, "base_series", series)
+    arguments = ["identify", "twin", "--out", str(tmp_path), "--starts", "1", "--generations", "1", "--json"]
+    found = printed(capsys, *arguments)
+    assert found["evaluations"] == len(asked) == 10
+    assert found == printed(capsys, *arguments)
+    assert len(asked) == 10
+    assert load_robot(tmp_path / "identified.toml").get("legs.half_width") == pytest.approx(
+        found["constants"]["legs.half_width"]["value_si"]
+    )
+
+
+@pytest.mark.slow
+def test_a_study_that_is_killed_goes_on_where_it_was(tmp_path):
+    robot = load_robot(ROBOT)
+    trials = [Trial(robot, 4.0, seed, engine="twin") for seed in range(24)]
+    script = (
+        "import sys\nfrom chilopod import load_robot\nfrom chilopod.studies.trials import Trial, run\n"
+        "robot = load_robot('aoi2022')\n"
+        "run([Trial(robot, 4.0, seed, engine='twin') for seed in range(24)], sys.argv[1])\n"
+    )
+    child = subprocess.Popen([sys.executable, "-c", script, str(tmp_path)])
+    deadline = time.monotonic() + 120.0
+    while not list(tmp_path.glob("twin-*.nc")) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    os.kill(child.pid, signal.SIGKILL)
+    child.wait()
+    kept = {path.name: path.stat().st_mtime_ns for path in tmp_path.glob("twin-*.nc")}
+    assert 0 < len(kept) < 24
+    records = run(trials, tmp_path)
+    assert len(records) == 24
+    for name, when in kept.items():
+        assert (tmp_path / name).stat().st_mtime_ns == when
+    whole = run(trials[:2])
+    for one, other in zip(records, whole, strict=False):
+        np.testing.assert_array_equal(one.position.values, other.position.values)
