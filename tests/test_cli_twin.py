@@ -15,7 +15,6 @@ from chilopod import load_robot
 from chilopod.cli import main
 from chilopod.studies import identify_twin
 from chilopod.studies.trials import Trial, run
-from chilopod.studies.twin_spread import known_fits
 
 ROBOT = "aoi2022"
 SOFT = ["--set", "springs.stiffness[0]=15 N*mm/deg"]
@@ -82,7 +81,7 @@ def test_a_robot_that_blows_up_says_so(capsys):
 
 
 def test_identify_twin_keeps_what_it_has_tried(capsys, tmp_path, monkeypatch):
-    bends = known_fits()[0].bends
+    bends = identify_twin.known()[0].bends
     asked = []
 
     def series(robot):
@@ -90,11 +89,13 @@ def test_identify_twin_keeps_what_it_has_tried(capsys, tmp_path, monkeypatch):
         return np.stack([bends, bends])
 
     monkeypatch.setattr(identify_twin, "base_series", series)
+    monkeypatch.setattr(identify_twin, "confirmed", lambda robot: True)
     arguments = ["identify", "twin", "--out", str(tmp_path), "--starts", "1", "--generations", "1", "--json"]
     found = printed(capsys, *arguments)
-    assert found["evaluations"] == len(asked) == 10
+    count = 10 + len(identify_twin.known())
+    assert found["evaluations"] == len(asked) == count
     assert found == printed(capsys, *arguments)
-    assert len(asked) == 10
+    assert len(asked) == count
     assert load_robot(tmp_path / "identified.toml").get("legs.half_width") == pytest.approx(
         found["constants"]["legs.half_width"]["value_si"]
     )

@@ -3,9 +3,8 @@ import pytest
 
 from chilopod import load_robot
 from chilopod.studies import ablation
-from chilopod.studies.ablation import FACTORS, FINER, growth, planar_limit, with_factors, with_grip
+from chilopod.studies.ablation import FACTORS, FINER, limit_point, planar_limit, sign_change, with_factors, with_grip
 from chilopod.studies.floquet import pitchfork
-from chilopod.studies.robot_walks import sign_change
 from chilopod.twin import foot_creep
 
 ROBOT, PLANAR = load_robot("aoi2022"), load_robot("aoi2022-planar")
@@ -23,11 +22,7 @@ def test_the_two_engines_vouch_for_each_other():
     """The planar limit of the twin loses the straight walk where the planar model does, within 3 %."""
     limit = planar_limit(ROBOT, PLANAR, FINER)
     assert foot_creep(limit).across == pytest.approx(PLANAR.ground.friction, rel=1e-3)
-    springs = (11.4, 12.6)
-    found = growth(limit, springs)
-    exact = pitchfork(PLANAR, normal_form=False).value
-    assert sign_change(np.array(springs), found.growth.values) == pytest.approx(exact, rel=0.03)
-    assert not found.undulates.any()
+    assert limit_point(ROBOT, PLANAR) == pytest.approx(pitchfork(PLANAR, normal_form=False).value, rel=0.03)
 
 
 def test_factors_take_every_constant_from_the_limit_to_the_twin():
@@ -52,16 +47,13 @@ def test_creep_is_in_proportion_to_the_impedance_ratio():
 
 
 def test_points_that_are_not_there_are_said_to_be(monkeypatch):
-    def growing(robot, springs, folder=None, duration=0.0):
-        return real(springs, sign)
+    def curving_below(spring):
+        return lambda robot, springs, folder: 0.3 * np.sqrt(np.maximum(spring / np.array(springs) - 1.0, 0.0))
 
-    def real(springs, value):
-        import xarray as xr
-
-        return xr.Dataset({"growth": ("spring", np.full(len(springs), value))}, coords={"spring": list(springs)})
-
-    monkeypatch.setattr(ablation, "growth", growing)
-    sign = 1.0
-    assert ablation.onset_by_growth(ROBOT) == np.inf
-    sign = -1.0
-    assert np.isnan(ablation.onset_by_growth(ROBOT))
+    monkeypatch.setattr(ablation, "_bends", curving_below(27.0))
+    assert ablation.onset(ROBOT) == pytest.approx(27.0, rel=1e-3)
+    assert ablation.onset(ROBOT, quick=True) == pytest.approx(27.0, rel=1e-3)
+    monkeypatch.setattr(ablation, "_bends", curving_below(500.0))
+    assert ablation.onset(ROBOT) == np.inf
+    monkeypatch.setattr(ablation, "_bends", curving_below(5.0))
+    assert np.isnan(ablation.onset(ROBOT))

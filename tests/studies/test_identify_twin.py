@@ -5,18 +5,9 @@ import pytest
 
 from chilopod import load_robot
 from chilopod.studies import identify_twin
-from chilopod.studies.identify_twin import (
-    FREE,
-    RESIDUALS,
-    SERVO_TIME,
-    SPRINGS,
-    TwinIdentification,
-    constants_of,
-    residuals,
-    search,
-    with_constants,
-)
-from chilopod.studies.twin_spread import known_fits, unlike
+from chilopod.studies.identify_twin import RESIDUALS, SPRINGS, TwinIdentification, known, residuals, search
+from chilopod.studies.twin_constants import FREE, SERVO_TIME, constants_of, with_constants
+from chilopod.studies.twin_spread import unlike
 
 ROBOT = load_robot("aoi2022")
 
@@ -93,14 +84,14 @@ def test_a_search_that_was_stopped_goes_on_where_it_was(tmp_path, monkeypatch):
 
 
 def test_what_was_found_as_json():
-    found = TwinIdentification(ROBOT, known_fits()).as_json()
+    found = TwinIdentification(ROBOT, known()).as_json()
     assert json.loads(json.dumps(found, allow_nan=False)) == found
-    for path, (low, high) in TwinIdentification(ROBOT, known_fits()).ranges().items():
+    for path, (low, high) in TwinIdentification(ROBOT, known()).ranges().items():
         assert low <= found["constants"][path]["value_si"] <= high
 
 
-def test_the_preset_is_the_best_of_the_known_fits():
-    fits = known_fits()
+def test_the_preset_is_the_best_of_the_known():
+    fits = known()
     assert len(fits) >= 5
     assert all(fit.misfit <= 1.0 for fit in fits)
     np.testing.assert_allclose(constants_of(ROBOT), fits[0].constants, rtol=2e-3)  # it is rounded

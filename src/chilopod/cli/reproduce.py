@@ -127,6 +127,7 @@ def twin(
         int, typer.Option(metavar="N", help="Of ten evaluations each, in every search.", min=1, max=1000)
     ] = 9,
     seed: Annotated[int, typer.Option(metavar="N", help="Of the search.", min=0)] = 1,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Begin without the constants that are known.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Constants of the three-dimensional robot from the paper's base series of walks, and how sure they are.
@@ -147,6 +148,7 @@ def twin(
             generations,
             seed,
             prepare_folder(folder / "evaluations"),
+            fresh,
             lambda done, words: show("identification", done, words),
         )
     write_atomic(folder / "identified.toml", found.best.with_(name="identified").to_toml())

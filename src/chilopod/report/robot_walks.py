@@ -14,7 +14,7 @@ from chilopod import units
 from chilopod.report import style
 from chilopod.report.curved_trials import INVERSE_UNIT, errorbars, springs_above
 from chilopod.report.panel import Panel
-from chilopod.report.words import SPRING_UNIT, k, listing, number
+from chilopod.report.words import SPRING_UNIT, k, listing, number, typeset
 from chilopod.studies.paper import printed
 from chilopod.studies.robot_rows import printed_number
 from chilopod.studies.robot_walks import RobotWalks, is_curved, onset, radius_at
@@ -54,7 +54,7 @@ def walks(found: RobotWalks) -> Panel:
         f"1/{k(1)} with the fitted square root. D: radius of the body axis with the two radii that the paper prints.",
         text=(
             f"The paper's base series with its own springs: {base.sizes['repeat']} walks of the twin from straight on "
-            f"at each of {base.sizes['spring']} values of {k(1)}, a minute each, angles averaged over the last "
+            f"at each of {base.sizes['spring']} values of {k(1)}, 90\u00a0s each, angles averaged over the last "
             f"5\u00a0s as in the paper. {int(here.sum())} of {here.size} end in a curve, {lefts} to the left and "
             f"{rights} to the right. The square-root fit puts the onset at {said} {SPRING_UNIT}; the paper's "
             f"estimate for its robot is {printed_number('pitchfork', 'robot_critical_k1'):g}.",
@@ -176,7 +176,7 @@ def _draw_fork(axes: Axes, found: RobotWalks) -> None:
     axes.set_xlabel(f"1/{k(1)} ({INVERSE_UNIT})")
     axes.set_ylabel("mean angle of joint 1 (deg)")
     axes.set_title("C  Joint 1")
-    axes.legend(loc="center left")
+    axes.legend(loc="upper left")
     style.grid(axes)
 
 
@@ -230,7 +230,7 @@ def _draw_different(found: RobotWalks, narrow: bool) -> Figure:
     for (name, data), (color, marker) in zip(_all(found).items(), _VARIANTS, strict=True):
         springs = [float(spring) for spring in data.spring.values]
         radius, error = np.array([radius_at(data, spring) for spring in springs]).T
-        errorbars(axes["A"], 1.0 / np.array(springs), radius, error, color, marker, name)
+        errorbars(axes["A"], 1.0 / np.array(springs), radius, error, color, marker, typeset(name))
         axes["A"].plot(1.0 / np.array(springs), radius, color=color, lw=1.0)
     axes["A"].set_ylim(0.0, 3.0)
     springs_above(axes["A"], (34.0, 28.0, 21.0, 17.0, 15.0, 12.0))
@@ -255,7 +255,7 @@ def _draw_different(found: RobotWalks, narrow: bool) -> Figure:
         axes["B"].plot(paper, row, "D", color=style.ORANGE, markersize=7, label=None if row else "robot, paper")
         if twin is not None and np.isfinite(twin):
             axes["B"].plot(twin, row, "o", color=style.BLUE, markersize=7, label=None if row else "twin")
-    axes["B"].set_yticks(range(len(lines)), [name for name, *_ in lines])
+    axes["B"].set_yticks(range(len(lines)), [typeset(name) for name, *_ in lines])
     axes["B"].invert_yaxis()
     axes["B"].set_xlim(0.0, 45.0)
     axes["B"].set_ylim(len(lines) - 0.5, -0.7)

@@ -6,19 +6,21 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from chilopod import units
 from chilopod.report import style
 from chilopod.report.panel import Panel
-from chilopod.report.words import SPRING_UNIT, listing, number
+from chilopod.report.words import SPRING_UNIT, listing, number, typeset
 from chilopod.robot import Robot
 from chilopod.studies.paper import printed
 from chilopod.studies.robot_rows import printed_number
 from chilopod.studies.robot_walks import SPRINGS
+from chilopod.studies.twin_constants import FREE
 
 _WHY = (style.Layout("AB", 4.6, widths=(1.2, 1.0)), style.Layout("A;B", 9.0))
 _SPREAD = (style.Layout("AB", 4.2, widths=(1.0, 1.1)), style.Layout("A;B", 8.2))
-_BEYOND = 70.0  # N*mm/deg, where bars that have no end are cut off
+_BEYOND = 60.0  # N*mm/deg, where bars that have no end are cut off
 
 
 def why(data: xr.Dataset) -> Panel:
@@ -32,20 +34,21 @@ def why(data: xr.Dataset) -> Panel:
         letter="",
         title="Why 34 and not 12: from the planar model to the robot",
         draw=lambda narrow: _draw_why(data, narrow),
-        alt="A: the point where a small bend neither grows nor dies out, from the planar limit to the twin, one "
-        "assumption after the other. B: each of them alone, and the twin without each.",
+        alt="A: where curved walks set in, from the planar limit to the twin, one assumption after the other. B: each "
+        "of them alone, and the twin without each.",
         text=(
             "With stiff legs that lift their feet high and a floor that holds feet as a viscous one does, the twin is "
-            f"the planar model in another engine: a small bend stops to grow at {_shown(limit)}, the planar model's "
-            f"own number is 12.001. With everything the twin is at {_shown(twin)}.",
+            f"the planar model in another engine: it loses the straight walk at {_shown(data.attrs['vouched'], 4)}, "
+            f"the planar model at {_shown(data.attrs['exact'], 4)}. By the paper's method, a square-root fit to walks, "
+            f"curved ones set in at {_shown(limit)} there, and with everything at {_shown(twin)}.",
             "In A the planar model's assumptions are taken back one after the other, from the top down: "
             + "; ".join(
                 f"{name} ({about}): {_shown(float(value))}"
                 for name, about, value in zip(data.factor.values, data.about.values, data.path.values, strict=True)
             )
             + f". The largest steps are {listing(largest)}. They are no independent contributions: B shows each "
-            "alone in the planar limit and the twin without each. Where a bar runs out of the picture, a bend grows "
-            "at every spring tried, up to 60; where there is none, at no spring.",
+            "alone in the planar limit and the twin without each. Where a bar runs out of the picture, walks "
+            "curve at every spring tried, up to 50; where there is none, at fewer than two.",
             f"The viscous coefficient of the planar model's feet is 256.5\u00a0N·s/m. A foot of the twin that does not "
             f"slide creeps like one of {number(data.attrs['grip'], 2)}\u00a0N·s/m: it is held, and lets go only beyond "
             "the Coulomb limit.",
@@ -54,10 +57,10 @@ def why(data: xr.Dataset) -> Panel:
     )
 
 
-def _shown(value: float) -> str:
+def _shown(value: float, digits: int = 3) -> str:
     if np.isinf(value):
         return "beyond all springs tried"
-    return "none" if np.isnan(value) else f"{number(value, 3)}\u00a0{SPRING_UNIT}"
+    return "none" if np.isnan(value) else f"{number(value, digits)}\u00a0{SPRING_UNIT}"
 
 
 def _draw_why(data: xr.Dataset, narrow: bool) -> Figure:
@@ -72,8 +75,6 @@ def _draw_why(data: xr.Dataset, narrow: bool) -> Figure:
     _bars(axes["B"], rows - 0.19, data.alone.values, [style.SKY] * len(rows), 0.34)
     _bars(axes["B"], rows + 0.19, data.without.values, [style.ORANGE] * len(rows), 0.34)
     axes["B"].set_yticks(rows, [str(name) for name in data.factor.values])
-    axes["B"].barh([], [], color=style.SKY, label="planar limit and this alone")
-    axes["B"].barh([], [], color=style.ORANGE, label="twin without this")
     axes["B"].set_title("B  Each by itself")
     for letter in "AB":
         axes[letter].axvline(12.0, color=style.GREY, lw=1.2, linestyle=(0, (4, 2)), label="planar model, 12")
@@ -89,6 +90,8 @@ def _draw_why(data: xr.Dataset, narrow: bool) -> Figure:
         axes[letter].set_xlabel(f"point ({SPRING_UNIT})")
         style.grid(axes[letter], "x")
     handles, labels = axes["B"].get_legend_handles_labels()
+    handles += [Patch(color=style.SKY), Patch(color=style.ORANGE)]
+    labels += ["planar limit and this alone", "twin without this"]
     figure.legend(handles, labels, loc="outside lower center", ncols=1 if narrow else 4)
     return figure
 
@@ -147,8 +150,6 @@ def spread(data: xr.Dataset, robot: Robot) -> Panel:
 
 
 def _draw_spread(data: xr.Dataset, robot: Robot, narrow: bool) -> Figure:
-    from chilopod.studies.identify_twin import FREE
-
     figure, axes = style.figure(*_SPREAD, narrow)
     rows = np.arange(len(FREE))
     colors = (style.BLUE, *style.CURVES[1:])
@@ -193,7 +194,7 @@ def _draw_spread(data: xr.Dataset, robot: Robot, narrow: bool) -> Figure:
                 markeredgewidth=1.6,
                 label="preset" if row == 0 and index == 0 else None,
             )
-    axes["B"].set_yticks(range(len(lines)), [name for name, *_ in lines])
+    axes["B"].set_yticks(range(len(lines)), [typeset(name) for name, *_ in lines])
     axes["B"].set_xlim(10.0, max(45.0, max(SPRINGS[:-1])))
     axes["B"].set_ylim(len(lines) - 0.5, -0.8)
     axes["B"].set_xlabel(f"{SPRING_UNIT}")

@@ -12,6 +12,7 @@ import xarray as xr
 from chilopod.errors import ParameterError, nearest_name
 from chilopod.robot import Robot
 from chilopod.studies import (
+    ablation,
     curved_rows,
     floquet,
     floquet_rows,
@@ -20,7 +21,6 @@ from chilopod.studies import (
     turning_rows,
     twin_numerics,
 )
-from chilopod.studies.ablation import ablation
 from chilopod.studies.curved_findings import CurvedStudy, curved_study
 from chilopod.studies.curved_walk import curved_walks
 from chilopod.studies.floquet import K1, stiffness
@@ -169,8 +169,8 @@ def reproduce(
     only
         Names of :data:`SECTIONS`; all by default.
     quick
-        Coarser sweeps, fewer module counts, springs and repeats; what does not depend on chance is as exact as
-        otherwise.
+        Coarser sweeps, fewer module counts, springs and repeats, and no other constants of the robot in three
+        dimensions unless asked for; what does not depend on chance is as exact as otherwise.
     folder
         Where the records of trials are kept, so that what was stopped goes on where it was; without one nothing is
         kept.
@@ -182,6 +182,8 @@ def reproduce(
     results = Results(robot, whole=whole)
     for name in chosen(only):
         if name.startswith("robot-") and whole is None:
+            continue
+        if name == "robot-spread" and quick and only is None:
             continue
         started = time.perf_counter()
         progress(name, 0.0, SECTIONS[name])
@@ -257,11 +259,11 @@ def _robot_section(
         results.datasets[name] = twin_spread(whole, folder, 2 if quick else SPREAD, report)
         return []
     if name == "robot-numerics":
-        results.datasets[name] = twin_numerics.twin_numerics(whole, report)
+        results.datasets[name] = twin_numerics.twin_numerics(whole, quick, report)
         return twin_numerics.rows(results.datasets[name])
     if name == "robot-why":
-        results.datasets[name] = ablation(whole, results.robot, folder, quick, report)
-        return []
+        results.datasets[name] = ablation.ablation(whole, results.robot, folder, quick, report)
+        return ablation.rows(results.datasets[name])
     straight, little, lot = (stiffness(value) for value in _ROBOT_FILMED)
     stiff, best, soft = (stiffness(value) for value in _ROBOT_TRIED)
     results.robot_movies = robot_movies(whole, (straight, little, lot), (stiff, best, soft), folder, report)

@@ -7,8 +7,6 @@ and undisturbed walks.
 
 from __future__ import annotations
 
-import json
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -20,14 +18,15 @@ from chilopod.engine import Status
 from chilopod.errors import AnalysisError
 from chilopod.robot import Robot
 from chilopod.steering import ARRIVAL_RADIUS, Target, steered, strategy_named
-from chilopod.studies import trials
+from chilopod.studies import identify_twin, trials
 from chilopod.studies.curved_trials import variant_robots
 from chilopod.studies.floquet import K1, Progress, silent, stiffness
-from chilopod.studies.identify_twin import FREE, Fit, with_constants
+from chilopod.studies.identify_twin import Fit
 from chilopod.studies.paper import printed
 from chilopod.studies.robot_walks import AVERAGED, CURVED, undulations
 from chilopod.studies.square_root import square_root_fit
 from chilopod.studies.trials import NONE, Trial
+from chilopod.studies.twin_constants import FREE, with_constants
 
 Array = NDArray[np.float64]
 
@@ -36,24 +35,11 @@ SPRINGS = (13.0, 15.0, 17.0, 19.0, 21.0, 24.0, 28.0)
 
 TASK_SPRINGS = (15.0, 17.0, 21.0, 26.0, 28.0, 34.0, 41.0)
 UNIFORM_SPRINGS = (8.7, 11.0, 13.0, 15.0)
-COUNT = 5
+COUNT = 4
 """Sets of constants that predict, the preset's among them."""
 
 _DURATION, _TASK = 45.0, 23.0  # s
 _BEND = float(np.deg2rad(5.0))
-
-
-def known_fits() -> list[Fit]:
-    """The fits that come with chilopod, best first."""
-    table = json.loads(files("chilopod.studies").joinpath("twin_fits.json").read_text(encoding="utf-8"))
-    return [
-        Fit(
-            np.array([each["constants"][free.path] for free in FREE]),
-            np.array(each["bends_rad"]),
-            np.array(each["residuals"]),
-        )
-        for each in table["fits"]
-    ]
 
 
 def unlike(fits: list[Fit], count: int = COUNT) -> list[Fit]:
@@ -89,7 +75,8 @@ def twin_spread(
     over that as built), ``uniform`` (N*mm/deg), and over task ``best``, the spring that comes nearest to the target
     (N*mm/deg), and ``arrives``, whether that arrives.
     """
-    fits = unlike(known_fits(), count)
+    known = identify_twin.known()
+    fits = unlike(known, count)
     rows: list[dict[str, Any]] = []
     for index, fit in enumerate(fits):
         progress(index / len(fits), f"set {index + 1} of {len(fits)}")
@@ -103,7 +90,7 @@ def twin_spread(
             "uniform": ("set", np.array([row["uniform"] for row in rows]), {"units": "N*mm/deg"}),
         },
         coords={"set": np.arange(len(fits)), "constant": [c.path for c in FREE], "variant": names, "task": tasks},
-        attrs={"robot": robot.name, "known": len(known_fits())},
+        attrs={"robot": robot.name, "known": len(known)},
     )
     for name, over, keys in (("onset", "variant", names), ("tighter", "variant", names), ("best", "task", tasks)):
         data[name] = (("set", over), np.array([[row[name][key] for key in keys] for row in rows]))

@@ -1,0 +1,15 @@
+"""Constants of the whole robot that meet the paper's base series, as ``chilopod identify twin`` has found them."""
+
+from __future__ import annotations
+
+import json
+from importlib.resources import files
+from typing import Any
+
+
+def known_fits() -> list[dict[str, Any]]:
+    """What ``twin_fits.json`` holds, best first: ``constants`` (SI, by path), ``bends_rad``, ``residuals`` of each."""
+    found: list[dict[str, Any]] = json.loads(
+        files("chilopod.studies").joinpath("twin_fits.json").read_text(encoding="utf-8")
+    )["fits"]
+    return found
