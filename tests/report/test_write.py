@@ -15,6 +15,7 @@ from chilopod.errors import OutputError
 from chilopod.report import write_identification, write_report
 from chilopod.report.write import panels
 from chilopod.studies import Results
+from chilopod.studies.robot_rows import RobotRow
 
 VOID = {"meta", "link", "img", "source", "br", "hr", "input"}
 
@@ -193,3 +194,15 @@ def test_unwritable_folder(results, tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(OutputError, match="file"):
         write_report(results, tmp_path / "file")
+
+
+def test_the_robot_has_a_table_and_its_numbers(results, tmp_path):
+    whole = load_robot("aoi2022")
+    row = RobotRow("where <it> bends", "34 N*mm/deg", "33.2 N*mm/deg (-2 %)", "", "predicted", "outside", "10 %")
+    found = Results(results.robot, whole=whole, robot_rows={"robot-walks": [row]})
+    page = Page(write_report(found, tmp_path).read_text(encoding="utf-8"))
+    assert "robot-table" in [attrs.get("id") for tag, attrs in page.tags if tag == "section"]
+    assert "33.2 N·mm/deg (−2 %)" in page.text.replace("\u00a0", " ")
+    assert "meets 0 of 1 further statements" in page.text
+    assert "twin.clearance" in page.text
+    assert load_robot(tmp_path / "data" / "robot-3d.toml") == whole

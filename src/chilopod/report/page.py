@@ -95,8 +95,7 @@ def page(
         robot_rows=[_robot_row(row) for row in results.all_robot_rows],
         chapters=_chapters(figures, films),
         commands=commands(robot_file, results),
-        robot=results.robot.name,
-        numbers=_numbers(results.robot),
+        robots=_robots(results),
         versions=listing(
             [f"chilopod {version('chilopod')}", f"Python {platform.python_version()}"]
             + [f"{name} {version(name)}" for name in _LIBRARIES]
@@ -253,6 +252,14 @@ def _figure(drawn: Drawn) -> dict[str, Any]:
 
 def _embedded(svg: bytes) -> str:
     return "data:image/svg+xml;base64," + b64encode(svg).decode("ascii")
+
+
+def _robots(results: Results) -> list[dict[str, Any]]:
+    """The robots of the report, with the files their numbers stand in."""
+    found = [("The robot of the planar model", results.robot, "robot.toml")]
+    if results.whole and results.all_robot_rows:
+        found.append(("The robot in three dimensions", results.whole, "robot-3d.toml"))
+    return [{"says": says, "name": robot.name, "file": file, "numbers": _numbers(robot)} for says, robot, file in found]
 
 
 def _numbers(robot: Robot) -> list[dict[str, str]]:
