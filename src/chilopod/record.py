@@ -12,6 +12,12 @@ from chilopod.engine import Event, Status, bearing_and_distance
 
 Array = NDArray[np.float64]
 
+RATE = 100.0
+"""Default sampling rate of records, Hz."""
+
+LONGEST = 1e5
+"""s, more than a day: anything longer is a slip of the pen."""
+
 MOST_NUMBERS = 5e8
 """Of a record (4 GB)."""
 

@@ -15,19 +15,13 @@ from chilopod.planar import stretch
 from chilopod.planar.model import PlanarModel
 from chilopod.planar.pieces import pieces
 from chilopod.planar.record import foot_forces, planar_record
-from chilopod.record import MOST_NUMBERS, add_outcome, leg_yaw_at
+from chilopod.record import LONGEST, MOST_NUMBERS, RATE, add_outcome, leg_yaw_at
 from chilopod.robot import Robot
 
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-6
 """Default of :func:`simulate`: a minute of walking is then good to better than 1e-6 m."""
-
-RATE = 100.0
-"""Default sampling rate of records, Hz."""
-
-LONGEST = 1e5
-"""s, more than a day: anything longer is a slip of the pen."""
 
 _STATUS = {
     stretch.WALKING: Status.WALKED,

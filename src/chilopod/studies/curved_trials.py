@@ -26,6 +26,7 @@ from chilopod.stability.system import whole_period
 from chilopod.studies.floquet import K1, PAPER_UNIT, Progress, pitchfork, silent, stiffness
 from chilopod.studies.paper import printed
 from chilopod.studies.trials import Disturbance, Trial, run
+from chilopod.studies.walks import AVERAGED
 
 Array = NDArray[np.float64]
 
@@ -34,9 +35,6 @@ SPRINGS = (7.0, 8.0, 9.0, 10.0, 11.0, 11.5, 13.0, 15.0, 41.0)
 
 EXAMPLES = (41.0, 8.0)
 """k1 of the two walks that are shown over time, N*mm/deg: straight, and about as far below the point as the paper's."""
-
-AVERAGED = 5.0
-"""Angles are averaged over the last so many seconds, as in the paper."""
 
 BEFORE = 30.0
 """s; the mean over so long before that tells whether they had settled."""

@@ -25,6 +25,7 @@ from chilopod.studies.curved_trials import variant_robots
 from chilopod.studies.floquet import ALL, K1, PAPER_UNIT, Progress, silent, stiffness
 from chilopod.studies.square_root import SquareRootFit, square_root_fit
 from chilopod.studies.trials import Disturbance, Trial
+from chilopod.studies.walks import AVERAGED
 
 Array = NDArray[np.float64]
 
@@ -46,9 +47,6 @@ DURATION = 90.0
 
 UNIFORM_DURATION = 60.0
 """s, of walks with all springs alike, which settle sooner."""
-
-AVERAGED = 5.0
-"""s at the end, over which angles are averaged, as in the paper."""
 
 CURVED = 0.25
 """rad: a walk is curved if its joints bend by more than this in all, to a radius of 4.5 m or less."""

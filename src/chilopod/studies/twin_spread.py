@@ -23,10 +23,11 @@ from chilopod.studies.curved_trials import variant_robots
 from chilopod.studies.floquet import K1, Progress, silent, stiffness
 from chilopod.studies.identify_twin import Fit
 from chilopod.studies.paper import printed
-from chilopod.studies.robot_walks import AVERAGED, CURVED, undulations
+from chilopod.studies.robot_walks import CURVED, undulations
 from chilopod.studies.square_root import square_root_fit
 from chilopod.studies.trials import NONE, Trial
 from chilopod.studies.twin_constants import FREE, with_constants
+from chilopod.studies.walks import AVERAGED
 
 Array = NDArray[np.float64]
 

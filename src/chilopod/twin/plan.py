@@ -9,14 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import ParameterError
-from chilopod.record import MOST_NUMBERS
+from chilopod.record import LONGEST, MOST_NUMBERS
 from chilopod.robot import Robot
 from chilopod.twin.model import TwinModel, compiled, without_springs
 
 Array = NDArray[np.float64]
-
-LONGEST = 1e5
-"""s, more than a day: anything longer is a slip of the pen."""
 
 
 def initial_states(

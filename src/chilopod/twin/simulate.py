@@ -12,7 +12,7 @@ from mujoco.batch import Batch
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.engine import Controller, Event, Observation, Status, event_times
-from chilopod.record import add_outcome, walk_record
+from chilopod.record import RATE, add_outcome, walk_record
 from chilopod.robot import Robot
 from chilopod.twin.legs import servo_targets
 from chilopod.twin.model import SIDES, silence
@@ -20,9 +20,6 @@ from chilopod.twin.plan import Plan, checked_plan
 from chilopod.twin.scanner import beams, detect, rotation, scan
 
 Array = NDArray[np.float64]
-
-RATE = 100.0
-"""Default sampling rate of records, Hz."""
 
 TOLERANCE = 1e-8
 """Default of the contact solver, MuJoCo's own."""
