@@ -159,7 +159,7 @@ class TowardsTarget:
 
     def act(self, event: Event, seen: Observation) -> Command:
         angle = np.clip(0.5 * seen.bearing, -np.radians(20.0), np.radians(20.0))
-        return Command(np.stack([angle, angle], axis=-1), 0.0)
+        return Command(leg_yaw=np.stack([angle, angle], axis=-1))
 
 
 def closed_loop(threads: int) -> str:

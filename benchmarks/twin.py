@@ -43,7 +43,7 @@ def trials(count: int, threads: int) -> Any:
         initial=starts(count),
         controller=LegYawController(),
         target=TARGET.position,
-        scan_seeds=list(range(count)),
+        seeds=list(range(count)),
         rate=RATE,
         threads=threads,
     )

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from chilopod.engine import Event, Status, bearing_and_distance
+from chilopod.errors import ParameterError
 
 Array = NDArray[np.float64]
 
@@ -20,6 +21,107 @@ LONGEST = 1e5
 
 MOST_NUMBERS = 5e8
 """Of a record (4 GB)."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What is to be written down of a walk.
+
+    Attributes
+    ----------
+    rate
+        Samples per second.
+    forces
+        Whether to add the force on every foot.
+    poses
+        Whether to add the positions of all joints, from which the robot can be drawn, where an engine has them.
+    """
+
+    rate: float = RATE
+    forces: bool = False
+    poses: bool = False
+
+    def __post_init__(self) -> None:
+        in_range("rate", self.rate, 1e6)
+
+    def samples(self, until: float) -> Array:
+        """Times of all samples up to a time, s."""
+        return np.arange(int(np.floor(until * self.rate * (1.0 + 1e-12))) + 1) / self.rate
+
+
+def in_range(name: str, value: float, most: float) -> None:
+    """Refuse what is not positive or beyond all reason.
+
+    Raises
+    ------
+    ParameterError
+        Naming the field.
+    """
+    if not 0.0 < value <= most:
+        raise ParameterError("is out of range", field=name, value=value, allowed=f"more than 0, at most {most:g}")
+
+
+def check_size(record: Recording | None, until: float, numbers: int) -> None:
+    """Refuse a record that nobody can hold, of ``numbers`` at every sample.
+
+    Raises
+    ------
+    ParameterError
+        If it would be.
+    """
+    if record is not None and (until * record.rate + 1.0) * numbers > MOST_NUMBERS:
+        raise ParameterError(
+            "the record would be too large", field="rate", value=record.rate, allowed="fewer robots, samples or seconds"
+        )
+
+
+class Samples:
+    """Rows that grow with a walk, all in one array.
+
+    Parameters
+    ----------
+    shape
+        Of a row.
+    expected
+        Rows that are likely to come; more may.
+    """
+
+    def __init__(self, shape: tuple[int, ...], expected: int = 0) -> None:
+        self.count = 0
+        self._rows = np.full((max(expected, 16), *shape), np.nan)
+
+    @property
+    def rows(self) -> Array:
+        """Those there are, shape (count, ...); a view."""
+        return self._rows[: self.count]
+
+    def grown(self, count: int) -> Array:
+        """Room for ``count`` rows in all, those that are new NaN; a view that holds until the next call."""
+        if count > len(self._rows):
+            longer = np.full((max(count, 2 * len(self._rows)), *self._rows.shape[1:]), np.nan)
+            longer[: self.count] = self._rows[: self.count]
+            self._rows = longer
+        self.count = max(self.count, count)
+        return self.rows
+
+
+def bearing_and_distance(position: Array, heading: Array, target: Array) -> tuple[Array, Array]:
+    """Where a target is, seen from module 1.
+
+    Parameters
+    ----------
+    position, target
+        On the floor, m, shape (..., 2).
+    heading
+        rad, shape (...).
+
+    Returns
+    -------
+    Direction relative to the heading, rad in [-pi, pi), and distance, m.
+    """
+    away = target - position
+    angle = np.arctan2(away[..., 1], away[..., 0]) - heading
+    return (angle + np.pi) % (2.0 * np.pi) - np.pi, np.hypot(away[..., 0], away[..., 1])
 
 
 def walk_record(
@@ -68,49 +170,34 @@ def walk_record(
     )
 
 
-def add_outcome(
-    data: xr.Dataset,
-    statuses: Sequence[Status],
-    target: Array | None,
-    asked: Sequence[tuple[float, Event]] | None,
-    commands: Array,
-    within: Array,
-) -> None:
-    """Add to a record how the walks ended, where the target was, and what a controller said.
+def add_outcome(data: xr.Dataset, statuses: Sequence[str], target: Array | None) -> None:
+    """Add to a record how the walks ended, and where the target was.
 
     Parameters
     ----------
     data
         From :func:`walk_record`; changed in place.
     statuses
-        One a robot.
+        Labels, one a robot.
     target
         m, shape (robots, 2), or None.
-    asked
-        Instants at which the controller was asked; None if there was none.
-    commands, within
-        Its answers: leg yaw, rad, shape (events, robots, 2), and the time they were to be reached in, s, (events,).
     """
-    data["status"] = ("robot", np.array([status.label for status in statuses], dtype=object))
+    data["status"] = ("robot", np.array(statuses, dtype=object))
     if target is not None:
         data["target"] = (("robot", "axis"), target, {"units": "m"})
         angle, away = bearing_and_distance(data.position.values, data.heading.values, target)
         data["distance"] = (("time", "robot"), away, {"units": "m"})
         data["bearing"] = (("time", "robot"), angle, {"units": "rad"})
-    if asked is not None:
-        data.coords["event"] = ("event", np.array([t for t, _ in asked]), {"units": "s"})
-        data["command"] = (("event", "robot", "side"), commands, {"units": "rad"})
-        data["within"] = ("event", within, {"units": "s"})
 
 
-def leg_yaw_at(
-    samples: Array, asked: Sequence[tuple[float, Event]], commands: Array, within: Array, count: int
-) -> Array:
-    """Leg yaw at the samples, shape (samples, robots, 2): ramps from command to command."""
-    yaw = np.zeros((len(samples), count, 2))
-    previous = np.zeros((count, 2))
-    for (t, _), command, duration in zip(asked, commands, within, strict=True):
-        part = np.clip((samples - t) / duration if duration > 0.0 else samples >= t, 0.0, 1.0)
-        yaw += part[:, None, None] * (command - previous)
-        previous = command
-    return yaw
+def spring_work(data: xr.Dataset) -> xr.DataArray:
+    """Work that changing stiffness did on the springs of every robot of a record, J, over (robot).
+
+    It is the integral of 1/2 theta^2 dk over the motion, by the mean of theta^2 between samples: exact where a spring
+    steps, of second order in the sampling where it ramps. Springs that do not change take none.
+    """
+    if "time" not in data.stiffness.dims:
+        return (data.stiffness * 0.0).sum("joint").assign_attrs(units="J")
+    stored = 0.5 * data.joint_angle**2
+    mean = 0.5 * (stored + stored.shift(time=1))
+    return (mean * data.stiffness.diff("time")).sum(("time", "joint"), skipna=True).assign_attrs(units="J")

@@ -28,7 +28,7 @@ class Sideways:
     def act(self, event, seen):
         yaw = seen.leg_yaw.copy()
         yaw[:, int(event.name)] = self.gain * seen.bearing
-        return Command(yaw, event.window)
+        return Command(leg_yaw=yaw, within=event.window)
 
 
 def test_samples_are_states_of_the_flow():

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from chilopod.engine import bearing_and_distance
 from chilopod.planar import simulate
+from chilopod.record import bearing_and_distance
 from chilopod.robot import load_robot
 from chilopod.steering import LegYawController, Outcome, Target, earliest_arrival, evaluate
 

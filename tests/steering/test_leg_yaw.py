@@ -40,7 +40,9 @@ def lift_offs(side, count):
 def seen(bearing, yaw=(0.0, 0.0)):
     bearing = np.atleast_1d(np.asarray(bearing, float))
     yaw = np.broadcast_to(np.asarray(yaw, float), (len(bearing), 2))
-    return Observation(0.0, bearing, np.ones_like(bearing), np.zeros((len(bearing), 5)), yaw)
+    return Observation(
+        0.0, bearing, np.ones_like(bearing), np.zeros((len(bearing), 5)), yaw, np.ones((len(bearing), 5))
+    )
 
 
 def test_each_leg_is_asked_in_its_own_swing():

@@ -6,7 +6,7 @@ import pytest
 from mujoco.batch import Batch
 
 from chilopod import load_robot
-from chilopod.engine import bearing_and_distance
+from chilopod.record import bearing_and_distance
 from chilopod.steering import LegYawController
 from chilopod.twin import TwinModel, initial_states, simulate
 from chilopod.twin.scanner import beams, detect, rotation, scan
@@ -40,9 +40,14 @@ def random_scenes(seed, count=200):
     return positions, headings, seen_from(positions, headings, bearings, distances), rng
 
 
+def poses(batch):
+    """Of module 1."""
+    return batch.bind("qpos")[:, :7]
+
+
 def found_in(batch, noise=None):
     ids = np.arange(batch.nsim)
-    return np.array([detect(TWIN, each) for each in scan(TWIN, batch, ids, noise)]).T
+    return np.array([detect(TWIN, each) for each in scan(TWIN, batch, poses(batch), ids, noise)]).T
 
 
 def test_beams_are_those_of_the_sensor():
@@ -97,12 +102,12 @@ def test_the_edges_of_the_view_are_seen(bearing, distance):
 def test_neither_floor_nor_robot_is_seen_even_when_it_nods():
     batch = placed(np.zeros((3, 2)), 0.0, np.full((3, 2), 30.0))
     batch.bind("qpos")[:, 3:7] = [[np.cos(a), 0.0, np.sin(a), 0.0] for a in (-0.05, 0.03, 0.1)]
-    assert np.isnan(scan(TWIN, batch, np.arange(3))).all()
+    assert np.isnan(scan(TWIN, batch, poses(batch), np.arange(3))).all()
 
 
 def test_distances_are_rounded_to_the_resolution():
     batch = placed(np.zeros((1, 2)), 0.0, np.array([[1.0, 0.2]]))
-    found = scan(TWIN, batch, np.arange(1), np.random.default_rng(2).standard_normal((1, 683)))
+    found = scan(TWIN, batch, poses(batch), np.arange(1), np.random.default_rng(2).standard_normal((1, 683)))
     steps = found[np.isfinite(found)] / TWIN.scanner_resolution
     assert len(steps) > 5
     np.testing.assert_allclose(steps, np.round(steps), rtol=0, atol=1e-9)
@@ -123,7 +128,7 @@ def steered(target, duration=2.5, **arguments):
 
 
 def test_the_controller_sees_the_last_scan():
-    record = steered((1.5, 0.8), scan_seeds=[5])
+    record = steered((1.5, 0.8), seeds=[5])
     for event, when in enumerate(record.event.values):
         scanned = np.floor(when / TWIN.scanner_period + 1e-9) * TWIN.scanner_period
         there = record.sel(time=scanned, method="nearest").isel(robot=0)
@@ -149,8 +154,8 @@ def test_leg_yaw_stays_as_it_is_while_the_pole_is_unseen():
 
 
 def test_noise_belongs_to_the_seed_and_not_to_the_company():
-    together = steered((1.5, 0.8), scan_seeds=[7, 8, 7], duration=1.5)
-    alone = steered((1.5, 0.8), scan_seeds=[8], duration=1.5)
+    together = steered((1.5, 0.8), seeds=[7, 8, 7], duration=1.5)
+    alone = steered((1.5, 0.8), seeds=[8], duration=1.5)
     exact = steered((1.5, 0.8), duration=1.5)
     seen = together.seen_distance.values
     np.testing.assert_array_equal(seen[:, 1], alone.seen_distance.values[:, 0])

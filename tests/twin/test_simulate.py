@@ -28,7 +28,7 @@ class Sideways:
 
     def act(self, event, seen):
         wanted = np.where(np.isnan(seen.bearing), 0.0, np.clip(0.3 * seen.bearing, -0.1, 0.1))
-        return Command(np.repeat(wanted[:, None], 2, axis=1), event.window)
+        return Command(leg_yaw=np.repeat(wanted[:, None], 2, axis=1), within=event.window)
 
 
 def looped(robot, start, control, friction=1.0, target=None):
@@ -84,7 +84,7 @@ def test_a_steered_batch_is_mujocos_loop_with_the_same_controls_to_the_bit(monke
 
     monkeypatch.setattr(Batch, "rollout", listening)
     record = simulate(
-        robots, 3.0, initial=start, controller=Sideways(), target=targets, scan_seeds=[1, 2], poses=True, rate=500.0
+        robots, 3.0, initial=start, controller=Sideways(), target=targets, seeds=[1, 2], poses=True, rate=500.0
     )
     control = np.concatenate(given, axis=1)
     assert control.shape == (2, 1500, 26)
@@ -108,11 +108,11 @@ def test_a_steered_batch_is_mujocos_loop_with_the_same_controls_to_the_bit(monke
 def test_neither_company_nor_threads_change_a_bit():
     robots = [SOFT.with_value("springs.stiffness[0]", k) for k in np.linspace(0.4, 3.0, 4)]
     common = {"initial": initial_states(SOFT, BENT), "controller": LegYawController(), "target": (1.0, 1.0)}
-    one = simulate(robots, 2.0, **common, scan_seeds=[0, 1, 2, 3], threads=1)
-    two = simulate(robots, 2.0, **common, scan_seeds=[0, 1, 2, 3], threads=2)
+    one = simulate(robots, 2.0, **common, seeds=[0, 1, 2, 3], threads=1)
+    two = simulate(robots, 2.0, **common, seeds=[0, 1, 2, 3], threads=2)
     assert one.equals(two)
     for i in (0, 3):
-        alone = simulate(robots[i], 2.0, **common, scan_seeds=[i], threads=1)
+        alone = simulate(robots[i], 2.0, **common, seeds=[i], threads=1)
         for name in ("position", "joint_angle", "leg_yaw", "command", "seen_distance"):
             np.testing.assert_array_equal(alone[name].isel(robot=0).values, one[name].isel(robot=i).values)
 
@@ -297,20 +297,20 @@ def test_progress_goes_from_nothing_to_everything():
         ({"robots": []}, "robots"),
         ({"robots": [PRESET, PRESET.set_from_text(["gait.stride=2 cm"])]}, "robots"),
         ({"robots": [PRESET, PRESET.set_from_text(["twin.servo_stiffness=8"])]}, "robots"),
-        ({"robots": [PRESET, load_robot("aoi2022-planar")]}, "robots"),
+        ({"robots": [PRESET, load_robot("aoi2022-planar")]}, "twin"),
         ({"robots": load_robot("aoi2022-planar")}, "twin"),
         ({"robots": PRESET.set_from_text(["twin.hip_height=13 cm"])}, "twin.hip_height"),
         ({"initial": np.zeros(16)}, "initial"),
         ({"initial": np.zeros((0, 38))}, "initial"),
         ({"initial": np.full(38, np.nan)}, "initial"),
-        ({"initial": np.zeros((3, 38)), "target": np.zeros((2, 2))}, "robots, initial, friction, target"),
-        ({"robots": [PRESET, PRESET], "scan_seeds": [1, 2, 3]}, "robots, initial, friction, target"),
+        ({"initial": np.zeros((3, 38)), "target": np.zeros((2, 2))}, "target"),
+        ({"robots": [PRESET, PRESET], "seeds": [1, 2, 3]}, "robots"),
         ({"friction": np.zeros((6, 2))}, "friction"),
         ({"friction": np.ones((5, 2))}, "friction"),
         ({"target": 1.0}, "target"),
         ({"target": (np.inf, 0.0)}, "target"),
-        ({"scan_seeds": []}, "scan_seeds"),
-        ({"scan_seeds": [-1]}, "scan_seeds"),
+        ({"seeds": []}, "seeds"),
+        ({"seeds": [-1]}, "seeds"),
     ],
 )
 def test_bad_arguments_are_named(arguments, field):

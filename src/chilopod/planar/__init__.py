@@ -1,8 +1,22 @@
-"""The paper's planar model: compiled equations of motion, linearisation, flow and its derivative."""
+"""The paper's planar model: compiled equations of motion, linearisation, flow and its derivative; an engine."""
 
 from chilopod.planar.drift import Drift
 from chilopod.planar.energy import Powers, energy, powers
 from chilopod.planar.model import PlanarModel
-from chilopod.planar.simulate import initial_states, simulate
+from chilopod.planar.simulate import simulate
+from chilopod.planar.walk import PlanarWalk, common, initial_states, resume, start, traits
 
-__all__ = ["Drift", "PlanarModel", "Powers", "energy", "initial_states", "powers", "simulate"]
+__all__ = [
+    "Drift",
+    "PlanarModel",
+    "PlanarWalk",
+    "Powers",
+    "common",
+    "energy",
+    "initial_states",
+    "powers",
+    "resume",
+    "simulate",
+    "start",
+    "traits",
+]

@@ -19,6 +19,9 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+from numba.extending import overload
+
 from chilopod.compiled import fused_njit
 from chilopod.dual import cos_sin, reciprocal
 from chilopod.planar.contact import C_EX, C_EY, C_PD, C_PP, C_PXE, C_SUM, C_X, C_Y
@@ -28,6 +31,38 @@ LENGTH, MASS, INERTIA, SPEED = range(4)
 
 SCRATCH = 10
 """Numbers per module that the right-hand side keeps."""
+
+
+ORIGIN, LEVEL, SLOPE, BEHIND, DECAY, TORQUE = range(6)
+"""Columns that describe a spring that changes, and what drives its joint beside it."""
+
+
+def _spring_torque(springs: Any, joint: int, angle: Any, t: Any) -> Any:
+    """What a spring, and a motor beside it, turn the rear module with at an angle (rad) and time t, N*m.
+
+    ``springs`` is the stiffness of each, shape (N-1,); or, where they change, a description of shape (N-1, 6): TORQUE,
+    and k = LEVEL + SLOPE s + BEHIND e^(-DECAY s), where s = t - ORIGIN.
+    """
+    raise NotImplementedError
+
+
+@overload(_spring_torque, inline="always")
+def _spring_torque_of(springs: Any, joint: int, angle: Any, t: Any) -> Any:
+    if springs.ndim == 1:
+
+        def constant(springs: Any, joint: int, angle: Any, t: Any) -> Any:
+            return -springs[joint] * angle
+
+        return constant
+
+    def changing(springs: Any, joint: int, angle: Any, t: Any) -> Any:
+        since = t - springs[joint, ORIGIN]
+        stiffness = springs[joint, LEVEL] + springs[joint, SLOPE] * since
+        if springs[joint, BEHIND] != 0.0:
+            stiffness += springs[joint, BEHIND] * np.exp(-springs[joint, DECAY] * since)
+        return springs[joint, TORQUE] - stiffness * angle
+
+    return changing
 
 
 @fused_njit
@@ -41,12 +76,13 @@ def rhs(t: float, x: Any, args: Any, out: Any) -> None:
     x
         Reduced state, shape (2N+1,), real or complex; or with the pose behind it, shape (2N+4,).
     args
-        ``(scalars, stiffness, damping, moments, scratch)``: scalars (4,); N*m/rad and N*m*s/rad, shape (N-1,);
-        contact moments at t = 0, shape (N, 8); scratch (N, SCRATCH), the dtype of ``x``.
+        ``(scalars, springs, damping, moments, scratch)``: scalars (4,); stiffness of the springs, N*m/rad, shape
+        (N-1,), or a description of springs that change, see :func:`_spring_torque`; N*m*s/rad, shape (N-1,); contact
+        moments at t = 0, shape (N, 8); scratch (N, SCRATCH), the dtype of ``x``.
     out
         The shape of ``x``.
     """
-    scalars, stiffness, damping, moments, work = args
+    scalars, springs, damping, moments, work = args
     n = moments.shape[0]
     half = 0.5 * scalars[LENGTH]
     m = scalars[MASS]
@@ -139,7 +175,7 @@ def rhs(t: float, x: Any, args: Any, out: Any) -> None:
         work[i, 8] = bt
         if i > 0:
             # Torque of spring and damper on this module; minus that on the module in front.
-            torque = -stiffness[i - 1] * x[2 + i] - damping[i - 1] * x[n + 1 + i]
+            torque = _spring_torque(springs, i - 1, x[2 + i], t) - damping[i - 1] * x[n + 1 + i]
             work[i, 9] = torque
             torque_behind = torque
             inverse = reciprocal(j)

@@ -9,7 +9,6 @@ text of the robot file.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -113,7 +112,7 @@ def body_frames(record: xr.Dataset, times: ArrayLike | None = None) -> BodyFrame
 def _robot(record: xr.Dataset) -> Robot:
     if "robot" not in record.attrs:
         raise ParameterError("has no robot", field="record", allowed="the text of a robot file in attrs['robot']")
-    robot = Robot(**tomllib.loads(record.attrs["robot"]))
+    robot = Robot.from_toml(record.attrs["robot"])
     if record.sizes["joint"] != robot.body.modules - 1:
         raise ParameterError(
             f"has {record.sizes['joint']} joints",

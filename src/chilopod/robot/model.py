@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final, Self
@@ -14,7 +15,7 @@ from chilopod.ground import Ground
 from chilopod.robot.files import Table, read_table, to_toml
 from chilopod.robot.parameters import QUANTITIES, Place, place_of, spring_index
 from chilopod.robot.parts import MODULES, Body, Legs, Springs, Twin, spread
-from chilopod.units import Description, format, quantities
+from chilopod.units import Description, Flag, quantities
 
 _OVERRIDDEN: Final = "set by override"
 
@@ -107,6 +108,11 @@ class Robot(Description):
         except RecursionError:
             raise RobotFileError("is nested too deeply", source=source) from None
 
+    @classmethod
+    def from_toml(cls, text: str) -> Self:
+        """The robot that :meth:`to_toml` wrote."""
+        return cls(**tomllib.loads(text))
+
     @model_validator(mode="before")
     @classmethod
     def _spread_springs(cls, data: Any) -> Any:
@@ -119,19 +125,16 @@ class Robot(Description):
             modules = body.modules if isinstance(body, Body) else MODULES.read(body.get("modules"))
         except ChilopodError:
             return data  # the field itself reports it
-        return {
-            **data,
-            "springs": spread(spread(springs, "stiffness", int(modules) - 1), "damping", int(modules) - 1),
-        }
+        return {**data, "springs": spread(springs, quantities(Springs), int(modules) - 1)}
 
     @model_validator(mode="after")
     def _counts_agree(self) -> Self:
         joints = self.body.modules - 1
-        for key in ("stiffness", "damping"):
-            count = len(getattr(self.springs, key))
-            if count != joints:
+        for key in quantities(Springs):
+            values = getattr(self.springs, key)
+            if values is not None and len(values) != joints:
                 raise ParameterError(
-                    f"has {count} values",
+                    f"has {len(values)} values",
                     field=f"springs.{key}",
                     allowed=f"{joints}, one fewer than body.modules, or a single value for all",
                 )
@@ -164,7 +167,10 @@ class Robot(Description):
         """Return the path of every number of this robot, springs one by one."""
         paths: list[str] = []
         for path, quantity in QUANTITIES.items():
-            if self.twin is None and path.startswith("twin."):
+            section, key = path.split(".")
+            if quantity.optional and quantity.each and getattr(getattr(self, section), key) is None:
+                continue
+            if self.twin is None and section == "twin":
                 continue
             count = self.body.modules - 1
             paths += [f"{path}[{index}]" for index in range(count)] if quantity.each else [path]
@@ -188,6 +194,8 @@ class Robot(Description):
         if path == "body.yaw_inertia":
             return self.module_yaw_inertia
         value = getattr(getattr(self, place.section), place.key)
+        if value is None:
+            raise ParameterError("this robot has none", field=path)
         if not place.quantity.each:
             return float(value)
         if place.index is None and any(item != value[0] for item in value):
@@ -272,15 +280,13 @@ class Robot(Description):
             value = getattr(getattr(self, section), key, None)
             if value is None:
                 continue
-            if quantity.integer:
-                text: Any = value
-            elif path == "springs.damping" and len(set(value)) == 1:
-                text = format(value[0], quantity.display)
-            elif quantity.each:
-                text = [format(item, quantity.display) for item in value]
+            if not quantity.each:
+                written = quantity.write(value)
+            elif path != "springs.stiffness" and len(set(value)) == 1:
+                written = quantity.write(value[0])
             else:
-                text = format(value, quantity.display)
-            table.setdefault(section, {})[key] = text
+                written = [quantity.write(item) for item in value]
+            table.setdefault(section, {})[key] = written
         if self.provenance:
             table["provenance"] = self.provenance
         return to_toml(table)
@@ -299,12 +305,16 @@ class Robot(Description):
         old = getattr(section, place.key)
         new: Any = value
         if place.quantity.each:
+            if old is None:
+                if place.index is not None and not isinstance(place.quantity, Flag):
+                    raise ParameterError("this robot has none", allowed=f"{path.partition('[')[0]} for all of them")
+                old = (False,) * (self.body.modules - 1)
             new = tuple(value if place.index in (None, index) else item for index, item in enumerate(old))
         if new == old:
             return self
         changed = section.model_copy(update={place.key: new})
-        if place.section == "twin":
-            changed = Twin(**dict(changed))
+        if place.section == "twin" or place.key in ("softest", "stiffest"):
+            changed = type(changed)(**dict(changed))
         changes: dict[str, Any] = {place.section: changed}
         # What was said of single springs no longer holds when all are set, nor when their joints are gone.
         joints = 0 if place.quantity.each and place.index is None else self.body.modules - 1
@@ -323,5 +333,5 @@ def load_robot(robot: str | Path) -> Robot:
     return Robot.load(robot)
 
 
-def _resized(values: tuple[float, ...], count: int) -> tuple[float, ...]:
-    return (values + values[-1:] * count)[:count]
+def _resized(values: tuple[float, ...] | None, count: int) -> tuple[float, ...] | None:
+    return None if values is None else (values + values[-1:] * count)[:count]

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Annotated, Any, Final, Self
 
 from pydantic import model_validator
 
 from chilopod.errors import ParameterError
-from chilopod.units import Description, Quantity
+from chilopod.units import Description, Flag, Quantity, quantities
 from chilopod.units.quantity import is_list
 
 MODULES: Final = Quantity("", "", at_least=2, at_most=1000, integer=True)
+_STIFFNESS: Final = Quantity("N*m/rad", "N*mm/deg", each=True)
 
 
 class Body(Description):
@@ -37,25 +39,52 @@ class Body(Description):
 
 
 class Springs(Description):
-    """Torsional springs and dampers of the yaw joints, front to rear.
+    """Torsional springs and dampers of the yaw joints, front to rear; and actuators that change springs on the way.
+
+    All have one value for each joint; a single one stands for all joints.
 
     Attributes
     ----------
     stiffness
-        (modules-1,) N*m/rad, positive.
+        When the walk begins, (modules-1,) N*m/rad, positive.
     damping
-        (modules-1,) N*m*s/rad, zero or more; a single value stands for all joints.
+        (modules-1,) N*m*s/rad, zero or more.
+    adjustable
+        Whether a spring has an actuator that changes its stiffness, (modules-1,); None: none of them.
+    softest, stiffest
+        Between which its actuator keeps a spring, (modules-1,) N*m/rad; None: no limit.
+    rate
+        At most, of a spring's stiffness, (modules-1,) N*m/rad/s; None: no limit.
+    lag
+        Time constant with which a spring follows its actuator, (modules-1,) s; None: at once.
     """
 
-    stiffness: Annotated[tuple[float, ...], Quantity("N*m/rad", "N*mm/deg", each=True)]
+    stiffness: Annotated[tuple[float, ...], _STIFFNESS]
     damping: Annotated[tuple[float, ...], Quantity("N*m*s/rad", "N*m*s/rad", at_least=0.0, each=True)]
+    adjustable: Annotated[tuple[bool, ...] | None, Flag(each=True, optional=True)] = None
+    softest: Annotated[tuple[float, ...] | None, replace(_STIFFNESS, optional=True)] = None
+    stiffest: Annotated[tuple[float, ...] | None, replace(_STIFFNESS, optional=True)] = None
+    rate: Annotated[tuple[float, ...] | None, Quantity("N*m/rad/s", "N*mm/deg/s", each=True, optional=True)] = None
+    lag: Annotated[tuple[float, ...] | None, Quantity("s", "s", at_least=0.0, each=True, optional=True)] = None
 
     @model_validator(mode="before")
     @classmethod
-    def _spread_damping(cls, data: Any) -> Any:
+    def _spread_to_all(cls, data: Any) -> Any:
         if isinstance(data, Mapping) and is_list(data.get("stiffness")):
-            return spread(data, "damping", len(data["stiffness"]))
+            return spread(data, quantities(cls), len(data["stiffness"]))
         return data
+
+    @model_validator(mode="after")
+    def _range_in_order(self) -> Self:
+        if self.softest is not None and self.stiffest is not None:
+            for joint, (low, high) in enumerate(zip(self.softest, self.stiffest, strict=False)):
+                if low > high:
+                    raise ParameterError(
+                        f"of joint {joint + 1}, softest is above stiffest",
+                        value=f"{low:g} N*m/rad",
+                        allowed=f"at most {high:g} N*m/rad",
+                    )
+        return self
 
 
 class Legs(Description):
@@ -157,8 +186,8 @@ class Twin(Description):
         return self
 
 
-def spread(table: Mapping[str, Any], key: str, count: int) -> Mapping[str, Any]:
-    """Return `table` with a single value under `key` repeated `count` times."""
-    if key not in table or is_list(table[key]) or isinstance(table[key], Mapping):
-        return table
-    return {**table, key: [table[key]] * count}
+def spread(table: Mapping[str, Any], keys: Iterable[str], count: int) -> Mapping[str, Any]:
+    """Return `table` with a single value under any of `keys` repeated `count` times."""
+    given = {key: table[key] for key in keys if table.get(key) is not None}
+    single = {key: value for key, value in given.items() if not (is_list(value) or isinstance(value, Mapping))}
+    return {**table, **{key: [value] * count for key, value in single.items()}}

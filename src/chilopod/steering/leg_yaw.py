@@ -62,4 +62,4 @@ class LegYawController:
         change = np.clip(seen.bearing - yaw[:, side], -self.step, self.step)
         wanted = np.clip(yaw[:, side] + change, -self.limit, self.limit)
         yaw[:, side] = np.where(np.isnan(wanted), yaw[:, side], wanted)
-        return Command(yaw, event.window)
+        return Command(leg_yaw=yaw, within=event.window)

@@ -36,7 +36,7 @@ from chilopod.studies.square_root import square_root_fit
 from chilopod.studies.trials import Trial, run
 from chilopod.studies.twin_constants import FREE, with_constants
 from chilopod.twin import initial_states, simulate
-from chilopod.twin.simulate import TOLERANCE
+from chilopod.twin.walk import TOLERANCE
 
 Array = NDArray[np.float64]
 

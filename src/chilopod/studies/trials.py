@@ -226,7 +226,7 @@ def _batches(trials: Sequence[tuple[str, Trial]]) -> list[list[tuple[str, Trial]
 def _walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
     """Records of trials that can walk together."""
     first = trials[0]
-    asked = event_times(first.controller, first.robot.gait, first.duration) if first.controller else []
+    asked = list(event_times(first.controller, first.robot.gait, first.duration)) if first.controller else []
     drawn = [_drawn(trial, len(asked)) for trial in trials]
     target = None if first.target is None else np.stack([t.target.position for t in trials if t.target])
     given: dict[str, Any] = {
@@ -246,7 +246,7 @@ def _walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
         data = twin.simulate(
             **given,
             initial=twin.initial_states(first.robot, angles, heading),
-            scan_seeds=[each.scan_seed for each in drawn] if noisy else None,
+            seeds=[each.scan_seed for each in drawn] if noisy else None,
             poses=first.poses,
         )
     else:

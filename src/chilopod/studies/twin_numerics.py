@@ -11,7 +11,7 @@ from chilopod.studies.floquet import Progress, silent
 from chilopod.studies.identify_twin import base_series
 from chilopod.studies.robot_rows import CHECKED, RobotRow
 from chilopod.studies.square_root import square_root_fit
-from chilopod.twin.simulate import TOLERANCE
+from chilopod.twin.walk import TOLERANCE
 
 SPRINGS = (15.0, 17.0, 21.0, 26.0, 28.0)
 """k1 of the walks, N*mm/deg."""

@@ -7,7 +7,19 @@ gl.import_mujoco()
 
 from chilopod.twin.creep import Creep, foot_creep  # noqa: E402
 from chilopod.twin.model import TwinModel  # noqa: E402
-from chilopod.twin.plan import initial_states  # noqa: E402
 from chilopod.twin.simulate import simulate  # noqa: E402
+from chilopod.twin.start import common, initial_states, resume, start, traits  # noqa: E402
+from chilopod.twin.walk import TwinWalk  # noqa: E402
 
-__all__ = ["Creep", "TwinModel", "foot_creep", "initial_states", "simulate"]
+__all__ = [
+    "Creep",
+    "TwinModel",
+    "TwinWalk",
+    "common",
+    "foot_creep",
+    "initial_states",
+    "resume",
+    "simulate",
+    "start",
+    "traits",
+]

@@ -4,8 +4,9 @@ Modules are boxes in a row, joined by passive yaw joints with springs. Every leg
 module 1 a yaw joint above them; every leg joint has a position servo. Only round feet touch the floor. The frame of a
 module is at its centre, at the height of the hips.
 
-Every constant has one owner: springs and their damping the yaw joints, servo gains the actuators, friction and contact
-settings the feet (their priority is above the floor's), ``impratio`` the options.
+Every constant has one owner: springs and their damping the yaw joints (what changes springs, actuators beside them),
+servo gains the actuators, friction and contact settings the feet (their priority is above the floor's), ``impratio``
+the options.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import ParameterError
-from chilopod.robot import Robot, Twin
+from chilopod.robot import Robot, Springs, Twin
 from chilopod.twin.legs import check_reach, servo_targets, twin_of
 
 Array = NDArray[np.float64]
@@ -63,6 +64,8 @@ class TwinModel:
         Of their servos in ``ctrl``, (N, 2, 2).
     leg_yaw_positions, leg_yaw_controls
         Of the leg yaw joints of module 1, (2,).
+    spring_controls
+        Of the actuators that change the springs, (N-1,): N*m/rad above the spring's own stiffness; empty if none does.
 
     Raises
     ------
@@ -92,6 +95,8 @@ class TwinModel:
         self.leg_positions, self.leg_yaw_positions = at[legs], at[leg_yaw]
         self.leg_controls = np.vectorize(servo_of.__getitem__)(legs)
         self.leg_yaw_controls = np.array([servo_of[i] for i in leg_yaw])
+        names = [f"spring{i}" for i in range(1, count)] if _adjustable(robot) else []
+        self.spring_controls = np.array([self.model.actuator(name).id for name in names], dtype=np.intp)
         self.feet = np.array([[int(self.model.geom(f"{leg}_foot").id) for leg in _legs(i)] for i in range(count)])
 
     @property
@@ -151,6 +156,8 @@ def build(robot: Robot, forces: bool = False) -> mujoco.MjSpec:
                 stiffness=[robot.springs.stiffness[i - 1], 0.0, 0.0],
                 damping=[robot.springs.damping[i - 1], 0.0, 0.0],
             )
+            if _adjustable(robot):
+                _add_spring_actuator(spec, i)
         _add_box(body, robot, twin)
         for side, leg in enumerate(_legs(i)):
             _add_leg(spec, body, leg, robot, twin, side, steered=i == 0)
@@ -176,7 +183,8 @@ def compiled(robot: Robot, forces: bool = False) -> TwinModel:
 def without_springs(robot: Robot) -> Robot:
     """The robot as far as the model is concerned that a batch shares."""
     joints = robot.body.modules - 1
-    same = robot.springs.model_copy(update={"stiffness": (1.0,) * joints, "damping": (0.0,) * joints})
+    adjustable = (True,) * joints if _adjustable(robot) else None
+    same = Springs(stiffness=(1.0,) * joints, damping=(0.0,) * joints, adjustable=adjustable)
     return robot.model_copy(update={"name": "robot", "springs": same, "provenance": type(robot.provenance)()})
 
 
@@ -293,6 +301,22 @@ def _add_servo(spec: mujoco.MjSpec, body: mujoco.MjsBody, name: str, axis: list[
         biastype=mujoco.mjtBias.mjBIAS_AFFINE,
         gainprm=[twin.servo_stiffness] + [0.0] * 9,
         biasprm=[0.0, -twin.servo_stiffness, -twin.servo_damping] + [0.0] * 7,
+    )
+
+
+def _adjustable(robot: Robot) -> bool:
+    return any(robot.springs.adjustable or ())
+
+
+def _add_spring_actuator(spec: mujoco.MjSpec, joint: int) -> None:
+    """What stiffens a spring: torque = -control * angle, so that the control adds to the joint's own stiffness."""
+    spec.add_actuator(
+        name=f"spring{joint}",
+        target=f"yaw{joint}",
+        trntype=mujoco.mjtTrn.mjTRN_JOINT,
+        gaintype=mujoco.mjtGain.mjGAIN_AFFINE,
+        biastype=mujoco.mjtBias.mjBIAS_NONE,
+        gainprm=[0.0, -1.0] + [0.0] * 8,
     )
 
 

@@ -6,6 +6,8 @@ else is as high as the scanner. Distances are rounded to the scanner's resolutio
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
@@ -15,6 +17,7 @@ from chilopod.twin.model import POLE_GROUP, scanner_place
 
 Array = NDArray[np.float64]
 
+_SAME_INSTANT = 1e-9  # scans
 _GROUPS = np.array([group == POLE_GROUP for group in range(6)], dtype=np.uint8)
 
 
@@ -24,15 +27,79 @@ def beams(twin: Twin) -> Array:
     return np.arange(-half, half + 1, dtype=np.float64) * twin.scanner_step
 
 
-def scan(twin: Twin, batch: Batch, ids: NDArray[np.intp], noise: Array | None = None) -> Array:
-    """One scan of every robot.
+class Scanner:
+    """The scanners of a batch of robots: a scan every so often, looked at when it is asked for.
+
+    Parameters
+    ----------
+    twin
+        Whose scanner it is.
+    batch
+        The robots, where they start.
+    seeds
+        Of its noise, one a robot; None for none.
+    """
+
+    def __init__(self, twin: Twin, batch: Batch, seeds: Sequence[int] | None) -> None:
+        self._twin, self._batch, self._seeds = twin, batch, seeds
+        self._every = twin.scanner_period / twin.control_interval
+        self._number, self._poses = 0, batch.bind("qpos")[:, :7].copy()
+        self._looked = -1
+        self._seen = np.empty((2, len(self._poses)))
+
+    def passed(self, before: int, now: int, poses: Array, ids: NDArray[np.intp]) -> None:
+        """Take note of where robots were, for the last scan up to now.
+
+        Parameters
+        ----------
+        before, now
+            Control intervals gone by since the start.
+        poses
+            Of module 1 at the end of every interval from ``before`` on: place and quaternion, shape
+            (len(ids), intervals, 7).
+        ids
+            Which robots.
+        """
+        number = int(now / self._every + _SAME_INSTANT)
+        tick = round(number * self._every)
+        if tick > before:
+            self._poses[ids] = poses[:, tick - before - 1]
+            self._number = number
+
+    def look(self, ids: NDArray[np.intp]) -> Array:
+        """Bearing (rad) and distance (m) of the target in the last scan of some robots, shape (2, len(ids))."""
+        if self._number != self._looked:
+            noise = None
+            if self._seeds is not None:
+                size = len(beams(self._twin))
+                seeds = [self._seeds[i] for i in ids]
+                noise = np.stack([np.random.default_rng([s, self._number]).standard_normal(size) for s in seeds])
+            scans = scan(self._twin, self._batch, self._poses, ids, noise)
+            self._seen = np.full((2, len(self._poses)), np.nan)
+            self._seen[:, ids] = np.transpose([detect(self._twin, each) for each in scans])
+            self._looked = self._number
+        return self._seen[:, ids]
+
+    def state(self) -> dict[str, Array]:
+        """All there is to it, for :meth:`restore`."""
+        return {"number": np.array(self._number), "poses": self._poses}
+
+    def restore(self, state: dict[str, Array]) -> None:
+        """Become as another was, of the same robots."""
+        self._number, self._poses, self._looked = int(state["number"]), state["poses"], -1
+
+
+def scan(twin: Twin, batch: Batch, poses: Array, ids: NDArray[np.intp], noise: Array | None = None) -> Array:
+    """One scan of some robots.
 
     Parameters
     ----------
     twin
         The scanner.
     batch
-        The robots.
+        The robots and their targets.
+    poses
+        Of module 1 of all robots at the time of the scan: place and quaternion, shape (robots, 7).
     ids
         Which of them.
     noise
@@ -44,7 +111,7 @@ def scan(twin: Twin, batch: Batch, ids: NDArray[np.intp], noise: Array | None = 
     """
     angles = beams(twin)
     local = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=-1)
-    pose = batch.bind("qpos")[ids, :7]
+    pose = poses[ids]
     turn = rotation(pose[:, 3:])
     start = pose[:, :3] + turn @ scanner_place(twin)
     away = local @ np.swapaxes(turn, 1, 2)

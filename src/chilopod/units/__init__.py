@@ -8,6 +8,6 @@
 """
 
 from chilopod.units.expressions import Unit, format, from_si, parse, unit
-from chilopod.units.quantity import Description, Quantity, quantities
+from chilopod.units.quantity import Description, Flag, Quantity, quantities
 
-__all__ = ["Description", "Quantity", "Unit", "format", "from_si", "parse", "quantities", "unit"]
+__all__ = ["Description", "Flag", "Quantity", "Unit", "format", "from_si", "parse", "quantities", "unit"]

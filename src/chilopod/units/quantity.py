@@ -95,9 +95,37 @@ class Quantity:
                 raise
         return tuple(values)
 
+    def write(self, value: float) -> Any:
+        """What stands for one value in a robot file: text with its unit, or a whole number."""
+        return value if self.integer else format(value, self.display)
+
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Let pydantic read the field by `read_field` alone."""
         return core_schema.no_info_plain_validator_function(self.read_field)
+
+
+@dataclass(frozen=True, slots=True)
+class Flag(Quantity):
+    """A field, or each value of one, that is either true or false."""
+
+    si: str = ""
+    display: str = ""
+    at_least: float = 0.0
+    at_most: float = 1.0
+    integer: bool = True
+
+    def check(self, value: float, given: object = None) -> bool:
+        """Return whether `value` is 1; a ParameterError if it is neither that nor 0."""
+        if value not in (0, 1):
+            raise ParameterError("is neither true nor false", value=value if given is None else given)
+        return bool(value)
+
+    def read(self, value: object) -> bool:
+        """Read true or false, as such or as text."""
+        text = str(value).strip().lower()
+        if text not in ("true", "false"):
+            raise ParameterError("is neither true nor false", value=value, allowed="true or false")
+        return text == "true"
 
 
 class Description(BaseModel):

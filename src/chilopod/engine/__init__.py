@@ -1,0 +1,40 @@
+"""The contract between what walks and what steers: engines, walks that go on step by step, controllers.
+
+``contract`` says what everybody may rely on, ``actuators`` does what a command asks for within the robot's limits,
+``loop`` lets a controller steer a walk, ``named`` finds engines and controllers by name, ``check`` tries an engine's
+promises.
+"""
+
+from chilopod.engine.actuators import Actuators, Ramps
+from chilopod.engine.contract import (
+    Array,
+    Command,
+    Controller,
+    Engine,
+    Event,
+    Observation,
+    Status,
+    Traits,
+    Walk,
+)
+from chilopod.engine.loop import event_times, steer
+from chilopod.engine.named import ENGINES, controller_named, engine_named
+
+__all__ = [
+    "ENGINES",
+    "Actuators",
+    "Array",
+    "Command",
+    "Controller",
+    "Engine",
+    "Event",
+    "Observation",
+    "Ramps",
+    "Status",
+    "Traits",
+    "Walk",
+    "controller_named",
+    "engine_named",
+    "event_times",
+    "steer",
+]

@@ -1,0 +1,298 @@
+"""What an engine is: it starts walks that go on step by step, see, and obey.
+
+A controller knows neither the engine nor the robot's place on the floor: at instants of the gait it sees what the
+robot's sensors give, and answers with a command. Everything comes as arrays with the robots of a batch in front, so one
+object steers one robot or ten thousand, a model or a machine.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chilopod.gait import Gait
+from chilopod.record import Recording
+from chilopod.robot import Robot
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = NDArray[np.float64]
+
+
+class Status(enum.Enum):
+    """How a walk ended; each member's ``sentence`` says it in words."""
+
+    WALKED = "walked", "walked to the end"
+    DIVERGED = "diverged", "the motion became too fast to follow or infinite"
+    OUT_OF_RANGE = "out of range", "a yaw joint bent by more than a right angle, where modules run into each other"
+    FALLEN = "fallen", "module 1 tipped over"
+
+    def __init__(self, label: str, sentence: str) -> None:
+        self.label = label
+        self.sentence = sentence
+
+
+@dataclass(frozen=True)
+class Event:
+    """An instant of every gait cycle at which a controller is asked.
+
+    Attributes
+    ----------
+    name
+        For the controller to know it by.
+    phase
+        Time since the start of the cycle over its period, in [0, 1).
+    window
+        Time there is to act, s.
+    """
+
+    name: str
+    phase: float
+    window: float
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What the robots of a batch see at an instant; the arrays are the controller's to keep.
+
+    Attributes
+    ----------
+    time
+        s.
+    bearing
+        Direction of the target relative to the heading of module 1, left positive, rad in [-pi, pi); NaN where it is
+        not seen. Shape (robots,).
+    distance
+        Of the target from the centre of module 1, m; NaN where it is not seen. Shape (robots,).
+    joint_angles
+        Of the yaw joints, rad, shape (robots, N-1); NaN for a robot that no longer walks.
+    leg_yaw
+        Angles last commanded for the left and right leg of module 1, rad, shape (robots, 2).
+    stiffness
+        That the springs of the yaw joints have at this moment, N*m/rad, shape (robots, N-1).
+    """
+
+    time: float
+    bearing: Array
+    distance: Array
+    joint_angles: Array
+    leg_yaw: Array
+    stiffness: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Command:
+    """What is wanted of the actuators; what is None goes on as it is. One row for all robots, or one a robot.
+
+    What the robot's actuators allow (``[springs]`` of its file) is seen to by :class:`chilopod.engine.Actuators`.
+
+    Attributes
+    ----------
+    leg_yaw
+        Angles for the left and right leg of module 1, left positive, rad, at most a right angle, shape (robots, 2).
+    stiffness
+        Of the springs of the yaw joints, N*m/rad, positive, shape (robots, N-1). A spring that is not adjustable must
+        be given the stiffness it has.
+    joint_torque
+        That drives the yaw joints beside their springs, positive where it turns the rear module to the left, N*m,
+        shape (robots, N-1). Held until another torque is commanded.
+    within
+        Time in which leg yaw and stiffness are to be reached, at constant rate, s; 0 for at once.
+    """
+
+    leg_yaw: ArrayLike | None = None
+    stiffness: ArrayLike | None = None
+    joint_torque: ArrayLike | None = None
+    within: float = 0.0
+
+
+class Controller(Protocol):
+    """Anything that steers: asked at its events, in order of time.
+
+    For trials it must be a frozen dataclass, whose class and fields then are part of what the trial is.
+    """
+
+    def events(self, gait: Gait) -> Sequence[Event]:
+        """Instants of the cycle at which :meth:`act` is to be called."""
+
+    def act(self, event: Event, seen: Observation) -> Command:
+        """What to do, given what is seen."""
+
+
+@runtime_checkable
+class Walk(Protocol):
+    """Robots under way, each alone, all at the same time.
+
+    The same bits come out whether a minute is one :meth:`advance` or a thousand, however often is looked, alone or in a
+    batch, with any number of threads, and after :meth:`save` and ``resume``. Only commands change a walk.
+    """
+
+    @property
+    def robots(self) -> tuple[Robot, ...]:
+        """One a walk."""
+
+    @property
+    def time(self) -> float:
+        """That it has been advanced to, s; the gait is at phase 0 at time 0."""
+
+    @property
+    def status(self) -> tuple[Status, ...]:
+        """One a robot: ``WALKED`` while nothing has gone wrong."""
+
+    def observe(self) -> Observation:
+        """What the robots see now."""
+
+    def command(self, command: Command) -> None:
+        """Tell the actuators, from now on.
+
+        Raises
+        ------
+        ParameterError
+            If the command is none: wrong shape, NaN, a spring that cannot be adjusted. The walk is as before.
+        """
+
+    def advance(self, until: float) -> None:
+        """Walk on to a time, s. Robots that fail stop there, with a status; the others go on.
+
+        Raises
+        ------
+        ParameterError
+            If that time has passed, or is not finite.
+        """
+
+    def save(self) -> bytes:
+        """Everything that it takes to go on, the record so far included."""
+
+    def to_dataset(self) -> xr.Dataset:
+        """The record so far, see :func:`chilopod.record.walk_record`; robots are NaN from where they failed."""
+
+
+@dataclass(frozen=True)
+class Traits:
+    """What one needs to know of an engine before it walks.
+
+    Attributes
+    ----------
+    name
+        As it is typed and recorded.
+    sentence
+        What it is.
+    exact
+        Whether its walks are those of the planar theory (:mod:`chilopod.analysis`), so that branches hold for them.
+    noisy
+        Whether its sensors have noise of their own, drawn from ``seeds``.
+    poses
+        Whether it can record the positions of all joints, to be drawn.
+    a_core
+        Robots that one core should walk at a time: a few seconds' work.
+    a_round
+        Walks that a search may spend on one round of trials.
+    haste
+        How many times as long as at the speed of the straight walk without slip a task should be given.
+    version
+        Of whatever else than chilopod decides what its records hold; empty for nothing.
+    """
+
+    name: str
+    sentence: str
+    exact: bool = False
+    noisy: bool = False
+    poses: bool = False
+    a_core: int = 1
+    a_round: int = 8
+    haste: float = 2.0
+    version: str = ""
+
+
+class Engine(Protocol):
+    """Something that starts walks: a module such as :mod:`chilopod.planar`, or an object."""
+
+    @property
+    def traits(self) -> Traits:
+        """What it is like."""
+
+    def common(self, robot: Robot) -> Hashable:
+        """What robots must have in common to walk in one batch.
+
+        Raises
+        ------
+        ParameterError
+            If the engine cannot walk such a robot at all.
+        """
+
+    def initial_states(
+        self,
+        robot: Robot,
+        joint_angles: ArrayLike = 0.0,
+        heading: ArrayLike = 0.0,
+        position: ArrayLike = (0.0, 0.0),
+    ) -> Array:
+        """States of robots that are about to walk.
+
+        Parameters
+        ----------
+        robot
+            The robot.
+        joint_angles
+            rad, shape (N-1,) or (robots, N-1).
+        heading
+            Of module 1, rad, a number or shape (robots,).
+        position
+            Of its centre, m, shape (2,) or (robots, 2).
+
+        Returns
+        -------
+        For ``initial`` of :meth:`start`, shape (robots, n), with n the engine's affair.
+        """
+
+    def start(
+        self,
+        robots: Robot | Sequence[Robot],
+        *,
+        initial: ArrayLike | None = None,
+        friction: ArrayLike | None = None,
+        target: ArrayLike | None = None,
+        seeds: Sequence[int] | None = None,
+        record: Recording | None = Recording(),  # noqa: B008  (frozen)
+        **options: Any,
+    ) -> Walk:
+        """Put robots on the floor.
+
+        Parameters
+        ----------
+        robots
+            One, or one for every walk, with the same :meth:`common`.
+        initial
+            From :meth:`initial_states`, one row for all or one a walk; by default straight from the origin along x.
+        friction
+            Factor on the friction coefficient of every foot, positive, shape (N, 2) or (walks, N, 2).
+        target
+            Its place on the floor, m, shape (2,) or (walks, 2), for the robots to see.
+        seeds
+            Of the noise of the sensors, one a walk; without them there is none.
+        record
+            What is written down; by default the motion, :data:`chilopod.record.RATE` times a second. None: nothing but
+            commands and statuses.
+        options
+            The engine's own.
+
+        Raises
+        ------
+        ParameterError
+            If an argument has the wrong shape or is out of range, or the robots do not go together.
+        """
+
+    def resume(self, saved: bytes) -> Walk:
+        """A walk that was saved, to the bit.
+
+        Raises
+        ------
+        ParameterError
+            If it was not saved by this engine and version, or is damaged.
+        """

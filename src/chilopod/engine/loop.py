@@ -1,0 +1,115 @@
+"""The loop that lets a controller steer a walk: walk on to its next event, look, ask, command."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.engine.contract import Command, Controller, Event, Observation, Walk
+from chilopod.errors import AnalysisError, ChilopodError, ParameterError
+from chilopod.gait import Gait
+
+Array = NDArray[np.float64]
+_T = TypeVar("_T")
+
+_LOOKS = 10
+"""Times that the progress of a walk without a controller is told."""
+
+
+def event_times(controller: Controller, gait: Gait, duration: float) -> Iterator[tuple[float, Event]]:
+    """All instants in [0, duration) at which a controller is asked, in order, one after the other.
+
+    Raises
+    ------
+    ParameterError, AnalysisError
+        If the controller's events are none.
+    """
+    events = _asked(controller, "events", lambda: list(controller.events(gait)))
+    for event in events:
+        if not isinstance(event, Event):
+            raise ParameterError("is no chilopod.engine.Event", field=_of(controller, "events"), value=event)
+        if not 0.0 <= event.phase < 1.0:
+            raise ParameterError(
+                "is no phase", field=_of(controller, "events"), value=event.phase, allowed="0 to less than 1"
+            )
+    events.sort(key=lambda event: event.phase)
+    for cycle in range(math.ceil(duration / gait.period) if events else 0):
+        for event in events:
+            time = (cycle + event.phase) * gait.period
+            if time >= duration:
+                return
+            yield time, event
+
+
+def steer(
+    walk: Walk,
+    until: float,
+    controller: Controller | None = None,
+    *,
+    bearing_noise: Array | None = None,
+    progress: Callable[[float, str], None] = lambda done, words: None,
+) -> None:
+    """Walk on to a time, commanded by a controller at its events.
+
+    Parameters
+    ----------
+    walk
+        Changed in place.
+    until
+        s.
+    controller
+        Without one the robots walk on as they were told.
+    bearing_noise
+        What is added to the bearing that the controller sees at its events, rad, shape (walks, at least as many as
+        events); the last axis is the order of events from the start of the walk.
+    progress
+        Called with the part done (0 to 1) and a few words.
+
+    Raises
+    ------
+    ParameterError
+        If the controller's events or commands are none, naming it.
+    AnalysisError
+        If the controller raises, with its exception as the cause.
+    """
+    gait, begun = walk.robots[0].gait, walk.time
+    for index, (time, event) in enumerate(event_times(controller, gait, until) if controller else ()):
+        if time < begun:
+            continue
+        walk.advance(time)
+        seen = walk.observe()
+        if bearing_noise is not None:
+            seen = replace(seen, bearing=(seen.bearing + bearing_noise[:, index] + np.pi) % (2.0 * np.pi) - np.pi)
+        assert controller is not None
+        command = _answer(controller, event, seen)
+        try:
+            walk.command(command)
+        except ParameterError as error:
+            error.field = _of(controller, error.field or "command")
+            raise
+        progress(time / until, f"{time:.1f} s")
+    for time in np.linspace(walk.time, until, _LOOKS + 1)[1:]:
+        walk.advance(float(time))
+        progress(time / until, f"{time:.1f} s")
+
+
+def _answer(controller: Controller, event: Event, seen: Observation) -> Command:
+    return _asked(controller, "act", lambda: controller.act(event, seen))
+
+
+def _asked(controller: Controller, name: str, ask: Callable[[], _T]) -> _T:
+    try:
+        return ask()
+    except ChilopodError:
+        raise
+    except Exception as error:
+        raise AnalysisError(f"raised {type(error).__name__}: {error}", field=_of(controller, name)) from error
+
+
+def _of(controller: Controller, name: str) -> str:
+    return f"{type(controller).__name__}.{name}"

@@ -1,0 +1,75 @@
+"""A walk that is put aside, as bytes: plain arrays and text in numpy's zip format, with a checksum, no pickles."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import zipfile
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from chilopod.engine.contract import Traits
+from chilopod.errors import ParameterError
+from chilopod.robot import Robot
+
+_MAGIC = b"chilopod walk 1\n"
+_DIGEST = 32  # bytes
+
+
+def pack(traits: Traits, robots: Sequence[Robot], settings: Mapping[str, Any], arrays: Mapping[str, Any]) -> bytes:
+    """The bytes of a walk.
+
+    Parameters
+    ----------
+    traits
+        Of its engine.
+    robots
+        One a walk.
+    settings
+        Plain data: numbers, text, lists and None.
+    arrays
+        By name.
+    """
+    texts = [robot.to_toml() for robot in robots]
+    distinct = list(dict.fromkeys(texts))
+    header = {**_made_by(traits), "robots": distinct, "settings": settings}
+    body = io.BytesIO()
+    which = np.array([distinct.index(text) for text in texts])
+    np.savez(body, header=np.array(json.dumps(header)), which=which, **arrays)
+    content = body.getvalue()
+    return _MAGIC + hashlib.sha256(content).digest() + content
+
+
+def unpack(traits: Traits, saved: bytes) -> tuple[list[Robot], dict[str, Any], dict[str, Any]]:
+    """Robots, settings and arrays of a walk that :func:`pack` made.
+
+    Raises
+    ------
+    ParameterError
+        If it is no such thing, damaged, or another engine's or version's.
+    """
+    content = saved[len(_MAGIC) + _DIGEST :]
+    if saved[: len(_MAGIC)] != _MAGIC:
+        raise ParameterError("is no saved walk", field="saved", allowed="what save() gave")
+    if hashlib.sha256(content).digest() != saved[len(_MAGIC) : len(_MAGIC) + _DIGEST]:
+        raise ParameterError("is damaged", field="saved", allowed="what save() gave, every byte of it")
+    try:
+        with np.load(io.BytesIO(content), allow_pickle=False) as read:
+            arrays: dict[str, Any] = dict(read)
+        header = json.loads(str(arrays.pop("header")))
+        robots = [Robot.from_toml(text) for text in header.pop("robots")]
+        settings = header.pop("settings")
+    except (ValueError, KeyError, OSError, zipfile.BadZipFile) as error:
+        raise ParameterError(f"cannot be read ({error})", field="saved") from None
+    for name, here in _made_by(traits).items():
+        if header.get(name) != here:
+            raise ParameterError(f"was saved with another {name}", field="saved", value=header.get(name), allowed=here)
+    return [robots[i] for i in arrays.pop("which")], settings, arrays
+
+
+def _made_by(traits: Traits) -> dict[str, str]:
+    return {"engine": traits.name, "chilopod": version("chilopod"), "version": traits.version}

@@ -1,0 +1,325 @@
+"""Walks of many robots at a time that go on step by step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from chilopod.engine import Actuators, Command, Observation, Status, Traits
+from chilopod.engine.arguments import check_time, rows_of
+from chilopod.engine.saved import pack, unpack
+from chilopod.errors import ParameterError
+from chilopod.planar import stretch
+from chilopod.planar.model import PlanarModel
+from chilopod.planar.record import foot_forces, planar_record
+from chilopod.planar.timeline import Timeline
+from chilopod.record import Recording, Samples, add_outcome, bearing_and_distance, check_size, in_range
+from chilopod.robot import Robot
+
+Array = NDArray[np.float64]
+
+TOLERANCE = 1e-6
+"""Default of :func:`start`: a minute of walking is then good to better than 1e-6 m."""
+
+traits = Traits(
+    name="planar",
+    sentence="the paper's planar model",
+    exact=True,
+    a_core=16,
+    a_round=48,
+    haste=1.6,
+)
+
+_STATUS = {
+    stretch.WALKING: Status.WALKED,
+    stretch.DIVERGED: Status.DIVERGED,
+    stretch.OUT_OF_RANGE: Status.OUT_OF_RANGE,
+}
+
+
+def common(robot: Robot) -> tuple[Any, ...]:
+    """What robots of a batch share, see :class:`chilopod.engine.Engine`: gait and number of modules."""
+    return robot.gait, robot.body.modules
+
+
+def initial_states(
+    robot: Robot,
+    joint_angles: ArrayLike = 0.0,
+    heading: ArrayLike = 0.0,
+    position: ArrayLike = (0.0, 0.0),
+) -> Array:
+    """States of robots that are about to walk: at the speed of the straight walk, and at rest in their joints.
+
+    Parameters
+    ----------
+    robot
+        Size and gait.
+    joint_angles
+        rad, shape (N-1,) or (robots, N-1).
+    heading
+        Of module 1, rad, a number or shape (robots,).
+    position
+        Of its centre, m, shape (2,) or (robots, 2).
+
+    Returns
+    -------
+    Shape (robots, 2N+4): reduced state (see :mod:`chilopod.planar.dynamics`), then x, y and heading.
+    """
+    n = robot.body.modules
+    angles = np.atleast_2d(np.asarray(joint_angles, dtype=np.float64))
+    angles = np.broadcast_to(angles, (len(angles), n - 1))
+    heading, position = np.atleast_1d(np.asarray(heading, float)), np.atleast_2d(np.asarray(position, float))
+    count = np.broadcast_shapes(angles.shape[:1], heading.shape, position.shape[:1])[0]
+    states = np.zeros((count, 2 * n + 4))
+    states[:, 0] = robot.gait.speed
+    states[:, 3 : n + 2] = angles
+    states[:, 2 * n + 1 : 2 * n + 3] = position
+    states[:, 2 * n + 3] = heading
+    return states
+
+
+def start(
+    robots: Robot | Sequence[Robot],
+    *,
+    initial: ArrayLike | None = None,
+    friction: ArrayLike | None = None,
+    target: ArrayLike | None = None,
+    seeds: Sequence[int] | None = None,
+    record: Recording | None = Recording(),  # noqa: B008  (frozen)
+    tolerance: float = TOLERANCE,
+    expected: float = 0.0,
+) -> PlanarWalk:
+    """Put robots on the plane, see :class:`chilopod.engine.Engine`.
+
+    Parameters
+    ----------
+    robots, friction, target, record
+        As there. Robots share gait and number of modules and may differ in all else.
+    initial
+        States with poses, shape (walks, 2N+4) or (2N+4,), such as :func:`initial_states` gives.
+    seeds
+        Not used: what these robots see has no noise.
+    tolerance
+        Of every step, relative to max(1, |state|).
+    expected
+        How long the walk is likely to be, s; memory for its record is taken at once.
+    """
+    in_range("tolerance", tolerance, 1e-2)
+    given = [robots] if isinstance(robots, Robot) else list(robots)
+    n = given[0].body.modules if given else 2
+    if record is not None and record.poses:
+        raise ParameterError("the planar model has none", field="poses", value=True, allowed="False, or the twin")
+    count, rows = rows_of(
+        given, {"initial": (initial, (2 * n + 4,)), "friction": (friction, (n, 2)), "target": (target, (2,))}, seeds
+    )
+    if any(common(robot) != common(given[0]) for robot in given[1:]):
+        raise ParameterError("must have the same gait and number of modules", field="robots")
+    all_robots = given * count if len(given) == 1 else given
+    states = rows["initial"]
+    return PlanarWalk(
+        all_robots,
+        np.array(np.broadcast_to(initial_states(given[0]) if states is None else states, (count, 2 * n + 4))),
+        np.ones((count, n, 2)) if rows["friction"] is None else rows["friction"],
+        rows["target"],
+        record,
+        tolerance,
+        expected,
+    )
+
+
+def resume(saved: bytes) -> PlanarWalk:
+    """A walk that was saved, see :class:`chilopod.engine.Engine`."""
+    robots, settings, arrays = unpack(traits, saved)
+    walk = PlanarWalk(
+        robots,
+        arrays["states"],
+        arrays["factors"],
+        arrays.get("target"),
+        None if settings["record"] is None else Recording(**settings["record"]),
+        settings["tolerance"],
+    )
+    walk.restore(settings, arrays)
+    return walk
+
+
+class PlanarWalk:
+    """Robots under way on the plane, see :class:`chilopod.engine.Walk`; :func:`start` makes one.
+
+    A leg's yaw moves at once here and matters only while its foot stands.
+    """
+
+    def __init__(
+        self,
+        robots: Sequence[Robot],
+        states: Array,
+        factors: Array,
+        target: Array | None,
+        record: Recording | None,
+        tolerance: float,
+        expected: float = 0.0,
+    ) -> None:
+        self._robots = tuple(robots)
+        distinct: dict[int, PlanarModel] = {}
+        self._models = [distinct.setdefault(id(robot), PlanarModel(robot)) for robot in robots]
+        self._modules = self._models[0].modules
+        self._record, self._tolerance, self._target, self._factors = record, tolerance, target, factors
+        own = np.array([robot.ground.friction for robot in robots])
+        self._friction = own[:, None, None] * factors
+        schedule = self._models[0].schedule
+        self._feet = (schedule.contact, schedule.stroke)
+        self._bodies = (
+            np.concatenate([model.scalars for model in self._models]),
+            np.array([(robot.legs.forward_offset, robot.legs.half_width) for robot in robots]),
+        )
+        self._stiffness = np.array([robot.springs.stiffness for robot in robots])
+        self._damping = np.array([robot.springs.damping for robot in robots])
+        self._actuators = Actuators(robots, keep=record is not None)
+        self._timeline = Timeline(schedule, record.rate if record else 0.0)
+        self._time = 0.0
+        self._states, self._step = states, np.zeros(len(robots))
+        self._status = np.full(len(robots), stretch.WALKING)
+        self._here: tuple[Array, Array, NDArray[np.intp]] | None = None
+        check_size(record, expected, states.size)
+        rows = int(expected * record.rate) + 2 if record else 0
+        self._samples = Samples(states.shape, rows)
+        if record:
+            self._samples.grown(1)[0] = states
+
+    @property
+    def robots(self) -> tuple[Robot, ...]:
+        """One a walk."""
+        return self._robots
+
+    @property
+    def time(self) -> float:
+        """s."""
+        return self._time
+
+    @property
+    def status(self) -> tuple[Status, ...]:
+        """One a robot, as of the last switch or sample."""
+        return tuple(_STATUS[int(each)] for each in self._status)
+
+    def observe(self) -> Observation:
+        """See :class:`chilopod.engine.Walk`; a target is seen wherever it is."""
+        states, _, status = self._now()
+        n, gone = self._modules, status != stretch.WALKING
+        if self._target is None:
+            bearing = distance = np.full(len(states), np.nan)
+        else:
+            place, heading = states[:, 2 * n + 1 : 2 * n + 3], states[:, 2 * n + 3]
+            bearing, distance = bearing_and_distance(place, heading, self._target)
+        angles = states[:, 3 : n + 2].copy()
+        for seen in (bearing, distance, angles):
+            seen[gone] = np.nan
+        told = self._actuators
+        return Observation(self._time, bearing, distance, angles, told.leg_yaw.copy(), told.stiffness(self._time))
+
+    def command(self, command: Command) -> None:
+        """See :class:`chilopod.engine.Walk`."""
+        *_, status = self._now()
+        self._actuators.command(self._time, command, status == stretch.WALKING)
+        if self._here is not None:
+            self._states, self._step, self._status = self._here
+            for sample in self._timeline.rest(self._time)[-1]:
+                if sample >= 0:
+                    walking = self._status == stretch.WALKING
+                    self._samples.grown(sample + 1)[sample, walking] = self._states[walking]
+        self._timeline.cut_at(self._time)
+        self._here = None
+
+    def advance(self, until: float) -> None:
+        """See :class:`chilopod.engine.Walk`."""
+        check_time(until, self._time)
+        check_size(self._record, until, self._states.size)
+        pieces = self._timeline.whole_pieces(until)
+        self._time, self._here = float(until), None
+        if pieces[0].size:
+            self._carry(pieces, self._states, self._step, self._status)
+
+    def save(self) -> bytes:
+        """See :class:`chilopod.engine.Walk`."""
+        record = self._record
+        settings = {
+            "record": None if record is None else {"rate": record.rate, "forces": record.forces, "poses": record.poses},
+            "tolerance": self._tolerance,
+            "time": self._time,
+        }
+        arrays = {
+            "states": self._states,
+            "step": self._step,
+            "status": self._status,
+            "factors": self._factors,
+            "position": self._timeline.position,
+            "samples": self._samples.rows,
+            **({} if self._target is None else {"target": self._target}),
+            **{f"told_{name}": values for name, values in self._actuators.state().items()},
+        }
+        return pack(traits, self._robots, settings, arrays)
+
+    def restore(self, settings: dict[str, Any], arrays: dict[str, Any]) -> None:
+        """Become as the walk was that was saved, of the same robots."""
+        self._time = settings["time"]
+        self._step, self._status = arrays["step"], arrays["status"]
+        self._timeline.position = arrays["position"]
+        if len(arrays["samples"]):
+            self._samples.grown(len(arrays["samples"]))[:] = arrays["samples"]
+        told = {name.removeprefix("told_"): each for name, each in arrays.items() if name.startswith("told_")}
+        self._actuators.restore(told)
+
+    def to_dataset(self) -> xr.Dataset:
+        """The record so far, see :func:`chilopod.planar.simulate`."""
+        rate = self._record.rate if self._record else 1.0
+        states = self._samples.rows
+        times = np.arange(len(states)) / rate
+        leg_yaw = self._actuators.leg_yaw_over(times)
+        data = planar_record(self._models[0], times, states, leg_yaw)
+        add_outcome(data, [each.label for each in self.status], self._target)
+        self._actuators.add_to(data)
+        if self._record and self._record.forces:
+            data["foot_force"] = foot_forces(self._models, times, states, leg_yaw, self._friction)
+        data.attrs = {
+            "engine": traits.name,
+            "robot": self._robots[0].to_toml(),
+            "duration": self._time,
+            "tolerance": self._tolerance,
+        }
+        return data
+
+    # -- inside
+    # ---------------------------------------------------------------------------------------------------------------
+
+    def _now(self) -> tuple[Array, Array, NDArray[np.intp]]:
+        """States, steps and statuses at the present time; a copy unless there is a cut."""
+        if self._time <= self._timeline.cut:
+            return self._states, self._step, self._status
+        if self._here is None:
+            self._here = self._states.copy(), self._step.copy(), self._status.copy()
+            begins, starts, widths, interval, _ = self._timeline.rest(self._time)
+            self._carry((begins, starts, widths, interval, np.full(len(begins), -1)), *self._here)
+        return self._here
+
+    def _carry(
+        self,
+        pieces: tuple[Array, Array, Array, NDArray[np.intp], NDArray[np.intp]],
+        states: Array,
+        step: Array,
+        status: NDArray[np.intp],
+    ) -> None:
+        """Carry all robots through pieces of time, in place."""
+        begins, starts, widths, interval, sample = pieces
+        record = self._samples.grown(int(sample.max(initial=-1)) + 1)
+        told = self._actuators
+        when = (starts, widths, interval, sample, *self._feet, *self._bodies)
+        what = (self._damping, self._friction, told.leg_yaw, self._tolerance, states, step, status, record)
+        free = np.flatnonzero(~told.driven)
+        if free.size == 1:
+            stretch.walk_alone(free[0], *when, self._stiffness, *what)
+        elif free.size:
+            stretch.walk(free, *when, self._stiffness, *what)
+        if free.size < len(states):
+            stretch.drive(np.flatnonzero(told.driven), begins, *when, told.profile, told.lag, told.joint_torque, *what)

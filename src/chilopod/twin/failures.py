@@ -1,0 +1,66 @@
+"""Robots that no longer walk: which, how, and from which step on."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.engine import Status
+
+Array = NDArray[np.float64]
+
+_FASTEST = 100.0  # m/s and rad/s: a robot that moves faster than that has blown up
+_FARTHEST = 1e6  # m and rad, likewise
+_UPRIGHT = 0.5  # cosine of the tilt of module 1 beyond which it has fallen over
+_MOST_BENT = 0.5 * np.pi  # rad, of a yaw joint
+
+
+def failures(
+    positions: Array,
+    rates: Array,
+    before: tuple[Array, Array],
+    yaw_positions: NDArray[np.intp],
+    warned: NDArray[np.bool_],
+) -> dict[int, tuple[int, Status]]:
+    """What went wrong with the robots of a batch in some steps.
+
+    Parameters
+    ----------
+    positions, rates
+        MuJoCo's ``qpos`` and ``qvel`` after every step, shapes (robots, steps, nq) and (robots, steps, nv).
+    before
+        The same before the first step, (robots, nq) and (robots, nv).
+    yaw_positions
+        Of the yaw joints in ``qpos``, (N-1,).
+    warned
+        Whether MuJoCo warned of a robot, which it then stopped, repeating its last state, (robots,).
+
+    Returns
+    -------
+    By robot: the first step that is no longer a walk's, and how it ended.
+    """
+    bends = positions[..., yaw_positions]
+    with np.errstate(invalid="ignore", over="ignore"):
+        # Cosine of the tilt, from the quaternion.
+        upright = 1.0 - 2.0 * (positions[..., 4] ** 2 + positions[..., 5] ** 2)
+        most = (np.abs(rates).max(), np.abs(positions).max(), np.abs(bends).max(), -upright.min())
+        if not warned.any() and np.less(most, (_FASTEST, _FARTHEST, _MOST_BENT, -_UPRIGHT)).all():
+            return {}  # as nearly always, and that takes no time
+        quiet = (np.abs(rates).max(2) < _FASTEST) & (np.abs(positions).max(2) < _FARTHEST)
+        straight, standing = np.abs(bends).max(2) <= _MOST_BENT, upright > _UPRIGHT
+    found = {}
+    for row in range(len(positions)):
+        signs = ((quiet, Status.DIVERGED), (straight, Status.OUT_OF_RANGE), (standing, Status.FALLEN))
+        bad = [(int(np.argmin(good[row])), status) for good, status in signs if not good[row].all()]
+        if bad:
+            found[row] = bad[0]
+        elif warned[row]:
+            found[row] = _stopped(positions[row], rates[row], (before[0][row], before[1][row])), Status.DIVERGED
+    return found
+
+
+def _stopped(positions: Array, rates: Array, before: tuple[Array, Array]) -> int:
+    """The first step that only repeats the state before it, up to the end."""
+    places, speeds = np.vstack([before[0], positions]), np.vstack([before[1], rates])
+    moved = (np.diff(places, axis=0) != 0.0).any(axis=1) | (np.diff(speeds, axis=0) != 0.0).any(axis=1)
+    return int(np.flatnonzero(moved)[-1]) + 1 if moved.any() else 0

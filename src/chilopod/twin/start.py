@@ -1,0 +1,149 @@
+"""What a batch of walks needs to begin: robots that go together, where they start, their floor and their targets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chilopod.engine import Traits
+from chilopod.engine.arguments import rows_of
+from chilopod.engine.saved import unpack
+from chilopod.errors import ParameterError
+from chilopod.record import Recording
+from chilopod.robot import Robot
+from chilopod.twin.legs import twin_of
+from chilopod.twin.model import compiled, without_springs
+from chilopod.twin.walk import TOLERANCE, TwinWalk
+
+Array = NDArray[np.float64]
+
+traits = Traits(
+    name="twin",
+    sentence="the whole robot in three dimensions",
+    noisy=True,
+    poses=True,
+    a_core=4,
+    a_round=8,
+    haste=1.9,
+    version=f"MuJoCo {mujoco.__version__}",
+)
+
+
+def common(robot: Robot) -> Robot:
+    """What robots of a batch share, see :class:`chilopod.engine.Engine`: all but the numbers of their springs."""
+    twin_of(robot)
+    return without_springs(robot)
+
+
+def initial_states(
+    robot: Robot,
+    joint_angles: ArrayLike = 0.0,
+    heading: ArrayLike = 0.0,
+    position: ArrayLike = (0.0, 0.0),
+) -> Array:
+    """States of robots that are about to walk: at rest, feet where the gait has them at time 0.
+
+    Parameters
+    ----------
+    robot
+        With a twin.
+    joint_angles
+        Of the yaw joints, rad, shape (N-1,) or (robots, N-1).
+    heading
+        Of module 1, rad, a number or shape (robots,).
+    position
+        Of its centre, m, shape (2,) or (robots, 2).
+
+    Returns
+    -------
+    Positions of all joints (MuJoCo's ``qpos``), shape (robots, nq).
+    """
+    plan = compiled(common(robot))
+    joints = len(plan.yaw_positions)
+    angles = np.atleast_2d(np.asarray(joint_angles, dtype=np.float64))
+    angles = np.broadcast_to(angles, (len(angles), joints))
+    heading, position = np.atleast_1d(np.asarray(heading, float)), np.atleast_2d(np.asarray(position, float))
+    count = np.broadcast_shapes(angles.shape[:1], heading.shape, position.shape[:1])[0]
+    states = np.tile(plan.initial_positions(), (count, 1))
+    states[:, :2] = position
+    states[:, 3], states[:, 6] = np.cos(0.5 * heading), np.sin(0.5 * heading)
+    states[:, plan.yaw_positions] = angles
+    return states
+
+
+def start(
+    robots: Robot | Sequence[Robot],
+    *,
+    initial: ArrayLike | None = None,
+    friction: ArrayLike | None = None,
+    target: ArrayLike | None = None,
+    seeds: Sequence[int] | None = None,
+    record: Recording | None = Recording(),  # noqa: B008  (frozen)
+    threads: int = 0,
+    tolerance: float = TOLERANCE,
+    expected: float = 0.0,
+) -> TwinWalk:
+    """Put robots on the floor, see :class:`chilopod.engine.Engine`.
+
+    Parameters
+    ----------
+    robots, friction, record
+        As there. Robots may differ in the numbers of their springs and in nothing else.
+    initial
+        From :func:`initial_states`, shape (walks, nq) or (nq,).
+    target
+        Place of a pole on the floor, m, shape (2,) or (walks, 2); what is seen of it is what the scanner made of its
+        last scan.
+    seeds
+        Of the scanner's noise, one a walk.
+    threads
+        At most; 0 for all cores. Results are the same to the bit at any number.
+    tolerance
+        At which MuJoCo's solver of contact forces stops, relative.
+    expected
+        How long the walk is likely to be, s; memory for its record is taken at once.
+    """
+    given = [robots] if isinstance(robots, Robot) else list(robots)
+    if not given:
+        raise ParameterError("there are none", field="robots", allowed="at least one")
+    first = common(given[0])
+    if any(common(each) != first for each in given[1:]):
+        raise ParameterError("may differ in their springs only", field="robots")
+    size, n = compiled(first).model.nq, first.body.modules
+    count, rows = rows_of(
+        given, {"initial": (initial, (size,)), "friction": (friction, (n, 2)), "target": (target, (2,))}, seeds
+    )
+    states = rows["initial"]
+    return TwinWalk(
+        traits,
+        given * count if len(given) == 1 else given,
+        np.tile(initial_states(given[0]), (count, 1)) if states is None else states,
+        np.ones((count, n, 2)) if rows["friction"] is None else rows["friction"],
+        rows["target"],
+        None if seeds is None else list(seeds) * (count if len(seeds) == 1 else 1),
+        record,
+        tolerance=tolerance,
+        threads=threads,
+        expected=expected,
+    )
+
+
+def resume(saved: bytes, threads: int = 0) -> TwinWalk:
+    """A walk that was saved, see :class:`chilopod.engine.Engine`; the number of threads does not matter."""
+    robots, settings, arrays = unpack(traits, saved)
+    walk = TwinWalk(
+        traits,
+        robots,
+        arrays["positions"],
+        arrays["factors"],
+        arrays.get("target"),
+        settings["seeds"],
+        None if settings["record"] is None else Recording(**settings["record"]),
+        tolerance=settings["tolerance"],
+        threads=threads,
+    )
+    walk.restore(settings, arrays)
+    return walk

@@ -1,0 +1,294 @@
+"""Walks of many robots at a time in three dimensions that go on step by step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from mujoco.batch import Batch
+from numpy.typing import NDArray
+
+from chilopod.engine import Actuators, Command, Observation, Ramps, Status, Traits
+from chilopod.engine.arguments import check_time
+from chilopod.engine.saved import pack
+from chilopod.record import Recording, Samples, add_outcome, check_size, walk_record
+from chilopod.robot import Robot
+from chilopod.twin.failures import failures
+from chilopod.twin.legs import servo_targets
+from chilopod.twin.model import SIDES, compiled, silence, without_springs
+from chilopod.twin.scanner import Scanner, rotation
+
+Array = NDArray[np.float64]
+
+TOLERANCE = 1e-8
+"""Default of the contact solver, MuJoCo's own."""
+
+_LONGEST_STRETCH = 0.6  # s that are stepped without a look, and kept step by step meanwhile
+_TARGETS_AHEAD = 2048  # ticks for which servo targets are computed at a time
+_SAME_INSTANT = 1e-9  # ticks
+_STATE = ("time", "qpos", "qvel", "qacc_warmstart", "qfrc_applied")
+"""Of MuJoCo's state what is not the same in every walk or set before every step."""
+
+
+class TwinWalk:
+    """Robots under way on the floor, see :class:`chilopod.engine.Walk`; :func:`chilopod.twin.start` makes one.
+
+    Time goes in servo targets (ticks), every control interval: a walk is advanced to the first of them that is not
+    before the time asked for, and commands act from there.
+    """
+
+    def __init__(
+        self,
+        traits: Traits,
+        robots: Sequence[Robot],
+        states: Array,
+        factors: Array,
+        target: Array | None,
+        seeds: Sequence[int] | None,
+        record: Recording | None,
+        *,
+        tolerance: float,
+        threads: int,
+        expected: float = 0.0,
+    ) -> None:
+        self._traits, self._robots, self._factors, self._target = traits, tuple(robots), factors, target
+        self._seeds, self._record, self._tolerance = seeds, record, tolerance
+        self._plan = compiled(without_springs(robots[0]), bool(record and record.forces))
+        plan, count = self._plan, len(robots)
+        self._batch = Batch(plan.model, count, threads)
+        self._springs = np.array([each.springs.stiffness for each in robots])
+        self._batch.expand("jnt_stiffness")[:, plan.yaw_joints] = self._springs
+        self._batch.expand("dof_damping")[:, plan.yaw_rates] = [each.springs.damping for each in robots]
+        self._batch.expand("geom_friction")[:, plan.feet, 0] = plan.twin.sliding_friction * factors
+        self._batch.expand("opt.tolerance")[:] = tolerance
+        self._batch.bind("qpos")[:] = states
+        self._scanner = None
+        if target is not None:
+            self._batch.bind("mocap_pos")[:, 0, :2] = target
+            self._batch.bind("mocap_pos")[:, 0, 2] = 0.0
+            self._scanner = Scanner(plan.twin, self._batch, seeds)
+        self._actuators = Actuators(robots, keep=record is not None)
+        self._leg_yaw = Ramps(np.zeros((count, 2)))
+        self._time, self._tick = 0.0, 0
+        self._status = [Status.WALKED] * count
+        self._walking = np.arange(count)
+        self._targets_from, self._targets = 0, np.empty((0, plan.leg_controls.size))
+        self._seen: list[tuple[Array, Array]] = []
+
+        check_size(record, expected, count * (plan.model.nq + plan.model.nv))
+        rows = int(expected * record.rate) + 2 if record else 0
+        self._positions = Samples((count, plan.model.nq), rows)
+        self._rates = Samples((count, plan.model.nv), rows)
+        self._forces = Samples((count, plan.model.nsensordata), rows if plan.model.nsensordata else 0)
+        for sample in self._samples(-1, 0):  # several, if sampled more often than stepped
+            self._positions.grown(sample + 1)[sample] = states
+            self._rates.grown(sample + 1)[sample] = 0.0
+
+    @property
+    def robots(self) -> tuple[Robot, ...]:
+        """One a walk."""
+        return self._robots
+
+    @property
+    def time(self) -> float:
+        """That was asked for, s."""
+        return self._time
+
+    @property
+    def status(self) -> tuple[Status, ...]:
+        """One a robot."""
+        return tuple(self._status)
+
+    def observe(self) -> Observation:
+        """See :class:`chilopod.engine.Walk`; a target is seen as in the scanner's last scan."""
+        bearing, distance = self._look()
+        angles = self._batch.bind("qpos")[:, self._plan.yaw_positions].copy()
+        angles[~self._on_foot()] = np.nan
+        told = self._actuators
+        return Observation(self._time, bearing, distance, angles, told.leg_yaw.copy(), told.stiffness(self._time))
+
+    def command(self, command: Command) -> None:
+        """See :class:`chilopod.engine.Walk`."""
+        interval = self._plan.twin.control_interval
+        self._actuators.command(self._time, command, self._on_foot())
+        self._leg_yaw.to(self._actuators.leg_yaw, self._tick, max(1, round(command.within / interval)))
+        self._batch.bind("qfrc_applied")[:, self._plan.yaw_rates] = self._actuators.joint_torque
+        if self._record is not None and self._target is not None:
+            self._seen.append(self._look())
+
+    def advance(self, until: float) -> None:
+        """See :class:`chilopod.engine.Walk`."""
+        check_time(until, self._time)
+        check_size(self._record, until, len(self._robots) * (self._plan.model.nq + self._plan.model.nv))
+        interval = self._plan.twin.control_interval
+        last, longest = int(np.ceil(until / interval - _SAME_INSTANT)), max(1, int(_LONGEST_STRETCH / interval))
+        with silence():
+            while self._tick < last:
+                tick = min(last, self._tick + longest)
+                if len(self._walking):
+                    self._step_to(tick)
+                self._tick = tick
+        self._time = float(until)
+
+    def save(self) -> bytes:
+        """See :class:`chilopod.engine.Walk`."""
+        record = self._record
+        settings = {
+            "record": None if record is None else {"rate": record.rate, "forces": record.forces, "poses": record.poses},
+            "tolerance": self._tolerance,
+            "seeds": self._seeds,
+            "time": self._time,
+            "tick": self._tick,
+            "status": [each.name for each in self._status],
+        }
+        arrays = {
+            "factors": self._factors,
+            "positions": self._batch.bind("qpos"),
+            **{f"state_{name}": self._batch.bind(name) for name in _STATE},
+            **{f"samples_{name}": samples.rows for name, samples in self._kept().items()},
+            **{f"told_{name}": values for name, values in self._actuators.state().items()},
+            **{f"yaw_{name}": values for name, values in self._leg_yaw.state().items()},
+            "seen": np.array(self._seen).reshape(-1, 2, len(self._robots)),
+        }
+        if self._target is not None and self._scanner is not None:
+            arrays |= {"target": self._target, **{f"scan_{k}": v for k, v in self._scanner.state().items()}}
+        return pack(self._traits, self._robots, settings, arrays)
+
+    def restore(self, settings: dict[str, Any], arrays: dict[str, Any]) -> None:
+        """Become as the walk was that was saved, of the same robots."""
+
+        def part(prefix: str) -> dict[str, Any]:
+            return {name.removeprefix(prefix): each for name, each in arrays.items() if name.startswith(prefix)}
+
+        self._time, self._tick = settings["time"], settings["tick"]
+        self._status = [Status[name] for name in settings["status"]]
+        self._walking = np.flatnonzero(self._on_foot())
+        for name, values in part("state_").items():
+            self._batch.bind(name)[:] = values
+        for name, samples in self._kept().items():
+            rows = arrays[f"samples_{name}"]
+            samples.grown(len(rows))[:] = rows
+        self._actuators.restore(part("told_"))
+        self._leg_yaw.restore(part("yaw_"))
+        self._seen = [(each[0], each[1]) for each in arrays["seen"]]
+        if self._scanner is not None:
+            self._scanner.restore(part("scan_"))
+
+    def to_dataset(self) -> xr.Dataset:
+        """The record so far, see :func:`chilopod.twin.simulate`."""
+        plan, count = self._plan, 0 if self._record is None else len(self._record.samples(self._time))
+        positions, rates = self._positions.rows[:count], self._rates.rows[:count]
+        turn = rotation(positions[..., 3:7])
+        data = walk_record(
+            np.asarray(self._sample_steps(np.arange(len(positions))) * plan.twin.timestep, dtype=np.float64),
+            position=positions[..., :2],
+            heading=np.unwrap(np.arctan2(turn[..., 1, 0], turn[..., 0, 0]), axis=0),
+            velocity=rates[..., :2],
+            # Of the free joint, MuJoCo gives the rate of turn in the frame of the body.
+            heading_rate=np.einsum("...j,...j->...", turn[..., 2, :], rates[..., 3:6]),
+            joint_angle=positions[..., plan.yaw_positions],
+            joint_rate=rates[..., plan.yaw_rates],
+            leg_yaw=positions[..., plan.leg_yaw_positions],
+        )
+        add_outcome(data, [each.label for each in self._status], self._target)
+        self._actuators.add_to(data)
+        if self._seen:
+            seen = np.array(self._seen)
+            data["seen_bearing"] = (("event", "robot"), seen[:, 0], {"units": "rad"})
+            data["seen_distance"] = (("event", "robot"), seen[:, 1], {"units": "m"})
+        if self._record and self._record.forces:
+            forces = self._forces.rows[:count]
+            shape = (*forces.shape[:2], plan.robot.body.modules, len(SIDES), 3)
+            data.coords["module"] = np.arange(1, plan.robot.body.modules + 1)
+            over = ("time", "robot", "module", "side")
+            # The sensor gives what the foot does to the floor.
+            data["foot_force"] = ((*over, "axis"), -forces.reshape(shape)[..., :2], {"units": "N"})
+            data["foot_load"] = (over, -forces.reshape(shape)[..., 2], {"units": "N"})
+        if self._record and self._record.poses:
+            data["pose"] = (("time", "robot", "coordinate"), positions, {"units": "m, 1, rad: MuJoCo's qpos"})
+        data.attrs = {"engine": self._traits.name, "robot": self._robots[0].to_toml(), "duration": self._time}
+        return data
+
+    # -- inside
+    # ---------------------------------------------------------------------------------------------------------------
+
+    def _on_foot(self) -> NDArray[np.bool_]:
+        return np.array([each is Status.WALKED for each in self._status])
+
+    def _kept(self) -> dict[str, Samples]:
+        """What is recorded, by MuJoCo's name."""
+        kept = {"qpos": self._positions, "qvel": self._rates}
+        return {**kept, "sensordata": self._forces} if self._plan.model.nsensordata else kept
+
+    def _sample_steps(self, samples: NDArray[np.intp]) -> NDArray[np.intp]:
+        """The simulation steps that are nearest to samples."""
+        rate = self._record.rate if self._record else 1.0
+        return np.round(samples / rate / self._plan.twin.timestep).astype(np.intp)
+
+    def _samples(self, after: int, up_to: int) -> NDArray[np.intp]:
+        """The samples at steps after one and up to another."""
+        if self._record is None:
+            return np.empty(0, dtype=np.intp)
+        in_a_step = self._record.rate * self._plan.twin.timestep
+        first, last = (max(0, int(step * in_a_step) - 1) for step in (after, up_to))
+        near = np.arange(first, last + int(in_a_step) + 4)
+        steps = self._sample_steps(near)
+        return near[(steps > after) & (steps <= up_to)]
+
+    def _look(self) -> tuple[Array, Array]:
+        """Bearing and distance of the target in the last scan; NaN for robots that no longer walk."""
+        seen = np.full((2, len(self._robots)), np.nan)
+        if self._scanner is not None and len(self._walking):
+            seen[:, self._walking] = self._scanner.look(self._walking)
+        return seen[0], seen[1]
+
+    def _step_to(self, tick: int) -> None:
+        plan, batch, walking = self._plan, self._batch, self._walking
+        per_tick = plan.steps_per_control
+        first, count = self._tick * per_tick, (tick - self._tick) * per_tick
+        kept = self._kept()
+        before = batch.bind("qpos")[walking], batch.bind("qvel")[walking]
+        out = batch.rollout(count, self._controls(tick), record=list(kept), ids=walking)
+        if self._scanner is not None:
+            self._scanner.passed(self._tick, tick, out["qpos"][:, per_tick - 1 :: per_tick, :7], walking)
+        samples = self._samples(first, first + count)
+        at = self._sample_steps(samples) - first - 1
+        for name, store in kept.items():
+            if samples.size:
+                store.grown(samples[-1] + 1)[np.ix_(samples, walking)] = np.swapaxes(out[name][:, at], 0, 1)
+        if self._tick == 0 and "sensordata" in kept:  # forces are of the step before, at time 0 of the step after
+            start = self._samples(-1, 0)
+            self._forces.grown(len(start))[np.ix_(start, walking)] = out["sensordata"][:, 0]
+        warned = batch.warning[walking].any(axis=tuple(range(1, batch.warning.ndim)))
+        found = failures(out["qpos"], out["qvel"], before, plan.yaw_positions, warned)
+        for row, (step, status) in found.items():
+            self._status[walking[row]] = status
+            for store in kept.values():
+                store.rows[samples[at >= step], walking[row]] = np.nan
+        if found:
+            self._walking = np.delete(walking, list(found))
+
+    def _controls(self, tick: int) -> Array:
+        """Of all actuators before every step up to a tick, for the robots that walk, shape (robots, steps, nu)."""
+        plan, ticks, per_tick = self._plan, np.arange(self._tick, tick), self._plan.steps_per_control
+        control = np.zeros((len(self._walking), len(ticks), plan.model.nu))
+        # Both legs at the knees and hips, then the yaw of module 1's.
+        control[..., plan.leg_controls.ravel()] = self._leg_targets(ticks)
+        control[..., plan.leg_yaw_controls] = np.swapaxes(self._leg_yaw.at(ticks), 0, 1)[self._walking]
+        control = np.repeat(control, per_tick, axis=1)
+        if self._actuators.driven.any() and len(plan.spring_controls):
+            edges = np.arange(self._tick * per_tick, tick * per_tick + 1) * plan.twin.timestep
+            change = self._actuators.mean_stiffness(np.asarray(edges, dtype=np.float64)) - self._springs
+            control[..., plan.spring_controls] = np.swapaxes(change, 0, 1)[self._walking]
+        return control
+
+    def _leg_targets(self, ticks: NDArray[np.intp]) -> Array:
+        """Servo targets of all hips and knees, shape (ticks, legs times 2)."""
+        if ticks[-1] >= self._targets_from + len(self._targets):
+            self._targets_from = int(ticks[0])
+            ahead = np.arange(ticks[0], ticks[0] + max(len(ticks), _TARGETS_AHEAD))
+            targets = servo_targets(self._plan.robot, ahead * self._plan.twin.control_interval)
+            self._targets = targets.reshape(len(ahead), -1)
+        return self._targets[ticks - self._targets_from]
