@@ -8,6 +8,8 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from chilopod.lazy import exports
+
 if TYPE_CHECKING:
     from chilopod.errors import (
         AnalysisError,
@@ -37,31 +39,26 @@ __all__ = [
     "load_robot",
 ]
 
-_HOMES = {
-    "AnalysisError": "chilopod.errors",
-    "ChilopodError": "chilopod.errors",
-    "Gait": "chilopod.gait",
-    "Ground": "chilopod.ground",
-    "OutputError": "chilopod.errors",
-    "ParameterError": "chilopod.errors",
-    "Robot": "chilopod.robot",
-    "RobotFileError": "chilopod.errors",
-    "UnitError": "chilopod.errors",
-    "load_robot": "chilopod.robot",
-}
+_load, __dir__ = exports(
+    __name__,
+    {
+        "AnalysisError": "chilopod.errors",
+        "ChilopodError": "chilopod.errors",
+        "Gait": "chilopod.gait",
+        "Ground": "chilopod.ground",
+        "OutputError": "chilopod.errors",
+        "ParameterError": "chilopod.errors",
+        "Robot": "chilopod.robot",
+        "RobotFileError": "chilopod.errors",
+        "UnitError": "chilopod.errors",
+        "load_robot": "chilopod.robot",
+    },
+)
 
 
 def __getattr__(name: str) -> Any:
     # numpy, pydantic and importlib.metadata are loaded on first use: --help imports this package but none of them.
-    if name == "__version__":
-        value: Any = import_module("importlib.metadata").version("chilopod")
-    elif name in _HOMES:
-        value = getattr(import_module(_HOMES[name]), name)
-    else:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    globals()[name] = value
+    if name != "__version__":
+        return _load(name)
+    value = globals()[name] = import_module("importlib.metadata").version("chilopod")
     return value
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})

@@ -174,7 +174,7 @@ def write_branch(data: xr.Dataset, folder: str | Path, *, replace: bool = True) 
     Parameters
     ----------
     data
-        From :mod:`chilopod.studies.curved_walk`.
+        From :mod:`chilopod.analysis.branch`.
     folder
         Created where there is none.
     replace

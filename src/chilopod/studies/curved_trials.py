@@ -19,11 +19,13 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from chilopod import stability
+from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
+from chilopod.analysis.straight_walk import pitchfork
 from chilopod.engine import Status
 from chilopod.planar import PlanarModel
+from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability.system import whole_period
-from chilopod.studies.floquet import K1, PAPER_UNIT, Progress, pitchfork, silent, stiffness
 from chilopod.studies.paper import printed
 from chilopod.studies.trials import Disturbance, Trial, run
 from chilopod.studies.walks import AVERAGED
@@ -154,7 +156,7 @@ def off_branch(robot: Robot, trials: xr.Dataset, branch: xr.Dataset) -> xr.DataA
     trials
         From :func:`curved_trials`; without spread of friction, which the branch does not have.
     branch
-        From :func:`chilopod.studies.curved_walk.curved_walks` over k1, turning right.
+        From :func:`chilopod.analysis.branch.curved_walks` over k1, turning right.
 
     Returns
     -------

@@ -17,12 +17,13 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from chilopod import units
+from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT, stiffness
+from chilopod.analysis.straight_walk import bifurcations, first_loss, pitchfork
 from chilopod.errors import AnalysisError
+from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import Kind
-from chilopod.studies.floquet import ALL, K1, PAPER_UNIT, Progress, first_loss, pitchfork, silent, stiffness
 from chilopod.studies.paper import printed, printed_stiffness
-from chilopod.studies.straight_walk import bifurcations
 
 Array = NDArray[np.float64]
 

@@ -26,13 +26,14 @@ from cmaes import CMA
 from numpy.typing import NDArray
 
 from chilopod import units
+from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
+from chilopod.analysis.square_root import square_root_fit
 from chilopod.errors import AnalysisError, ChilopodError
 from chilopod.output import prepare_folder, write_atomic
+from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
-from chilopod.studies.floquet import K1, PAPER_UNIT, Progress, silent, stiffness
 from chilopod.studies.known_fits import known_fits
 from chilopod.studies.paper import printed
-from chilopod.studies.square_root import square_root_fit
 from chilopod.studies.trials import Trial, run
 from chilopod.studies.twin_constants import FREE, with_constants
 from chilopod.twin import initial_states, simulate

@@ -9,6 +9,9 @@ from pathlib import Path
 
 import xarray as xr
 
+from chilopod.analysis.branch import curved_walks
+from chilopod.analysis.parameters import K1, stiffness
+from chilopod.analysis.undulation import undulating_walks
 from chilopod.errors import ParameterError, nearest_name
 from chilopod.robot import Robot
 from chilopod.studies import (
@@ -22,8 +25,6 @@ from chilopod.studies import (
     twin_numerics,
 )
 from chilopod.studies.curved_findings import CurvedStudy, curved_study
-from chilopod.studies.curved_walk import curved_walks
-from chilopod.studies.floquet import K1, stiffness
 from chilopod.studies.movies import Movie, movies, robot_movies
 from chilopod.studies.planar_words import planar_words
 from chilopod.studies.robot_rows import RobotRow
@@ -33,7 +34,6 @@ from chilopod.studies.table import Row
 from chilopod.studies.turning_findings import Turning, turning
 from chilopod.studies.twin_spread import COUNT as SPREAD
 from chilopod.studies.twin_spread import twin_spread
-from chilopod.studies.undulation import undulating_walks
 
 Progress = Callable[[str, float, str], None]
 """Called with the section, the part of it that is done (0 to 1), and a few words."""

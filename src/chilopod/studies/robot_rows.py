@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 
 from chilopod import units
+from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.steering import Outcome
-from chilopod.studies.floquet import PAPER_UNIT
 from chilopod.studies.paper import printed
 from chilopod.studies.robot_turning import PAPER_SPRING, RobotTurning
 from chilopod.studies.robot_walks import RobotWalks, is_curved, onset, radius_at, spring_for

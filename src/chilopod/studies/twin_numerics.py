@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from chilopod.analysis.square_root import square_root_fit
 from chilopod.errors import AnalysisError
+from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
-from chilopod.studies.floquet import Progress, silent
 from chilopod.studies.identify_twin import base_series
 from chilopod.studies.robot_rows import CHECKED, RobotRow
-from chilopod.studies.square_root import square_root_fit
 from chilopod.twin.simulate import TOLERANCE
 
 SPRINGS = (15.0, 17.0, 21.0, 26.0, 28.0)

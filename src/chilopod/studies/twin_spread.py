@@ -14,17 +14,18 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from chilopod.analysis.parameters import K1, stiffness
+from chilopod.analysis.square_root import square_root_fit
 from chilopod.engine import Status
 from chilopod.errors import AnalysisError
+from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import ARRIVAL_RADIUS, Target, steered, strategy_named
 from chilopod.studies import identify_twin, trials
 from chilopod.studies.curved_trials import variant_robots
-from chilopod.studies.floquet import K1, Progress, silent, stiffness
 from chilopod.studies.identify_twin import Fit
 from chilopod.studies.paper import printed
 from chilopod.studies.robot_walks import CURVED, undulations
-from chilopod.studies.square_root import square_root_fit
 from chilopod.studies.trials import NONE, Trial
 from chilopod.studies.twin_constants import FREE, with_constants
 from chilopod.studies.walks import AVERAGED

@@ -1,0 +1,45 @@
+"""Packages are light: a verb loads what it needs itself, and nothing of its neighbours."""
+
+import importlib
+import subprocess
+import sys
+
+import pytest
+
+import chilopod
+from chilopod import analysis, planar
+
+HEAVY = ("mujoco", "matplotlib", "xarray", "pandas", "h5netcdf", "av", "cmaes", "jinja2")
+PACKAGES = (chilopod, analysis, planar)
+
+
+def loaded(code, *modules):
+    """Which of the modules a fresh process has after running some code."""
+    asked = f"import sys\n{code}\nprint(*[name for name in {modules!r} if name in sys.modules])"
+    result = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, timeout=120, check=True)
+    return set(result.stdout.split())
+
+
+@pytest.mark.parametrize("package", ["chilopod", "chilopod.analysis", "chilopod.planar"])
+def test_a_package_alone_loads_nothing(package):
+    assert loaded(f"import {package}", *HEAVY, "numpy", "scipy", "numba", "pydantic") == set()
+
+
+def test_the_theory_loads_no_engine_in_3d_no_drawing_and_no_records():
+    assert loaded("from chilopod.analysis import bifurcations, pitchfork, straight_walk", *HEAVY) == set()
+
+
+@pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.__name__)
+def test_every_name_is_there_and_listed(package):
+    for name in package.__all__:
+        assert getattr(package, name) is not None
+        assert name in dir(package)
+    with pytest.raises(AttributeError, match="nonsense"):
+        _ = package.nonsense
+
+
+def test_a_verb_named_like_its_module_is_the_verb_whatever_was_loaded_first():
+    code = "import chilopod.analysis.straight_walk\nfrom chilopod.analysis import straight_walk\nassert callable({})"
+    for name in ("straight_walk", "chilopod.analysis.straight_walk"):
+        loaded(code.format(name))
+    assert importlib.import_module("chilopod.analysis.straight_walk").straight_walk is analysis.straight_walk
