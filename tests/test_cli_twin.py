@@ -14,7 +14,7 @@ import xarray as xr
 from chilopod import load_robot
 from chilopod.cli import main
 from chilopod.studies import identify_twin
-from chilopod.studies.trials import Trial, run
+from chilopod.trials import Trial, run
 
 ROBOT = "aoi2022"
 SOFT = ["--set", "springs.stiffness[0]=15 N*mm/deg"]
@@ -106,7 +106,7 @@ def test_a_study_that_is_killed_goes_on_where_it_was(tmp_path):
     robot = load_robot(ROBOT)
     trials = [Trial(robot, 4.0, seed, engine="twin") for seed in range(24)]
     script = (
-        "import sys\nfrom chilopod import load_robot\nfrom chilopod.studies.trials import Trial, run\n"
+        "import sys\nfrom chilopod import load_robot\nfrom chilopod.trials import Trial, run\n"
         "robot = load_robot('aoi2022')\n"
         "run([Trial(robot, 4.0, seed, engine='twin') for seed in range(24)], sys.argv[1])\n"
     )

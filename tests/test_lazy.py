@@ -7,10 +7,10 @@ import sys
 import pytest
 
 import chilopod
-from chilopod import analysis, planar
+from chilopod import analysis, planar, trials
 
 HEAVY = ("mujoco", "matplotlib", "xarray", "pandas", "h5netcdf", "av", "cmaes", "jinja2")
-PACKAGES = (chilopod, analysis, planar)
+PACKAGES = (chilopod, analysis, planar, trials)
 
 
 def loaded(code, *modules):
@@ -20,13 +20,17 @@ def loaded(code, *modules):
     return set(result.stdout.split())
 
 
-@pytest.mark.parametrize("package", ["chilopod", "chilopod.analysis", "chilopod.planar"])
+@pytest.mark.parametrize("package", ["chilopod", "chilopod.analysis", "chilopod.planar", "chilopod.trials"])
 def test_a_package_alone_loads_nothing(package):
     assert loaded(f"import {package}", *HEAVY, "numpy", "scipy", "numba", "pydantic") == set()
 
 
 def test_the_theory_loads_no_engine_in_3d_no_drawing_and_no_records():
     assert loaded("from chilopod.analysis import bifurcations, pitchfork, straight_walk", *HEAVY) == set()
+
+
+def test_trials_load_the_engine_that_walks_and_no_other():
+    assert loaded("from chilopod.trials import NONE, Trial, run, together", "mujoco", "matplotlib", "cmaes") == set()
 
 
 @pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.__name__)
@@ -39,7 +43,7 @@ def test_every_name_is_there_and_listed(package):
 
 
 def test_a_verb_named_like_its_module_is_the_verb_whatever_was_loaded_first():
-    code = "import chilopod.analysis.straight_walk\nfrom chilopod.analysis import straight_walk\nassert callable({})"
-    for name in ("straight_walk", "chilopod.analysis.straight_walk"):
-        loaded(code.format(name))
-    assert importlib.import_module("chilopod.analysis.straight_walk").straight_walk is analysis.straight_walk
+    for name in ("chilopod.analysis.straight_walk", "chilopod.trials.run"):
+        package, _, verb = name.rpartition(".")
+        loaded(f"import {name}\nfrom {package} import {verb}\nassert callable({verb}) and callable({name})")
+        assert getattr(importlib.import_module(name), verb) is getattr(sys.modules[package], verb)

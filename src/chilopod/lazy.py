@@ -6,7 +6,7 @@ A verb then costs what it needs itself, not what its neighbours need.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from types import ModuleType
 from typing import Any
@@ -24,16 +24,17 @@ class _Package(ModuleType):
             super().__setattr__(name, value)
 
 
-def exports(package: str, homes: Mapping[str, str]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+def exports(package: str, names: Mapping[str, Sequence[str]]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     """``__getattr__`` and ``__dir__`` for the module of a package.
 
     Parameters
     ----------
     package
         Its ``__name__``.
-    homes
-        The module that each exported name is in.
+    names
+        What each of its submodules gives it.
     """
+    homes = {name: f"{package}.{submodule}" for submodule, given in names.items() for name in given}
     module = sys.modules[package]
     module.__class__ = _Package
     module.__dict__["_homes"] = homes

@@ -10,7 +10,7 @@ from chilopod.planar import PlanarModel
 from chilopod.robot import load_robot
 from chilopod.studies import curved_findings, curved_rows
 from chilopod.studies.curved_trials import curved_trials, off_branch, on_branch, variant_robots
-from chilopod.studies.trials import NONE, Disturbance, Trial, run
+from chilopod.trials import NONE, Disturbance, Trial, run
 
 ROBOT = load_robot("aoi2022-planar")
 EVEN = Disturbance(friction=0.0)

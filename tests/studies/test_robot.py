@@ -23,8 +23,8 @@ from chilopod.studies.robot_walks import (
     undulations,
     walk_trials,
 )
-from chilopod.studies.trials import Trial
 from chilopod.studies.turning import turning_task, without_leg_yaw
+from chilopod.trials import Trial
 from chilopod.twin import simulate
 
 ROBOT = load_robot("aoi2022")

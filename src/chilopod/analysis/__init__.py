@@ -17,6 +17,24 @@ if TYPE_CHECKING:
         straight_walk,
     )
     from chilopod.analysis.undulation import undulating_walks
+else:
+    __getattr__, __dir__ = exports(
+        __name__,
+        {
+            "branch": ("curved_walks", "read_walks", "resumed"),
+            "radius_law": ("RadiusLaws", "radius_laws"),
+            "square_root": ("SquareRootFit", "square_root_fit"),
+            "straight_walk": (
+                "StraightWalk",
+                "WalkBifurcation",
+                "bifurcations",
+                "first_loss",
+                "pitchfork",
+                "straight_walk",
+            ),
+            "undulation": ("undulating_walks",),
+        },
+    )
 
 __all__ = [
     "RadiusLaws",
@@ -34,23 +52,3 @@ __all__ = [
     "straight_walk",
     "undulating_walks",
 ]
-
-__getattr__, __dir__ = exports(
-    __name__,
-    {
-        "RadiusLaws": "chilopod.analysis.radius_law",
-        "SquareRootFit": "chilopod.analysis.square_root",
-        "StraightWalk": "chilopod.analysis.straight_walk",
-        "WalkBifurcation": "chilopod.analysis.straight_walk",
-        "bifurcations": "chilopod.analysis.straight_walk",
-        "curved_walks": "chilopod.analysis.branch",
-        "first_loss": "chilopod.analysis.straight_walk",
-        "pitchfork": "chilopod.analysis.straight_walk",
-        "radius_laws": "chilopod.analysis.radius_law",
-        "read_walks": "chilopod.analysis.branch",
-        "resumed": "chilopod.analysis.branch",
-        "square_root_fit": "chilopod.analysis.square_root",
-        "straight_walk": "chilopod.analysis.straight_walk",
-        "undulating_walks": "chilopod.analysis.undulation",
-    },
-)

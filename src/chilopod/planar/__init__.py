@@ -9,19 +9,16 @@ if TYPE_CHECKING:
     from chilopod.planar.energy import Powers, energy, powers
     from chilopod.planar.model import PlanarModel
     from chilopod.planar.simulate import initial_states, simulate
+else:
+    # Analysis needs the model but no records of walks, and so no xarray.
+    __getattr__, __dir__ = exports(
+        __name__,
+        {
+            "drift": ("Drift",),
+            "energy": ("Powers", "energy", "powers"),
+            "model": ("PlanarModel",),
+            "simulate": ("initial_states", "simulate"),
+        },
+    )
 
 __all__ = ["Drift", "PlanarModel", "Powers", "energy", "initial_states", "powers", "simulate"]
-
-# Analysis needs the model but no records of walks, and so no xarray.
-__getattr__, __dir__ = exports(
-    __name__,
-    {
-        "Drift": "chilopod.planar.drift",
-        "PlanarModel": "chilopod.planar.model",
-        "Powers": "chilopod.planar.energy",
-        "energy": "chilopod.planar.energy",
-        "initial_states": "chilopod.planar.simulate",
-        "powers": "chilopod.planar.energy",
-        "simulate": "chilopod.planar.simulate",
-    },
-)

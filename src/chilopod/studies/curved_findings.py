@@ -28,7 +28,7 @@ from chilopod.studies.curved_trials import (
     variant_trials,
 )
 from chilopod.studies.paper import printed
-from chilopod.studies.trials import Disturbance
+from chilopod.trials import Disturbance
 
 Array = NDArray[np.float64]
 

@@ -27,8 +27,7 @@ from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability.system import whole_period
 from chilopod.studies.paper import printed
-from chilopod.studies.trials import Disturbance, Trial, run
-from chilopod.studies.walks import AVERAGED
+from chilopod.trials import AVERAGED, Disturbance, Trial, run
 
 Array = NDArray[np.float64]
 
@@ -80,7 +79,7 @@ def curved_trials(
         How long a trial walks, in e-folds of the slowest motion about the straight walk, but 180 s at least and 1200 s
         at most.
     folder
-        Where trials are kept, see :func:`chilopod.studies.trials.run`.
+        Where trials are kept, see :func:`chilopod.trials.run`.
     progress
         Called as trials are done.
 

@@ -34,8 +34,8 @@ from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.studies.known_fits import known_fits
 from chilopod.studies.paper import printed
-from chilopod.studies.trials import Trial, run
 from chilopod.studies.twin_constants import FREE, with_constants
+from chilopod.trials import Trial, run
 from chilopod.twin import initial_states, simulate
 from chilopod.twin.simulate import TOLERANCE
 

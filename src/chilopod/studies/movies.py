@@ -13,7 +13,7 @@ from chilopod.analysis.parameters import K1
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import LegYawController, Target
-from chilopod.studies.trials import NONE, Trial, run, together
+from chilopod.trials import NONE, Trial, run, together
 
 TASK_A = Target(float(np.deg2rad(45.0)), 1.3)
 

@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from chilopod import units
+from chilopod import trials, units
 from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT, stiffness
 from chilopod.analysis.square_root import SquareRootFit, square_root_fit
 from chilopod.engine import Status
@@ -23,10 +23,8 @@ from chilopod.errors import AnalysisError
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import RadiusLaw
-from chilopod.studies import trials
 from chilopod.studies.curved_trials import variant_robots
-from chilopod.studies.trials import Disturbance, Trial
-from chilopod.studies.walks import AVERAGED
+from chilopod.trials import AVERAGED, Disturbance, Trial
 
 Array = NDArray[np.float64]
 

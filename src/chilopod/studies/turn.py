@@ -16,7 +16,7 @@ from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import Criteria, Strategy, Target, earliest_arrival, evaluate, steered
 from chilopod.studies.robot_walks import twin_radius_law
-from chilopod.studies.trials import NONE, Disturbance, Trial, check_engine, run, together
+from chilopod.trials import NONE, Disturbance, Trial, check_engine, run, together
 
 Array = NDArray[np.float64]
 
@@ -122,7 +122,7 @@ def turn(
     repeats
         How many walks.
     engine
-        Of :data:`chilopod.studies.trials.ENGINES`. The radius law of the planar model is that of its exact branch, the
+        Of :data:`chilopod.trials.ENGINES`. The radius law of the planar model is that of its exact branch, the
         twin's that of trials.
     progress
         Called with the part done (0 to 1) and a few words.

@@ -15,16 +15,15 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from chilopod import units
+from chilopod import trials, units
 from chilopod.analysis.parameters import PAPER_UNIT, stiffness
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import STRATEGIES, Outcome, Target, earliest_arrival, evaluate, steered
 from chilopod.steering.criteria import efforts
 from chilopod.steering.strategies import strategy_named
-from chilopod.studies import trials
 from chilopod.studies.paper import printed
-from chilopod.studies.trials import Disturbance, Trial
+from chilopod.trials import Disturbance, Trial
 
 Array = NDArray[np.float64]
 
@@ -126,7 +125,7 @@ def turning_task(
     shown
         Springs of ``paths``, N*mm/deg.
     engine
-        Of :data:`chilopod.studies.trials.ENGINES`.
+        Of :data:`chilopod.trials.ENGINES`.
     folder
         Where records are kept, so that a study that was stopped goes on where it was.
     progress

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from chilopod import trials
 from chilopod.analysis.parameters import ALL, PAPER_UNIT, stiffness
 from chilopod.analysis.radius_law import RadiusLaws, radius_laws
 from chilopod.analysis.straight_walk import first_loss
@@ -18,9 +19,7 @@ from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import Kind
 from chilopod.steering import STRATEGIES, Target, earliest_arrival, evaluate, steered
-from chilopod.studies import trials
 from chilopod.studies.paper import printed
-from chilopod.studies.trials import NONE, Disturbance, Trial
 from chilopod.studies.turning import (
     DURATION,
     RATE,
@@ -30,6 +29,7 @@ from chilopod.studies.turning import (
     turning_task,
     without_leg_yaw,
 )
+from chilopod.trials import NONE, Disturbance, Trial
 
 ROUGH = 3.0
 """Times the usual disturbance, for the check that conclusions do not hang on it."""

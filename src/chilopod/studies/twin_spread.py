@@ -14,6 +14,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from chilopod import trials
 from chilopod.analysis.parameters import K1, stiffness
 from chilopod.analysis.square_root import square_root_fit
 from chilopod.engine import Status
@@ -21,14 +22,13 @@ from chilopod.errors import AnalysisError
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import ARRIVAL_RADIUS, Target, steered, strategy_named
-from chilopod.studies import identify_twin, trials
+from chilopod.studies import identify_twin
 from chilopod.studies.curved_trials import variant_robots
 from chilopod.studies.identify_twin import Fit
 from chilopod.studies.paper import printed
 from chilopod.studies.robot_walks import CURVED, undulations
-from chilopod.studies.trials import NONE, Trial
 from chilopod.studies.twin_constants import FREE, with_constants
-from chilopod.studies.walks import AVERAGED
+from chilopod.trials import AVERAGED, NONE, Trial
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ import pytest
 from chilopod import load_robot
 from chilopod.errors import ParameterError
 from chilopod.steering import LegYawController, Target
-from chilopod.studies.trials import NONE, Disturbance, Trial, run, together
+from chilopod.trials import NONE, Disturbance, Trial, run, together
 
 ROBOT = load_robot("aoi2022-planar")
 BASE = Trial(ROBOT, 2.0, seed=3, target=Target(0.7, 1.3), controller=LegYawController(), rate=20.0)
