@@ -25,7 +25,7 @@ from chilopod.cli.progress import progress_bar
 
 if TYPE_CHECKING:
     from chilopod.robot import Robot
-    from chilopod.studies.turn import Turn
+    from chilopod.tasks import Turn
 
 
 def walk(
@@ -148,7 +148,7 @@ def turn(
     spring = k1 if k1 in ("auto", "law") else units.parse(k1, "N*m/rad")
     seconds = None if duration is None else units.parse(duration, "s")
     folder = prepared(out)
-    from chilopod.studies.turn import turn as walk_there
+    from chilopod.tasks import turn as walk_there
 
     if folder:
         from chilopod.output import free_path

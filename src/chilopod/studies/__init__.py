@@ -1,7 +1,6 @@
 """Studies: conditions in, results out. One module for each figure or table of the paper."""
 
-from chilopod.studies.identify import Identification, identify_planar
 from chilopod.studies.reproduce import CHAPTERS, SECTIONS, Results, reproduce
 from chilopod.studies.table import Row
 
-__all__ = ["CHAPTERS", "SECTIONS", "Identification", "Results", "Row", "identify_planar", "reproduce"]
+__all__ = ["CHAPTERS", "SECTIONS", "Results", "Row", "reproduce"]

@@ -29,7 +29,7 @@ from chilopod.progress import Progress, silent
 from chilopod.robot import Robot, Twin
 from chilopod.studies.paper import printed
 from chilopod.studies.robot_rows import CHECKED, RobotRow
-from chilopod.studies.robot_walks import CURVED
+from chilopod.tasks.radius_law import CURVED
 from chilopod.trials import NONE, Trial
 from chilopod.twin.creep import foot_creep
 from chilopod.twin.legs import twin_of

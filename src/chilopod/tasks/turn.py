@@ -15,7 +15,7 @@ from chilopod.errors import AnalysisError, ParameterError
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import Criteria, Strategy, Target, earliest_arrival, evaluate, steered
-from chilopod.studies.robot_walks import twin_radius_law
+from chilopod.tasks.radius_law import twin_radius_law
 from chilopod.trials import NONE, Disturbance, Trial, check_engine, run, together
 
 Array = NDArray[np.float64]
