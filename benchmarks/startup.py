@@ -15,6 +15,7 @@ COMMAND = Path(sys.executable).with_name("chilopod")
 CALLS = {
     "`chilopod --help`": ([str(COMMAND), "--help"], "0.3 s"),
     '`python -c "import chilopod"`': ([sys.executable, "-c", "import chilopod"], "0.5 s"),
+    '`python -c "import chilopod.analysis"`': ([sys.executable, "-c", "import chilopod.analysis"], "0.6 s"),
     '`python -c "import numpy"`, for comparison': ([sys.executable, "-c", "import numpy"], ""),
     '`python -c "pass"`, for comparison': ([sys.executable, "-c", "pass"], ""),
 }

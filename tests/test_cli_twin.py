@@ -13,8 +13,8 @@ import xarray as xr
 
 from chilopod import load_robot
 from chilopod.cli import main
-from chilopod.studies import identify_twin
-from chilopod.studies.trials import Trial, run
+from chilopod.tasks.identify import twin
+from chilopod.trials import Trial, run
 
 ROBOT = "aoi2022"
 SOFT = ["--set", "springs.stiffness[0]=15 N*mm/deg"]
@@ -81,18 +81,18 @@ def test_a_robot_that_blows_up_says_so(capsys):
 
 
 def test_identify_twin_keeps_what_it_has_tried(capsys, tmp_path, monkeypatch):
-    bends = identify_twin.known()[0].bends
+    bends = twin.known()[0].bends
     asked = []
 
-    def series(robot):
+    def series(robot, data):
         asked.append(robot)
         return np.stack([bends, bends])
 
-    monkeypatch.setattr(identify_twin, "base_series", series)
-    monkeypatch.setattr(identify_twin, "confirmed", lambda robot: True)
+    monkeypatch.setattr(twin, "base_series", series)
+    monkeypatch.setattr(twin, "confirmed", lambda robot, springs: True)
     arguments = ["identify", "twin", "--out", str(tmp_path), "--starts", "1", "--generations", "1", "--json"]
     found = printed(capsys, *arguments)
-    count = 10 + len(identify_twin.known())
+    count = 10 + len(twin.known())
     assert found["evaluations"] == len(asked) == count
     assert found == printed(capsys, *arguments)
     assert len(asked) == count
@@ -106,7 +106,7 @@ def test_a_study_that_is_killed_goes_on_where_it_was(tmp_path):
     robot = load_robot(ROBOT)
     trials = [Trial(robot, 4.0, seed, engine="twin") for seed in range(24)]
     script = (
-        "import sys\nfrom chilopod import load_robot\nfrom chilopod.studies.trials import Trial, run\n"
+        "import sys\nfrom chilopod import load_robot\nfrom chilopod.trials import Trial, run\n"
         "robot = load_robot('aoi2022')\n"
         "run([Trial(robot, 4.0, seed, engine='twin') for seed in range(24)], sys.argv[1])\n"
     )

@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 from chilopod.cli import main
+from chilopod.record import RATE
 
 ROBOT = "aoi2022-planar"
 SOFT = ["--set", "springs.stiffness[0]=9 N*mm/deg"]
@@ -157,3 +158,9 @@ def test_turn_with_a_given_spring_and_the_other_strategies(capsys):
 def test_turn_refuses(capsys, arguments, words):
     message = refused(capsys, "turn", ROBOT, *arguments)
     assert all(word in message for word in words), message
+
+
+def test_the_rate_that_the_help_names_is_that_of_records(capsys):
+    assert main(["walk", "--help"]) == 0
+    words = capsys.readouterr().out.replace("│", " ").split()
+    assert f"by default {RATE:g}." in " ".join(words)

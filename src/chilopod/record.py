@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from chilopod.errors import ParameterError
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = NDArray[np.float64]
 
@@ -149,6 +152,8 @@ def walk_record(
     leg_yaw
         Of the legs of module 1, rad, shape (T, robots, 2).
     """
+    import xarray as xr  # takes a third of a second to load, and not all who know of records make any
+
     over = ("time", "robot")
     return xr.Dataset(
         {

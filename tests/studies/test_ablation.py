@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from chilopod import load_robot
+from chilopod.analysis.straight_walk import pitchfork
 from chilopod.studies import ablation
 from chilopod.studies.ablation import FACTORS, FINER, limit_point, planar_limit, sign_change, with_factors, with_grip
-from chilopod.studies.floquet import pitchfork
 from chilopod.twin import foot_creep
 
 ROBOT, PLANAR = load_robot("aoi2022"), load_robot("aoi2022-planar")

@@ -13,19 +13,9 @@ from chilopod.report import style
 from chilopod.steering import Target
 from chilopod.studies import robot_rows, robot_walks
 from chilopod.studies.robot_turning import RobotTurning
-from chilopod.studies.robot_walks import (
-    RobotWalks,
-    end_of_walk,
-    is_curved,
-    onset,
-    radius_at,
-    spring_for,
-    undulations,
-    walk_trials,
-)
-from chilopod.studies.trials import Trial
+from chilopod.studies.robot_walks import RobotWalks, onset, radius_at, spring_for, undulations, walk_trials
 from chilopod.studies.turning import turning_task, without_leg_yaw
-from chilopod.twin import simulate
+from chilopod.tasks.radius_law import is_curved
 
 ROBOT = load_robot("aoi2022")
 
@@ -117,29 +107,3 @@ def test_rows_and_figures_of_the_tasks(tasks, walks):
         for panel in turning_figures.panels(tasks, walks):
             assert style.svg(panel.draw(False), panel.name)
             assert style.svg(panel.draw(True), panel.name)
-
-
-def test_the_end_of_a_circle_is_its_radius():
-    """Angles that do not change give the paper's radius, and module 1's pace is its speed."""
-    record = simulate(ROBOT, 0.6, rate=50.0)
-    time = np.arange(0.0, 20.0, 0.02)
-    made = xr.Dataset(
-        {
-            "joint_angle": (("time", "robot", "joint"), np.full((time.size, 1, 5), 0.2)),
-            "position": (("time", "robot", "axis"), np.stack([0.05 * time, 0.0 * time], -1)[:, None]),
-            "status": ("robot", np.array(["walked"], dtype=object)),
-        },
-        coords={"time": time, "robot": [0], "joint": record.joint, "axis": record.axis},
-    )
-    end = end_of_walk(made, ROBOT)
-    assert float(end.axis_radius) == pytest.approx(5 * 0.225)
-    assert float(end.speed) == pytest.approx(0.05)
-    assert end.direction.item() == "right"
-    assert float(end.moved) == pytest.approx(0.0)
-
-
-def test_a_trial_of_the_twin_is_not_one_of_the_planar_model():
-    one = Trial(ROBOT, 1.0)
-    other = Trial(ROBOT, 1.0, engine="twin")
-    assert one.file_name != other.file_name
-    assert other.file_name.startswith("twin-")

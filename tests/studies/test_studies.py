@@ -2,12 +2,10 @@
 
 import numpy as np
 import pytest
-import xarray as xr
 
-from chilopod.errors import AnalysisError, ParameterError
+from chilopod.errors import ParameterError
 from chilopod.robot import load_robot
-from chilopod.stability import Kind
-from chilopod.studies import bifurcations, floquet, identify, reproduce, straight_walk
+from chilopod.studies import floquet, reproduce
 from chilopod.studies.reproduce import SECTIONS, chosen
 
 ROBOT = load_robot("aoi2022-planar")
@@ -49,58 +47,6 @@ def test_uniform_springs():
     assert data.attrs["value"] == pytest.approx(6.5756, abs=5e-5)
     assert data.attrs["frequency_rad_s"] == pytest.approx(0.5767, abs=5e-5)
     assert np.linalg.norm(data.amplitude) == pytest.approx(1.0)
-
-
-def test_a_loss_of_another_kind_is_said():
-    with pytest.raises(AnalysisError, match="Neimark-Sacker"):
-        floquet.first_loss(ROBOT, floquet.ALL, (floquet.stiffness(2.0), floquet.stiffness(75.0)), Kind.PITCHFORK)
-
-
-def test_coefficients_are_those_of_the_joint_angles():
-    (point,) = bifurcations(ROBOT, floquet.K1, (floquet.stiffness(11.0), floquet.stiffness(13.0)))
-    share = np.linalg.norm(point.point.mode[3:8])
-    assert point.coefficient == pytest.approx(point.point.coefficient / share**2)
-    assert np.linalg.norm(point.joint_components) == pytest.approx(1.0)
-    assert point.error_bound < 1e-8
-
-
-def test_modules_are_no_continuous_parameter():
-    with pytest.raises(ParameterError, match=r"body\.modules"):
-        bifurcations(ROBOT, "body.modules", (3.0, 8.0))
-
-
-def test_stability_agrees_with_the_sign_of_the_leading_exponent():
-    for k1 in (11.0, 13.0):
-        found = straight_walk(ROBOT.with_value(floquet.K1, floquet.stiffness(k1)))
-        assert found.stable == (found.exponents.values[0].real < 0) == (k1 > 12)
-
-
-def test_identification_finds_constants_it_was_not_started_from():
-    # Data made with other constants than the preset's: the fit has to find those back.
-    residuals = identify.residuals(ROBOT)
-    assert np.abs(residuals).max() == pytest.approx(1.016, abs=0.01)
-    fits = [identify._fit(ROBOT, np.array(start), fixed=0) for start in identify._STARTS]
-    for constants, off in fits:
-        assert constants == pytest.approx(fits[0][0], rel=1e-4)
-        assert np.abs(off).max() < 1.0
-        assert (off**2).sum() < (residuals**2).sum()
-
-
-def test_the_profile_passes_through_the_best_fit_and_predicts():
-    found = identify.identify_planar(ROBOT, 5)
-    assert isinstance(found.profile, xr.Dataset)
-    best = found.best.legs.forward_offset
-    cost = np.interp(best, found.profile.forward_offset, found.profile.largest_residual)
-    assert cost == pytest.approx(np.abs(found.residuals).max(), abs=0.1)
-    assert found.allowed("forward_offset")[0] < best < found.allowed("forward_offset")[1]
-    assert np.isfinite(found.profile.uniform).all()
-    result = found.as_json()
-    assert set(result["constants"]) == set(identify.FREE)
-
-
-def test_residuals_need_the_papers_number_of_modules():
-    with pytest.raises(AnalysisError, match="6 modules"):
-        identify.residuals(ROBOT.with_value("body.modules", 7))
 
 
 def test_sections_come_in_their_own_order_and_misspelt_ones_are_refused():

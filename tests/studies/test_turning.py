@@ -14,10 +14,10 @@ import xarray as xr
 from chilopod.errors import ParameterError
 from chilopod.robot import load_robot
 from chilopod.steering import Outcome, Target
-from chilopod.studies.trials import NONE
 from chilopod.studies.turning import CRITERIA, minima, springs_by_outcome, turning_task
 from chilopod.studies.turning_findings import turning
 from chilopod.studies.turning_rows import rows
+from chilopod.trials import NONE
 
 ROBOT = load_robot("aoi2022-planar")
 TASK_A = Target.parse("45 deg, 1.3 m")

@@ -72,7 +72,8 @@ def branch(
     replace = force or (resume is not None and (folder is None or folder.resolve() == resume.resolve()))
     if folder and not replace and (folder / "branch.nc").exists():
         raise OutputError("exists and is not overwritten", source=str(folder / "branch.nc"), allowed="--force")
-    from chilopod.studies import curved_walk
+    from chilopod.analysis.branch import as_json as plain
+    from chilopod.analysis.branch import curved_walks, read_walks, resumed
 
     with progress_bar() as show:
 
@@ -81,7 +82,7 @@ def branch(
 
         if resume is None:
             assert limits is not None
-            data = curved_walk.curved_walks(
+            data = curved_walks(
                 described,
                 parameter,
                 limits,
@@ -91,8 +92,8 @@ def branch(
                 progress=progress,
             )
         else:
-            data = curved_walk.resumed(
-                curved_walk.read_walks(resume / "branch.nc"),
+            data = resumed(
+                read_walks(resume / "branch.nc"),
                 described,
                 parameter,
                 limits,
@@ -108,7 +109,7 @@ def branch(
         for path in write_branch(data, folder, replace=replace):
             typer.echo(f"wrote {path}", err=True)
     if as_json:
-        print_json(curved_walk.as_json(data))
+        print_json(plain(data))
         return
     _print(data)
 

@@ -97,10 +97,17 @@ def planar(
     described = read_robot(robot, overrides)
     folder = prepare_folder(out)
     from chilopod.report import write_identification
-    from chilopod.studies import identify_planar
+    from chilopod.studies.fit_data import critical_mode_data, variant_settings
+    from chilopod.tasks.identify import identify_planar
 
     with progress_bar() as show:
-        found = identify_planar(described, points, lambda done, words: show("identification", done, words))
+        found = identify_planar(
+            described,
+            critical_mode_data(),
+            points,
+            variant_settings(),
+            lambda done, words: show("identification", done, words),
+        )
     best = found.best.with_(name="identified")
     write_identification(found, folder)
     write_atomic(folder / "identified.toml", best.to_toml())
@@ -139,11 +146,13 @@ def twin(
 
     described = read_robot(robot, overrides)
     folder = prepare_folder(out)
-    from chilopod.studies.identify_twin import identify_twin
+    from chilopod.studies.fit_data import base_series_data
+    from chilopod.tasks.identify import identify_twin
 
     with progress_bar() as show:
         found = identify_twin(
             described,
+            base_series_data(),
             starts,
             generations,
             seed,

@@ -30,7 +30,7 @@ def stability(robot: RobotArg, overrides: SetOption = None, as_json: JsonOption 
     """
     described = read_robot(robot, overrides)
     folder = prepared(out)
-    from chilopod.studies import straight_walk
+    from chilopod.analysis import straight_walk
 
     found = straight_walk(described)
     result = found.as_json()
@@ -60,7 +60,7 @@ def bifurcation(
     described = read_robot(robot, overrides)
     low, high = interval(described, parameter, between)
     folder = prepared(out)
-    from chilopod.studies import bifurcations
+    from chilopod.analysis import bifurcations
 
     points = bifurcations(described, parameter, (low, high))
     result = {"points": [point.as_json() for point in points]}

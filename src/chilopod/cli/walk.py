@@ -25,7 +25,7 @@ from chilopod.cli.progress import progress_bar
 
 if TYPE_CHECKING:
     from chilopod.robot import Robot
-    from chilopod.studies.turn import Turn
+    from chilopod.tasks import Turn
 
 
 def walk(
@@ -37,7 +37,7 @@ def walk(
     ] = None,
     seed: SeedOption = None,
     repeats: RepeatsOption = 1,
-    rate: Annotated[float, typer.Option(metavar="HZ", help="Samples per second.")] = 100.0,
+    rate: Annotated[float | None, typer.Option(metavar="HZ", help="Samples per second, by default 100.")] = None,
     forces: Annotated[bool, typer.Option("--forces", help="Record the force on every foot.")] = False,
     engine: EngineOption = "planar",
     overrides: SetOption = None,
@@ -59,8 +59,8 @@ def walk(
     if repeats > 1 and seed is None:
         raise ParameterError("are all alike without --seed", field="repeats", value=repeats, allowed="1")
     path = None if out is None else free_path(out, force)
-    from chilopod.studies.trials import NONE, Disturbance, Trial, check_engine, run, together
-    from chilopod.studies.walks import summaries
+    from chilopod.record import RATE
+    from chilopod.trials import NONE, Disturbance, Trial, check_engine, run, summaries, together
 
     check_engine(engine, described)
     disturbance = NONE if seed is None else Disturbance()
@@ -71,7 +71,7 @@ def walk(
             (seed or 0) + i,
             angles,
             disturbance=disturbance,
-            rate=rate,
+            rate=RATE if rate is None else rate,
             forces=forces,
             engine=engine,
         )
@@ -148,7 +148,7 @@ def turn(
     spring = k1 if k1 in ("auto", "law") else units.parse(k1, "N*m/rad")
     seconds = None if duration is None else units.parse(duration, "s")
     folder = prepared(out)
-    from chilopod.studies.turn import turn as walk_there
+    from chilopod.tasks import turn as walk_there
 
     if folder:
         from chilopod.output import free_path

@@ -12,15 +12,17 @@ tau, tau k' = u - k::
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.engine.contract import Command
 from chilopod.errors import ParameterError
 from chilopod.robot import Robot
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ _LAYOUTS = (style.Layout("ABC", 3.7), style.Layout("A;B;C", 9.5))
 
 
 def panel(data: xr.Dataset) -> Panel:
-    """The figure of a branch from :func:`chilopod.studies.curved_walk.curved_walks`."""
+    """The figure of a branch from :func:`chilopod.analysis.branch.curved_walks`."""
     shown = data.attrs["varied"]
     return Panel(
         name="branch",

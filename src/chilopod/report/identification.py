@@ -14,7 +14,8 @@ from chilopod.report import style
 from chilopod.report.panel import Panel
 from chilopod.report.words import SPRING_UNIT, listing, number, typeset
 from chilopod.robot import Robot
-from chilopod.studies import Identification, Results
+from chilopod.studies import Results
+from chilopod.tasks.identify import Identification
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,8 @@ from chilopod.report.body import chain, draw_heading, draw_joints, draw_modules,
 from chilopod.report.panel import Panel
 from chilopod.report.words import listing, number, spring
 from chilopod.studies import Results
-from chilopod.studies.identify import MODE_ROUNDING, Identification
+from chilopod.studies.fit_data import MODE_ROUNDING
+from chilopod.tasks.identify import Identification
 
 _WIDE = style.Layout("AC;BC", 5.2, heights=(1.5, 1.0), widths=(1.15, 1.0))
 _NARROW = style.Layout("A;B;C", 10.8, heights=(1.2, 0.9, 1.9))

@@ -17,7 +17,8 @@ from chilopod.report.panel import Panel
 from chilopod.report.words import SPRING_UNIT, k, listing, number, typeset
 from chilopod.studies.paper import printed
 from chilopod.studies.robot_rows import printed_number
-from chilopod.studies.robot_walks import RobotWalks, is_curved, onset, radius_at
+from chilopod.studies.robot_walks import RobotWalks, onset, radius_at
+from chilopod.tasks.radius_law import is_curved
 
 Array = NDArray[np.float64]
 

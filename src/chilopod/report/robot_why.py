@@ -16,7 +16,7 @@ from chilopod.robot import Robot
 from chilopod.studies.paper import printed
 from chilopod.studies.robot_rows import printed_number
 from chilopod.studies.robot_walks import SPRINGS
-from chilopod.studies.twin_constants import FREE
+from chilopod.tasks.identify.twin_constants import FREE
 
 _WHY = (style.Layout("AB", 4.6, widths=(1.2, 1.0)), style.Layout("A;B", 9.0))
 _SPREAD = (style.Layout("AB", 4.2, widths=(1.0, 1.1)), style.Layout("A;B", 8.2))

@@ -17,7 +17,7 @@ from chilopod.report.frames import body_frames
 from chilopod.report.replay import replay
 from chilopod.report.replay_3d import replay_3d
 from chilopod.steering import ARRIVAL_RADIUS
-from chilopod.studies.turn import Turn
+from chilopod.tasks import Turn
 
 _LAYOUTS = (style.Layout("AB;AC", 4.6, widths=(1.5, 1.0)), style.Layout("A;B;C", 9.0, heights=(2.0, 1.0, 1.0)))
 _STILLS = 5

@@ -15,7 +15,7 @@ _LAYOUTS = (style.Layout("ABC", 3.7), style.Layout("A;B;C", 9.5))
 
 
 def panel(data: xr.Dataset) -> Panel:
-    """The figure of :func:`chilopod.studies.undulation.undulating_walks`."""
+    """The figure of :func:`chilopod.analysis.undulation.undulating_walks`."""
     near = data.isel(distance=int(data.distance.values.argmin()))
     off = 100.0 * abs(float(near.amplitude / near.predicted_amplitude) - 1.0)
     return Panel(

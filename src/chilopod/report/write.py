@@ -34,8 +34,9 @@ from chilopod.report.render import film_3d, stills
 from chilopod.report.replay import replay
 from chilopod.report.replay_3d import replay_3d
 from chilopod.robot import Robot, load_robot, presets
-from chilopod.studies import CHAPTERS, Identification, Results
+from chilopod.studies import CHAPTERS, Results
 from chilopod.studies.movies import Movie
+from chilopod.tasks.identify import Identification
 
 _STRAIGHT: Mapping[str, Callable[[Results], Panel]] = {
     "exponents": exponents.panel,
@@ -174,7 +175,7 @@ def write_branch(data: xr.Dataset, folder: str | Path, *, replace: bool = True) 
     Parameters
     ----------
     data
-        From :mod:`chilopod.studies.curved_walk`.
+        From :mod:`chilopod.analysis.branch`.
     folder
         Created where there is none.
     replace

@@ -20,15 +20,17 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from chilopod import trials
+from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
+from chilopod.analysis.square_root import square_root_fit
+from chilopod.analysis.straight_walk import pitchfork
 from chilopod.errors import AnalysisError
+from chilopod.progress import Progress, silent
 from chilopod.robot import Robot, Twin
-from chilopod.studies import trials
-from chilopod.studies.floquet import K1, PAPER_UNIT, Progress, pitchfork, silent, stiffness
 from chilopod.studies.paper import printed
 from chilopod.studies.robot_rows import CHECKED, RobotRow
-from chilopod.studies.robot_walks import CURVED
-from chilopod.studies.square_root import square_root_fit
-from chilopod.studies.trials import NONE, Trial
+from chilopod.tasks.radius_law import CURVED
+from chilopod.trials import NONE, Trial
 from chilopod.twin.creep import foot_creep
 from chilopod.twin.legs import twin_of
 

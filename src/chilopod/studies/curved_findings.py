@@ -13,6 +13,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from chilopod.analysis.branch import curved_walks
+from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
+from chilopod.analysis.square_root import SquareRootFit, square_root_fit
+from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.studies.curved_trials import (
     SPRINGS,
@@ -23,11 +27,8 @@ from chilopod.studies.curved_trials import (
     variant_robots,
     variant_trials,
 )
-from chilopod.studies.curved_walk import curved_walks
-from chilopod.studies.floquet import K1, PAPER_UNIT, Progress, silent, stiffness
 from chilopod.studies.paper import printed
-from chilopod.studies.square_root import SquareRootFit, square_root_fit
-from chilopod.studies.trials import Disturbance
+from chilopod.trials import Disturbance
 
 Array = NDArray[np.float64]
 
@@ -48,7 +49,7 @@ class CurvedStudy:
     examples
         See :func:`chilopod.studies.curved_trials.example_walks`.
     branch
-        The exact curved walks, turning right, see :func:`chilopod.studies.curved_walk.curved_walks`.
+        The exact curved walks, turning right, see :func:`chilopod.analysis.branch.curved_walks`.
     fits
         See :func:`onset_fits`.
     law
@@ -144,7 +145,7 @@ def onset_fits(trials: xr.Dataset, branch: xr.Dataset) -> xr.Dataset:
     Returns
     -------
     Dataset over softest (the softest spring fitted, N*mm/deg): ``critical_k1``, its ``error`` and ``bootstrap_error``
-    (see :class:`chilopod.studies.square_root.SquareRootFit`), ``exact_walks``, what the fit gives if every trial is
+    (see :class:`chilopod.analysis.SquareRootFit`), ``exact_walks``, what the fit gives if every trial is
     replaced by the exact walk of its spring: the part of being off that no repeating cures, and ``trials``.
     """
     curved = trials.isel(spring=bent(trials).any(axis=1))

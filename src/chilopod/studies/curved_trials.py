@@ -19,14 +19,15 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from chilopod import stability
+from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
+from chilopod.analysis.straight_walk import pitchfork
 from chilopod.engine import Status
 from chilopod.planar import PlanarModel
+from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability.system import whole_period
-from chilopod.studies.floquet import K1, PAPER_UNIT, Progress, pitchfork, silent, stiffness
 from chilopod.studies.paper import printed
-from chilopod.studies.trials import Disturbance, Trial, run
-from chilopod.studies.walks import AVERAGED
+from chilopod.trials import AVERAGED, Disturbance, Trial, run
 
 Array = NDArray[np.float64]
 
@@ -78,7 +79,7 @@ def curved_trials(
         How long a trial walks, in e-folds of the slowest motion about the straight walk, but 180 s at least and 1200 s
         at most.
     folder
-        Where trials are kept, see :func:`chilopod.studies.trials.run`.
+        Where trials are kept, see :func:`chilopod.trials.run`.
     progress
         Called as trials are done.
 
@@ -154,7 +155,7 @@ def off_branch(robot: Robot, trials: xr.Dataset, branch: xr.Dataset) -> xr.DataA
     trials
         From :func:`curved_trials`; without spread of friction, which the branch does not have.
     branch
-        From :func:`chilopod.studies.curved_walk.curved_walks` over k1, turning right.
+        From :func:`chilopod.analysis.branch.curved_walks` over k1, turning right.
 
     Returns
     -------

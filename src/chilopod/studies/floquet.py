@@ -6,61 +6,20 @@ where a figure is drawn in them.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from chilopod import stability, units
+from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT, stiffness
+from chilopod.analysis.straight_walk import WalkBifurcation, first_loss, pitchfork
 from chilopod.errors import AnalysisError
 from chilopod.planar import PlanarModel
+from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import Kind
 from chilopod.studies.paper import printed, printed_stiffness
-from chilopod.studies.straight_walk import WalkBifurcation, bifurcations
-
-K1 = "springs.stiffness[0]"
-ALL = "springs.stiffness"
-PAPER_UNIT = "N*mm/deg"
-
-Progress = Callable[[float, str], None]
-"""Called with the part done (0 to 1) and a few words."""
-
-
-def silent(done: float, words: str) -> None:
-    """A :data:`Progress` that shows nothing."""
-
-
-def stiffness(value: float) -> float:
-    """A spring constant in N*mm/deg as SI."""
-    return units.parse(f"{float(value)!r} {PAPER_UNIT}", "N*m/rad")
-
-
-def first_loss(
-    robot: Robot, parameter: str, between: tuple[float, float], kind: Kind, normal_form: bool = True
-) -> WalkBifurcation:
-    """The bifurcation at which the straight walk loses stability as a spring is softened from ``between[1]`` down.
-
-    Raises
-    ------
-    AnalysisError
-        If it is not of the kind asked for, or there is none.
-    """
-    for low in np.geomspace(between[1], between[0], 5)[1:]:
-        # From the stiff end down, so that points far below, where the walk is unstable anyway, cost nothing.
-        points = bifurcations(robot, parameter, (float(low), between[1]), normal_form=False)
-        if points:
-            if points[-1].point.kind is kind:
-                if not normal_form:
-                    return points[-1]
-                near = points[-1].point.value * np.array([1.0 - 1e-3, 1.0 + 1e-3])
-                return bifurcations(robot, parameter, (float(near[0]), float(near[1])))[-1]
-            raise AnalysisError(
-                f"stability is lost by a {points[-1].point.kind.label}, not a {kind.label}", field=parameter
-            )
-    raise AnalysisError(f"no {kind.label} in the interval", field=parameter)
 
 
 def exponent_sweep(robot: Robot, count: int = 120, progress: Progress = silent) -> xr.Dataset:
@@ -105,11 +64,6 @@ def _followed(
     # Fast exponents lie far apart and move fast; distances count relative to how fast a mode decays.
     cost = np.hypot(difference.real, wrapped) / (1.0 + np.abs(expected.real))[:, None]
     return values[linear_sum_assignment(cost)[1]]
-
-
-def pitchfork(robot: Robot, normal_form: bool = True) -> WalkBifurcation:
-    """The pitchfork in k1, searched where the paper's springs are."""
-    return first_loss(robot, K1, (stiffness(2.0), stiffness(75.0)), Kind.PITCHFORK, normal_form)
 
 
 def critical_mode(robot: Robot) -> xr.Dataset:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chilopod.studies.identify import K1_ROUNDING, MODE_ROUNDING
+from chilopod.studies.fit_data import K1_ROUNDING, MODE_ROUNDING
 from chilopod.studies.paper import printed
 from chilopod.studies.table import Row, agrees
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,12 +9,11 @@ import numpy as np
 import xarray as xr
 
 from chilopod import units
+from chilopod.analysis.parameters import K1
+from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import LegYawController, Target
-from chilopod.studies.floquet import K1
-from chilopod.studies.trials import NONE, Trial, run, together
-
-Progress = Callable[[float, str], None]
+from chilopod.trials import NONE, Trial, run, together
 
 TASK_A = Target(float(np.deg2rad(45.0)), 1.3)
 
@@ -55,7 +53,7 @@ def movies(
     springs: tuple[float, float, float],
     best: float,
     folder: str | Path | None = None,
-    progress: Progress = lambda done, words: None,
+    progress: Progress = silent,
 ) -> list[Movie]:
     """Walk what is filmed.
 
@@ -88,7 +86,7 @@ def robot_movies(
     springs: tuple[float, float, float],
     tried: tuple[float, float, float],
     folder: str | Path | None = None,
-    progress: Progress = lambda done, words: None,
+    progress: Progress = silent,
 ) -> list[Movie]:
     """The same of the whole robot: the walks of movie 1 start straight but for their disturbance, as the paper's do.
 

@@ -9,21 +9,14 @@ from pathlib import Path
 
 import xarray as xr
 
+from chilopod.analysis.branch import curved_walks
+from chilopod.analysis.parameters import K1, stiffness
+from chilopod.analysis.undulation import undulating_walks
 from chilopod.errors import ParameterError, nearest_name
 from chilopod.robot import Robot
-from chilopod.studies import (
-    ablation,
-    curved_rows,
-    floquet,
-    floquet_rows,
-    identify,
-    robot_rows,
-    turning_rows,
-    twin_numerics,
-)
+from chilopod.studies import ablation, curved_rows, floquet, floquet_rows, robot_rows, turning_rows, twin_numerics
 from chilopod.studies.curved_findings import CurvedStudy, curved_study
-from chilopod.studies.curved_walk import curved_walks
-from chilopod.studies.floquet import K1, stiffness
+from chilopod.studies.fit_data import critical_mode_data, variant_settings
 from chilopod.studies.movies import Movie, movies, robot_movies
 from chilopod.studies.planar_words import planar_words
 from chilopod.studies.robot_rows import RobotRow
@@ -33,7 +26,7 @@ from chilopod.studies.table import Row
 from chilopod.studies.turning_findings import Turning, turning
 from chilopod.studies.twin_spread import COUNT as SPREAD
 from chilopod.studies.twin_spread import twin_spread
-from chilopod.studies.undulation import undulating_walks
+from chilopod.tasks.identify import Identification, identify_planar
 
 Progress = Callable[[str, float, str], None]
 """Called with the section, the part of it that is done (0 to 1), and a few words."""
@@ -107,7 +100,7 @@ class Results:
 
     robot: Robot
     datasets: dict[str, xr.Dataset] = field(default_factory=dict)
-    identification: identify.Identification | None = None
+    identification: Identification | None = None
     curved: CurvedStudy | None = None
     turning: Turning | None = None
     movies: list[Movie] = field(default_factory=list)
@@ -221,7 +214,9 @@ def _section(
         data[name] = floquet.uniform_springs(robot)
         return floquet_rows.uniform_rows(results)
     if name == "identification":
-        results.identification = identify.identify_planar(robot, 7 if quick else 25, report)
+        results.identification = identify_planar(
+            robot, critical_mode_data(), 7 if quick else 25, variant_settings(), report
+        )
         data[name] = results.identification.profile
         return floquet_rows.identification_rows(results)
     if name == "branch":

@@ -10,13 +10,14 @@ import numpy as np
 import xarray as xr
 
 from chilopod import units
+from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.steering import Outcome
-from chilopod.studies.floquet import PAPER_UNIT
 from chilopod.studies.paper import printed
 from chilopod.studies.robot_turning import PAPER_SPRING, RobotTurning
-from chilopod.studies.robot_walks import RobotWalks, is_curved, onset, radius_at, spring_for
+from chilopod.studies.robot_walks import RobotWalks, onset, radius_at, spring_for
 from chilopod.studies.turning import minima, springs_by_outcome
 from chilopod.studies.turning_rows import AROUND, NAMES, SCALES
+from chilopod.tasks.radius_law import is_curved
 
 FITTED, PREDICTED, CHECKED = "fitted", "predicted", "checked"
 

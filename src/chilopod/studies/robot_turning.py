@@ -8,9 +8,9 @@ from pathlib import Path
 
 import xarray as xr
 
+from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import Target
-from chilopod.studies.floquet import Progress, silent
 from chilopod.studies.paper import printed
 from chilopod.studies.turning import REPEATS, TurningTask, turning_task, without_leg_yaw
 

@@ -15,17 +15,15 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from chilopod import units
-from chilopod.engine import Status
+from chilopod import trials
+from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT, stiffness
+from chilopod.analysis.square_root import SquareRootFit, square_root_fit
 from chilopod.errors import AnalysisError
+from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
-from chilopod.steering import RadiusLaw
-from chilopod.studies import trials
 from chilopod.studies.curved_trials import variant_robots
-from chilopod.studies.floquet import ALL, K1, PAPER_UNIT, Progress, silent, stiffness
-from chilopod.studies.square_root import SquareRootFit, square_root_fit
-from chilopod.studies.trials import Disturbance, Trial
-from chilopod.studies.walks import AVERAGED
+from chilopod.tasks.radius_law import DURATION, end_of_walk, is_curved
+from chilopod.trials import AVERAGED, Disturbance, Trial
 
 Array = NDArray[np.float64]
 
@@ -42,22 +40,15 @@ SWINGING = 15.0
 """N*mm/deg: of the paper's uniform springs, those up to here are on the soft side of its Hopf point."""
 
 REPEATS, VARIANT_REPEATS, UNIFORM_REPEATS = 10, 5, 3
-DURATION = 90.0
-"""s, of every trial: beside the onset a bend takes a minute to grow."""
 
 UNIFORM_DURATION = 60.0
 """s, of walks with all springs alike, which settle sooner."""
-
-CURVED = 0.25
-"""rad: a walk is curved if its joints bend by more than this in all, to a radius of 4.5 m or less."""
 
 _RATE = 50.0
 _EXAMPLES = (41.0, 15.0)
 _WINDOW = 24.0  # s, some two cycles of an undulation
 _PER_CYCLE = 6  # samples
 _SEEDS = 10_000  # between springs
-_LAW_SPRINGS = (0.2, 0.3, 0.37, 0.44, 0.51, 0.59, 0.68, 0.78, 0.9)  # of the stiffest spring
-_LAW_BEND = 0.8  # rad in all, to start with
 
 
 @dataclass(frozen=True)
@@ -152,10 +143,7 @@ def walk_trials(
 
     Returns
     -------
-    Dataset over spring (N*mm/deg), repeat and joint: ``mean_angle`` over the last 5 s (rad, NaN where the walk failed),
-    ``bend``, the sum of their sizes (rad), ``axis_radius`` (m), ``direction`` (left, right, straight; empty where it
-    failed), ``moved``, by how much the sum differs from that of the 10 s before (rad), ``speed`` of module 1 over the
-    last 12 s (m/s), and ``status``.
+    Dataset over spring (N*mm/deg), repeat and joint: what :func:`chilopod.tasks.radius_law.end_of_walk` makes of each.
     """
     asked = [
         Trial(
@@ -178,40 +166,6 @@ def walk_trials(
     return data
 
 
-def end_of_walk(record: xr.Dataset, robot: Robot) -> xr.Dataset:
-    """What one trial's record comes to, see :func:`walk_trials`."""
-    walk = record.isel(robot=0)
-    angles, times = walk.joint_angle.transpose("time", "joint").values, walk.time.values
-    late = times > times[-1] - AVERAGED + 1e-9
-    before = (times > times[-1] - AVERAGED - 10.0) & ~late
-    last = angles[late].mean(axis=0)
-    bend = float(np.abs(last).sum())
-    failed = walk.status.item() != Status.WALKED.label
-    side = "straight" if bend < CURVED else "right" if last.sum() > 0.0 else "left"
-    place = walk.position.transpose("time", "axis").values
-    back = int(np.searchsorted(times, times[-1] - 12.0))
-    # Along the way, gait cycle by gait cycle: on a curve the chord of 12 s is shorter.
-    stride = max(1, round(robot.gait.period / (times[1] - times[0])))
-    steps = np.linalg.norm(np.diff(place[back::stride], axis=0), axis=1) / (stride * (times[1] - times[0]))
-    return xr.Dataset(
-        {
-            "mean_angle": ("joint", last, {"units": "rad"}),
-            "bend": ((), bend, {"units": "rad"}),
-            "axis_radius": ((), (robot.body.modules - 1) * robot.module_length / max(bend, 1e-9), {"units": "m"}),
-            "direction": ((), np.array("" if failed else side, dtype=object)),
-            "moved": ((), abs(bend - float(np.abs(angles[before].mean(axis=0)).sum())), {"units": "rad"}),
-            "speed": ((), float(steps.mean()), {"units": "m/s"}),
-            "status": ((), np.array(walk.status.item(), dtype=object)),
-        },
-        coords={"joint": walk.joint.values},
-    )
-
-
-def is_curved(data: xr.Dataset) -> NDArray[np.bool_]:
-    """Which trials walk a curve, shape (spring, repeat)."""
-    return np.isin(data.direction.values, ("left", "right"))
-
-
 def onset(data: xr.Dataset, joint: int = 1) -> SquareRootFit | None:
     """Where curved walks set in by the paper's method: the square-root fit to trials at springs at which most curve.
 
@@ -229,7 +183,7 @@ def onset(data: xr.Dataset, joint: int = 1) -> SquareRootFit | None:
 def radius_at(data: xr.Dataset, spring: float) -> tuple[float, float]:
     """Mean radius of the trials at a spring that curve, and its standard error, m; NaN if there are fewer than two."""
     at = data.sel(spring=spring)
-    radii = at.axis_radius.values[np.isin(at.direction.values, ("left", "right"))]
+    radii = at.axis_radius.values[is_curved(at)]
     if len(radii) < 2:
         return float("nan"), float("nan")
     return float(radii.mean()), float(radii.std(ddof=1) / np.sqrt(len(radii)))
@@ -249,42 +203,6 @@ def spring_for(data: xr.Dataset, radius: float) -> float:
     wanted = (float(data.bend[0, 0] * data.axis_radius[0, 0]) / radius) ** 2
     found = np.interp(wanted, squared[order], inverse[order], left=np.nan, right=np.nan)
     return float(1.0 / found)
-
-
-def twin_radius_law(robot: Robot, progress: Progress = silent) -> RadiusLaw:
-    """Radius of the twin's curved walks over k1, from undisturbed walks that start bent.
-
-    Raises
-    ------
-    AnalysisError
-        If fewer than three springs curve, or softer ones do not curve more tightly.
-    """
-    stiffest = units.from_si(max(robot.springs.stiffness), PAPER_UNIT)
-    springs = [float(round(part * stiffest, 2)) for part in _LAW_SPRINGS]
-    joints = robot.body.modules - 1
-    bend = tuple([_LAW_BEND / joints] * joints)
-    asked = [
-        Trial(
-            robot.with_value(K1, stiffness(spring)),
-            DURATION,
-            0,
-            bend,
-            disturbance=trials.NONE,
-            rate=10.0,
-            engine="twin",
-        )
-        for spring in springs
-    ]
-    ends = xr.concat([end_of_walk(each, robot) for each in trials.run(asked, progress=progress)], "spring")
-    curved = np.isin(ends.direction.values, ("left", "right"))
-    if curved.sum() < 3:
-        raise AnalysisError("the walks at fewer than three springs curve: there is no radius law", field="springs")
-    inverse = 1.0 / np.array(springs)
-    fit = square_root_fit(inverse[curved], ends.bend.values[curved], resampled=0)
-    stiff_first = np.flatnonzero(curved)[::-1]
-    values = [fit.critical, *(springs[i] for i in stiff_first)]
-    radii = [np.inf, *(float(ends.axis_radius[i]) for i in stiff_first)]
-    return RadiusLaw.of_branch([stiffness(each) for each in values], radii, [True] * len(values), PAPER_UNIT)
 
 
 def undulations(

@@ -6,7 +6,7 @@ module 1 yaw towards the target. Each task is walked with many springs and sever
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,18 +15,17 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from chilopod import units
+from chilopod import trials, units
+from chilopod.analysis.parameters import PAPER_UNIT, stiffness
+from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import STRATEGIES, Outcome, Target, earliest_arrival, evaluate, steered
 from chilopod.steering.criteria import efforts
 from chilopod.steering.strategies import strategy_named
-from chilopod.studies import trials
-from chilopod.studies.floquet import PAPER_UNIT, silent, stiffness
 from chilopod.studies.paper import printed
-from chilopod.studies.trials import Disturbance, Trial
+from chilopod.trials import Disturbance, Trial
 
 Array = NDArray[np.float64]
-Progress = Callable[[float, str], None]
 
 DURATION: float = units.parse(printed()["turning"]["evaluation_time"], "s")
 """s: when the paper evaluates, and how long these trials are."""
@@ -126,7 +125,7 @@ def turning_task(
     shown
         Springs of ``paths``, N*mm/deg.
     engine
-        Of :data:`chilopod.studies.trials.ENGINES`.
+        Of :data:`chilopod.trials.ENGINES`.
     folder
         Where records are kept, so that a study that was stopped goes on where it was.
     progress

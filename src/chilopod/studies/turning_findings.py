@@ -11,24 +11,25 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from chilopod import trials
+from chilopod.analysis.parameters import ALL, PAPER_UNIT, stiffness
+from chilopod.analysis.radius_law import RadiusLaws, radius_laws
+from chilopod.analysis.straight_walk import first_loss
+from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import Kind
 from chilopod.steering import STRATEGIES, Target, earliest_arrival, evaluate, steered
-from chilopod.studies import trials
-from chilopod.studies.floquet import ALL, PAPER_UNIT, first_loss, silent, stiffness
 from chilopod.studies.paper import printed
-from chilopod.studies.radius_laws import RadiusLaws, radius_laws
-from chilopod.studies.trials import NONE, Disturbance, Trial
 from chilopod.studies.turning import (
     DURATION,
     RATE,
     SPRINGS,
     UNIFORM_SPRINGS,
-    Progress,
     TurningTask,
     turning_task,
     without_leg_yaw,
 )
+from chilopod.trials import NONE, Disturbance, Trial
 
 ROUGH = 3.0
 """Times the usual disturbance, for the check that conclusions do not hang on it."""

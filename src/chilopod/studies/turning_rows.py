@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from chilopod import units
+from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.steering import Outcome
-from chilopod.studies.floquet import PAPER_UNIT
 from chilopod.studies.paper import printed
 from chilopod.studies.table import Row
 from chilopod.studies.turning import DURATION, minima, springs_by_outcome

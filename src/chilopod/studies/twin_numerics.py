@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from chilopod.analysis.square_root import square_root_fit
 from chilopod.errors import AnalysisError
+from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
-from chilopod.studies.floquet import Progress, silent
-from chilopod.studies.identify_twin import base_series
+from chilopod.studies.fit_data import base_series_data
 from chilopod.studies.robot_rows import CHECKED, RobotRow
-from chilopod.studies.square_root import square_root_fit
+from chilopod.tasks.identify.twin import base_series
 from chilopod.twin.walk import TOLERANCE
 
 SPRINGS = (15.0, 17.0, 21.0, 26.0, 28.0)
@@ -42,7 +43,8 @@ def twin_numerics(robot: Robot, quick: bool = False, progress: Progress = silent
     cases = dict(list(CASES.items())[:2]) if quick else CASES
     for index, (name, (step, tolerance)) in enumerate(cases.items()):
         progress(index / len(cases), name)
-        angles = base_series(robot.with_value("twin.timestep", step), SPRINGS, tolerance=tolerance)[1]
+        finer = robot.with_value("twin.timestep", step)
+        angles = base_series(finer, base_series_data(), SPRINGS, tolerance=tolerance)[1]
         radii.append((robot.body.modules - 1) * robot.module_length / np.abs(angles).sum(axis=1))
         try:
             onsets.append(square_root_fit(1.0 / np.array(SPRINGS), np.abs(angles[:, 0]), resampled=0).critical)

@@ -14,20 +14,21 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from chilopod import trials
+from chilopod.analysis.parameters import K1, stiffness
+from chilopod.analysis.square_root import square_root_fit
 from chilopod.engine import Status
 from chilopod.errors import AnalysisError
+from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import ARRIVAL_RADIUS, Target, steered, strategy_named
-from chilopod.studies import identify_twin, trials
 from chilopod.studies.curved_trials import variant_robots
-from chilopod.studies.floquet import K1, Progress, silent, stiffness
-from chilopod.studies.identify_twin import Fit
 from chilopod.studies.paper import printed
-from chilopod.studies.robot_walks import CURVED, undulations
-from chilopod.studies.square_root import square_root_fit
-from chilopod.studies.trials import NONE, Trial
-from chilopod.studies.twin_constants import FREE, with_constants
-from chilopod.studies.walks import AVERAGED
+from chilopod.studies.robot_walks import undulations
+from chilopod.tasks.identify.twin import Fit, known
+from chilopod.tasks.identify.twin_constants import FREE, with_constants
+from chilopod.tasks.radius_law import CURVED
+from chilopod.trials import AVERAGED, NONE, Trial
 
 Array = NDArray[np.float64]
 
@@ -76,8 +77,7 @@ def twin_spread(
     over that as built), ``uniform`` (N*mm/deg), and over task ``best``, the spring that comes nearest to the target
     (N*mm/deg), and ``arrives``, whether that arrives.
     """
-    known = identify_twin.known()
-    fits = unlike(known, count)
+    fits = unlike(known(), count)
     rows: list[dict[str, Any]] = []
     for index, fit in enumerate(fits):
         progress(index / len(fits), f"set {index + 1} of {len(fits)}")
@@ -91,7 +91,7 @@ def twin_spread(
             "uniform": ("set", np.array([row["uniform"] for row in rows]), {"units": "N*mm/deg"}),
         },
         coords={"set": np.arange(len(fits)), "constant": [c.path for c in FREE], "variant": names, "task": tasks},
-        attrs={"robot": robot.name, "known": len(known)},
+        attrs={"robot": robot.name, "known": len(known())},
     )
     for name, over, keys in (("onset", "variant", names), ("tighter", "variant", names), ("best", "task", tasks)):
         data[name] = (("set", over), np.array([[row[name][key] for key in keys] for row in rows]))

@@ -8,9 +8,10 @@ import pytest
 from chilopod import load_robot
 from chilopod.errors import ParameterError
 from chilopod.steering import LegYawController, Target
-from chilopod.studies.trials import NONE, Disturbance, Trial, run, together
+from chilopod.trials import NONE, Disturbance, Trial, run, together
 
 ROBOT = load_robot("aoi2022-planar")
+WHOLE = load_robot("aoi2022")
 BASE = Trial(ROBOT, 2.0, seed=3, target=Target(0.7, 1.3), controller=LegYawController(), rate=20.0)
 
 
@@ -80,3 +81,10 @@ def test_disturbances_are_as_large_as_they_say():
 def test_a_disturbance_cannot_be_negative():
     with pytest.raises(ParameterError, match="friction"):
         Disturbance(friction=-0.1)
+
+
+def test_a_trial_of_the_twin_is_not_one_of_the_planar_model():
+    one = Trial(WHOLE, 1.0)
+    other = Trial(WHOLE, 1.0, engine="twin")
+    assert one.file_name != other.file_name
+    assert other.file_name.startswith("twin-")

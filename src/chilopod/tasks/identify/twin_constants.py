@@ -1,4 +1,4 @@
-"""The constants of the whole robot that the paper does not print: which are open, where they are looked for."""
+"""The constants of the whole robot that are hard to measure: which are open, where they are looked for."""
 
 from __future__ import annotations
 

@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod import stability, units
-from chilopod.errors import ParameterError
+from chilopod.analysis.parameters import K1, stiffness
+from chilopod.errors import AnalysisError, ParameterError
 from chilopod.planar import PlanarModel
 from chilopod.robot import Robot
+from chilopod.stability import Kind
 
 ComplexArray = NDArray[np.complex128]
 
@@ -162,6 +164,36 @@ def bifurcations(
         coefficient = None if point.coefficient is None else point.coefficient / share**2
         found.append(WalkBifurcation(point, parameter, unit, components, coefficient))
     return found
+
+
+def first_loss(
+    robot: Robot, parameter: str, between: tuple[float, float], kind: Kind, normal_form: bool = True
+) -> WalkBifurcation:
+    """The bifurcation at which the straight walk loses stability as a spring is softened from ``between[1]`` down.
+
+    Raises
+    ------
+    AnalysisError
+        If it is not of the kind asked for, or there is none.
+    """
+    for low in np.geomspace(between[1], between[0], 5)[1:]:
+        # From the stiff end down, so that points far below, where the walk is unstable anyway, cost nothing.
+        points = bifurcations(robot, parameter, (float(low), between[1]), normal_form=False)
+        if points:
+            if points[-1].point.kind is kind:
+                if not normal_form:
+                    return points[-1]
+                near = points[-1].point.value * np.array([1.0 - 1e-3, 1.0 + 1e-3])
+                return bifurcations(robot, parameter, (float(near[0]), float(near[1])))[-1]
+            raise AnalysisError(
+                f"stability is lost by a {points[-1].point.kind.label}, not a {kind.label}", field=parameter
+            )
+    raise AnalysisError(f"no {kind.label} in the interval", field=parameter)
+
+
+def pitchfork(robot: Robot, normal_form: bool = True) -> WalkBifurcation:
+    """The pitchfork in k1, searched where the paper's springs are."""
+    return first_loss(robot, K1, (stiffness(2.0), stiffness(75.0)), Kind.PITCHFORK, normal_form)
 
 
 def joint_components(mode: ComplexArray, modules: int) -> ComplexArray:

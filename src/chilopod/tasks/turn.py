@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,16 +9,16 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from chilopod.analysis.parameters import K1
+from chilopod.analysis.radius_law import radius_laws
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import Criteria, Strategy, Target, earliest_arrival, evaluate, steered
-from chilopod.studies.floquet import K1
-from chilopod.studies.radius_laws import radius_laws
-from chilopod.studies.robot_walks import twin_radius_law
-from chilopod.studies.trials import NONE, Disturbance, Trial, check_engine, run, together
+from chilopod.tasks.radius_law import twin_radius_law
+from chilopod.trials import NONE, Disturbance, Trial, check_engine, run, together
 
 Array = NDArray[np.float64]
-Progress = Callable[[float, str], None]
 
 _SOFTEST = 1.0 / 20.0  # of the stiffest spring: where a strategy without a radius law starts to look
 _TRIED = {"planar": 48, "twin": 8}  # springs a round
@@ -100,7 +99,7 @@ def turn(
     seed: int | None = None,
     repeats: int = 1,
     engine: str = "planar",
-    progress: Progress = lambda done, words: None,
+    progress: Progress = silent,
 ) -> Turn:
     """Walk to a target.
 
@@ -123,7 +122,7 @@ def turn(
     repeats
         How many walks.
     engine
-        Of :data:`chilopod.studies.trials.ENGINES`. The radius law of the planar model is that of its exact branch, the
+        Of :data:`chilopod.trials.ENGINES`. The radius law of the planar model is that of its exact branch, the
         twin's that of trials.
     progress
         Called with the part done (0 to 1) and a few words.

@@ -1,13 +1,13 @@
-"""Finding the constants of the three-dimensional robot that the paper does not print, from its base series alone.
+"""Finding the constants of the three-dimensional robot that are hard to measure, from one series of its walks alone.
 
-The base series is what the paper prints of the walks with k2 to k5 = 41 N*mm/deg and a stride of 3 cm: straight at
-k1 = 75 and 41, curved at 28, 21, 17 and 15, set in at 34 by a square-root fit to the bend of joint 1, radius 1.2 m at
-26 and 0.88 m at 21. Everything else (other springs, strides and phases, uniform springs, turning) is left to predict.
+The series is walks with several first springs (:class:`chilopod.tasks.identify.BaseSeries`): which of them curve and
+which are straight, how tightly some turn, and where by a square-root fit to the bend of joint 1 the curve sets in.
+Everything else (other springs, strides and phases, uniform springs, turning) is left to predict.
 
-Three numbers and six yes-or-no answers do not determine eight constants. Every constant therefore has a plausible
+A few numbers and yes-or-no answers do not determine eight constants. Every constant therefore has a plausible
 range, and where the data leave it open the middle of the range is preferred: what is minimised is the misfit to the
 data plus a weak prior, by evolution strategies from several starts, with every evaluation kept. Evaluations begin near
-the bends that the paper's numbers ask for, which saves the minute that a bend takes to grow; the preset is the best of
+the bends that the data ask for, which saves the minute that a bend takes to grow; the preset is the best of
 those whose walks from straight on get there too. All others that meet the data as well say how far the data determine
 each constant, and how far to trust what is predicted.
 """
@@ -26,15 +26,16 @@ from cmaes import CMA
 from numpy.typing import NDArray
 
 from chilopod import units
+from chilopod.analysis.parameters import K1, stiffness
+from chilopod.analysis.square_root import square_root_fit
 from chilopod.errors import AnalysisError, ChilopodError
 from chilopod.output import prepare_folder, write_atomic
+from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
-from chilopod.studies.floquet import K1, PAPER_UNIT, Progress, silent, stiffness
-from chilopod.studies.known_fits import known_fits
-from chilopod.studies.paper import printed
-from chilopod.studies.square_root import square_root_fit
-from chilopod.studies.trials import Trial, run
-from chilopod.studies.twin_constants import FREE, with_constants
+from chilopod.tasks.identify.data import BaseSeries
+from chilopod.tasks.identify.known_fits import known_fits
+from chilopod.tasks.identify.twin_constants import FREE, with_constants
+from chilopod.trials import Trial, run
 from chilopod.twin import initial_states, simulate
 from chilopod.twin.walk import TOLERANCE
 
@@ -43,36 +44,16 @@ Array = NDArray[np.float64]
 VERSION = 1
 """Goes up whenever the same constants would give other bends; evaluations of other versions are left alone."""
 
-
-SPRINGS = (15.0, 17.0, 21.0, 26.0, 28.0, 41.0, 75.0)
-"""k1 of the walks that an evaluation runs, N*mm/deg."""
-
 GOOD = 1.0
 """A set of constants does as well as any if its misfit is below this: then each datum is within its tolerance."""
 
-RESIDUALS = (
-    "radius at 21",
-    "radius at 26",
-    "onset",
-    "straight at 41",
-    "straight at 75",
-    "curved at 28",
-    "steady",
-)
-"""What the data are."""
-
-_CURVED = (15.0, 17.0, 21.0, 28.0)
-_STRAIGHT = (41.0, 75.0)
 _DURATION = 36.0  # s
 _AVERAGED = 4.8  # s, whole periods near the paper's 5 s
-_TOLERANCE = 0.05  # of printed numbers: half of what the report calls agreeing
 _STEADY = 0.1  # rad that the summed bend may move between the last two averages
-_LAW = (9.7, 0.030)  # rad*sqrt(N*mm/deg), deg/(N*mm): summed bend over 1/k1 that meets both printed radii; a start only
-_SHAPE = np.array([0.64, 0.36, 0.48, 0.46, 0.16]) / 2.10
 _PRIOR = 0.25  # of its range: standard deviation of a constant about the middle
 _LOST = 30.0  # misfit of constants with which the robot does not walk
 _POPULATION = 10
-_NEAR_ONSET, _PATIENCE = (26.0, 28.0), 100.0  # N*mm/deg, s
+_PATIENCE = 100.0  # s
 _SURELY_CURVED = 0.6  # rad in all
 _MOST_CONFIRMED = 20
 
@@ -86,8 +67,8 @@ class Fit:
     constants
         SI, in the order of :data:`FREE`.
     bends
-        Mean angle of each joint over the last 4.8 s, rad, over :data:`SPRINGS`, shape (7, joints); NaN where a walk
-        failed.
+        Mean angle of each joint over the last 4.8 s, rad, over the springs of the series, shape (springs,
+        joints); NaN where a walk failed.
     residuals
         Of the data in units of their tolerance, see :func:`residuals`.
     """
@@ -127,11 +108,14 @@ class TwinIdentification:
     ----------
     given
         The robot, for what is not fitted.
+    data
+        What was fitted.
     fits
         All evaluations; first the best of those that walk into the curve from straight on, then by their objective.
     """
 
     given: Robot
+    data: BaseSeries
     fits: list[Fit]
 
     @property
@@ -166,7 +150,7 @@ class TwinIdentification:
         return {
             "constants": constants,
             "misfit": self.fits[0].misfit,
-            "residuals": dict(zip(RESIDUALS, self.fits[0].residuals.tolist(), strict=True)),
+            "residuals": dict(zip(self.data.names, self.fits[0].residuals.tolist(), strict=True)),
             "evaluations": len(self.fits),
             "good": len(self.good),
             "fits": [fit.as_json() for fit in (self.good or self.fits[:1])],
@@ -174,25 +158,42 @@ class TwinIdentification:
 
 
 def base_series(
-    robot: Robot, springs: Sequence[float] = SPRINGS, duration: float = _DURATION, tolerance: float = TOLERANCE
+    robot: Robot,
+    data: BaseSeries,
+    springs: Sequence[float] | None = None,
+    duration: float = _DURATION,
+    tolerance: float = TOLERANCE,
 ) -> Array:
-    """Bends that the walks of the base series end in, begun near those that the paper's numbers ask for.
+    """Bends that the walks of a series end in, begun near those that the data ask for.
+
+    Parameters
+    ----------
+    robot
+        Its first spring does not matter.
+    data
+        The series.
+    springs
+        Values of k1, N*mm/deg, if not those of the series.
+    duration
+        s.
+    tolerance
+        Of the contact solver.
 
     Returns
     -------
     Mean joint angles over the last two stretches of 4.8 s, rad, shape (2, springs, joints); NaN where a walk failed.
     """
+    springs = data.springs if springs is None else springs
     robots = [robot.with_value(K1, stiffness(spring)) for spring in springs]
-    law = _LAW[0] * np.sqrt(np.maximum(1.0 / np.array(springs) - _LAW[1], 0.0))
-    start = np.maximum(law, 0.1)[:, None] * _SHAPE
+    start = data.start(springs)
     rate = 6.0 / robot.gait.period
     walked = simulate(robots, duration, initial=initial_states(robot, start), rate=rate, tolerance=tolerance)
     angles, samples = walked.joint_angle.transpose("time", "robot", "joint").values, round(_AVERAGED * rate)
     return np.stack([angles[-2 * samples : -samples].mean(0), angles[-samples:].mean(0)])
 
 
-def residuals(robot: Robot, bends: Array) -> Array:
-    """The base series' data, computed less printed.
+def residuals(robot: Robot, bends: Array, data: BaseSeries) -> Array:
+    """Computed less the data.
 
     Parameters
     ----------
@@ -200,62 +201,60 @@ def residuals(robot: Robot, bends: Array) -> Array:
         For its size.
     bends
         From :func:`base_series`.
+    data
+        The series.
 
     Returns
     -------
-    Shape (7,): radius at 21 and 26 and onset (each over 5 % of it); bend at 41 and 75 beyond 0.1 rad in all (over
-    0.05 rad); lacking bend at 28; motion between the averages (over 0.1 rad).
+    One for each of ``data.names``: radii and onset (each over the tolerance of it); bend where the robot is straight
+    beyond 0.1 rad in all (over 0.05 rad); what it lacks at the stiffest spring that curves of 0.3 rad (the same);
+    motion between the averages (over 0.1 rad).
     """
+    springs = data.springs
     summed = np.abs(bends[1]).sum(-1)
-    at = dict(zip(SPRINGS, summed, strict=True))
+    at = dict(zip(springs, summed, strict=True))
     if not np.isfinite(bends).all():
-        return np.full(7, _LOST)
-    wanted = printed()["curved"]["radius"]
-    radius = [units.parse(wanted[key], "m") for key in ("21", "26")]
+        return np.full(len(data.names), _LOST)
     length = (robot.body.modules - 1) * robot.module_length
     # Of curvatures, which are finite where a walk is straight.
-    found = [(at[k] * r / length - 1.0) / _TOLERANCE for k, r in zip((21.0, 26.0), radius, strict=True)]
-    onset = printed_onset()
-    curved = [SPRINGS.index(k) for k in _CURVED]
+    found = [(at[k] * r / length - 1.0) / data.tolerance for k, r in data.radii.items()]
+    curved = [springs.index(k) for k in data.curved]
     try:
-        fitted = square_root_fit(1.0 / np.array(_CURVED), np.abs(bends[1, curved, 0]), resampled=0).critical
+        fitted = square_root_fit(1.0 / np.array(data.curved), np.abs(bends[1, curved, 0]), resampled=0).critical
     except AnalysisError:
-        fitted = 0.5 * onset
-    found.append((fitted / onset - 1.0) / _TOLERANCE)
-    found += [max(at[k] - 0.1, 0.0) / 0.05 for k in _STRAIGHT]
-    found.append(max(0.3 - at[28.0], 0.0) / 0.05)
+        fitted = 0.5 * data.onset
+    found.append((fitted / data.onset - 1.0) / data.tolerance)
+    found += [max(at[k] - 0.1, 0.0) / 0.05 for k in data.straight]
+    found.append(max(0.3 - at[max(data.curved)], 0.0) / 0.05)
     moved = np.abs(bends[1].sum(-1) - bends[0].sum(-1))
     found.append(max(float(moved.max()) - _STEADY, 0.0) / _STEADY)
     return np.array(found)
 
 
-def printed_onset() -> float:
-    """The robot's critical k1 by the paper, N*mm/deg."""
-    return units.from_si(units.parse(printed()["pitchfork"]["robot_critical_k1"], "N*m/rad"), PAPER_UNIT)
-
-
-def evaluate(robot: Robot, constants: Array, folder: Path | None = None) -> Fit:
-    """Walk the base series with a set of constants, or read what came of it before."""
+def evaluate(robot: Robot, constants: Array, data: BaseSeries, folder: Path | None = None) -> Fit:
+    """Walk the series with a set of constants, or read what came of it before."""
     given = with_constants(robot, constants)
-    text = json.dumps([VERSION, given.with_(name="robot", provenance={}).to_toml(), SPRINGS, _DURATION])
+    series = [data.springs, data.law, data.shape]
+    text = json.dumps([VERSION, given.with_(name="robot", provenance={}).to_toml(), series, _DURATION])
     path = None if folder is None else folder / f"{hashlib.sha256(text.encode()).hexdigest()[:20]}.json"
     if path is not None and path.exists():
         try:
             bends = np.array(json.loads(path.read_text())["bends"], dtype=np.float64)
-            return Fit(constants, bends[1], residuals(given, bends))
+            return Fit(constants, bends[1], residuals(given, bends, data))
         except (OSError, ValueError, KeyError):
             pass
     try:
-        bends = base_series(given)
+        bends = base_series(given, data)
     except ChilopodError:  # legs too short, say
-        bends = np.full((2, len(SPRINGS), given.body.modules - 1), np.nan)
+        bends = np.full((2, len(data.springs), given.body.modules - 1), np.nan)
     if path is not None:
         write_atomic(path, json.dumps({"constants": constants.tolist(), "bends": bends.tolist()}))
-    return Fit(constants, bends[1], residuals(given, bends))
+    return Fit(constants, bends[1], residuals(given, bends, data))
 
 
 def search(
     robot: Robot,
+    data: BaseSeries,
     starts: int = 3,
     generations: int = 9,
     seed: int = 1,
@@ -268,6 +267,8 @@ def search(
     ----------
     robot
         What is not fitted.
+    data
+        What the robot's walks came to.
     starts
         How many, spread over the ranges of the constants.
     generations
@@ -299,9 +300,8 @@ def search(
             told = []
             for _ in range(_POPULATION):
                 parts = strategy.ask()
-                fit = evaluate(
-                    robot, np.array([each.value(part) for each, part in zip(FREE, parts, strict=True)]), kept
-                )
+                constants = np.array([each.value(part) for each, part in zip(FREE, parts, strict=True)])
+                fit = evaluate(robot, constants, data, kept)
                 told.append((parts, fit.objective))
                 fits.append(fit)
                 best = min(fits, key=lambda each: each.objective)
@@ -312,7 +312,7 @@ def search(
 
 
 def known() -> list[Fit]:
-    """The sets of constants that come with chilopod, best first."""
+    """The sets of constants that come with chilopod, best first; their residuals are those of the paper's series."""
     return [
         Fit(
             np.array([each["constants"][free.path] for free in FREE]),
@@ -323,11 +323,12 @@ def known() -> list[Fit]:
     ]
 
 
-def confirmed(robot: Robot) -> bool:
-    """Whether walks from straight on end in the curves that evaluations begin near: at 26 and 28 N*mm/deg, two each."""
+def confirmed(robot: Robot, springs: Sequence[float]) -> bool:
+    """Whether walks from straight on end in the curves that evaluations begin near: two at each of some springs
+    (N*mm/deg)."""
     asked = [
         Trial(robot.with_value(K1, stiffness(spring)), _PATIENCE, seed, rate=10.0, engine="twin")
-        for spring in _NEAR_ONSET
+        for spring in springs
         for seed in (1, 2)
     ]
     ends = [np.abs(each.joint_angle.isel(robot=0)[-50:].mean("time").values).sum() for each in run(asked)]
@@ -336,6 +337,7 @@ def confirmed(robot: Robot) -> bool:
 
 def identify_twin(
     robot: Robot,
+    data: BaseSeries,
     starts: int = 3,
     generations: int = 9,
     seed: int = 1,
@@ -344,21 +346,21 @@ def identify_twin(
     progress: Progress = silent,
 ) -> TwinIdentification:
     """Find the constants: the known ones first, then a :func:`search`, then the best of all that walk into the curve
-    from straight on, as the paper's robot did.
+    from straight on, as a robot does.
 
     Parameters
     ----------
-    robot, starts, generations, seed, folder, progress
+    robot, data, starts, generations, seed, folder, progress
         As for :func:`search`.
     fresh
         Whether to begin without the known ones.
     """
     kept = None if folder is None else prepare_folder(folder)
-    fits = [] if fresh else [evaluate(robot, fit.constants, kept) for fit in known()]
-    fits += search(robot, starts, generations, seed, folder, lambda done, words: progress(0.95 * done, words))
+    fits = [] if fresh else [evaluate(robot, fit.constants, data, kept) for fit in known()]
+    fits += search(robot, data, starts, generations, seed, folder, lambda done, words: progress(0.95 * done, words))
     fits.sort(key=lambda fit: fit.objective)
     progress(0.95, "walks from straight on")
     for index, fit in enumerate(fits[:_MOST_CONFIRMED]):
-        if fit.misfit <= GOOD and confirmed(with_constants(robot, fit.constants)):
-            return TwinIdentification(robot, [fit, *fits[:index], *fits[index + 1 :]])
-    return TwinIdentification(robot, fits)
+        if fit.misfit <= GOOD and confirmed(with_constants(robot, fit.constants), data.near_onset):
+            return TwinIdentification(robot, data, [fit, *fits[:index], *fits[index + 1 :]])
+    return TwinIdentification(robot, data, fits)

@@ -16,13 +16,15 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chilopod import units
+from chilopod.analysis.parameters import ALL, PAPER_UNIT, stiffness
+from chilopod.analysis.straight_walk import first_loss
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.planar.along import FollowedModel
+from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import BifurcationPoint, Criticality, Kind
 from chilopod.stability.floquet import spectrum
 from chilopod.stability.system import return_map, whole_period
-from chilopod.studies.floquet import ALL, PAPER_UNIT, Progress, first_loss, silent, stiffness
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

@@ -15,15 +15,15 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chilopod import stability, units
+from chilopod.analysis.straight_walk import WalkBifurcation, bifurcations, family
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.planar.along import FollowedModel, walk_means
+from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import Branch, BranchPoint, Criticality, Ending, Kind, follow, leave_pitchfork, proceed
 from chilopod.stability.branch import LONGEST
-from chilopod.studies.straight_walk import WalkBifurcation, bifurcations, family
 
 Array = NDArray[np.float64]
-Progress = Callable[[float, str], None]
 
 TOLERANCE = 1e-10
 """Of the nonlinear flow along a branch; orbits are then good to about 1e-10 (the tests hold 1e-9 against 1e-14)."""
@@ -42,10 +42,6 @@ _SUFFIX = {
 _SAME = ("body", "springs", "legs", "gait", "ground")  # what must agree for a branch to go on; names may differ
 
 
-def _silent(done: float, words: str) -> None:
-    """A :data:`Progress` that shows nothing."""
-
-
 def curved_walks(
     robot: Robot,
     parameter: str,
@@ -54,7 +50,7 @@ def curved_walks(
     points: int = 60,
     longest: float = LONGEST,
     side: int = 1,
-    progress: Progress = _silent,
+    progress: Progress = silent,
 ) -> xr.Dataset:
     """Follow the curved walks from the pitchfork at the upper end of stability through an interval of a parameter.
 
@@ -118,7 +114,7 @@ def resumed(
     points: int = 60,
     longest: float = LONGEST,
     side: int | None = None,
-    progress: Progress = _silent,
+    progress: Progress = silent,
 ) -> xr.Dataset:
     """Follow a branch on from where it ends.
 

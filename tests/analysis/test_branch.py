@@ -5,6 +5,8 @@ import pytest
 import xarray as xr
 
 from chilopod import stability
+from chilopod.analysis.branch import as_json, curved_walks, read_walks, resumed
+from chilopod.analysis.parameters import K1, stiffness
 from chilopod.errors import AnalysisError, OutputError, ParameterError
 from chilopod.planar import PlanarModel
 from chilopod.planar.along import walk_means
@@ -12,21 +14,19 @@ from chilopod.report import write_branch
 from chilopod.robot import load_robot
 from chilopod.stability.curve import BranchPoint, Curve
 from chilopod.stability.system import whole_period
-from chilopod.studies import floquet
-from chilopod.studies.curved_walk import as_json, curved_walks, read_walks, resumed
 
 ROBOT = load_robot("aoi2022-planar")
 
 
 @pytest.fixture(scope="module")
 def right():
-    return curved_walks(ROBOT, floquet.K1, (floquet.stiffness(7.8), floquet.stiffness(20.0)), points=40)
+    return curved_walks(ROBOT, K1, (stiffness(7.8), stiffness(20.0)), points=40)
 
 
 def radius_at(data, k1):
     """Of the body axis on the orbit at a spring, found from the nearest point of the branch."""
     near = data.isel(point=int(np.abs(data.parameter.values - k1).argmin()))
-    model = PlanarModel(ROBOT.with_value(floquet.K1, floquet.stiffness(k1)), tolerance=1e-11)
+    model = PlanarModel(ROBOT.with_value(K1, stiffness(k1)), tolerance=1e-11)
     orbit, _ = stability.find_orbit(whole_period(model), near.orbit.values, with_error=False)
     angles = walk_means([model], orbit[None]).mean_angle[0]
     return 5 * ROBOT.module_length / np.abs(angles).sum()
@@ -50,9 +50,9 @@ def test_powers_balance_over_a_period(right):
 
 
 def test_left_is_the_mirror_image_of_right_half_a_period_later():
-    left = curved_walks(ROBOT, floquet.K1, (floquet.stiffness(7.8), floquet.stiffness(20.0)), points=5, side=-1)
+    left = curved_walks(ROBOT, K1, (stiffness(7.8), stiffness(20.0)), points=5, side=-1)
     point = left.isel(point=-1)
-    model = PlanarModel(ROBOT.with_value(floquet.K1, floquet.stiffness(float(point.parameter))), tolerance=1e-11)
+    model = PlanarModel(ROBOT.with_value(K1, stiffness(float(point.parameter))), tolerance=1e-11)
     half_way = model.flow_states(point.orbit.values[None], 0.0, model.period / 2)[0]
     mirrored = model.reflection @ half_way
     assert model.flow_states(mirrored[None], 0.0, model.period)[0] == pytest.approx(mirrored, abs=1e-9)
@@ -66,7 +66,7 @@ def test_left_is_the_mirror_image_of_right_half_a_period_later():
 
 def test_a_disturbed_walk_settles_on_the_branch(right):
     point = right.isel(point=12)
-    model = PlanarModel(ROBOT.with_value(floquet.K1, floquet.stiffness(float(point.parameter))), tolerance=1e-10)
+    model = PlanarModel(ROBOT.with_value(K1, stiffness(float(point.parameter))), tolerance=1e-10)
     state = point.orbit.values + np.r_[np.zeros(3), 0.02 * np.ones(5), np.zeros(5)]
     for _ in range(1000):
         state = model.flow_states(state[None], 0.0, model.period)[0]
@@ -75,7 +75,7 @@ def test_a_disturbed_walk_settles_on_the_branch(right):
 
 def test_near_zero_forward_offset_the_branch_folds_back():
     robot = ROBOT.with_value("legs.forward_offset", 0.02)
-    data = curved_walks(robot, floquet.K1, (floquet.stiffness(9.0), floquet.stiffness(20.0)), points=20)
+    data = curved_walks(robot, K1, (stiffness(9.0), stiffness(20.0)), points=20)
     special = list(data.special.values)
     fold = special.index("fold")
     assert float(data.parameter[fold]) == pytest.approx(10.3881, abs=1e-4)
@@ -88,7 +88,7 @@ def test_near_zero_forward_offset_the_branch_folds_back():
 
 
 def test_nothing_happens_on_the_way_to_very_soft_springs():
-    data = curved_walks(ROBOT, floquet.K1, (floquet.stiffness(1.0), floquet.stiffness(20.0)))
+    data = curved_walks(ROBOT, K1, (stiffness(1.0), stiffness(20.0)))
     assert data.attrs["ending"] == "left the interval"
     assert list(data.special.values[1:]) == [""] * (data.sizes["point"] - 1)
     assert data.stable.values[1:].all()
@@ -100,7 +100,7 @@ def test_the_direction_confirms_the_verdict(right):
 
 
 def test_orbits_and_multipliers_are_as_good_as_is_said(right):
-    curve = Curve(lambda value: PlanarModel(ROBOT.with_value(floquet.K1, value), tolerance=1e-14), right.attrs["scale"])
+    curve = Curve(lambda value: PlanarModel(ROBOT.with_value(K1, value), tolerance=1e-14), right.attrs["scale"])
     for index in (3, 8, 12, -1):
         at = right.isel(point=index)
         multipliers = at.multiplier_real.values + 1j * at.multiplier_imag.values
@@ -114,24 +114,24 @@ def test_orbits_and_multipliers_are_as_good_as_is_said(right):
 
 
 def test_in_pieces_from_files_as_in_one(tmp_path):
-    between = (floquet.stiffness(7.8), floquet.stiffness(20.0))
-    whole = curved_walks(ROBOT, floquet.K1, between, points=9)
-    write_branch(curved_walks(ROBOT, floquet.K1, between, points=5), tmp_path)
-    pieces = resumed(read_walks(tmp_path / "branch.nc"), ROBOT, floquet.K1, points=4)
+    between = (stiffness(7.8), stiffness(20.0))
+    whole = curved_walks(ROBOT, K1, between, points=9)
+    write_branch(curved_walks(ROBOT, K1, between, points=5), tmp_path)
+    pieces = resumed(read_walks(tmp_path / "branch.nc"), ROBOT, K1, points=4)
     xr.testing.assert_equal(pieces, whole)
     assert pieces.attrs == whole.attrs
 
 
 def test_only_its_own_branch_is_resumed(tmp_path):
-    between = (floquet.stiffness(7.8), floquet.stiffness(20.0))
-    data = curved_walks(ROBOT, floquet.K1, between, points=2)
+    between = (stiffness(7.8), stiffness(20.0))
+    data = curved_walks(ROBOT, K1, between, points=2)
     # What the robot has for the parameter does not matter, nor what it is called.
-    same = ROBOT.with_value(floquet.K1, 0.1).with_(name="renamed")
-    assert resumed(data, same, floquet.K1, points=1).sizes["point"] == data.sizes["point"] + 1
+    same = ROBOT.with_value(K1, 0.1).with_(name="renamed")
+    assert resumed(data, same, K1, points=1).sizes["point"] == data.sizes["point"] + 1
     for robot, parameter, side, match in (
-        (ROBOT.with_value("ground.friction", 200.0), floquet.K1, None, "another robot: ground"),
+        (ROBOT.with_value("ground.friction", 200.0), K1, None, "another robot: ground"),
         (ROBOT, "springs.stiffness[1]", None, "saved branch varies"),
-        (ROBOT, floquet.K1, -1, "other side"),
+        (ROBOT, K1, -1, "other side"),
     ):
         with pytest.raises(ParameterError, match=match):
             resumed(data, robot, parameter, side=side)
@@ -144,7 +144,7 @@ def test_only_its_own_branch_is_resumed(tmp_path):
 
 def test_no_pitchfork_is_said():
     with pytest.raises(AnalysisError, match="no pitchfork"):
-        curved_walks(ROBOT, floquet.K1, (floquet.stiffness(20.0), floquet.stiffness(30.0)))
+        curved_walks(ROBOT, K1, (stiffness(20.0), stiffness(30.0)))
 
 
 def test_written_and_printed(right, tmp_path):

@@ -1,14 +1,16 @@
-"""Finding the planar model's constants that the paper does not print, from the numbers it does.
+"""Finding the planar model's constants that are hard to measure, from where the straight walk bends and how.
 
-Three constants are free: foot friction, half-width and forward offset. They are fitted to the printed critical k1 and
-the printed mode, every number weighted by half its last digit, so that a residual of 1 is exactly what rounding
-allows. The profile over the forward offset shows how far the data determine them: at each offset the other two are
-fitted again.
+Three constants are free: foot friction, half-width and forward offset. They are fitted to the critical k1 and the mode
+of a robot, every number weighted by its tolerance, so that a residual of 1 is exactly what that allows (of printed
+numbers, half their last digit). The profile over the forward offset shows how far the data determine them: at each
+offset the other two are fitted again.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -17,20 +19,18 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from chilopod import units
+from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT, stiffness
+from chilopod.analysis.straight_walk import bifurcations, first_loss, pitchfork
 from chilopod.errors import AnalysisError
+from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import Kind
-from chilopod.studies.floquet import ALL, K1, PAPER_UNIT, Progress, first_loss, pitchfork, silent, stiffness
-from chilopod.studies.paper import printed, printed_stiffness
-from chilopod.studies.straight_walk import bifurcations
+from chilopod.tasks.identify.data import CriticalMode
 
 Array = NDArray[np.float64]
 
 FREE = ("ground.friction", "legs.half_width", "legs.forward_offset")
 """The constants that are fitted, SI."""
-
-K1_ROUNDING = 0.5  # N*mm/deg: the paper prints 12
-MODE_ROUNDING = 0.005  # it prints two decimals
 
 # Sizes of the steps of the optimiser, and rough starting points from which it is run: far from the answer on purpose.
 _SCALE = np.array([200.0, 0.07, 0.05])
@@ -40,7 +40,7 @@ _NO_PITCHFORK = 100.0
 
 @dataclass(frozen=True)
 class Identification:
-    """What the printed numbers say about the constants.
+    """What the data say about the constants.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Identification:
     best
         The robot with the best constants.
     residuals
-        At the best constants: critical k1 and five mode components, in units of what rounding allows, shape (6,).
+        At the best constants: critical k1 and the components of the mode, in units of their tolerance, shape (N,).
     starts
         Constants reached from every starting point, shape (starts, 3), SI.
     preset_residuals
@@ -67,12 +67,12 @@ class Identification:
     profile: xr.Dataset
 
     def allowed(self, name: str) -> tuple[float, float] | None:
-        """Range of a constant along the profile within which every printed number is met, SI; None if nowhere."""
+        """Range of a constant along the profile within which every datum is met, SI; None if nowhere."""
         values = self.profile[name].values[self.profile.largest_residual.values <= 1.0]
         return (float(values.min()), float(values.max())) if values.size else None
 
     def as_json(self) -> dict[str, Any]:
-        """Constants with what rounding allows, and the residuals, as plain numbers and text."""
+        """Constants with what the tolerances allow, and the residuals, as plain numbers and text."""
         constants = {}
         for path in FREE:
             unit, span = self.best.unit_of(path), self.allowed(path.partition(".")[2])
@@ -92,22 +92,25 @@ class Identification:
         }
 
 
-def residuals(robot: Robot) -> Array:
-    """Printed numbers less computed ones, over half the last printed digit, shape (6,)."""
-    target = np.array(printed()["pitchfork"]["joint_components"])
-    if robot.body.modules != len(target) + 1:
-        raise AnalysisError("the paper prints the mode of 6 modules", field="body.modules", value=robot.body.modules)
+def residuals(robot: Robot, data: CriticalMode) -> Array:
+    """Computed numbers less the data, over their tolerance, shape (N,)."""
+    count = len(data.components) + 1
+    if robot.body.modules != count:
+        raise AnalysisError(
+            f"the mode of the data is that of {count} modules", field="body.modules", value=robot.body.modules
+        )
+    low, high = data.between
     try:
-        points = bifurcations(robot, K1, (stiffness(4.0), stiffness(40.0)), normal_form=False)
+        points = bifurcations(robot, K1, (stiffness(low), stiffness(high)), normal_form=False)
     except AnalysisError:
         points = []
     points = [each for each in points if each.point.kind is Kind.PITCHFORK]
     if not points:
-        return np.full(6, _NO_PITCHFORK)
-    k1 = units.from_si(printed_stiffness("pitchfork", "critical_k1"), PAPER_UNIT)
+        return np.full(count, _NO_PITCHFORK)
     components = points[-1].joint_components.real
     components = components * np.sign(components.sum())
-    return np.concatenate([[(points[-1].value - k1) / K1_ROUNDING], (components - target) / MODE_ROUNDING])
+    off = (components - np.array(data.components)) / data.component_tolerance
+    return np.concatenate([[(points[-1].value - data.k1) / data.k1_tolerance], off])
 
 
 def with_constants(robot: Robot, constants: Array) -> Robot:
@@ -117,21 +120,31 @@ def with_constants(robot: Robot, constants: Array) -> Robot:
     return robot
 
 
-def identify_planar(robot: Robot, points: int = 25, progress: Progress = silent) -> Identification:
-    """Fit the free constants to the printed numbers and draw how well these determine them.
+def identify_planar(
+    robot: Robot,
+    data: CriticalMode,
+    points: int = 25,
+    variants: Mapping[str, Sequence[str]] = MappingProxyType({}),
+    progress: Progress = silent,
+) -> Identification:
+    """Fit the free constants to the data and draw how well these determine them.
 
     Parameters
     ----------
     robot
         Everything but the free constants; their values are only looked at for comparison.
+    data
+        What is fitted.
     points
         Of the profile.
+    variants
+        Settings of the robot, by name, of which each point of the profile predicts the critical k1.
     progress
         Called as the work goes on.
     """
     fits = []
     for index, start in enumerate(_STARTS):
-        fits.append(_fit(robot, np.array(start), fixed=0))
+        fits.append(_fit(robot, data, np.array(start), fixed=0))
         progress(0.3 * (index + 1) / len(_STARTS), f"fit from start {index + 1}")
     best = min(fits, key=lambda fit: float((fit[1] ** 2).sum()))
     return Identification(
@@ -139,17 +152,17 @@ def identify_planar(robot: Robot, points: int = 25, progress: Progress = silent)
         best=with_constants(robot, best[0]),
         residuals=best[1],
         starts=np.array([fit[0] for fit in fits]),
-        preset_residuals=residuals(robot),
-        profile=_profile(robot, best[0], points, progress),
+        preset_residuals=residuals(robot, data),
+        profile=_profile(robot, data, best[0], points, variants, progress),
     )
 
 
-def _fit(robot: Robot, start: Array, fixed: int) -> tuple[Array, Array]:
+def _fit(robot: Robot, data: CriticalMode, start: Array, fixed: int) -> tuple[Array, Array]:
     """Least squares over the constants but the last ``fixed``; returns constants and residuals."""
     free = len(start) - fixed
 
     def cost(scaled: Array) -> Array:
-        return residuals(with_constants(robot, np.concatenate([scaled * _SCALE[:free], start[free:]])))
+        return residuals(with_constants(robot, np.concatenate([scaled * _SCALE[:free], start[free:]])), data)
 
     answer = least_squares(
         cost,
@@ -162,7 +175,9 @@ def _fit(robot: Robot, start: Array, fixed: int) -> tuple[Array, Array]:
     return np.concatenate([answer.x * _SCALE[:free], start[free:]]), np.asarray(answer.fun)
 
 
-def _profile(robot: Robot, best: Array, count: int, progress: Progress) -> xr.Dataset:
+def _profile(
+    robot: Robot, data: CriticalMode, best: Array, count: int, variants: Mapping[str, Sequence[str]], progress: Progress
+) -> xr.Dataset:
     """Fits at fixed forward offsets, outward from the best so that each starts next to its neighbour."""
     offsets = np.linspace(0.030, 0.070, count)
     rows: dict[int, dict[str, float | str]] = {}
@@ -171,13 +186,13 @@ def _profile(robot: Robot, best: Array, count: int, progress: Progress) -> xr.Da
     for direction in (range(middle, count), range(middle - 1, -1, -1)):
         last = best
         for index in direction:
-            constants, off = _fit(robot, np.append(last[:2], offsets[index]), fixed=1)
+            constants, off = _fit(robot, data, np.append(last[:2], offsets[index]), fixed=1)
             last = constants
             rows[index] = {
                 "friction": constants[0],
                 "half_width": constants[1],
                 "largest_residual": float(np.abs(off).max()),
-                **_predictions(with_constants(robot, constants)),
+                **_predictions(with_constants(robot, constants), variants),
             }
             done += 1
             progress(0.3 + 0.7 * done / count, f"profile, forward offset {1e3 * offsets[index]:.0f} mm")
@@ -199,22 +214,22 @@ def _profile(robot: Robot, best: Array, count: int, progress: Progress) -> xr.Da
             for name in rows[0]
         },
         coords={"forward_offset": ("forward_offset", offsets, {"units": "m"})},
-        attrs={"robot": robot.name, "about": "largest_residual <= 1: all six printed numbers are met within rounding"},
+        attrs={"robot": robot.name, "about": "largest_residual <= 1: all data are met within their tolerance"},
     )
 
 
-def _predictions(robot: Robot) -> dict[str, float | str]:
+def _predictions(robot: Robot, variants: Mapping[str, Sequence[str]]) -> dict[str, float | str]:
     """What a set of constants says about numbers that were not fitted."""
 
-    def critical(setting: list[str]) -> float:
+    def critical(setting: Sequence[str]) -> float:
         try:
             return pitchfork(robot.set_from_text(setting), normal_form=False).value
         except AnalysisError:
             return float("nan")
 
     found: dict[str, float | str] = {"critical_k1": critical([])}
-    for name, entry in printed()["variants"].items():
-        found[name] = critical(entry["set"])
+    for name, setting in variants.items():
+        found[name] = critical(setting)
     try:
         point = first_loss(robot, ALL, (stiffness(2.0), stiffness(75.0)), Kind.NEIMARK_SACKER, normal_form=False)
         found["uniform"], found["uniform_frequency"] = point.value, point.point.frequency

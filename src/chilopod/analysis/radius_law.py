@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 
 from chilopod import units
+from chilopod.analysis.branch import curved_walks
+from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
+from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import RadiusLaw
-from chilopod.studies.curved_walk import curved_walks
-from chilopod.studies.floquet import K1, PAPER_UNIT, silent, stiffness
 
 _BETWEEN = (1.0 / 20.0, 3.0)
 """Of the stiffest spring: where the pitchfork of the first one is looked for and its branch followed."""
@@ -49,7 +49,7 @@ class RadiusLaws:
         return tuple(float(np.interp(wanted, root, walks.orbit.values[:, joint])) for joint in joints)
 
 
-def radius_laws(robot: Robot, progress: Callable[[float, str], None] = silent) -> RadiusLaws:
+def radius_laws(robot: Robot, progress: Progress = silent) -> RadiusLaws:
     """The laws from the branch of curved walks, from the pitchfork down to where a joint bends by a right angle.
 
     Parameters

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from chilopod.analysis.undulation import undulating_walks
 from chilopod.errors import ParameterError
 from chilopod.report import write_undulation
 from chilopod.robot import load_robot
-from chilopod.studies.undulation import undulating_walks
 
 ROBOT = load_robot("aoi2022-planar")
 

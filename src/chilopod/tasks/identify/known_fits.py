@@ -10,6 +10,6 @@ from typing import Any
 def known_fits() -> list[dict[str, Any]]:
     """What ``twin_fits.json`` holds, best first: ``constants`` (SI, by path), ``bends_rad``, ``residuals`` of each."""
     found: list[dict[str, Any]] = json.loads(
-        files("chilopod.studies").joinpath("twin_fits.json").read_text(encoding="utf-8")
+        files("chilopod.tasks.identify").joinpath("twin_fits.json").read_text(encoding="utf-8")
     )["fits"]
     return found

@@ -1,16 +1,10 @@
-"""Trials: one walk each, with its conditions, its disturbances drawn from a seed, and its file.
-
-A study is a list of trials. They run in batches on all cores, each batch's records are written as soon as it is done,
-every file whole or not at all and under a name derived from all that makes the trial, so a study that was stopped in
-any way goes on where it was, and a trial that several studies share is run once.
-"""
+"""Running trials: in batches on all cores, each batch's records written as soon as it is done."""
 
 from __future__ import annotations
 
-import hashlib
 import json
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,133 +14,21 @@ from numpy.typing import NDArray
 
 from chilopod import planar
 from chilopod.engine import event_times
-from chilopod.errors import ParameterError, nearest_name
 from chilopod.output import prepare_folder, write_atomic
-from chilopod.robot import Robot
-from chilopod.steering import LegYawController, Target
+from chilopod.progress import Progress, silent
+from chilopod.trials.store import as_bytes, read
+from chilopod.trials.trial import Trial
 
 Array = NDArray[np.float64]
-
-RECORD_VERSION = 3
-"""Goes up whenever the same trial would give another record; files of other versions are left alone."""
-
-ENGINES = ("planar", "twin")
-"""What walks: the planar model, or the whole robot in three dimensions."""
 
 _BATCH = {"planar": 32, "twin": 8}
 """Trials that run, and are lost, together; a few seconds' work."""
 
 
-@dataclass(frozen=True)
-class Disturbance:
-    """What differs from trial to trial: standard deviations of independent normal deviates.
-
-    The same for every study and engine. None of it is printed in the paper; the values are what careful setting up by
-    hand leaves (joints and heading), what a vinyl mat varies (friction), and the scanner's step of 0.352 deg with an
-    extended target (bearing).
-
-    Attributes
-    ----------
-    joint_angle
-        Of every yaw joint at the start, rad.
-    heading
-        Of module 1 at the start, rad.
-    friction
-        Of the logarithm of every foot's friction coefficient.
-    bearing
-        Of every measured bearing, rad. The twin's scanner has noise of its own instead, if this is not zero.
-    """
-
-    joint_angle: float = float(np.deg2rad(0.5))
-    heading: float = float(np.deg2rad(1.0))
-    friction: float = 0.02
-    bearing: float = float(np.deg2rad(0.5))
-
-    def __post_init__(self) -> None:
-        for name, value in asdict(self).items():
-            if not 0.0 <= value < 10.0:
-                raise ParameterError("is out of range", field=name, value=value, allowed="0 or more, less than 10")
-
-
-NONE = Disturbance(0.0, 0.0, 0.0, 0.0)
-"""No disturbance at all."""
-
-
-@dataclass(frozen=True)
-class Trial:
-    """Everything that makes a walk.
-
-    Attributes
-    ----------
-    robot
-        With the springs of this trial.
-    duration
-        s.
-    seed
-        Of its disturbances.
-    joint_angles
-        At the start, before disturbance, rad, (N-1,); empty for straight.
-    target
-        Where the robot is to go, if anywhere.
-    controller
-        What steers it, if anything.
-    disturbance
-        How much differs from trial to trial.
-    rate
-        Samples per second.
-    forces
-        Whether the record has the force on every foot.
-    engine
-        One of :data:`ENGINES`.
-    poses
-        Whether the record has the positions of all joints, to be drawn (twin only).
-    """
-
-    robot: Robot
-    duration: float
-    seed: int = 0
-    joint_angles: tuple[float, ...] = ()
-    target: Target | None = None
-    controller: LegYawController | None = None
-    disturbance: Disturbance = field(default_factory=Disturbance)
-    rate: float = 100.0
-    forces: bool = False
-    engine: str = "planar"
-    poses: bool = False
-
-    def __post_init__(self) -> None:
-        check_engine(self.engine, self.robot)
-
-    @property
-    def description(self) -> dict[str, Any]:
-        """All of it as plain data; equal descriptions are equal trials."""
-        return {
-            "version": RECORD_VERSION,
-            "engine": self.engine,
-            # What it is called and where its numbers come from makes no difference.
-            "robot": self.robot.with_(name="robot", provenance={}).to_toml(),
-            "duration": self.duration,
-            "seed": self.seed,
-            "joint_angles": list(self.joint_angles),
-            "target": asdict(self.target) if self.target else None,
-            "controller": asdict(self.controller) if self.controller else None,
-            "disturbance": asdict(self.disturbance),
-            "rate": self.rate,
-            "forces": self.forces,
-            "poses": self.poses,
-        }
-
-    @property
-    def file_name(self) -> str:
-        """Of its record."""
-        text = json.dumps(self.description, sort_keys=True)
-        return f"{self.engine}-{hashlib.sha256(text.encode()).hexdigest()[:20]}.nc"
-
-
 def run(
     trials: Sequence[Trial],
     folder: str | Path | None = None,
-    progress: Callable[[float, str], None] = lambda done, words: None,
+    progress: Progress = silent,
 ) -> list[xr.Dataset]:
     """Run trials, or read what has been run before.
 
@@ -171,7 +53,7 @@ def run(
     records: dict[str, xr.Dataset] = {}
     if folder is not None:
         for name in list(missing):
-            found = _read(folder / name)
+            found = read(folder / name)
             if found is not None:
                 records[name] = found
                 del missing[name]
@@ -180,7 +62,7 @@ def run(
         progress(done / len(records | missing), f"{done} of {len(records | missing)} trials")
         for (name, _), record in zip(batch, _walked([trial for _, trial in batch]), strict=True):
             if folder is not None:
-                write_atomic(folder / name, _bytes(record))
+                write_atomic(folder / name, as_bytes(record))
             records[name] = record
             done += 1
     progress(1.0, f"{done} trials")
@@ -286,42 +168,3 @@ def _drawn(trial: Trial, events: int) -> _Drawn:
         spread.bearing * bearing.standard_normal(events),
         int(streams[4].generate_state(1)[0]),
     )
-
-
-def check_engine(engine: str, robot: Robot) -> None:
-    """Make sure that there is such an engine and that it knows such a robot.
-
-    Raises
-    ------
-    ParameterError
-        If not.
-    """
-    if engine not in ENGINES:
-        raise ParameterError(
-            "there is no such engine",
-            field="engine",
-            value=engine,
-            allowed=", ".join(ENGINES),
-            nearest=nearest_name(engine, ENGINES),
-        )
-    if engine == "twin" and robot.twin is None:
-        raise ParameterError(
-            "the robot has no [twin], only the planar model knows it",
-            field="engine",
-            value=engine,
-            allowed="planar, or a robot file with a [twin], such as the preset aoi2022",
-        )
-
-
-def _bytes(record: xr.Dataset) -> bytes:
-    """A record as a netCDF-3 file: twenty times as fast to write and read as netCDF-4, and a study has hundreds."""
-    written: bytes = bytes(record.to_netcdf(engine="scipy", format="NETCDF3_64BIT"))
-    return written
-
-
-def _read(path: Path) -> xr.Dataset | None:
-    """A record that is there and whole, else None."""
-    try:
-        return xr.load_dataset(path, engine="scipy")
-    except (OSError, ValueError, KeyError, TypeError, IndexError):
-        return None

@@ -1,0 +1,52 @@
+"""Packages that load what they export on first use (PEP 562).
+
+A verb then costs what it needs itself, not what its neighbours need.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
+from types import ModuleType
+from typing import Any
+
+
+class _Package(ModuleType):
+    """A package in which an export stays what it is when a submodule of the same name is loaded."""
+
+    _homes: Mapping[str, str]
+
+    def __setattr__(self, name: str, value: object) -> None:
+        # The import system binds every submodule it loads to the package: `turn`, say, would be a module or the
+        # function in it, depending on what was imported first.
+        if not (name in self._homes and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
+
+
+def exports(package: str, names: Mapping[str, Sequence[str]]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """``__getattr__`` and ``__dir__`` for the module of a package.
+
+    Parameters
+    ----------
+    package
+        Its ``__name__``.
+    names
+        What each of its submodules gives it.
+    """
+    homes = {name: f"{package}.{submodule}" for submodule, given in names.items() for name in given}
+    module = sys.modules[package]
+    module.__class__ = _Package
+    module.__dict__["_homes"] = homes
+
+    def load(name: str) -> Any:
+        if name not in homes:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        value = getattr(import_module(homes[name]), name)
+        module.__dict__[name] = value
+        return value
+
+    def listed() -> list[str]:
+        return sorted({*module.__dict__, *homes})
+
+    return load, listed

@@ -1,0 +1,91 @@
+"""What constants are fitted to: what a robot's walks came to, the paper's or one's own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CriticalMode:
+    """What is known of the pitchfork in k1 of a robot: the data that the constants are fitted to.
+
+    Attributes
+    ----------
+    k1
+        Where it is, N*mm/deg.
+    components
+        Joint angles of the critical mode, front to rear, of unit norm and positive sum, shape (N-1,).
+    k1_tolerance, component_tolerance
+        How far off each of them may be.
+    between
+        Where the point is looked for, N*mm/deg.
+    """
+
+    k1: float
+    components: tuple[float, ...]
+    k1_tolerance: float
+    component_tolerance: float
+    between: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class BaseSeries:
+    """What is known of a robot's walks with several first springs: the data that the constants are fitted to.
+
+    All springs are in N*mm/deg.
+
+    Attributes
+    ----------
+    curved, straight
+        Springs at which the robot curves, and at which it walks straight.
+    radii
+        Radius of the curve (m) at some springs, in the order in which they are to be listed.
+    onset
+        Where curves set in, by a square-root fit to the bend of joint 1 at the springs of ``curved``.
+    law, shape
+        Bends that evaluations begin near, roughly those of the data: all joints together
+        ``law[0] * sqrt(1/k1 - law[1])`` rad, of which each joint has the share ``shape``, front to rear, (N-1,).
+    tolerance
+        Of radii and onset, relative.
+    """
+
+    curved: tuple[float, ...]
+    straight: tuple[float, ...]
+    radii: Mapping[float, float]
+    onset: float
+    law: tuple[float, float]
+    shape: tuple[float, ...]
+    tolerance: float = 0.05
+
+    @property
+    def springs(self) -> tuple[float, ...]:
+        """Of all walks that an evaluation runs, rising."""
+        return tuple(sorted({*self.curved, *self.straight, *self.radii}))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What each of the :func:`residuals` is of."""
+        return (
+            *(f"radius at {spring:g}" for spring in self.radii),
+            "onset",
+            *(f"straight at {spring:g}" for spring in self.straight),
+            f"curved at {max(self.curved):g}",
+            "steady",
+        )
+
+    @property
+    def near_onset(self) -> tuple[float, ...]:
+        """The two stiffest springs at which the robot curves."""
+        return tuple(sorted({*self.curved, *self.radii}))[-2:]
+
+    def start(self, springs: Sequence[float]) -> Array:
+        """Joint angles that walks begin with, rad, shape (springs, N-1)."""
+        bend = self.law[0] * np.sqrt(np.maximum(1.0 / np.array(springs) - self.law[1], 0.0))
+        angles: Array = np.maximum(bend, 0.1)[:, None] * np.array(self.shape)
+        return angles

@@ -1,0 +1,103 @@
+"""How tightly the twin turns with which first spring, from walks of its own: there is no exact branch to follow."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from chilopod import units
+from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
+from chilopod.analysis.square_root import square_root_fit
+from chilopod.engine import Status
+from chilopod.errors import AnalysisError
+from chilopod.progress import Progress, silent
+from chilopod.robot import Robot
+from chilopod.steering import RadiusLaw
+from chilopod.trials import AVERAGED, NONE, Trial, run
+
+DURATION = 90.0
+"""s, of every trial: beside the onset a bend takes a minute to grow."""
+
+CURVED = 0.25
+"""rad: a walk is curved if its joints bend by more than this in all, to a radius of 4.5 m or less."""
+
+_LAW_SPRINGS = (0.2, 0.3, 0.37, 0.44, 0.51, 0.59, 0.68, 0.78, 0.9)  # of the stiffest spring
+_LAW_BEND = 0.8  # rad in all, to start with
+
+
+def twin_radius_law(robot: Robot, progress: Progress = silent) -> RadiusLaw:
+    """Radius of the twin's curved walks over k1, from undisturbed walks that start bent.
+
+    Raises
+    ------
+    AnalysisError
+        If fewer than three springs curve, or softer ones do not curve more tightly.
+    """
+    stiffest = units.from_si(max(robot.springs.stiffness), PAPER_UNIT)
+    springs = [float(round(part * stiffest, 2)) for part in _LAW_SPRINGS]
+    joints = robot.body.modules - 1
+    bend = tuple([_LAW_BEND / joints] * joints)
+    asked = [
+        Trial(
+            robot.with_value(K1, stiffness(spring)),
+            DURATION,
+            0,
+            bend,
+            disturbance=NONE,
+            rate=10.0,
+            engine="twin",
+        )
+        for spring in springs
+    ]
+    ends = xr.concat([end_of_walk(each, robot) for each in run(asked, progress=progress)], "spring")
+    curved = is_curved(ends)
+    if curved.sum() < 3:
+        raise AnalysisError("the walks at fewer than three springs curve: there is no radius law", field="springs")
+    inverse = 1.0 / np.array(springs)
+    fit = square_root_fit(inverse[curved], ends.bend.values[curved], resampled=0)
+    stiff_first = np.flatnonzero(curved)[::-1]
+    values = [fit.critical, *(springs[i] for i in stiff_first)]
+    radii = [np.inf, *(float(ends.axis_radius[i]) for i in stiff_first)]
+    return RadiusLaw.of_branch([stiffness(each) for each in values], radii, [True] * len(values), PAPER_UNIT)
+
+
+def end_of_walk(record: xr.Dataset, robot: Robot) -> xr.Dataset:
+    """What one trial's record comes to.
+
+    Returns
+    -------
+    Dataset over joint: ``mean_angle`` over the last 5 s (rad), ``bend``, the sum of their sizes (rad), ``axis_radius``
+    (m), ``direction`` (left, right, straight; empty where the walk failed), ``moved``, by how much the sum differs from
+    that of the 10 s before (rad), ``speed`` of module 1 over the last 12 s (m/s), and ``status``.
+    """
+    walk = record.isel(robot=0)
+    angles, times = walk.joint_angle.transpose("time", "joint").values, walk.time.values
+    late = times > times[-1] - AVERAGED + 1e-9
+    before = (times > times[-1] - AVERAGED - 10.0) & ~late
+    last = angles[late].mean(axis=0)
+    bend = float(np.abs(last).sum())
+    failed = walk.status.item() != Status.WALKED.label
+    side = "straight" if bend < CURVED else "right" if last.sum() > 0.0 else "left"
+    place = walk.position.transpose("time", "axis").values
+    back = int(np.searchsorted(times, times[-1] - 12.0))
+    # Along the way, gait cycle by gait cycle: on a curve the chord of 12 s is shorter.
+    stride = max(1, round(robot.gait.period / (times[1] - times[0])))
+    steps = np.linalg.norm(np.diff(place[back::stride], axis=0), axis=1) / (stride * (times[1] - times[0]))
+    return xr.Dataset(
+        {
+            "mean_angle": ("joint", last, {"units": "rad"}),
+            "bend": ((), bend, {"units": "rad"}),
+            "axis_radius": ((), (robot.body.modules - 1) * robot.module_length / max(bend, 1e-9), {"units": "m"}),
+            "direction": ((), np.array("" if failed else side, dtype=object)),
+            "moved": ((), abs(bend - float(np.abs(angles[before].mean(axis=0)).sum())), {"units": "rad"}),
+            "speed": ((), float(steps.mean()), {"units": "m/s"}),
+            "status": ((), np.array(walk.status.item(), dtype=object)),
+        },
+        coords={"joint": walk.joint.values},
+    )
+
+
+def is_curved(data: xr.Dataset) -> NDArray[np.bool_]:
+    """Which walks curve, by :func:`end_of_walk`; of the shape of ``data.direction``."""
+    return np.isin(data.direction.values, ("left", "right"))

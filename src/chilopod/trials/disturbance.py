@@ -1,0 +1,44 @@
+"""What differs from trial to trial."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from chilopod.errors import ParameterError
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """What differs from trial to trial: standard deviations of independent normal deviates.
+
+    The same for every study and engine. None of it is printed in the paper; the values are what careful setting up by
+    hand leaves (joints and heading), what a vinyl mat varies (friction), and the scanner's step of 0.352 deg with an
+    extended target (bearing).
+
+    Attributes
+    ----------
+    joint_angle
+        Of every yaw joint at the start, rad.
+    heading
+        Of module 1 at the start, rad.
+    friction
+        Of the logarithm of every foot's friction coefficient.
+    bearing
+        Of every measured bearing, rad. The twin's scanner has noise of its own instead, if this is not zero.
+    """
+
+    joint_angle: float = float(np.deg2rad(0.5))
+    heading: float = float(np.deg2rad(1.0))
+    friction: float = 0.02
+    bearing: float = float(np.deg2rad(0.5))
+
+    def __post_init__(self) -> None:
+        for name, value in asdict(self).items():
+            if not 0.0 <= value < 10.0:
+                raise ParameterError("is out of range", field=name, value=value, allowed="0 or more, less than 10")
+
+
+NONE = Disturbance(0.0, 0.0, 0.0, 0.0)
+"""No disturbance at all."""
