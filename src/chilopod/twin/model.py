@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import ParameterError
+from chilopod.ground import GRAVITY
 from chilopod.robot import Robot, Twin
 from chilopod.twin.legs import check_reach, servo_targets, twin_of
 
@@ -116,6 +117,7 @@ def build(robot: Robot, forces: bool = False) -> mujoco.MjSpec:
     spec.modelname = robot.name
     spec.compiler.degree = False
     spec.option.timestep = twin.timestep
+    spec.option.gravity = [0.0, 0.0, -GRAVITY]
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.impratio = twin.impedance_ratio
