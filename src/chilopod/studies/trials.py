@@ -27,7 +27,7 @@ from chilopod.steering import LegYawController, Target
 
 Array = NDArray[np.float64]
 
-RECORD_VERSION = 3
+RECORD_VERSION = 4
 """Goes up whenever the same trial would give another record; files of other versions are left alone."""
 
 ENGINES = ("planar", "twin")
