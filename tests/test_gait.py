@@ -125,3 +125,27 @@ def test_ground():
         Ground(friction=0)
     with pytest.raises(ParameterError, match="friction: is missing"):
         Ground()
+
+
+@given(gaits)
+def test_stroke_goes_back_at_the_gaits_speed_and_swings_forward_again(gait):
+    standing = np.linspace(0.0, gait.duty, 50, endpoint=False)
+    assert gait.stands(standing).all()
+    expected = 0.5 * gait.stride - gait.speed * gait.period * standing
+    np.testing.assert_allclose(gait.stroke(standing), expected, rtol=0, atol=1e-12 * gait.stride)
+    swinging = np.linspace(gait.duty, 1.0, 50)
+    assert not gait.stands(swinging).any()
+    forward = gait.stroke(swinging)
+    assert (np.diff(forward) > 0.0).all()
+    np.testing.assert_allclose(forward[[0, -1]], [-0.5 * gait.stride, 0.5 * gait.stride], rtol=1e-12)
+
+
+def test_schedule_is_that_of_the_phases():
+    gait = Gait(**PAPER)
+    schedule = gait.schedule(6)
+    middle = 0.5 * (schedule.times[:-1] + schedule.times[1:])
+    phase = gait.phases(middle, 6)
+    assert phase.shape == schedule.stroke.shape
+    np.testing.assert_array_equal(gait.stands(phase), schedule.contact)
+    moved = schedule.stroke - gait.speed * (middle - schedule.times[:-1])[:, None, None]
+    np.testing.assert_allclose(gait.stroke(phase)[schedule.contact], moved[schedule.contact], rtol=0, atol=1e-15)

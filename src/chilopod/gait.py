@@ -13,7 +13,7 @@ from functools import lru_cache
 from typing import Annotated, Final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import ParameterError
 from chilopod.units import Description, Quantity
@@ -35,8 +35,8 @@ class Schedule:
     contact
         (S, modules, 2) whether the foot stands, by segment, module from the front, and side (left, right).
     stroke
-        (S, modules, 2) m: position of a standing foot ahead of mid-stroke at the start of the segment, from
-        +stride/2 at touch-down; within the segment it moves at -stride/stance. 0 for swing feet.
+        (S, modules, 2) m: position of a standing foot ahead of mid-stroke at the start of the segment, see
+        :meth:`Gait.stroke`; within the segment it moves back at :attr:`Gait.speed`. 0 for swing feet.
 
     All arrays are read-only.
     """
@@ -79,7 +79,7 @@ class Gait(Description):
 
     @property
     def speed(self) -> float:
-        """Speed of the straight walk, at which no standing foot slips, m/s."""
+        """Speed at which standing feet move back, and of the straight walk, in which none of them slips, m/s."""
         return self.stride / self.stance
 
     @property
@@ -91,6 +91,32 @@ class Gait(Description):
         """Return the phase of every leg at time 0, in cycles, shape (modules, 2), in [0, 1)."""
         by_module = np.arange(modules)[:, None] * (self.module_phase / _TURN)
         return _wrapped(by_module + np.array([0.0, self.side_phase / _TURN]))
+
+    def phases(self, times: ArrayLike, modules: int) -> NDArray[np.float64]:
+        """Return the phase of every leg at `times` (s, any shape), in cycles, shape (..., modules, 2), in [0, 1)."""
+        cycles = np.asarray(times, dtype=np.float64)[..., None, None] / self.period
+        phases: NDArray[np.float64] = (cycles + self.leg_phases(modules)) % 1.0
+        return phases
+
+    def stands(self, phase: ArrayLike) -> NDArray[np.bool_]:
+        """Return whether a foot stands at a phase (in cycles, in [0, 1)), of its shape."""
+        stands: NDArray[np.bool_] = np.asarray(phase, dtype=np.float64) < self.duty
+        return stands
+
+    def stroke(self, phase: ArrayLike) -> NDArray[np.float64]:
+        """Return how far a foot is ahead of mid-stroke at a phase (in cycles, in [0, 1)), m, of its shape.
+
+        Standing it moves from stride/2 to -stride/2 at constant speed; it swings back as a half ellipse looks from
+        above.
+        """
+        cycles = np.asarray(phase, dtype=np.float64)
+        back, forward = 0.5 - cycles / self.duty, -0.5 * np.cos(self.swing_angle(cycles))
+        return np.where(self.stands(cycles), back, forward) * self.stride
+
+    def swing_angle(self, phase: ArrayLike) -> NDArray[np.float64]:
+        """Return how far along its half ellipse a swinging foot is, from 0 at lift-off to pi at touch-down, rad."""
+        angle: NDArray[np.float64] = np.pi * (np.asarray(phase, dtype=np.float64) - self.duty) / (1.0 - self.duty)
+        return angle
 
     def schedule(self, modules: int, duration: float | None = None) -> Schedule:
         """Return the contact pattern from time 0 on.
@@ -136,10 +162,10 @@ def _schedule(gait: Gait, modules: int, duration: float) -> Schedule:
     # Asked in mid-segment, where round-off in the edges cannot change the answer.
     middle = (edges[:-1] + half_lengths)[:, None, None] + phases
     middle -= np.floor(middle)
-    contact = middle < duty
+    contact = gait.stands(middle)
     since_touch_down = np.maximum(middle - half_lengths[:, None, None], 0.0)
     since_touch_down[since_touch_down < _SAME_PHASE] = 0.0
-    stroke = np.where(contact, gait.stride * (0.5 - since_touch_down / duty), 0.0)
+    stroke = np.where(contact, gait.stroke(since_touch_down), 0.0)
     times = edges * gait.period
     times[-1] = duration
     for array in (times, contact, stroke):

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Final
 
 from chilopod.units import Description, Quantity
+
+GRAVITY: Final = 9.81
+"""Acceleration of free fall, m/s^2."""
 
 
 class Ground(Description):

@@ -6,8 +6,10 @@ import pytest
 
 from chilopod import load_robot
 from chilopod.errors import ParameterError
+from chilopod.planar import PlanarModel
+from chilopod.studies.floquet import with_modules
 from chilopod.twin import TwinModel
-from chilopod.twin.legs import tip_place
+from chilopod.twin.legs import joint_angles, tip_place
 
 PRESET = load_robot("aoi2022")
 
@@ -47,13 +49,60 @@ def test_mass_and_length_add_up(modules):
     assert model.nu == 4 * modules + 2
 
 
-def test_yaw_inertia_is_that_of_the_body_or_the_one_given():
-    twin = PRESET.twin
-    mass = PRESET.module_mass - 4.0 * twin.link_mass
-    box = mass * (PRESET.module_length**2 + twin.body_width**2) / 12.0
-    assert TwinModel(PRESET).model.body("module2").inertia[2] == pytest.approx(box)
-    given = TwinModel(PRESET.set_from_text(["body.yaw_inertia=0.006"])).model
-    assert given.body("module2").inertia[2] == pytest.approx(0.006 * mass / PRESET.module_mass)
+def composite_yaw_inertia(twin, module):
+    """Of a module's body and the links that hang from it about its centre, legs at mid-stroke, from MuJoCo's arrays."""
+    model, data = twin.model, mujoco.MjData(twin.model)
+    data.qpos[:] = twin.initial_positions()
+    data.qpos[twin.leg_positions] = joint_angles(twin.twin, 0.0, twin.twin.hip_height)
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    names = [f"leg{module}_{side}_{link}" for side in ("left", "right") for link in ("upper", "lower")]
+    total = 0.0
+    for each in [model.body(f"module{module}").id, *(model.body(name).id for name in names)]:
+        axes = data.ximat[each].reshape(3, 3)
+        place = (data.xipos[each] - data.xpos[model.body(f"module{module}").id])[:2]
+        total += axes[2] ** 2 @ model.body_inertia[each] + model.body_mass[each] * place @ place
+    return total
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        [],
+        ["body.yaw_inertia=0.008"],
+        ["body.yaw_inertia=0.012", "twin.upper_link=50 mm", "twin.lower_link=75 mm", "legs.forward_offset=-20 mm"],
+        ["body.modules=12"],
+        ["twin.hip_height=118 mm"],
+    ],
+)
+def test_a_module_with_its_legs_has_the_yaw_inertia_of_the_robot(overrides):
+    robot = PRESET.set_from_text(overrides)
+    twin = TwinModel(robot)
+    for module in (1, 2, robot.body.modules):
+        assert composite_yaw_inertia(twin, module) == pytest.approx(robot.module_yaw_inertia, rel=1e-12)
+    assert PlanarModel(robot).scalars[0, 2] == robot.module_yaw_inertia
+    if "body.yaw_inertia=0.008" in overrides:
+        assert robot.module_yaw_inertia == 0.008
+
+
+@pytest.mark.parametrize("modules", [*range(2, 31), 52])
+@pytest.mark.parametrize("alike", [False, True])
+def test_without_a_yaw_inertia_any_number_of_modules_can_be_built(modules, alike):
+    robot = with_modules(PRESET, modules) if alike else PRESET.with_value("body.modules", modules)
+    twin = TwinModel(robot)
+    rod = robot.module_mass * robot.module_length**2 / 12.0
+    if alike or modules <= 8:
+        assert robot.module_yaw_inertia == rod
+    else:
+        # So short that the legs and the width of the body alone have more.
+        assert robot.module_yaw_inertia > rod
+    roll, pitch, yaw = twin.model.body("module2").inertia
+    mass = robot.module_mass - 4.0 * robot.twin.link_mass
+    assert roll == pytest.approx(mass * (robot.twin.body_width**2 + robot.twin.body_height**2) / 12.0)
+    # Such a body exists: no more of its mass is anywhere than there is.
+    across, along = mass * robot.twin.body_width**2 / 12.0, pitch - mass * robot.twin.body_height**2 / 12.0
+    assert yaw == pytest.approx(across + along)
+    assert -1e-15 <= along <= 0.25 * mass * robot.module_length**2
 
 
 @pytest.mark.parametrize("overrides", OVERRIDES)

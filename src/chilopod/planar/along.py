@@ -14,8 +14,10 @@ from scipy.linalg import qr
 from chilopod.compiled import parallel_njit
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.integrate import COMPLEX_STEP, integrator
+from chilopod.kinematics import foot_places, foot_velocities, from_modules, module_headings, module_velocities
 from chilopod.planar.drift import Drift
 from chilopod.planar.dynamics import SCRATCH, rhs
+from chilopod.planar.energy import foot_powers
 from chilopod.planar.flow import advance
 from chilopod.planar.model import PlanarModel
 
@@ -137,7 +139,7 @@ def walk_means(models: Sequence[PlanarModel], orbits: ArrayLike) -> WalkMeans:
     """Means over one period of the walk of every robot that starts in its state at time 0.
 
     All robots run through the period together, stopping at the nodes of Gauss-Legendre quadrature. Powers are those of
-    :func:`chilopod.planar.powers`, written in the frame of each module.
+    :func:`chilopod.planar.powers`.
 
     Parameters
     ----------
@@ -232,35 +234,20 @@ def _powers(models: Sequence[PlanarModel], x: Array, since: Array) -> tuple[Arra
     """Powers of legs and floor, W, shape (walks, pieces, nodes), in states x, shape (walks, pieces, nodes, 2N+1),
     ``since`` (s), shape (pieces, nodes), the start of each piece."""
     n, gait, schedule = models[0].modules, models[0].robot.gait, models[0].schedule
-    legs_of = [model.robot.legs for model in models]
-    half, friction, offset, half_width = (
-        np.array(values)[:, None, None, None]
+    # One number a robot, for all its pieces, nodes, modules and sides.
+    length, friction, offset, half_width = (
+        np.array(values)[:, None, None, None, None]
         for values in (
-            [0.5 * model.robot.module_length for model in models],
+            [model.robot.module_length for model in models],
             [model.robot.ground.friction for model in models],
-            [legs.forward_offset for legs in legs_of],
-            [legs.half_width for legs in legs_of],
+            [model.robot.legs.forward_offset for model in models],
+            [model.robot.legs.half_width for model in models],
         )
     )
-    none = np.zeros((*x.shape[:-1], 1))
-    heading = np.concatenate([none, x[..., 3 : n + 2].cumsum(-1)], axis=-1)
-    rate = x[..., 2:3] + np.concatenate([none, x[..., n + 2 :].cumsum(-1)], axis=-1)
-    c, s = np.cos(heading), np.sin(heading)
-    # From the centre of a module to its rear joint and on to the next centre: v + rate x r.
-    vx = x[..., 0:1] + half * np.concatenate(
-        [none, (rate[..., :-1] * s[..., :-1] + rate[..., 1:] * s[..., 1:]).cumsum(-1)], -1
-    )
-    vy = x[..., 1:2] - half * np.concatenate(
-        [none, (rate[..., :-1] * c[..., :-1] + rate[..., 1:] * c[..., 1:]).cumsum(-1)], -1
-    )
-    along, across = c * vx + s * vy - gait.speed, c * vy - s * vx
-    legs, floor = np.zeros(x.shape[:-1]), np.zeros(x.shape[:-1])
-    for side, sign in enumerate((1.0, -1.0)):
-        weight = friction * schedule.contact[:, None, :, side]
-        ahead = offset + schedule.stroke[:, None, :, side] - gait.speed * since[..., None]
-        slip_x = along - sign * half_width * rate
-        slip_y = across + ahead * rate
-        # A motor moves its foot back at the gait's speed, against friction that points ahead if the foot slips back.
-        legs -= gait.speed * (weight * slip_x).sum(-1)
-        floor -= (weight * (slip_x**2 + slip_y**2)).sum(-1)
-    return legs, floor
+    heading = module_headings(np.zeros(x.shape[:-1]), x[..., 3 : n + 2])
+    rate = module_headings(x[..., 2], x[..., n + 2 :])
+    velocity = module_velocities(x[..., :2], heading, rate, length[..., 0])
+    stroke = schedule.stroke[:, None] - gait.speed * since[..., None, None]
+    places = foot_places(offset, half_width, stroke)
+    slip = from_modules(velocity, heading, foot_velocities(places, rate, gait.speed))
+    return foot_powers(friction * schedule.contact[:, None], slip, heading, gait.speed)

@@ -11,6 +11,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chilopod.kinematics import (
+    directions,
+    foot_places,
+    foot_velocities,
+    from_modules,
+    module_headings,
+    module_velocities,
+)
+
 if TYPE_CHECKING:
     from chilopod.planar.model import PlanarModel
 
@@ -50,13 +59,9 @@ def module_motion(model: PlanarModel, x: ArrayLike) -> tuple[Array, Array]:
     """
     x = np.asarray(x, dtype=np.float64)
     n = model.modules
-    half = 0.5 * model.robot.module_length
-    heading = np.concatenate([[0.0], np.cumsum(x[3 : n + 2])])
-    rate = x[2] + np.concatenate([[0.0], np.cumsum(x[n + 2 : 2 * n + 1])])
-    # d/dt of -half (cos, sin) of every module is what its ends add to the velocity of the next centre.
-    swing = half * rate[:, None] * np.stack([np.sin(heading), -np.cos(heading)], axis=-1)
-    steps = swing[:-1] + swing[1:]
-    velocity = x[:2] + np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+    heading = module_headings(0.0, x[3 : n + 2])
+    rate = module_headings(x[2], x[n + 2 : 2 * n + 1])
+    velocity = module_velocities(x[:2], heading, rate, model.robot.module_length)
     return heading, np.column_stack([velocity, rate])
 
 
@@ -77,20 +82,35 @@ def powers(model: PlanarModel, x: ArrayLike, t: float) -> Powers:
     x = np.asarray(x, dtype=np.float64)
     robot, gait = model.robot, model.robot.gait
     heading, twist = module_motion(model, x)
-    phase = (t / gait.period + gait.leg_phases(model.modules)) % 1.0
-    standing = phase < gait.duty
-    forward = np.stack([np.cos(heading), np.sin(heading)], axis=-1)[:, None, :]
-    left = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)[:, None, :]
-    ahead = robot.legs.forward_offset + gait.stride * (0.5 - phase / gait.duty)
-    side = robot.legs.half_width * np.array([1.0, -1.0])
-    arm = ahead[..., None] * forward + side[:, None] * left
-    carried = twist[:, None, :2] + twist[:, None, 2:] * np.stack([-arm[..., 1], arm[..., 0]], axis=-1)
-    stroke = -gait.speed * forward
-    force = -robot.ground.friction * (carried + stroke) * standing[..., None]
+    phase = gait.phases(t, model.modules)
+    places = foot_places(robot.legs.forward_offset, robot.legs.half_width, gait.stroke(phase))
+    slip = from_modules(twist[:, :2], heading, foot_velocities(places, twist[:, 2], gait.speed))
+    friction = np.where(gait.stands(phase), robot.ground.friction, 0.0)
+    legs, floor = foot_powers(friction, slip, heading, gait.speed)
     rates = x[model.modules + 2 :]
-    return Powers(
-        # A motor pushes its foot with minus the friction force, at the speed of the stroke.
-        legs=float(-(force * stroke).sum()),
-        floor=float((force * (carried + stroke)).sum()),
-        dampers=float(-(model.damping * rates**2).sum()),
-    )
+    return Powers(legs=float(legs), floor=float(floor), dampers=float(-(model.damping * rates**2).sum()))
+
+
+def foot_powers(friction: Array, slip: Array, heading: Array, speed: float) -> tuple[Array, Array]:
+    """Powers that the leg motors deliver and the floor takes, with straight legs.
+
+    Parameters
+    ----------
+    friction
+        Of every foot, 0 in the air, N*s/m, shape (..., N, 2).
+    slip
+        Velocity of every foot on the floor, m/s, shape (..., N, 2, 2).
+    heading
+        Of every module, on the same axes, rad, shape (..., N).
+    speed
+        At which standing feet move back, m/s.
+
+    Returns
+    -------
+    legs, floor
+        W, shape (...).
+    """
+    back = -speed * directions(heading)[0][..., None, :]
+    force = -friction[..., None] * slip
+    # A motor pushes its foot with minus the friction force, at the speed of the stroke.
+    return -(force * back).sum((-3, -2, -1)), (force * slip).sum((-3, -2, -1))

@@ -10,6 +10,8 @@ from matplotlib.patches import FancyBboxPatch
 from matplotlib.transforms import Affine2D
 from numpy.typing import ArrayLike, NDArray
 
+from chilopod.kinematics import directions, module_centres, module_headings
+
 Array = NDArray[np.float64]
 
 SLIMNESS = 0.36
@@ -31,12 +33,11 @@ def chain(angles: ArrayLike, length: float) -> tuple[Array, Array, Array]:
     centres, headings, joints
         Shapes (N, 2), (N,), (N-1, 2).
     """
-    headings = np.concatenate([[0.0], np.cumsum(np.asarray(angles, dtype=np.float64))])
+    headings = module_headings(0.0, angles)
     headings -= headings.mean()
-    ahead = 0.5 * length * np.stack([np.cos(headings), np.sin(headings)], axis=-1)
-    centres = np.concatenate([np.zeros((1, 2)), -np.cumsum(ahead[:-1] + ahead[1:], axis=0)])
+    centres = module_centres(np.zeros(2), headings, length)
     centres -= centres.mean(axis=0)
-    return centres, headings, (centres - ahead)[:-1]
+    return centres, headings, (centres - 0.5 * length * directions(headings)[0])[:-1]
 
 
 def turned_about_tail(centres: Array, headings: Array, joints: Array) -> tuple[Array, Array, Array]:

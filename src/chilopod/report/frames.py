@@ -18,6 +18,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import ParameterError
+from chilopod.kinematics import directions, foot_places, from_modules, module_centres, module_headings
 from chilopod.robot import Robot
 from chilopod.steering import ARRIVAL_RADIUS, arrivals
 
@@ -93,11 +94,9 @@ def body_frames(record: xr.Dataset, times: ArrayLike | None = None) -> BodyFrame
     )
     walks = np.isfinite(position).all(-1) & np.isfinite(heading) & np.isfinite(angles).all(-1)
     walks &= np.isfinite(leg_yaw).all(-1)
-    headings = heading[..., None] + np.concatenate([np.zeros((*heading.shape, 1)), np.cumsum(angles, axis=-1)], axis=-1)
-    ahead = np.stack([np.cos(headings), np.sin(headings)], axis=-1)
-    half = 0.5 * robot.module_length * ahead
-    steps = np.cumsum(half[..., :-1, :] + half[..., 1:, :], axis=-2)
-    centres = position[..., None, :] - np.concatenate([np.zeros_like(steps[..., :1, :]), steps], axis=-2)
+    headings = module_headings(heading, angles)
+    centres = module_centres(position, headings, robot.module_length)
+    half = 0.5 * robot.module_length * directions(headings)[0]
     spine = np.concatenate([centres[..., :1, :] + half[..., :1, :], centres - half], axis=-2)
     reach, stands = _strokes(robot, time)
     feet = _feet(robot, centres, headings, reach, leg_yaw)
@@ -135,24 +134,16 @@ def _interpolated(values: NDArray[Any], recorded: Array, times: Array) -> Array:
 
 def _strokes(robot: Robot, time: Array) -> tuple[Array, NDArray[np.bool_]]:
     """How far every foot is ahead of mid-stroke (m) and whether it stands, both (T, N, 2)."""
-    gait = robot.gait
-    phase = time[:, None, None] / gait.period + gait.leg_phases(robot.body.modules)
-    phase = (phase + _SAME_PHASE) % 1.0
-    stands = phase < gait.duty
-    swung = np.clip((phase - gait.duty) / (1.0 - gait.duty), 0.0, 1.0)
-    share = np.where(stands, 0.5 - phase / gait.duty, -0.5 * np.cos(np.pi * swung))
-    return gait.stride * share, stands
+    phase = (robot.gait.phases(time, robot.body.modules) + _SAME_PHASE) % 1.0
+    return robot.gait.stroke(phase), robot.gait.stands(phase)
 
 
 def _feet(robot: Robot, centres: Array, headings: Array, reach: Array, leg_yaw: Array) -> Array:
     """Feet on the floor, (T, R, N, 2, 2); `reach` as from :func:`_strokes`, `leg_yaw` (T, R, 2)."""
     yaw = np.zeros((*headings.shape, 2))
     yaw[:, :, 0] = leg_yaw
-    offset, width = robot.legs.forward_offset, robot.legs.half_width
-    along = offset + reach[:, None] * np.cos(yaw)
-    across = np.array([width, -width]) + reach[:, None] * np.sin(yaw)
-    cos, sin = np.cos(headings)[..., None], np.sin(headings)[..., None]
-    return centres[..., None, :] + np.stack([along * cos - across * sin, along * sin + across * cos], axis=-1)
+    places = foot_places(robot.legs.forward_offset, robot.legs.half_width, reach[:, None], yaw)
+    return from_modules(centres, headings, places)
 
 
 @dataclass(frozen=True)

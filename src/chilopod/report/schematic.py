@@ -61,9 +61,9 @@ def legs(robot: Robot) -> xr.Dataset:
     """Where every foot is at t = 0 and when it touches down, over module and side."""
     gait, n = robot.gait, robot.body.modules
     phase = gait.leg_phases(n)
-    stands = phase < gait.duty
+    stands = gait.stands(phase)
     centre = -robot.module_length * (np.arange(n) + 0.5)
-    ahead = np.where(stands, gait.stride * (0.5 - phase / gait.duty), np.nan)
+    ahead = np.where(stands, gait.stroke(phase), np.nan)
     both = ("module", "side")
     return xr.Dataset(
         {

@@ -13,6 +13,7 @@ from chilopod.errors import ChilopodError, ParameterError, RobotFileError
 from chilopod.gait import Gait
 from chilopod.ground import Ground
 from chilopod.robot.files import Table, read_table, to_toml
+from chilopod.robot.inertia import module_yaw_inertia
 from chilopod.robot.parameters import QUANTITIES, Place, place_of, spring_index
 from chilopod.robot.parts import MODULES, Body, Legs, Springs, Twin, spread
 from chilopod.units import Description, Flag, quantities
@@ -158,10 +159,8 @@ class Robot(Description):
 
     @property
     def module_yaw_inertia(self) -> float:
-        """Moment of inertia of one module about its centre, kg*m^2: the one given, or that of a uniform rod."""
-        if self.body.yaw_inertia is not None:
-            return self.body.yaw_inertia
-        return self.module_mass * self.module_length**2 / 12.0
+        """Moment of inertia of one whole module with its legs about its centre, kg*m^2, see :class:`Body`."""
+        return module_yaw_inertia(self.body, self.legs, self.twin)
 
     def parameters(self) -> tuple[str, ...]:
         """Return the path of every number of this robot, springs one by one."""
@@ -183,7 +182,7 @@ class Robot(Description):
         ----------
         path
             Such as ``gait.stride`` or ``springs.stiffness[0]``. Without an index the springs count as one parameter,
-            which has a value if all are alike. ``body.yaw_inertia`` is that of the uniform rod where none is given.
+            which has a value if all are alike. ``body.yaw_inertia`` is `module_yaw_inertia` where none is given.
 
         Raises
         ------

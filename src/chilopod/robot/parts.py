@@ -29,7 +29,9 @@ class Body(Description):
     mass
         Of the whole chain, kg.
     yaw_inertia
-        Of one module about its centre, kg*m^2; None means a uniform rod.
+        Of one whole module with its legs about its centre, kg*m^2, in every engine. None means that of a uniform rod of
+        the module's mass and length; or, where the legs and the body's width of [twin] alone have more than the rod, as
+        in short modules, the least possible (:mod:`chilopod.robot.inertia`).
     """
 
     modules: Annotated[int, MODULES]

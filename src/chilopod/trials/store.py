@@ -6,7 +6,7 @@ from pathlib import Path
 
 import xarray as xr
 
-RECORD_VERSION = 3
+RECORD_VERSION = 4
 """Goes up whenever the same trial would give another record; files of other versions are left alone."""
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from chilopod.ground import GRAVITY
 from chilopod.robot import Robot
 from chilopod.twin.legs import joint_angles
 from chilopod.twin.model import compiled, silence
@@ -56,7 +57,7 @@ def _coefficient(robot: Robot, axis: int) -> float:
     modules = [model.body(f"module{i}").id for i in range(1, robot.body.modules + 1)]
     # Both ways: what drifts by itself cancels.
     start, speeds = data.qpos.copy(), []
-    push = _PUSH * robot.module_mass * 9.81
+    push = _PUSH * robot.module_mass * GRAVITY
     for sign in (1.0, -1.0):
         mujoco.mj_resetData(model, data)
         data.qpos[:] = start

@@ -32,11 +32,8 @@ def tip_path(robot: Robot, phase: ArrayLike) -> Array:
     """
     gait, clearance = robot.gait, twin_of(robot).clearance
     cycles = np.asarray(phase, dtype=np.float64) % 1.0
-    standing = cycles < gait.duty
-    swung = np.pi * (cycles - gait.duty) / (1.0 - gait.duty)
-    ahead = np.where(standing, 0.5 - cycles / gait.duty, -0.5 * np.cos(swung)) * gait.stride
-    above = np.where(standing, 0.0, clearance * np.sin(swung))
-    return np.stack([ahead, above], axis=-1)
+    above = np.where(gait.stands(cycles), 0.0, clearance * np.sin(gait.swing_angle(cycles)))
+    return np.stack([gait.stroke(cycles), above], axis=-1)
 
 
 def joint_angles(twin: Twin, ahead: ArrayLike, below: ArrayLike) -> Array:
@@ -106,8 +103,7 @@ def servo_targets(robot: Robot, times: ArrayLike) -> Array:
         If the legs cannot follow.
     """
     twin = twin_of(robot)
-    cycles = np.asarray(times, dtype=np.float64) / robot.gait.period
-    tip = tip_path(robot, cycles[:, None, None] + robot.gait.leg_phases(robot.body.modules))
+    tip = tip_path(robot, robot.gait.phases(times, robot.body.modules))
     return joint_angles(twin, tip[..., 0], twin.hip_height - tip[..., 1])
 
 

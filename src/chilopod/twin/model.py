@@ -20,7 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import ParameterError
+from chilopod.ground import GRAVITY
 from chilopod.robot import Robot, Springs, Twin
+from chilopod.robot.inertia import body_inertia, body_mass, link_inertia, yaw_inertia_range
 from chilopod.twin.legs import check_reach, servo_targets, twin_of
 
 Array = NDArray[np.float64]
@@ -121,6 +123,7 @@ def build(robot: Robot, forces: bool = False) -> mujoco.MjSpec:
     spec.modelname = robot.name
     spec.compiler.degree = False
     spec.option.timestep = twin.timestep
+    spec.option.gravity = [0.0, 0.0, -GRAVITY]
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     spec.option.impratio = twin.impedance_ratio
@@ -219,26 +222,22 @@ def _check_bodies(robot: Robot, twin: Twin) -> None:
             value=f"{1e3 * twin.body_height:g} mm",
             allowed=f"less than {2e3 * (twin.hip_height + twin.foot_radius):g} mm",
         )
+    low, high = yaw_inertia_range(robot.body, robot.legs, twin)
+    if not low <= robot.module_yaw_inertia <= high:
+        raise ParameterError(
+            "no module of this mass and size has it with its legs",
+            field="body.yaw_inertia",
+            value=f"{robot.module_yaw_inertia:.4g} kg*m^2",
+            allowed=f"{low:.4g} to {high:.4g} kg*m^2",
+        )
 
 
 def _add_box(body: mujoco.MjsBody, robot: Robot, twin: Twin) -> None:
-    """What a module weighs without its legs, as a uniform box, or with the yaw inertia that is given."""
-    mass = robot.module_mass - 4.0 * twin.link_mass
+    """What a module weighs without its legs, so that both together have the module's yaw inertia."""
     length, width, height = robot.module_length, twin.body_width, twin.body_height
-    yaw = mass * (length**2 + width**2) / 12.0
-    if robot.body.yaw_inertia is not None:
-        yaw = robot.body.yaw_inertia * mass / robot.module_mass
-    roll, pitch = mass * (width**2 + height**2) / 12.0, mass * (length**2 + height**2) / 12.0
-    if not abs(pitch - roll) <= yaw <= pitch + roll:
-        low, high = (part * robot.module_mass / mass for part in (abs(pitch - roll), pitch + roll))
-        raise ParameterError(
-            "no body of this mass and size has it",
-            field="body.yaw_inertia",
-            value=f"{robot.body.yaw_inertia:g} kg*m^2",
-            allowed=f"{low:.4g} to {high:.4g} kg*m^2",
-        )
     body.explicitinertial = True
-    body.mass, body.inertia, body.ipos = mass, [roll, pitch, yaw], [0.0, 0.0, 0.0]
+    body.mass, body.ipos = body_mass(robot.body, twin), [0.0, 0.0, 0.0]
+    body.inertia = body_inertia(robot.body, robot.legs, twin)
     # A little shorter than it is, so that a bend shows.
     body.add_geom(
         name=f"{body.name}_box",
@@ -261,11 +260,10 @@ def _add_leg(
     lower = upper.add_body(name=f"{leg}_lower", pos=[0.0, 0.0, -twin.upper_link])
     _add_servo(spec, lower, f"{leg}_knee", [0.0, -1.0, 0.0], twin)
     for link, length in ((upper, twin.upper_link), (lower, twin.lower_link)):
-        # Of a uniform rod; about its own axis a tenth of a foot's radius thick or more, so that nothing is singular.
-        across = twin.link_mass * length**2 / 12.0
+        across, axial = link_inertia(twin, length)
         link.explicitinertial = True
         link.mass, link.ipos = twin.link_mass, [0.0, 0.0, -0.5 * length]
-        link.inertia = [across, across, min(across, 0.5 * twin.link_mass * twin.foot_radius**2)]
+        link.inertia = [across, across, axial]
         link.add_geom(
             name=link.name,
             type=mujoco.mjtGeom.mjGEOM_CAPSULE,

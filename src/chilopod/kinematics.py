@@ -1,0 +1,148 @@
+"""The chain seen from above: headings, places and velocities of its modules and feet.
+
+Everything follows from module 1 and the joints; nothing here knows of forces. Arrays hold modules along their last axis
+but for components, front to rear, feet by side (left, right) behind that; whatever else is in front is a batch.
+Directions are those of the axes that headings are measured from: the floor's, or those of module 1 where its heading
+is given as 0.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+def module_headings(heading: ArrayLike, joint_angles: ArrayLike) -> Array:
+    """Headings of all modules; likewise their yaw rates, from that of module 1 and the joint rates.
+
+    Parameters
+    ----------
+    heading
+        Of module 1, rad, shape (...).
+    joint_angles
+        Heading of a module less that of the one in front of it, rad, shape (..., N-1).
+
+    Returns
+    -------
+    rad, shape (..., N).
+    """
+    return np.asarray(heading, dtype=np.float64)[..., None] + _summed(np.asarray(joint_angles, dtype=np.float64), -1)
+
+
+def module_centres(position: ArrayLike, headings: Array, length: float) -> Array:
+    """Centres of all modules.
+
+    Parameters
+    ----------
+    position
+        Centre of module 1, m, shape (..., 2).
+    headings
+        rad, shape (..., N).
+    length
+        Of a module, m.
+
+    Returns
+    -------
+    m, shape (..., N, 2).
+    """
+    half = 0.5 * length * directions(headings)[0]
+    return np.asarray(position)[..., None, :] - _summed(half[..., :-1, :] + half[..., 1:, :], -2)
+
+
+def module_velocities(velocity: ArrayLike, headings: Array, rates: Array, length: ArrayLike) -> Array:
+    """Velocities of the centres of all modules: the derivative of :func:`module_centres`.
+
+    Parameters
+    ----------
+    velocity
+        Of the centre of module 1, m/s, shape (..., 2).
+    headings, rates
+        rad and rad/s, shape (..., N).
+    length
+        Of a module, m, one for all or shape (..., 1).
+
+    Returns
+    -------
+    m/s, shape (..., N, 2).
+    """
+    swing = (0.5 * np.asarray(length, dtype=np.float64) * rates)[..., None] * directions(headings)[1]
+    return np.asarray(velocity)[..., None, :] - _summed(swing[..., :-1, :] + swing[..., 1:, :], -2)
+
+
+def foot_places(forward_offset: ArrayLike, half_width: ArrayLike, stroke: ArrayLike, yaw: ArrayLike = 0.0) -> Array:
+    """Places of all feet in the frames of their modules.
+
+    Parameters
+    ----------
+    forward_offset, half_width
+        Of a foot at mid-stroke, ahead of the centre and to the side of the axis, m, one for all or shape (..., 1, 1).
+    stroke
+        How far a foot is ahead of mid-stroke along its stroke, m, shape (..., N, 2).
+    yaw
+        Of the strokes, about the feet at mid-stroke, left positive, rad, shape (..., N, 2).
+
+    Returns
+    -------
+    m, ahead of the centre and left of the axis, shape (..., N, 2, 2).
+    """
+    stroke, side = np.asarray(stroke, dtype=np.float64), np.multiply(half_width, [1.0, -1.0])
+    ahead, left = forward_offset + stroke * np.cos(yaw), side + stroke * np.sin(yaw)
+    return np.stack(np.broadcast_arrays(ahead, left), axis=-1)
+
+
+def foot_velocities(places: Array, rates: Array, speed: float, yaw: ArrayLike = 0.0) -> Array:
+    """Velocities of standing feet relative to the centres of their modules, in the frames of the modules.
+
+    Parameters
+    ----------
+    places
+        As from :func:`foot_places`.
+    rates
+        Yaw rates of the modules, rad/s, shape (..., N).
+    speed
+        At which a standing foot moves back along its stroke, m/s.
+    yaw
+        As for :func:`foot_places`.
+
+    Returns
+    -------
+    m/s, shape (..., N, 2, 2).
+    """
+    turn = rates[..., None]
+    along, across = -speed * np.cos(yaw) - turn * places[..., 1], -speed * np.sin(yaw) + turn * places[..., 0]
+    return np.stack([along, across], axis=-1)
+
+
+def from_modules(centres: Array, headings: Array, inside: Array) -> Array:
+    """What is known of feet in the frames of their modules, on the axes that headings are measured from.
+
+    Parameters
+    ----------
+    centres
+        Places of the modules' centres, or their velocities, shape (..., N, 2).
+    headings
+        rad, shape (..., N).
+    inside
+        Places of feet, or velocities, relative to the centre, shape (..., N, 2, 2).
+
+    Returns
+    -------
+    Shape (..., N, 2, 2).
+    """
+    ahead, left = (direction[..., None, :] for direction in directions(headings))
+    out: Array = centres[..., None, :] + inside[..., :1] * ahead + inside[..., 1:] * left
+    return out
+
+
+def directions(headings: Array) -> tuple[Array, Array]:
+    """Unit vectors ahead and to the left, each of shape (..., 2), for headings (rad) of shape (...)."""
+    ahead = np.stack([np.cos(headings), np.sin(headings)], axis=-1)
+    return ahead, np.stack([-ahead[..., 1], ahead[..., 0]], axis=-1)
+
+
+def _summed(increments: Array, axis: int) -> Array:
+    """Running sums along an axis, starting from zero: one entry more."""
+    first = np.zeros_like(np.take(increments, [0], axis=axis))
+    return np.concatenate([first, np.cumsum(increments, axis=axis)], axis=axis)
