@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from chilopod import stability, units
 from chilopod.errors import ParameterError
+from chilopod.frozen import ReadOnlyArrays
 from chilopod.planar import PlanarModel
 from chilopod.robot import Robot
 
@@ -18,7 +19,7 @@ ComplexArray = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
-class StraightWalk:
+class StraightWalk(ReadOnlyArrays):
     """Stability of the straight walk.
 
     Attributes
@@ -60,7 +61,7 @@ class StraightWalk:
 
 
 @dataclass(frozen=True)
-class WalkBifurcation:
+class WalkBifurcation(ReadOnlyArrays):
     """A bifurcation of the straight walk as one parameter of the robot changes.
 
     Attributes
