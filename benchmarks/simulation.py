@@ -46,7 +46,7 @@ PRESET = load_robot("aoi2022-planar")
 
 def bent(robot: Robot) -> Array:
     """The straight walk with joint 1 bent by 2 degrees."""
-    x = PlanarModel(robot).orbit
+    x = PlanarModel(robot).orbit.copy()
     x[3] = np.radians(2.0)
     return x
 

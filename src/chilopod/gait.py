@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import ParameterError
+from chilopod.frozen import read_only
 from chilopod.units import Description, Quantity
 
 # Phases such as 3 * 120/360 miss their integer by round-off; anything nearer than this (in cycles) is meant equal.
@@ -168,9 +169,7 @@ def _schedule(gait: Gait, modules: int, duration: float) -> Schedule:
     stroke = np.where(contact, gait.stroke(since_touch_down), 0.0)
     times = edges * gait.period
     times[-1] = duration
-    for array in (times, contact, stroke):
-        array.flags.writeable = False
-    return Schedule(times, contact, stroke)
+    return Schedule(read_only(times), read_only(contact), read_only(stroke))
 
 
 def _wrapped(cycles: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -23,7 +23,7 @@ def walked(model, x, pose, t0, t1):
 
 def bent(model, degrees=2.0):
     """The straight walk with joint 1 bent."""
-    x = model.orbit
+    x = model.orbit.copy()
     x[3] = np.radians(degrees)
     return x
 

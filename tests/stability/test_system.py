@@ -6,7 +6,21 @@ import numpy as np
 import pytest
 
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
-from chilopod.stability import PeriodicSystem, SystemLike, exponents, find_orbit, locate, multipliers, sweep
+from chilopod.stability import (
+    FlowsEach,
+    FlowsMany,
+    FlowsStates,
+    FlowsWithError,
+    PeriodicSystem,
+    SystemLike,
+    exponents,
+    find_orbit,
+    locate,
+    multipliers,
+    sweep,
+)
+from chilopod.stability.capabilities import spatial_symmetry
+from chilopod.stability.system import whole_period
 
 
 class Own:
@@ -64,6 +78,30 @@ def test_optional_attributes_are_used():
         multipliers(b).values.tolist() for b in (Better(), Better(-0.1))
     ]
     assert sweep([]) == []
+
+
+def test_a_capability_that_is_none_is_missing():
+    class Without(Own):
+        flow_with_error = flow_states = flow_many = can_flow_with = flow_each = None
+        spatial_symmetry = orbit = None
+
+    protocols = (FlowsEach, FlowsMany, FlowsStates, FlowsWithError)
+    plain = PeriodicSystem(2, 2 * pi, Own().flow)
+    for system in (Own(), Without(), plain, whole_period(Without())):
+        assert not any(isinstance(system, protocol) for protocol in protocols)
+        assert spatial_symmetry(system) is None
+        with pytest.raises(AnalysisError, match="does not know its periodic orbit"):
+            multipliers(system)
+    found = multipliers(Without(), [1.0, 1.0])
+    assert found.values.tolist() == multipliers(Own(), [1.0, 1.0]).values.tolist()
+    assert found.error_bound == multipliers(Own(), [1.0, 1.0]).error_bound
+
+
+def test_a_capability_may_belong_to_the_instance():
+    system = PeriodicSystem(2, 2 * pi, Own().flow, flow_with_error=lambda x, t0, t1: (*Own().flow(x, t0, t1), 1e-5))
+    for each in (system, whole_period(system)):
+        assert isinstance(each, FlowsWithError)
+        assert not isinstance(each, FlowsStates)
 
 
 @pytest.mark.parametrize("noise", [1e-12, 1e-8, 1e-4])

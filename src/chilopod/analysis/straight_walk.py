@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from chilopod import stability, units
 from chilopod.analysis.parameters import K1, stiffness
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.frozen import ReadOnlyArrays
 from chilopod.planar import PlanarModel
 from chilopod.robot import Robot
 from chilopod.stability import Kind
@@ -20,7 +21,7 @@ ComplexArray = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
-class StraightWalk:
+class StraightWalk(ReadOnlyArrays):
     """Stability of the straight walk.
 
     Attributes
@@ -62,7 +63,7 @@ class StraightWalk:
 
 
 @dataclass(frozen=True)
-class WalkBifurcation:
+class WalkBifurcation(ReadOnlyArrays):
     """A bifurcation of the straight walk as one parameter of the robot changes.
 
     Attributes

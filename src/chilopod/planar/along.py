@@ -13,6 +13,7 @@ from scipy.linalg import qr
 
 from chilopod.compiled import parallel_njit
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.frozen import ReadOnlyArrays
 from chilopod.integrate import COMPLEX_STEP, integrator
 from chilopod.kinematics import foot_places, foot_velocities, from_modules, module_headings, module_velocities
 from chilopod.planar.drift import Drift
@@ -33,6 +34,7 @@ _DEAD = 1e-12  # size of a tangent that no longer matters, relative to the large
 _integrate = integrator(rhs)
 
 
+@dataclass(frozen=True, eq=False, repr=False)
 class FollowedModel(PlanarModel):
     """The planar model for walks that are followed through a parameter.
 
@@ -48,28 +50,24 @@ class FollowedModel(PlanarModel):
         ``left`` that are still alive are carried on.
         """
         x = self._checked(x)
-        if np.array_equal(x, self.orbit):
+        if (x == self.orbit).all():
             return super().flow(x, t0, t1)
         switches = self._pieces(t0, t1)[1].cumsum() + t0
         cuts = [float(switches[np.abs(switches - (t0 + part * (t1 - t0))).argmin()]) for part in _CUTS]
         times = sorted({t0, *cuts, t1})
-        precise = self.tolerance
+        tolerance = _DERIVATIVE * self.tolerance
         state, left, right = x.astype(np.complex128), np.eye(self.dimension), np.eye(self.dimension)
-        try:
-            self.tolerance = _DERIVATIVE * precise
-            for start, end in zip(times, times[1:], strict=False):
-                batch = state + 1j * COMPLEX_STEP * left.T
-                self._advance(batch, start, end)
-                state, left = batch[0].real.astype(np.complex128), batch.imag.T / COMPLEX_STEP
-                basis, upper, order = qr(left, mode="economic", pivoting=True)
-                size = np.abs(np.diag(upper))
-                alive = max(1, int((size > _DEAD * size[0]).sum()))
-                if alive < left.shape[1]:
-                    unsorted = np.empty_like(upper)
-                    unsorted[:, order] = upper
-                    left, right = basis[:, :alive], unsorted[:alive] @ right
-        finally:
-            self.tolerance = precise
+        for start, end in zip(times, times[1:], strict=False):
+            batch = state + 1j * COMPLEX_STEP * left.T
+            self._advance(batch, start, end, tolerance)
+            state, left = batch[0].real.astype(np.complex128), batch.imag.T / COMPLEX_STEP
+            basis, upper, order = qr(left, mode="economic", pivoting=True)
+            size = np.abs(np.diag(upper))
+            alive = max(1, int((size > _DEAD * size[0]).sum()))
+            if alive < left.shape[1]:
+                unsorted = np.empty_like(upper)
+                unsorted[:, order] = upper
+                left, right = basis[:, :alive], unsorted[:alive] @ right
         return state.real.copy(), left @ right
 
     @staticmethod
@@ -114,7 +112,7 @@ class FollowedModel(PlanarModel):
 
 
 @dataclass(frozen=True)
-class WalkMeans:
+class WalkMeans(ReadOnlyArrays):
     """What periodic walks amount to over one period.
 
     Attributes

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.frozen import ReadOnlyArrays, read_only
 from chilopod.integrate import COMPLEX_STEP
 from chilopod.planar import linear
 from chilopod.planar.contact import contact_moments
@@ -33,12 +35,14 @@ _ROWS_DIFFER = 2.0  # joint rates are differences of two rows
 _MOST_STEPS = 2e5  # of the linear flow: ten seconds or so
 
 
-class PlanarModel:
+@dataclass(frozen=True, eq=False, repr=False)
+class PlanarModel(ReadOnlyArrays):
     """The paper's planar model (eq. 1) of one robot, period by period.
 
     The state is ``[vx, vy, w0, theta_1 .., theta_1' ..]``, length 2N+1 (see :mod:`chilopod.planar.dynamics`). The
-    object has everything :mod:`chilopod.stability` asks of a periodic system: ``dimension``, ``period``,
-    ``switch_times``, ``symmetry``, ``spatial_symmetry``, ``orbit`` and the flows.
+    object has every capability that :mod:`chilopod.stability.capabilities` names but that of flowing each, which
+    :class:`chilopod.planar.along.FollowedModel` adds. It does not change once it is made, and its arrays cannot be
+    written into: another robot is another model.
 
     Parameters
     ----------
@@ -51,23 +55,42 @@ class PlanarModel:
         Whether to offer the half-period symmetry of the gait, where it has one, to the analyses.
     """
 
-    def __init__(self, robot: Robot, tolerance: float = TOLERANCE, use_symmetry: bool = True) -> None:
-        self.robot = robot
-        self.tolerance = tolerance
-        self.use_symmetry = use_symmetry
-        self.modules = robot.body.modules
-        self.dimension = 2 * self.modules + 1
-        self.period = robot.gait.period
-        self.stiffness: Array = np.array(robot.springs.stiffness)
-        self.damping: Array = np.array(robot.springs.damping)
+    robot: Robot
+    tolerance: float = TOLERANCE
+    use_symmetry: bool = True
 
     @property
+    def modules(self) -> int:
+        """Number of modules N."""
+        return self.robot.body.modules
+
+    @property
+    def dimension(self) -> int:
+        """Number of states, 2N+1."""
+        return 2 * self.modules + 1
+
+    @property
+    def period(self) -> float:
+        """Duration of a gait cycle, s."""
+        return self.robot.gait.period
+
+    @cached_property
+    def stiffness(self) -> Array:
+        """Of the yaw joints, N*m/rad, shape (N-1,)."""
+        return read_only(np.array(self.robot.springs.stiffness))
+
+    @cached_property
+    def damping(self) -> Array:
+        """Of the yaw joints, N*m*s/rad, shape (N-1,)."""
+        return read_only(np.array(self.robot.springs.damping))
+
+    @cached_property
     def orbit(self) -> Array:
         """The straight walk, shape (2N+1,): every stance foot rests on the floor, so it moves at stride/stance for
         ever."""
         state = np.zeros(self.dimension)
         state[0] = self.robot.gait.speed
-        return state
+        return read_only(state)
 
     @property
     def schedule(self) -> Schedule:
@@ -79,12 +102,12 @@ class PlanarModel:
         """Instants in [0, period) at which a foot touches down or lifts off, s."""
         return self.schedule.times[:-1]
 
-    @property
+    @cached_property
     def reflection(self) -> Array:
         """Matrix that mirrors a state left to right, shape (2N+1, 2N+1)."""
         signs = -np.ones(self.dimension)
         signs[0] = 1.0
-        return np.diag(signs)
+        return read_only(np.diag(signs))
 
     @property
     def symmetry(self) -> Array | None:
@@ -118,7 +141,7 @@ class PlanarModel:
     def flow_with_error(self, x: ArrayLike, t0: float, t1: float) -> tuple[Array, Array, float]:
         """:meth:`flow`, and a bound on the error of the largest entry of the derivative."""
         x = self._checked(x)
-        if np.array_equal(x, self.orbit):
+        if (x == self.orbit).all():
             matrix, error = self._linear_flow(t0, t1)
             return x.copy(), matrix, error
         n = self.dimension
@@ -152,7 +175,8 @@ class PlanarModel:
         starts, _, interval = self._pieces(t, t + self.period)
         out = np.empty_like(x)
         scratch = np.empty((self.modules, SCRATCH))
-        args = (self.scalars[0], self.stiffness, self.damping, self.moments(interval[:1])[0], scratch)
+        scalars, stiffness, damping = self._constants()
+        args = (scalars[0], stiffness[0], damping[0], self.moments(interval[:1])[0], scratch)
         compiled_rhs(float(starts[0]), x, args, out)
         return out
 
@@ -168,7 +192,8 @@ class PlanarModel:
         """What the compiled right-hand side wants to know of a module: length (m), mass (kg), yaw inertia (kg*m^2) and
         the speed of its feet (m/s), shape (1, 4)."""
         robot = self.robot
-        return np.array([[robot.module_length, robot.module_mass, robot.module_yaw_inertia, robot.gait.speed]])
+        sizes = [[robot.module_length, robot.module_mass, robot.module_yaw_inertia, robot.gait.speed]]
+        return read_only(np.array(sizes))
 
     def moments(self, interval: NDArray[np.intp]) -> Array:
         """Contact moments (see :mod:`chilopod.planar.contact`) at the start of intervals of :attr:`schedule`, shape
@@ -199,7 +224,8 @@ class PlanarModel:
     def can_flow_with(self, other: PlanarModel) -> bool:
         """Whether :meth:`flow_many` may take both robots at once: they differ in springs at the most in what sets the
         shape."""
-        return self.modules == other.modules and self.robot.gait == other.robot.gait
+        here, there = self.robot, other.robot
+        return self.modules == other.modules and (here.gait is there.gait or here.gait == there.gait)
 
     # -- inside
     # ---------------------------------------------------------------------------------------------------------------
@@ -221,28 +247,39 @@ class PlanarModel:
     def _pieces(self, t0: float, t1: float) -> tuple[Array, Array, NDArray[np.intp]]:
         return pieces(self.robot.gait, self.modules, t0, t1)
 
-    def _advance(self, batch: NDArray[np.float64] | NDArray[np.complex128], t0: float, t1: float) -> None:
+    def _constants(self) -> tuple[Array, Array, Array]:
+        """Copies of scalars, stiffness and damping as the compiled loops take them: one robot in front, writable, for
+        numba would compile everything once more for arrays that are not."""
+        return self.scalars.copy(), self.stiffness[None].copy(), self.damping[None].copy()
+
+    def _advance(
+        self,
+        batch: NDArray[np.float64] | NDArray[np.complex128],
+        t0: float,
+        t1: float,
+        tolerance: float | None = None,
+    ) -> None:
+        """Carry states in place; with the model's own tolerance unless another one is given."""
         starts, widths, interval = self._pieces(t0, t1)
         moments = self.moments(interval)
         ok = np.ones(len(batch), dtype=np.bool_)
         advance(
             starts,
             widths,
-            self.scalars,
-            self.stiffness[None],
-            self.damping[None],
+            *self._constants(),
             moments[None],
             np.zeros(len(batch), dtype=np.intp),
             batch,
-            self.tolerance,
+            self.tolerance if tolerance is None else tolerance,
             ok,
         )
         if not ok.all():
             raise AnalysisError(f"the motion diverges between {t0:g} s and {t1:g} s", field="x")
 
-    def _linear_pieces(self, t0: float, t1: float) -> tuple[Array, Array, Array, float]:
-        """Widths of the pieces, upper rows of A0, A1, A2 of every piece about its own start, its fastest decay, and the
-        frequency of the springs."""
+    @cached_property
+    def _linearised(self) -> tuple[Array, Array, Array, Array, float]:
+        """Of one period: the passive matrices, what springs and dampers take from A0, the fastest decay in every
+        interval, and the frequency of the springs."""
         robot = self.robot
         passive, joint, rates, decay = _passive_matrices(
             robot.gait,
@@ -252,6 +289,19 @@ class PlanarModel:
             robot.legs.half_width,
             robot.ground.friction,
         )
+        compliance = rates @ joint
+        return (
+            passive,
+            read_only(joint * self.stiffness),
+            read_only(joint * self.damping @ rates),
+            read_only(decay + linear.joint_bound(compliance, self.damping)),
+            float(np.sqrt(linear.joint_bound(compliance, self.stiffness))),
+        )
+
+    def _linear_pieces(self, t0: float, t1: float) -> tuple[Array, Array, Array, float]:
+        """Widths of the pieces, upper rows of A0, A1, A2 of every piece about its own start, its fastest decay, and the
+        frequency of the springs."""
+        passive, springs, dampers, decay, frequency = self._linearised
         starts, widths, interval = self._pieces(t0, t1)
         upper = passive[interval]
         if starts.any():
@@ -259,12 +309,10 @@ class PlanarModel:
             upper[:, :, 0] += t * (upper[:, :, 1] + t * upper[:, :, 2])
             upper[:, :, 1] += 2.0 * t * upper[:, :, 2]
         n = self.modules
-        upper[:, :, 0, n + 2 :] -= joint * self.stiffness
+        upper[:, :, 0, n + 2 :] -= springs
         if self.damping.any():
-            upper[:, :, 0, : n + 2] -= joint * self.damping @ rates
-        compliance = rates @ joint
-        frequency = np.sqrt(linear.joint_bound(compliance, self.stiffness))
-        decay = decay[interval] + linear.joint_bound(compliance, self.damping)
+            upper[:, :, 0, : n + 2] -= dampers
+        decay = decay[interval]
         steps = linear.steps(widths, decay, frequency)
         if not steps < _MOST_STEPS:
             raise AnalysisError(
@@ -299,7 +347,10 @@ def _passive_matrices(
     """:func:`linear.system_matrices` of one period; a sweep over springs computes them once."""
     schedule = gait.schedule(modules)
     moments = contact_moments(forward_offset, half_width, friction, schedule)
-    return linear.system_matrices(length, mass, inertia, gait.speed, moments, np.diff(schedule.times))
+    passive, joint, rates, decay = linear.system_matrices(
+        length, mass, inertia, gait.speed, moments, np.diff(schedule.times)
+    )
+    return read_only(passive), read_only(joint), read_only(rates), read_only(decay)
 
 
 @lru_cache(maxsize=64)

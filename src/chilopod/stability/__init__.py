@@ -8,12 +8,22 @@ False
 """
 
 from chilopod.stability.branch import Branch, BranchPoint, Ending, begin, follow, leave_pitchfork, proceed
+from chilopod.stability.capabilities import (
+    FlowsEach,
+    FlowsMany,
+    FlowsStates,
+    FlowsWithError,
+    KnowsOrbit,
+    SpatiallySymmetric,
+    Switches,
+    SystemLike,
+)
 from chilopod.stability.floquet import Exponents, Multipliers, exponents, multipliers, sweep
 from chilopod.stability.jumps import UndeclaredSwitch
 from chilopod.stability.locate import locate
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
 from chilopod.stability.rhs import NotAnalytic, from_rhs
-from chilopod.stability.system import PeriodicSystem, SystemLike, find_orbit
+from chilopod.stability.system import PeriodicSystem, find_orbit
 
 __all__ = [
     "BifurcationPoint",
@@ -22,10 +32,17 @@ __all__ = [
     "Criticality",
     "Ending",
     "Exponents",
+    "FlowsEach",
+    "FlowsMany",
+    "FlowsStates",
+    "FlowsWithError",
     "Kind",
+    "KnowsOrbit",
     "Multipliers",
     "NotAnalytic",
     "PeriodicSystem",
+    "SpatiallySymmetric",
+    "Switches",
     "SystemLike",
     "UndeclaredSwitch",
     "begin",

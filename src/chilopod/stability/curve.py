@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from chilopod.errors import AnalysisError
+from chilopod.frozen import ReadOnlyArrays, read_only
+from chilopod.stability.capabilities import FlowsEach, SystemLike
 from chilopod.stability.floquet import counts_outside
 from chilopod.stability.points import Kind
 from chilopod.stability.samples import Family
-from chilopod.stability.system import ReturnMap, SystemLike, optional, return_map, returned_states, whole_period
+from chilopod.stability.system import ReturnMap, return_map, returned_states, whole_period
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -33,7 +35,7 @@ _CRITICAL = 1e-5  # distance from the circle within which a multiplier is the cr
 
 
 @dataclass(frozen=True)
-class BranchPoint:
+class BranchPoint(ReadOnlyArrays):
     """A periodic orbit on a branch.
 
     Attributes
@@ -63,7 +65,7 @@ class BranchPoint:
 
 
 @dataclass(frozen=True)
-class Anchor:
+class Anchor(ReadOnlyArrays):
     """Where a step starts.
 
     Attributes
@@ -84,8 +86,8 @@ class Anchor:
 class Curve:
     """The curve H(x, p) = x of a family, with p in units of ``scale``.
 
-    Systems may have ``flow_each(systems, states, t0, t1)``, which carries every state by a system of its own; then the
-    derivative with respect to the parameter costs next to nothing on two cores.
+    Where its systems flow each (see :class:`chilopod.stability.capabilities.FlowsEach`), the derivative with respect to
+    the parameter costs next to nothing on two cores.
     """
 
     def __init__(self, family: Family, scale: float) -> None:
@@ -111,7 +113,7 @@ class Curve:
         # The matrix of a pitchfork was not its own, so it tells nothing about the next one.
         if before is None or before.special is not None:
             return Anchor(last, matrix)
-        return Anchor(last, matrix, (before, self._matrix_at(before)))
+        return Anchor(last, matrix, (before, read_only(self._matrix_at(before))))
 
     def _matrix_at(self, point: BranchPoint, ahead: float = 0.0) -> Array:
         x = point.orbit + ahead * point.tangent[:-1]
@@ -215,13 +217,13 @@ class Curve:
 
     def _mapped(self, x: Array, value: float) -> tuple[Array, Array | None]:
         """H at a state, and at a neighbouring value of the parameter if that costs no time."""
-        system = self._system(value)
-        each = optional(system, "flow_each")
-        if each is None:
-            return returned_states(system, x[None])[0], None
-        beside = self._system(value + _PARAMETER_STEP * self.scale)
-        mapped, moved = each([system, beside], np.array([x, x]), 0.0, system.period)
-        return (mapped, moved) if beside.period == system.period else (mapped, None)
+        system = self._family(value)
+        if isinstance(system, FlowsEach):
+            beside = self._family(value + _PARAMETER_STEP * self.scale)
+            if isinstance(beside, FlowsEach):
+                mapped, moved = system.flow_each([system, beside], np.array([x, x]), 0.0, system.period)
+                return (mapped, moved) if beside.period == system.period else (mapped, None)
+        return returned_states(whole_period(system), x[None])[0], None
 
     def _beside(self, x: Array, value: float) -> Array:
         beside: Array = returned_states(self._system(value + _PARAMETER_STEP * self.scale), x[None])[0]

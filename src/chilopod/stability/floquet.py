@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError
+from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.capabilities import SystemLike
 from chilopod.stability.splitting import split_product
-from chilopod.stability.system import ReturnMap, SystemLike, find_orbit, halves, return_maps
+from chilopod.stability.system import ReturnMap, find_orbit, halves, return_maps
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -25,7 +27,7 @@ _SAME_ANGLE = 1e-12
 
 
 @dataclass(frozen=True)
-class Multipliers:
+class Multipliers(ReadOnlyArrays):
     """Floquet multipliers of a periodic orbit.
 
     Attributes
@@ -54,7 +56,7 @@ class Multipliers:
 
 
 @dataclass(frozen=True)
-class Exponents:
+class Exponents(ReadOnlyArrays):
     """Floquet exponents and modes.
 
     Attributes
@@ -76,7 +78,7 @@ class Exponents:
 
 
 @dataclass(frozen=True)
-class Spectrum:
+class Spectrum(ReadOnlyArrays):
     """Eigenvalues of the return map with left and right eigenvectors, what locating a bifurcation works on.
 
     Attributes
@@ -184,7 +186,7 @@ def _factors(system: SystemLike, x: Array) -> list[Array]:
     count = 8
     while True:
         times = np.linspace(0.0, duration, count + 1)
-        state, factors = x, []
+        state, factors = x.copy(), []
         for t0, t1 in zip(times, times[1:], strict=False):
             state, factor = system.flow(state, float(t0), float(t1))
             factors.append(factor)

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.stability.system import ReturnMap, SystemLike, return_map
+from chilopod.stability.capabilities import SystemLike
+from chilopod.stability.system import ReturnMap, return_map
 
 Array = NDArray[np.float64]
 

@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.stability.capabilities import SystemLike, spatial_symmetry
 from chilopod.stability.floquet import Spectrum, spectrum
 from chilopod.stability.fold import Fold
 from chilopod.stability.normal_form import NormalForm, complex_normal_form, real_normal_form
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
 from chilopod.stability.samples import Family, Sample, Samples
-from chilopod.stability.system import SystemLike, optional, return_map
+from chilopod.stability.system import return_map
 from chilopod.stability.zeros import brackets
 
 Array = NDArray[np.float64]
@@ -261,7 +262,7 @@ def _where_it_exists(form: Callable[[float], NormalForm]) -> NormalForm:
 
 
 def _antisymmetric(system: SystemLike, mode: NDArray[np.inexact]) -> bool:
-    reflection = optional(system, "spatial_symmetry")
+    reflection = spatial_symmetry(system)
     return reflection is not None and bool(np.abs(reflection @ mode + mode).max() < 1e-6)
 
 

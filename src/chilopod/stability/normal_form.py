@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chilopod.stability.system import ReturnMap, SystemLike, returned_states
+from chilopod.stability.capabilities import SystemLike
+from chilopod.stability.system import ReturnMap, returned_states
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from chilopod.frozen import ReadOnlyArrays
+
 Array = NDArray[np.float64]
 
 
@@ -45,7 +47,7 @@ class Criticality(enum.Enum):
 
 
 @dataclass(frozen=True)
-class BifurcationPoint:
+class BifurcationPoint(ReadOnlyArrays):
     """A located bifurcation.
 
     Attributes

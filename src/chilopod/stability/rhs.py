@@ -6,7 +6,7 @@ import functools
 import itertools
 import warnings
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,6 +26,20 @@ _OTHER = 5.0  # two independent errors differ by less than a fifth of them rarel
 
 class NotAnalytic(UserWarning):
     """A compiled right-hand side cannot be differentiated by a complex step."""
+
+
+@runtime_checkable
+class Compiled(Protocol):
+    """A function that numba has compiled."""
+
+    @property
+    def py_func(self) -> Callable[..., ArrayLike]:
+        """The function as it was written."""
+        ...
+
+    def __call__(self, *args: Any) -> Any:
+        """Run the compiled code."""
+        ...
 
 
 def from_rhs(
@@ -83,7 +97,7 @@ def from_rhs(
     if jacobian is not None:
         check_shape(jacobian, args, times, base, (dimension, dimension), "jacobian")
     segments: _CompiledSegments | _PythonSegments
-    if hasattr(rhs, "py_func") and jacobian is None:
+    if isinstance(rhs, Compiled) and jacobian is None:
         if _is_analytic(rhs, args, base, times):
             segments = _CompiledSegments(rhs, args)
         else:

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError
+from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.capabilities import SystemLike
 from chilopod.stability.fold import Fold, find_fold
-from chilopod.stability.system import ReturnMap, SystemLike, find_orbit, return_maps
+from chilopod.stability.system import ReturnMap, find_orbit, return_maps
 
 Array = NDArray[np.float64]
 Family = Callable[[float], SystemLike]
@@ -22,7 +24,7 @@ _JUMP = 0.3  # of the orbit between prediction and correction, relative to its s
 
 
 @dataclass(frozen=True)
-class Sample:
+class Sample(ReadOnlyArrays):
     """The return map on the orbit at a value of the parameter."""
 
     value: float

@@ -1,16 +1,24 @@
-"""What the analyses need to know of a periodic system, and the return map built from it."""
+"""A periodic system of one's own, the return map of any system, and its fixed points."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.arguments import finite_array
+from chilopod.stability.capabilities import (
+    FlowsMany,
+    FlowsStates,
+    FlowsWithError,
+    KnowsOrbit,
+    SystemLike,
+    spatial_symmetry,
+)
 
 Array = NDArray[np.float64]
 
@@ -21,43 +29,8 @@ Flow = Callable[[Array, float, float], tuple[Array, Array]]
 """``flow(x, t0, t1) -> (state at t1, its derivative with respect to x)``, shapes (n,) and (n, n)."""
 
 
-@runtime_checkable
-class SystemLike(Protocol):
-    """A T-periodic system dx/dt = f(t, x), f(t + T, x) = f(t, x), given by its flow.
-
-    Besides what stands here, an object *may* have:
-
-    - ``spatial_symmetry``: a matrix P with f(t, P x) = P f(t, x);
-    - ``orbit``: a state on a known periodic orbit at time 0, shape (n,);
-    - ``flow_with_error(x, t0, t1) -> (state, derivative, bound)``: bound on the error of the largest entry of the
-      derivative;
-    - ``flow_states(states, t0, t1)``: many states without derivatives, shape (states, n);
-    - ``flow_many(systems, t0, t1)`` and ``can_flow_with(other)``: derivatives along the known orbits of many systems
-      at once.
-    """
-
-    @property
-    def dimension(self) -> int:
-        """Number of states n."""
-        ...
-
-    @property
-    def period(self) -> float:
-        """T."""
-        ...
-
-    @property
-    def symmetry(self) -> Array | None:
-        """A matrix S with S f(t, x) = f(t + T/2, S x), so that H = S flow(T/2) is a return map; or None."""
-        ...
-
-    def flow(self, x: Array, t0: float, t1: float) -> tuple[Array, Array]:
-        """State at t1 and its derivative with respect to the state x at t0."""
-        ...
-
-
 @dataclass(frozen=True)
-class PeriodicSystem:
+class PeriodicSystem(ReadOnlyArrays):
     """A periodic system of one's own, from anything that has a flow.
 
     To start from a right-hand side, see :func:`chilopod.stability.from_rhs`.
@@ -95,25 +68,27 @@ class PeriodicSystem:
             raise ParameterError("must be at least 1", field="dimension", value=self.dimension)
         if not (np.isfinite(self.period) and self.period > 0):
             raise ParameterError("must be positive and finite", field="period", value=self.period)
-        for name in ("symmetry", "spatial_symmetry"):
-            matrix = getattr(self, name)
-            if matrix is None:
-                continue
-            matrix = np.array(matrix, dtype=np.float64)
-            if matrix.shape != (self.dimension, self.dimension):
-                raise ParameterError(
-                    "has the wrong shape",
-                    field=name,
-                    value=matrix.shape,
-                    allowed=f"({self.dimension}, {self.dimension})",
-                )
-            if not np.allclose(matrix @ matrix, np.eye(self.dimension)):
-                raise ParameterError("must be its own inverse: applied twice it gives every state back", field=name)
-            object.__setattr__(self, name, matrix)
+        object.__setattr__(self, "symmetry", self._involution("symmetry", self.symmetry))
+        object.__setattr__(self, "spatial_symmetry", self._involution("spatial_symmetry", self.spatial_symmetry))
+        if self.orbit is not None:
+            object.__setattr__(self, "orbit", np.asarray(self.orbit, dtype=np.float64))
+        super().__post_init__()
+
+    def _involution(self, name: str, matrix: ArrayLike | None) -> Array | None:
+        if matrix is None:
+            return None
+        matrix = np.array(matrix, dtype=np.float64)
+        if matrix.shape != (self.dimension, self.dimension):
+            raise ParameterError(
+                "has the wrong shape", field=name, value=matrix.shape, allowed=f"({self.dimension}, {self.dimension})"
+            )
+        if not np.allclose(matrix @ matrix, np.eye(self.dimension)):
+            raise ParameterError("must be its own inverse: applied twice it gives every state back", field=name)
+        return matrix
 
 
 @dataclass(frozen=True)
-class ReturnMap:
+class ReturnMap(ReadOnlyArrays):
     """One evaluation of the return map at a state.
 
     Attributes
@@ -134,11 +109,6 @@ class ReturnMap:
     halves: int
 
 
-def optional(system: SystemLike, name: str) -> Any:
-    """An optional attribute of a system (see :class:`SystemLike`), None if it lacks it."""
-    return getattr(system, name, None)
-
-
 def halves(system: SystemLike) -> int:
     """How many applications of the return map make one period: 2 with the half-period symmetry, else 1."""
     return 1 if system.symmetry is None else 2
@@ -148,19 +118,19 @@ class _WholePeriod:
     """A system as it is, but without its half-period symmetry and its known orbit."""
 
     symmetry = None
-    orbit = None
 
     def __init__(self, system: SystemLike) -> None:
-        self._system = system
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._system, name)
+        self.dimension = system.dimension
+        self.period = system.period
+        self.flow = system.flow
+        self.spatial_symmetry = spatial_symmetry(system)
+        self.flow_with_error = system.flow_with_error if isinstance(system, FlowsWithError) else None
+        self.flow_states = system.flow_states if isinstance(system, FlowsStates) else None
 
 
 def whole_period(system: SystemLike) -> SystemLike:
     """The same system for the analysis of orbits that do not have its half-period symmetry."""
-    whole: SystemLike = _WholePeriod(system)  # it hands the rest through
-    return whole
+    return _WholePeriod(system)
 
 
 def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple[Array, Array, float]:
@@ -170,9 +140,8 @@ def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple
     sound bound; a flow of fixed steps that ignores how it is called cannot be seen through this way and should bring
     its own.
     """
-    own = optional(system, "flow_with_error")
-    if own is not None:
-        state, derivative, error = own(x, t0, t1)
+    if isinstance(system, FlowsWithError):
+        state, derivative, error = system.flow_with_error(x, t0, t1)
         return state, derivative, float(error)
     state, derivative = system.flow(x, t0, t1)
     _check_shapes(state, derivative, x.size)
@@ -182,7 +151,7 @@ def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple
     for a, b in zip(times, times[1:], strict=False):
         passing, factor = system.flow(passing, a, b)
         product = factor @ product
-    size = max(1.0, float(np.abs(derivative).max()))
+    size = _size(derivative)
     return state, derivative, 10.0 * float(np.abs(product - derivative).max()) + 1e-15 * size
 
 
@@ -208,7 +177,7 @@ def return_map(system: SystemLike, x: ArrayLike, with_error: bool = True) -> Ret
     AnalysisError
         If the flow gives anything that is not finite.
     """
-    x = np.asarray(x, dtype=np.float64)
+    x = np.array(x, dtype=np.float64)  # a system may write into what it is given
     n = system.dimension
     if x.shape != (n,):
         raise ParameterError("has the wrong shape", field="orbit", value=x.shape, allowed=f"({n},)")
@@ -229,25 +198,26 @@ def return_map(system: SystemLike, x: ArrayLike, with_error: bool = True) -> Ret
 def return_maps(systems: Sequence[SystemLike]) -> list[ReturnMap]:
     """The return maps of many systems at their known orbits, together where they can."""
     first = systems[0]
-    together = optional(first, "flow_many")
-    alike = optional(first, "can_flow_with")
-    if together is None or alike is None or len(systems) == 1 or not all(alike(system) for system in systems[1:]):
+    if len(systems) == 1 or not isinstance(first, FlowsMany):
+        return [_known_return(system)[1] for system in systems]
+    alike = [system for system in systems if isinstance(system, type(first)) and first.can_flow_with(system)]
+    if len(alike) < len(systems):
         return [_known_return(system)[1] for system in systems]
     count = halves(first)
-    jacobians, errors = together(systems, 0.0, first.period / count)
+    jacobians, errors = first.flow_many(alike, 0.0, first.period / count)
     symmetry = np.eye(first.dimension) if first.symmetry is None else first.symmetry
     return [
-        ReturnMap(known_orbit(system), symmetry @ jacobian, float(error), count)
-        for system, jacobian, error in zip(systems, jacobians, errors, strict=True)
+        ReturnMap(_given(system.orbit), symmetry @ jacobian, float(error), count)
+        for system, jacobian, error in zip(alike, jacobians, errors, strict=True)
     ]
 
 
 def returned_states(system: SystemLike, states: Array) -> Array:
     """H of many states at once, shape (states, n)."""
     duration = system.period / halves(system)
-    many = optional(system, "flow_states")
-    if many is not None:
-        result = np.asarray(many(states, 0.0, duration))
+    states = np.array(states)  # a system may write into what it is given
+    if isinstance(system, FlowsStates):
+        result = np.asarray(system.flow_states(states, 0.0, duration))
     else:
         result = np.array([system.flow(x, 0.0, duration)[0] for x in states])
     if system.symmetry is not None:
@@ -263,7 +233,10 @@ def known_orbit(system: SystemLike) -> Array:
     AnalysisError
         If it knows none.
     """
-    orbit = optional(system, "orbit")
+    return _given(system.orbit if isinstance(system, KnowsOrbit) else None)
+
+
+def _given(orbit: Array | None) -> Array:
     if orbit is None:
         raise AnalysisError(
             "this system does not know its periodic orbit", field="orbit", allowed="a first guess of it"
@@ -276,13 +249,17 @@ def _known_return(system: SystemLike, with_error: bool = True) -> tuple[Array, R
     x = known_orbit(system)
     image = return_map(system, x, with_error)
     off = float(np.abs(image.state - x).max())
-    if not off <= _RETURNS * max(1.0, float(np.abs(x).max())) * max(1.0, float(np.abs(image.jacobian).max())):
+    if not (off <= _RETURNS or off <= _RETURNS * _size(x) * _size(image.jacobian)):
         raise AnalysisError(
             f"is no periodic orbit: one return later the state is {off:.1e} away",
             field="orbit",
             allowed="a state on the orbit at time 0, or as a first guess, which is then improved",
         )
     return x, image
+
+
+def _size(array: Array) -> float:
+    return max(1.0, float(np.abs(array).max()))
 
 
 def find_orbit(system: SystemLike, guess: ArrayLike | None = None, with_error: bool = True) -> tuple[Array, ReturnMap]:
@@ -314,7 +291,7 @@ def find_orbit(system: SystemLike, guess: ArrayLike | None = None, with_error: b
         image = return_map(system, x, with_error=False)
         residual = image.state - x
         size = float(np.abs(residual).max())
-        scale = max(1.0, float(np.abs(x).max()))
+        scale = _size(x)
         # Converged once the residual is at the accuracy of the flow, or has stopped falling close to it.
         if size <= 4e-16 * scale or (size <= 1e-10 * scale and size >= 0.5 * best):
             return x, return_map(system, x) if with_error else image

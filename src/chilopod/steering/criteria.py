@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from chilopod.frozen import ReadOnlyArrays
 from chilopod.steering.target import ARRIVAL_RADIUS
 
 Array = NDArray[np.float64]
@@ -28,7 +29,7 @@ class Outcome(enum.Enum):
 
 
 @dataclass(frozen=True)
-class Criteria:
+class Criteria(ReadOnlyArrays):
     """Criteria of turning tasks, one entry a walk.
 
     Attributes

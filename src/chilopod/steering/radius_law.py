@@ -11,12 +11,13 @@ from scipy.optimize import brentq
 
 from chilopod import units
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.frozen import ReadOnlyArrays
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class RadiusLaw:
+class RadiusLaw(ReadOnlyArrays):
     """Radius of the stable curved walks from the pitchfork on, as long as it falls with the parameter.
 
     The squared curvature 1/r^2 is interpolated: it leaves zero linearly at the pitchfork, where the radius itself is
@@ -39,6 +40,7 @@ class RadiusLaw:
     def __post_init__(self) -> None:
         if not (len(self.values) >= 3 and (np.diff(self.values) > 0.0).all() and (np.diff(self.radii) > 0.0).all()):
             raise ParameterError("a radius law needs three points or more, rising in value and radius", field="radii")
+        super().__post_init__()
 
     @classmethod
     def of_branch(cls, values: ArrayLike, radii: ArrayLike, stable: ArrayLike, unit: str) -> RadiusLaw:
@@ -68,7 +70,7 @@ class RadiusLaw:
                 field="branch",
             )
         bent = np.concatenate([[np.inf], radii[1:count]])
-        return cls(values[:count][::-1].copy(), bent[::-1].copy(), unit)
+        return cls(values[:count][::-1], bent[::-1], unit)
 
     @property
     def pitchfork(self) -> float:
