@@ -25,8 +25,9 @@ def joint_rows(heading, half):
 
 
 @numba.njit(cache=True)
-def free_bodies_rhs(t, state, standing, touch_down, masses, stiffness, damping, numbers):
-    """Rates and accelerations of all modules; standing feet have been so since their ``touch_down``."""
+def free_bodies_rhs(t, state, standing, touch_down, masses, stiffness, damping, numbers, drive):
+    """Rates and accelerations of all modules; standing feet have been so since their ``touch_down``; ``drive`` is a
+    torque at every joint beside its spring."""
     half, forward_offset, half_width, stride, speed, friction = numbers
     n = len(masses) // 3
     place, rate = state[: 3 * n], state[3 * n :]
@@ -46,7 +47,7 @@ def free_bodies_rhs(t, state, standing, touch_down, masses, stiffness, damping, 
     wanted = np.zeros(2 * (n - 1))  # rows @ acceleration: what the turning ends do by themselves
     for j in range(n - 1):
         a, b = 3 * j + 2, 3 * j + 5
-        torque = -stiffness[j] * (place[b] - place[a]) - damping[j] * (rate[b] - rate[a])
+        torque = drive[j] - stiffness[j] * (place[b] - place[a]) - damping[j] * (rate[b] - rate[a])
         load[b] += torque
         load[a] -= torque
         wanted[2 * j] = -half * (rate[a] ** 2 * np.cos(place[a]) + rate[b] ** 2 * np.cos(place[b]))
@@ -78,7 +79,8 @@ class FreeBodies:
         speed = gait.stride / gait.stance
         numbers = (self.l / 2, legs.forward_offset, legs.half_width, gait.stride, speed, robot.ground.friction)
         self.masses = np.tile([self.m, self.m, self.inertia], self.n)
-        self.parts = (self.masses, np.array(robot.springs.stiffness), np.array(robot.springs.damping), numbers)
+        self.damping, self.numbers = np.array(robot.springs.damping), numbers
+        self.parts = (self.masses, np.array(robot.springs.stiffness), self.damping, numbers, np.zeros(self.n - 1))
 
     def from_reduced(self, x, pose=(0.0, 0.0, 0.0)):
         """Place the robot in reduced state ``x`` at a pose of module 1."""
@@ -117,20 +119,48 @@ class FreeBodies:
 
     def carry(self, state, t0, t1, rtol=1e-11):
         """State at t1."""
-        gait = self.robot.gait
-        cycles = np.arange(np.floor(t0 / gait.period) - 1, np.ceil(t1 / gait.period) + 2)
-        events = np.concatenate(
-            [(cycles[:, None, None] + event - self.phases % 1).ravel() for event in (0.0, gait.duty)]
-        )
-        events = np.sort(events * gait.period)
-        times = np.concatenate([[t0], events[(events > t0 + 1e-12) & (events < t1 - 1e-12)], [t1]])
-        for start, end in zip(times[:-1], times[1:], strict=True):
-            if end - start < 1e-12:
-                continue
-            middle = (start + end) / 2
-            phase = (middle / gait.period + self.phases) % 1.0
-            args = (phase < gait.duty, middle - phase * gait.period, *self.parts)
+        for start, end, standing, touch_down in self.pieces(t0, t1):
+            args = (standing, touch_down, *self.parts)
             solution = solve_ivp(free_bodies_rhs, (start, end), state, "DOP853", args=args, rtol=rtol, atol=1e-13)
             assert solution.success
             state = self.closed(solution.y[:, -1])
         return state
+
+    def carry_driven(self, state, stiffness, t0, t1, reference, lag, drive, kinks=(), rtol=1e-11):
+        """State and stiffness at t1, where springs follow a reference(t), lag k' = reference - k, joints driven.
+
+        The stiffness is part of what is integrated; without a lag it is the reference. ``kinks`` are where the
+        reference is not smooth.
+        """
+        n = 6 * self.n
+
+        def rhs(t, whole, standing, touch_down, middle):
+            wanted = reference(t, middle)
+            k = whole[n:] if lag > 0.0 else wanted
+            rates = free_bodies_rhs(
+                t, whole[:n], standing, touch_down, self.masses, k, self.damping, self.numbers, drive
+            )
+            return np.concatenate([rates, (wanted - k) / lag if lag > 0.0 else 0.0 * k])
+
+        whole = np.concatenate([state, stiffness])
+        for start, end, *feet in self.pieces(t0, t1, kinks):
+            args = (*feet, (start + end) / 2)
+            solution = solve_ivp(rhs, (start, end), whole, "DOP853", args=args, rtol=rtol, atol=1e-13)
+            assert solution.success
+            whole = np.concatenate([self.closed(solution.y[:n, -1]), solution.y[n:, -1]])
+            if not lag > 0.0:
+                whole[n:] = reference(end, (start + end) / 2)
+        return whole[:n], whole[n:]
+
+    def pieces(self, t0, t1, kinks=()):
+        """Times between which nothing switches, which feet stand there and when they would have touched down."""
+        gait = self.robot.gait
+        cycles = np.arange(np.floor(t0 / gait.period) - 1, np.ceil(t1 / gait.period) + 2)
+        events = [(cycles[:, None, None] + event - self.phases % 1).ravel() for event in (0.0, gait.duty)]
+        events = np.sort(np.concatenate([np.concatenate(events) * gait.period, kinks]))
+        times = np.concatenate([[t0], events[(events > t0 + 1e-12) & (events < t1 - 1e-12)], [t1]])
+        for start, end in zip(times[:-1], times[1:], strict=True):
+            if end - start >= 1e-12:
+                middle = (start + end) / 2
+                phase = (middle / gait.period + self.phases) % 1.0
+                yield start, end, phase < gait.duty, middle - phase * gait.period

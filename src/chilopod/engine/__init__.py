@@ -6,6 +6,7 @@ promises.
 """
 
 from chilopod.engine.actuators import Actuators, Ramps
+from chilopod.engine.check import check_engine
 from chilopod.engine.contract import (
     Array,
     Command,
@@ -33,6 +34,7 @@ __all__ = [
     "Status",
     "Traits",
     "Walk",
+    "check_engine",
     "controller_named",
     "engine_named",
     "event_times",

@@ -116,6 +116,7 @@ class Actuators:
         self._stiffest = limits([each.stiffest for each in springs], np.inf)
         self._fastest = limits([each.rate for each in springs], np.inf)
         self.lag = limits([each.lag for each in springs], 0.0)
+        self.lag[self.lag < _SAME_INSTANT] = 0.0
         self.leg_yaw = np.zeros((len(robots), 2))
         self.joint_torque = np.zeros_like(first)
         self.driven = np.zeros(len(robots), dtype=np.bool_)
@@ -291,6 +292,7 @@ class Actuators:
         now, reference = self.stiffness(time), _reference(self.profile, time)
         goal = np.where(changed, wanted, reference)
         length = np.maximum(within, np.abs(goal - reference) / self._fastest)
+        length[length < _SAME_INSTANT] = 0.0
         slope = np.divide(goal - reference, length, out=np.zeros_like(goal), where=length > 0.0)
         begun = np.empty_like(self.profile)
         begun[SINCE], begun[FROM], begun[SLOPE], begun[UNTIL], begun[GOAL] = time, reference, slope, time + length, goal
@@ -307,8 +309,8 @@ class Actuators:
 
     def _stiffness_over(self, times: Array) -> Array:
         values = np.repeat(self._start[None], len(times), axis=0)
-        starts = [start for start, _ in self._profiles]
-        for (start, profile), end in zip(self._profiles, [*starts[1:], np.inf], strict=True):
+        ends = [*(start for start, _ in self._profiles[1:]), np.inf]
+        for (start, profile), end in zip(self._profiles, ends, strict=False):
             # A sample at the very moment of a command is from before it.
             here = (times > start) & (times <= end)
             values[here] = _stiffness(profile, self.lag, times[here, None, None])

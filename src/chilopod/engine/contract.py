@@ -277,8 +277,7 @@ class Engine(Protocol):
         seeds
             Of the noise of the sensors, one a walk; without them there is none.
         record
-            What is written down; by default the motion, :data:`chilopod.record.RATE` times a second. None: nothing but
-            commands and statuses.
+            What is written down; by default the motion, :data:`chilopod.record.RATE` times a second. None: nothing.
         options
             The engine's own.
 

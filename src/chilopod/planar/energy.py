@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 class Powers:
     """Where energy comes from and goes to, W.
 
-    ``legs`` + ``floor`` + ``dampers`` = rate of change of the kinetic and elastic energy.
+    Their sum is the rate of change of the kinetic and elastic energy.
 
     Attributes
     ----------
@@ -40,11 +40,22 @@ class Powers:
         Lost to friction at the feet, never positive.
     dampers
         Lost in the yaw joints, never positive.
+    springs
+        Done on bent springs by stiffening them, 1/2 theta^2 dk/dt.
+    drives
+        Delivered by torques at the yaw joints.
     """
 
     legs: float
     floor: float
     dampers: float
+    springs: float = 0.0
+    drives: float = 0.0
+
+    @property
+    def total(self) -> float:
+        """Their sum."""
+        return self.legs + self.floor + self.dampers + self.springs + self.drives
 
 
 def module_motion(model: PlanarModel, x: ArrayLike) -> tuple[Array, Array]:
@@ -65,8 +76,8 @@ def module_motion(model: PlanarModel, x: ArrayLike) -> tuple[Array, Array]:
     return heading, np.column_stack([velocity, rate])
 
 
-def energy(model: PlanarModel, x: ArrayLike) -> float:
-    """Kinetic and elastic energy, J."""
+def energy(model: PlanarModel, x: ArrayLike, stiffness: ArrayLike | None = None) -> float:
+    """Kinetic and elastic energy, J; with the springs of the model, or of a ``stiffness``, N*m/rad, shape (N-1,)."""
     x = np.asarray(x, dtype=np.float64)
     _, twist = module_motion(model, x)
     robot = model.robot
@@ -74,11 +85,30 @@ def energy(model: PlanarModel, x: ArrayLike) -> float:
         0.5 * robot.module_mass * (twist[:, :2] ** 2).sum() + 0.5 * robot.module_yaw_inertia * (twist[:, 2] ** 2).sum()
     )
     angles = x[3 : model.modules + 2]
-    return float(kinetic + 0.5 * (model.stiffness * angles**2).sum())
+    springs = model.stiffness if stiffness is None else np.asarray(stiffness, dtype=np.float64)
+    return float(kinetic + 0.5 * (springs * angles**2).sum())
 
 
-def powers(model: PlanarModel, x: ArrayLike, t: float) -> Powers:
-    """Powers at time t (s) in state x, foot by foot."""
+def powers(
+    model: PlanarModel,
+    x: ArrayLike,
+    t: float,
+    stiffness_rate: ArrayLike = 0.0,
+    joint_torque: ArrayLike = 0.0,
+) -> Powers:
+    """Powers at one moment, foot by foot and joint by joint.
+
+    Parameters
+    ----------
+    model
+        The robot.
+    x
+        Reduced state, shape (2N+1,).
+    t
+        s.
+    stiffness_rate, joint_torque
+        How fast every spring stiffens, N*m/rad/s, and what drives its joint, N*m, shape (N-1,).
+    """
     x = np.asarray(x, dtype=np.float64)
     robot, gait = model.robot, model.robot.gait
     heading, twist = module_motion(model, x)
@@ -87,8 +117,14 @@ def powers(model: PlanarModel, x: ArrayLike, t: float) -> Powers:
     slip = from_modules(twist[:, :2], heading, foot_velocities(places, twist[:, 2], gait.speed))
     friction = np.where(gait.stands(phase), robot.ground.friction, 0.0)
     legs, floor = foot_powers(friction, slip, heading, gait.speed)
-    rates = x[model.modules + 2 :]
-    return Powers(legs=float(legs), floor=float(floor), dampers=float(-(model.damping * rates**2).sum()))
+    angles, rates = x[3 : model.modules + 2], x[model.modules + 2 :]
+    return Powers(
+        legs=float(legs),
+        floor=float(floor),
+        dampers=float(-(model.damping * rates**2).sum()),
+        springs=float((0.5 * angles**2 * np.asarray(stiffness_rate, dtype=np.float64)).sum()),
+        drives=float((rates * np.asarray(joint_torque, dtype=np.float64)).sum()),
+    )
 
 
 def foot_powers(friction: Array, slip: Array, heading: Array, speed: float) -> tuple[Array, Array]:

@@ -281,6 +281,8 @@ class TwinWalk:
         if self._actuators.driven.any() and len(plan.spring_controls):
             edges = np.arange(self._tick * per_tick, tick * per_tick + 1) * plan.twin.timestep
             change = self._actuators.mean_stiffness(np.asarray(edges, dtype=np.float64)) - self._springs
+            # Robots that were told nothing walk to the same bits whatever the others of the batch were told.
+            change[:, ~self._actuators.driven] = 0.0
             control[..., plan.spring_controls] = np.swapaxes(change, 0, 1)[self._walking]
         return control
 

@@ -1,0 +1,173 @@
+"""What actuators make of commands: closed forms against integrated equations, limits, logs."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import quad, solve_ivp
+
+from chilopod import load_robot
+from chilopod.engine import Actuators, Command, Ramps
+from chilopod.errors import ParameterError
+
+PRESET = load_robot("aoi2022-planar")
+FREE = PRESET.override("springs.adjustable", True)
+START = PRESET.springs.stiffness[0]
+WALKING = np.ones(1, dtype=bool)
+
+
+def told(actuators, time, first, within=0.0):
+    """Command another stiffness of spring 1."""
+    stiffness = actuators.stiffness(time)
+    stiffness[:, 0] = first
+    # The others are told what they were told before, not what they have by now.
+    stiffness[:, 1:] = START
+    actuators.command(time, Command(stiffness=stiffness, within=within), WALKING)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(st.tuples(st.floats(0.01, 1.0), st.floats(0.2, 5.0), st.floats(0.0, 1.0)), min_size=1, max_size=4),
+    st.floats(0.01, 0.5) | st.just(0.0),
+    st.floats(0.5, 20.0) | st.none(),
+)
+def test_stiffness_is_what_the_equations_of_ramp_and_lag_give(commands, lag, rate):
+    robot = FREE.override("springs.lag", lag).override("springs.softest", 0.5).override("springs.stiffest", 4.0)
+    if rate is not None:
+        robot = robot.override("springs.rate", rate)
+    actuators, time, k, goal_before, kink = Actuators([robot]), 0.0, START, START, 0.0
+
+    def reference(t):
+        return START
+
+    for lasts, goal, within in commands:
+        told(actuators, time, goal, within)
+        wanted, u = float(np.clip(goal, 0.5, 4.0)), reference(time)
+        if wanted != goal_before:  # else it goes on as it was
+            length = max(within, abs(wanted - u) / rate if rate else 0.0)
+            kink, goal_before = time + length, wanted
+
+            def reference(t, begun=time, u=u, wanted=wanted, length=length):
+                return wanted if t - begun >= length or length < 1e-9 else u + (wanted - u) * (t - begun) / length
+
+        end = time + lasts
+        edges = [time, *([kink] if time < kink < end else []), end]
+        if lag > 0.0:
+            for a, b in zip(edges[:-1], edges[1:], strict=True):
+                ode = solve_ivp(
+                    lambda t, y, r=reference: (r(t) - y) / lag, (a, b), [k], rtol=1e-11, atol=1e-12, max_step=0.02
+                )
+                k = ode.y[0, -1]
+        else:
+            k = reference(end)
+        assert actuators.stiffness(end)[0, 0] == pytest.approx(k, rel=1e-7)
+        if abs(kink - end) > 1e-3:
+            slope = (actuators.stiffness(end + 1e-6) - actuators.stiffness(end - 1e-6))[0, 0] / 2e-6
+            assert actuators.stiffness_rate(end)[0, 0] == pytest.approx(slope, rel=1e-4, abs=1e-5)
+        mean = sum(
+            quad(lambda t: actuators.stiffness(t)[0, 0], a, b)[0] for a, b in zip(edges, edges[1:], strict=False)
+        )
+        assert actuators.mean_stiffness(np.array([time, end]))[0, 0, 0] == pytest.approx(mean / lasts, rel=1e-6)
+        time = end
+    np.testing.assert_allclose(actuators.stiffness(time)[0, 1:], START, rtol=1e-12)
+
+
+def test_a_spring_that_is_told_the_same_again_goes_on_as_it_was():
+    actuators = Actuators([FREE])
+    told(actuators, 1.0, 1.0, within=1.0)
+    told(actuators, 1.5, 1.0, within=5.0)
+    assert actuators.stiffness(2.0)[0, 0] == 1.0
+
+
+def test_what_is_asked_for_and_what_is_done_are_both_known_afterwards():
+    import xarray as xr
+
+    actuators = Actuators([FREE.override("springs.softest", 1.0)])
+    told(actuators, 0.5, 0.25, within=0.5)
+    data = xr.Dataset(coords={"time": np.array([0.0, 0.5, 0.75, 1.0, 2.0])})
+    actuators.add_to(data)
+    assert data.command_stiffness.values[0, 0, 0] == 0.25
+    np.testing.assert_allclose(
+        data.stiffness.values[:, 0, 0], [START, START, 0.5 * (START + 1.0), 1.0, 1.0], rtol=1e-12
+    )
+
+
+@pytest.mark.parametrize(
+    ("command", "field"),
+    [
+        (Command(leg_yaw=[0.1, 0.1, 0.1]), "command.leg_yaw"),
+        (Command(leg_yaw=[np.nan, 0.0]), "command.leg_yaw"),
+        (Command(leg_yaw=[2.0, 0.0]), "command.leg_yaw"),
+        (Command(leg_yaw="left"), "command.leg_yaw"),
+        (Command(stiffness=[1.0, 1.0]), "command.stiffness"),
+        (Command(stiffness=[-1.0, START, START, START, START]), "command.stiffness"),
+        (Command(stiffness=[0.0, START, START, START, START]), "command.stiffness"),
+        (Command(stiffness=[np.inf, START, START, START, START]), "command.stiffness"),
+        (Command(joint_torque=[np.nan] * 5), "command.joint_torque"),
+        (Command(within=-1.0), "command.within"),
+        (Command(within=np.nan), "command.within"),
+        (np.zeros(2), "command"),
+    ],
+)
+def test_what_is_no_command_is_named_and_changes_nothing(command, field):
+    actuators = Actuators([FREE])
+    with pytest.raises(ParameterError) as caught:
+        actuators.command(1.0, command, WALKING)
+    assert caught.value.field == field
+    assert "\n" not in str(caught.value)
+    assert not actuators.driven.any()
+    np.testing.assert_array_equal(actuators.stiffness(2.0), [[START] * 5])
+
+
+def test_only_adjustable_springs_are_adjusted():
+    robot = PRESET.set_from_text(["springs.adjustable[0]=true"])
+    actuators = Actuators([robot])
+    told(actuators, 0.0, 1.0)
+    with pytest.raises(ParameterError, match=r"joint 3 is not adjustable.*springs\.adjustable"):
+        actuators.command(0.1, Command(stiffness=[1.0, START, 1.0, START, START]), WALKING)
+    with pytest.raises(ParameterError, match="joint 1 is not adjustable"):
+        Actuators([PRESET]).command(0.0, Command(stiffness=[1.0, START, START, START, START]), WALKING)
+
+
+def test_robots_that_no_longer_walk_do_not_obey_and_may_be_told_nonsense():
+    actuators, walking = Actuators([FREE, FREE]), np.array([True, False])
+    stiffness = np.full((2, 5), START)
+    stiffness[:, 0] = [1.0, np.nan]
+    actuators.command(0.0, Command(stiffness=stiffness, leg_yaw=[[0.1, 0.1], [np.nan, 9.0]]), walking)
+    np.testing.assert_array_equal(actuators.stiffness(1.0)[:, 0], [1.0, START])
+    np.testing.assert_array_equal(actuators.leg_yaw, [[0.1, 0.1], [0.0, 0.0]])
+    assert actuators.driven.tolist() == [True, False]
+
+
+def test_ramps_go_on_when_the_next_command_comes():
+    """Values told on a grid, looked up one by one and all at once, and by the sum of all changes."""
+    rng = np.random.default_rng(0)
+    starts, lengths = np.cumsum(rng.integers(1, 9, 12)), rng.integers(1, 20, 12)
+    goals, times = rng.normal(size=(12, 3, 2)), np.arange(0, 120)
+    expected = np.zeros((120, 3, 2))
+    for i in range(12):
+        change = goals[i] - (goals[i - 1] if i else 0.0)
+        expected += np.clip((times - starts[i]) / lengths[i], 0.0, 1.0)[:, None, None] * change
+    ramps = Ramps(np.zeros((3, 2)))
+    seen, told_so_far = [], 0
+    for time in times:
+        while told_so_far < 12 and starts[told_so_far] <= time:
+            ramps.to(goals[told_so_far], starts[told_so_far], lengths[told_so_far])
+            told_so_far += 1
+        seen.append(ramps.at(np.array([time]))[0])
+    np.testing.assert_allclose(seen, expected, rtol=0, atol=1e-14)
+
+
+def test_leg_yaw_of_overlapping_ramps_over_time_is_the_sum_of_all_changes():
+    rng = np.random.default_rng(1)
+    actuators = Actuators([PRESET, PRESET])
+    starts, lengths = np.sort(rng.uniform(0.0, 3.0, 30)), rng.uniform(0.0, 0.8, 30) * (rng.uniform(size=30) > 0.2)
+    goals = rng.uniform(-0.5, 0.5, (30, 2, 2))
+    times = np.sort(np.concatenate([np.linspace(0.0, 4.0, 401), starts, starts + lengths]))
+    expected = np.zeros((len(times), 2, 2))
+    for i in range(30):
+        actuators.command(float(starts[i]), Command(leg_yaw=goals[i], within=float(lengths[i])), np.ones(2, dtype=bool))
+        change = goals[i] - (goals[i - 1] if i else 0.0)
+        done = (times - starts[i]) / lengths[i] if lengths[i] > 0.0 else times >= starts[i]
+        expected += np.clip(done, 0.0, 1.0)[:, None, None] * change
+    np.testing.assert_allclose(actuators.leg_yaw_over(times), expected, rtol=0, atol=1e-14)

@@ -1,0 +1,208 @@
+"""The promises of the contract: kept by both engines and by the one in the docs, and missed where they are broken."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chilopod import load_robot, planar, twin
+from chilopod.engine import Command, Status, Traits, check_engine
+from chilopod.errors import AnalysisError, ParameterError
+
+ROBOT = load_robot("aoi2022-planar")
+DOCS = Path(__file__).parents[2] / "docs" / "engines.md"
+
+
+@pytest.fixture(scope="module")
+def docs():
+    """What the code in the docs page defines, which checks its own engine as it runs."""
+    code = "\n".join(re.findall(r"```python\n(.*?)```", DOCS.read_text(), flags=re.S))
+    names = {"__name__": "docs"}
+    exec(compile(code, str(DOCS), "exec"), names)
+    return names
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_the_planar_model_keeps_every_promise(seed):
+    assert len(check_engine(planar, ROBOT, seed)) == 12
+
+
+@pytest.mark.parametrize("changes", [["body.modules=3"], ["gait.side_phase=0 deg"], ["springs.damping=0.05"]])
+def test_the_planar_model_keeps_them_with_other_robots(changes):
+    check_engine(planar, ROBOT.set_from_text(changes))
+
+
+@pytest.mark.parametrize("changes", [[], ["twin.control_interval=4 ms", "springs.stiffness[0]=10 N*mm/deg"]])
+def test_the_twin_keeps_every_promise(changes):
+    assert len(check_engine(twin, load_robot("aoi2022").set_from_text(changes))) == 12
+
+
+def test_the_engine_in_the_docs_keeps_every_promise(docs):
+    assert len(check_engine(docs["Sketch"](), ROBOT)) == 12
+
+
+def _wrapped(walk_class, **changes):
+    return type("Broken", (walk_class,), changes)
+
+
+def _forgets_to_record_units(original):
+    def to_dataset(self):
+        data = original.to_dataset(self)
+        data.heading.attrs = {}
+        return data
+
+    return {"to_dataset": to_dataset}
+
+
+def _draws_at_random(original):
+    def advance(self, until):
+        original.advance(self, until)
+        self.states = self.states + 1e-12 * np.random.default_rng().normal(size=self.states.shape)
+
+    return {"advance": advance}
+
+
+def _counts_advances(original):
+    def advance(self, until):
+        original.advance(self, until)
+        self.states = self.states * (1.0 + 1e-15)
+
+    return {"advance": advance}
+
+
+def _is_changed_by_looking(original):
+    def observe(self):
+        self.states = self.states + 1e-14
+        return original.observe(self)
+
+    return {"observe": observe}
+
+
+def _looks_at_its_neighbours(original):
+    def write(self):
+        self.states = self.states + 1e-12 * (self.states - self.states.mean(axis=0))
+        original.write(self)
+
+    return {"write": write}
+
+
+def _forgets_ramps(original):
+    def save(self):
+        told, self.told = self.told, type(self.told)(self.robots)
+        try:
+            return original.save(self)
+        finally:
+            self.told = told
+
+    return {"save": save}
+
+
+def _sees_in_degrees(original):
+    def observe(self):
+        seen = original.observe(self)
+        return replace(seen, bearing=np.degrees(seen.bearing))
+
+    return {"observe": observe}
+
+
+def _gives_its_own_arrays(original):
+    def observe(self):
+        return replace(original.observe(self), leg_yaw=self.told.leg_yaw)
+
+    return {"observe": observe}
+
+
+def _obeys_before_it_refuses(original):
+    def command(self, command):
+        if isinstance(command, Command) and command.leg_yaw is not None:
+            self.states = self.states + 1e-9
+        original.command(self, command)
+
+    return {"command": command}
+
+
+def _ignores_its_limits(original):
+    def __init__(self, robots, *rest):
+        original.__init__(self, [robot.override("springs.softest", 1e-6) for robot in robots], *rest)
+        self.robots = tuple(robots)
+
+    return {"__init__": __init__}
+
+
+def _ignores_torques(original):
+    def command(self, command):
+        original.command(self, command)
+        self.told.joint_torque = 0.0 * self.told.joint_torque
+
+    return {"command": command}
+
+
+def _never_fails(original):
+    return {"status": property(lambda self: (Status.WALKED,) * len(self.robots))}
+
+
+def _stops_everybody(original):
+    def advance(self, until):
+        original.advance(self, until)
+        self.failed = self.failed | self.failed.any()
+
+    return {"advance": advance}
+
+
+def _records_robots_that_failed(original):
+    def write(self):
+        failed, self.failed = self.failed, np.zeros_like(self.failed)
+        original.write(self)
+        self.failed = failed
+
+    return {"write": write}
+
+
+@pytest.mark.parametrize(
+    ("broken", "promise"),
+    [
+        (_forgets_to_record_units, "records under the names"),
+        (_draws_at_random, "gives the same bits twice"),
+        (_counts_advances, "however it is advanced"),
+        (_is_changed_by_looking, "however it is advanced"),
+        (_looks_at_its_neighbours, "alone and in a batch"),
+        (_forgets_ramps, "saved and resumed"),
+        (_sees_in_degrees, "sees in the units"),
+        (_gives_its_own_arrays, "sees in the units"),
+        (_obeys_before_it_refuses, "refuses what is no command"),
+        (_ignores_its_limits, "keeps springs within"),
+        (_ignores_torques, "turns joints"),
+        (_never_fails, "ends a robot that fails"),
+        (_stops_everybody, "ends a robot that fails"),
+        (_records_robots_that_failed, "ends a robot that fails"),
+    ],
+    ids=lambda value: getattr(value, "__name__", ""),
+)
+def test_a_broken_promise_is_named(docs, monkeypatch, broken, promise):
+    original = docs["SketchWalk"]
+    monkeypatch.setitem(docs, "SketchWalk", _wrapped(original, **broken(original)))
+    with pytest.raises(AnalysisError, match=promise):
+        check_engine(docs["Sketch"](), ROBOT)
+
+
+def test_traits_and_noise_are_held_to(docs):
+    engine = docs["Sketch"]()
+    engine.traits = Traits(name="", sentence="nothing")
+    with pytest.raises(AnalysisError, match="says what it is"):
+        check_engine(engine, ROBOT)
+    engine.traits = Traits(name="sketch", sentence="noisy, it says", noisy=True)
+    with pytest.raises(AnalysisError, match="draws noise from its seeds alone"):
+        check_engine(engine, ROBOT)
+
+
+def test_a_walk_is_resumed_by_the_engine_and_version_that_saved_it(docs):
+    saved = docs["Sketch"]().start(ROBOT).save()
+    with pytest.raises(ParameterError, match="saved with another engine"):
+        planar.resume(saved)
+    with pytest.raises(ParameterError, match="another engine"):
+        twin.resume(planar.start(ROBOT).save())
+    for wrong in (b"", saved[:20], saved[:-1], saved + b"x", b"PK" + saved):
+        with pytest.raises(ParameterError, match=r"saved"):
+            docs["Sketch"]().resume(wrong)
