@@ -379,3 +379,52 @@ def test_remarks(robot):
 def test_descriptions_accept_arrays_and_copy(robot):
     assert Springs(stiffness=np.full(5, 2.0), damping=np.float32(0)).stiffness == (2.0,) * 5
     assert copy.deepcopy(robot) == robot
+
+
+ACTUATED = [
+    "springs.adjustable[0]=true",
+    "springs.softest=5 N*mm/deg",
+    "springs.stiffest=80 N*mm/deg",
+    "springs.rate=100 N*mm/deg/s",
+    "springs.lag=0.1 s",
+]
+
+
+def test_what_is_adjustable_is_part_of_the_file_and_absent_means_fixed():
+    fixed = load_robot("aoi2022-planar")
+    assert fixed.springs.adjustable is None
+    assert "adjustable" not in fixed.to_toml()
+    assert not any("adjustable" in path or "softest" in path for path in fixed.parameters())
+    robot = fixed.set_from_text(ACTUATED)
+    assert robot.springs.adjustable == (True, False, False, False, False)
+    assert Robot.from_toml(robot.to_toml()) == robot
+    assert robot.get("springs.rate") == pytest.approx(0.1 * 180.0 / np.pi)
+    assert robot.with_value("body.modules", 8).springs.adjustable == (True,) + (False,) * 6
+    assert robot.override("springs.adjustable", "true").springs.adjustable == (True,) * 5
+    table = {"adjustable": True, "lag": "50 ms", "stiffness": "41 N*mm/deg", "damping": 0.0}
+    assert Robot(**{**dict(fixed), "springs": table}).springs.lag == (0.05,) * 5
+
+
+@pytest.mark.parametrize(
+    ("changes", "field"),
+    [
+        (["springs.adjustable=perhaps"], "springs.adjustable"),
+        (["springs.adjustable=1"], "springs.adjustable"),
+        (["springs.softest[0]=3 N*mm/deg"], "springs.softest[0]"),
+        (["springs.softest=90 N*mm/deg", "springs.stiffest=80 N*mm/deg"], "springs.stiffest"),
+        (["springs.rate=0 N*mm/deg/s"], "springs.rate"),
+        (["springs.rate=3 N*mm/deg"], "springs.rate"),
+        (["springs.lag=-1 s"], "springs.lag"),
+        (["springs.adjustible=true"], "springs.adjustible"),
+    ],
+)
+def test_a_wrong_actuator_is_named(changes, field):
+    with pytest.raises((ParameterError, UnitError)) as caught:
+        load_robot("aoi2022-planar").set_from_text(changes)
+    assert caught.value.field == field
+
+
+def test_springs_that_begin_outside_the_range_of_their_actuators_are_worth_a_remark():
+    robot = load_robot("aoi2022-planar").set_from_text([*ACTUATED, "springs.stiffest=40 N*mm/deg"])
+    assert remarks(robot)[0] == "Springs 1 begin outside the range of their actuators."
+    assert not any("range" in each for each in remarks(load_robot("aoi2022-planar").set_from_text(ACTUATED)))

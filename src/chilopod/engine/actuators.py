@@ -319,7 +319,9 @@ class Actuators:
 
 def _decay(time: Any, lag: Array) -> Array:
     """e^(-t/lag), which is 0 without a lag."""
-    with np.errstate(divide="ignore", invalid="ignore"):
+    if not lag.any():
+        return np.zeros(np.broadcast_shapes(np.shape(time), lag.shape))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         decay: Array = np.exp(-np.where(lag > 0.0, time / lag, np.inf))
     return decay
 
@@ -330,19 +332,23 @@ def _reference(profile: Array, time: Any) -> Array:
     return np.where(time < profile[UNTIL], ramp, profile[GOAL])
 
 
-def _stiffness(profile: Array, lag: Array, time: Any) -> Array:
+def _behind(profile: Array, lag: Array, time: Any) -> Array:
+    """How far the stiffness is from where it would be had the ramp always been as it is."""
     ramping = time < profile[UNTIL]
-    since = np.where(ramping, time - profile[SINCE], time - profile[UNTIL])
-    behind = np.where(ramping, profile[RAMPING], profile[SETTLING]) * _decay(since, lag)
-    return _reference(profile, time) - np.where(ramping, profile[SLOPE] * lag, 0.0) + behind
+    since = time - np.where(ramping, profile[SINCE], profile[UNTIL])
+    return np.where(ramping, profile[RAMPING], profile[SETTLING]) * _decay(since, lag)
+
+
+def _stiffness(profile: Array, lag: Array, time: Any) -> Array:
+    if not lag.any():
+        return _reference(profile, time)
+    late = np.where(time < profile[UNTIL], profile[SLOPE] * lag, 0.0)
+    return _reference(profile, time) - late + _behind(profile, lag, time)
 
 
 def _rate(profile: Array, lag: Array, time: Any) -> Array:
-    ramping = time < profile[UNTIL]
-    since = np.where(ramping, time - profile[SINCE], time - profile[UNTIL])
-    behind = np.where(ramping, profile[RAMPING], profile[SETTLING]) * _decay(since, lag)
-    slowing = np.divide(behind, lag, out=np.zeros_like(behind), where=np.broadcast_to(lag > 0.0, behind.shape))
-    return np.where(ramping, profile[SLOPE], 0.0) - slowing
+    slope, behind = np.where(time < profile[UNTIL], profile[SLOPE], 0.0), _behind(profile, lag, time)
+    return slope - np.divide(behind, lag, out=np.zeros_like(behind), where=np.broadcast_to(lag > 0.0, behind.shape))
 
 
 def _integral(profile: Array, lag: Array, time: Any) -> Array:
