@@ -95,17 +95,19 @@ class Samples:
 
     @property
     def rows(self) -> Array:
-        """Those there are, shape (count, ...); a view."""
-        return self._rows[: self.count]
+        """Those there are, shape (count, ...); a view that cannot be written through."""
+        rows = self._rows[: self.count]
+        rows.flags.writeable = False
+        return rows
 
     def grown(self, count: int) -> Array:
-        """Room for ``count`` rows in all, those that are new NaN; a view that holds until the next call."""
+        """Room for ``count`` rows at least, those that are new NaN; a view to write through until the next call."""
         if count > len(self._rows):
             longer = np.full((max(count, 2 * len(self._rows)), *self._rows.shape[1:]), np.nan)
             longer[: self.count] = self._rows[: self.count]
             self._rows = longer
         self.count = max(self.count, count)
-        return self.rows
+        return self._rows[: self.count]
 
 
 def bearing_and_distance(position: Array, heading: Array, target: Array) -> tuple[Array, Array]:
@@ -189,7 +191,7 @@ def add_outcome(data: xr.Dataset, statuses: Sequence[str], target: Array | None)
     """
     data["status"] = ("robot", np.array(statuses, dtype=object))
     if target is not None:
-        data["target"] = (("robot", "axis"), target, {"units": "m"})
+        data["target"] = (("robot", "axis"), target.copy(), {"units": "m"})
         angle, away = bearing_and_distance(data.position.values, data.heading.values, target)
         data["distance"] = (("time", "robot"), away, {"units": "m"})
         data["bearing"] = (("time", "robot"), angle, {"units": "rad"})

@@ -206,3 +206,21 @@ def test_a_walk_is_resumed_by_the_engine_and_version_that_saved_it(docs):
     for wrong in (b"", saved[:20], saved[:-1], saved + b"x", b"PK" + saved):
         with pytest.raises(ParameterError, match=r"saved"):
             docs["Sketch"]().resume(wrong)
+
+
+@pytest.mark.parametrize(("engine", "robot"), [(planar, ROBOT), (twin, load_robot("aoi2022"))])
+def test_a_record_is_its_owner_s_and_the_walk_goes_on_with_its_own(engine, robot):
+    from chilopod.record import Recording
+
+    walk = engine.start(robot, target=(1.0, 1.0), record=Recording(forces=True))
+    walk.advance(0.5)
+    first = walk.to_dataset()
+    kept = first.copy(deep=True)
+    for name in first.data_vars:
+        if first[name].dtype == np.float64:
+            first[name].values[...] = 7.0
+    walk.advance(1.0)
+    later = walk.to_dataset()
+    for name in ("position", "heading", "velocity", "joint_angle", "joint_rate", "leg_yaw", "foot_force", "target"):
+        there = later[name].isel(time=slice(kept.sizes["time"])) if "time" in later[name].dims else later[name]
+        np.testing.assert_array_equal(there.values, kept[name].values)

@@ -195,7 +195,7 @@ class Actuators:
         """
         over = ("robot", "joint")
         if not self.adjustable:
-            data["stiffness"] = (over, self._start, {"units": "N*m/rad"})
+            data["stiffness"] = (over, self._start.copy(), {"units": "N*m/rad"})
         else:
             data["stiffness"] = (("time", *over), self._stiffness_over(data.time.values), {"units": "N*m/rad"})
         if not self._log:

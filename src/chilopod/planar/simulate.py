@@ -94,4 +94,4 @@ def simulate(
                 "has the wrong shape", field="bearing_noise", value=noise.shape, allowed=f"({count}, {asked} or more)"
             )
     steer(walk, duration, controller, bearing_noise=noise, progress=progress)
-    return walk.to_dataset()
+    return walk.to_dataset(copy=False)

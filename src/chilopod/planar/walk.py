@@ -271,10 +271,10 @@ class PlanarWalk:
         told = {name.removeprefix("told_"): each for name, each in arrays.items() if name.startswith("told_")}
         self._actuators.restore(told)
 
-    def to_dataset(self) -> xr.Dataset:
-        """The record so far, see :func:`chilopod.planar.simulate`."""
+    def to_dataset(self, copy: bool = True) -> xr.Dataset:
+        """The record so far, see :func:`chilopod.planar.simulate`; without a copy if the walk ends here."""
         rate = self._record.rate if self._record else 1.0
-        states = self._samples.rows
+        states = self._samples.rows.copy() if copy else self._samples.grown(0)
         times = np.arange(len(states)) / rate
         leg_yaw = self._actuators.leg_yaw_over(times)
         data = planar_record(self._models[0], times, states, leg_yaw)

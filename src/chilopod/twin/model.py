@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import ParameterError
+from chilopod.frozen import read_only
 from chilopod.ground import GRAVITY
 from chilopod.robot import Robot, Springs, Twin
 from chilopod.robot.inertia import body_inertia, body_mass, link_inertia, yaw_inertia_range
@@ -92,14 +93,16 @@ class TwinModel:
         leg_yaw = [joint(f"{leg}_yaw") for leg in _legs(0)]
         at, rate = self.model.jnt_qposadr, self.model.jnt_dofadr
         servo_of = {int(self.model.actuator_trnid[i, 0]): i for i in range(self.model.nu)}
-        self.yaw_joints = np.array(yaw)
-        self.yaw_positions, self.yaw_rates = at[yaw], rate[yaw]
-        self.leg_positions, self.leg_yaw_positions = at[legs], at[leg_yaw]
-        self.leg_controls = np.vectorize(servo_of.__getitem__)(legs)
-        self.leg_yaw_controls = np.array([servo_of[i] for i in leg_yaw])
         names = [f"spring{i}" for i in range(1, count)] if _adjustable(robot) else []
-        self.spring_controls = np.array([self.model.actuator(name).id for name in names], dtype=np.intp)
-        self.feet = np.array([[int(self.model.geom(f"{leg}_foot").id) for leg in _legs(i)] for i in range(count)])
+        feet = [[int(self.model.geom(f"{leg}_foot").id) for leg in _legs(i)] for i in range(count)]
+        # Models are shared, so nobody may write into these.
+        self.yaw_joints = read_only(np.array(yaw))
+        self.yaw_positions, self.yaw_rates = read_only(at[yaw]), read_only(rate[yaw])
+        self.leg_positions, self.leg_yaw_positions = read_only(at[legs]), read_only(at[leg_yaw])
+        self.leg_controls = read_only(np.vectorize(servo_of.__getitem__)(legs))
+        self.leg_yaw_controls = read_only(np.array([servo_of[i] for i in leg_yaw]))
+        self.spring_controls = read_only(np.array([self.model.actuator(name).id for name in names], dtype=np.intp))
+        self.feet = read_only(np.array(feet))
 
     @property
     def steps_per_control(self) -> int:

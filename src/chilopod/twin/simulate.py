@@ -86,4 +86,4 @@ def simulate(
         expected=duration,
     )
     steer(walk, duration, controller, progress=progress)
-    return walk.to_dataset()
+    return walk.to_dataset(copy=False)

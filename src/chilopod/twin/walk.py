@@ -176,10 +176,11 @@ class TwinWalk:
         if self._scanner is not None:
             self._scanner.restore(part("scan_"))
 
-    def to_dataset(self) -> xr.Dataset:
-        """The record so far, see :func:`chilopod.twin.simulate`."""
+    def to_dataset(self, copy: bool = True) -> xr.Dataset:
+        """The record so far, see :func:`chilopod.twin.simulate`; without a copy if the walk ends here."""
         plan, count = self._plan, 0 if self._record is None else len(self._record.samples(self._time))
-        positions, rates = self._positions.rows[:count], self._rates.rows[:count]
+        positions, rates = (each.grown(0)[:count] for each in (self._positions, self._rates))
+        positions, rates = (each.copy() if copy else each for each in (positions, rates))
         turn = rotation(positions[..., 3:7])
         data = walk_record(
             np.asarray(self._sample_steps(np.arange(len(positions))) * plan.twin.timestep, dtype=np.float64),
@@ -266,7 +267,7 @@ class TwinWalk:
         for row, (step, status) in found.items():
             self._status[walking[row]] = status
             for store in kept.values():
-                store.rows[samples[at >= step], walking[row]] = np.nan
+                store.grown(0)[samples[at >= step], walking[row]] = np.nan
         if found:
             self._walking = np.delete(walking, list(found))
 
