@@ -45,6 +45,8 @@ class Recording:
     poses: bool = False
 
     def __post_init__(self) -> None:
+        if not isinstance(self.rate, int | float):
+            raise ParameterError("is no number", field="rate", value=self.rate, allowed="samples per second")
         in_range("rate", self.rate, 1e6)
 
     def samples(self, until: float) -> Array:
@@ -178,12 +180,12 @@ def walk_record(
 
 
 def add_outcome(data: xr.Dataset, statuses: Sequence[str], target: Array | None) -> None:
-    """Add to a record how the walks ended, and where the target was.
+    """Add to a record how the walks ended and where the target was, and blank what robots that failed have no more.
 
     Parameters
     ----------
     data
-        From :func:`walk_record`; changed in place.
+        From :func:`walk_record`, with all else that is recorded; changed in place.
     statuses
         Labels, one a robot.
     target
@@ -195,13 +197,19 @@ def add_outcome(data: xr.Dataset, statuses: Sequence[str], target: Array | None)
         angle, away = bearing_and_distance(data.position.values, data.heading.values, target)
         data["distance"] = (("time", "robot"), away, {"units": "m"})
         data["bearing"] = (("time", "robot"), angle, {"units": "rad"})
+    failed = np.isnan(data.heading.values)
+    if failed.any():
+        for name, values in data.data_vars.items():
+            if values.dims[:2] == ("time", "robot"):
+                data[name] = (values.dims, values.values.copy(), values.attrs)
+                data[name].values[failed] = np.nan
 
 
 def spring_work(data: xr.Dataset) -> xr.DataArray:
     """Work that changing stiffness did on the springs of every robot of a record, J, over (robot).
 
-    It is the integral of 1/2 theta^2 dk over the motion, by the mean of theta^2 between samples: exact where a spring
-    steps, of second order in the sampling where it ramps. Springs that do not change take none.
+    It is the integral of 1/2 theta^2 dk over the motion, by the mean of theta^2 between samples: of second order in the
+    sampling where a spring ramps, of first where it steps. Springs that do not change take none.
     """
     if "time" not in data.stiffness.dims:
         return (data.stiffness * 0.0).sum("joint").assign_attrs(units="J")

@@ -43,8 +43,8 @@ def test_stiffness_is_what_the_equations_of_ramp_and_lag_give(commands, lag, rat
     for lasts, goal, within in commands:
         told(actuators, time, goal, within)
         wanted, u = float(np.clip(goal, 0.5, 4.0)), reference(time)
-        if wanted != goal_before:  # else it goes on as it was
-            length = max(within, abs(wanted - u) / rate if rate else 0.0)
+        length = max(within, abs(wanted - u) / rate if rate else 0.0)
+        if wanted != goal_before or time + length < kink:  # else it goes on as it was
             kink, goal_before = time + length, wanted
 
             def reference(t, begun=time, u=u, wanted=wanted, length=length):
@@ -107,6 +107,15 @@ def test_what_is_asked_for_and_what_is_done_are_both_known_afterwards():
         (Command(within=-1.0), "command.within"),
         (Command(within=np.nan), "command.within"),
         (np.zeros(2), "command"),
+        (Command(within=None), "command.within"),
+        (Command(within="1"), "command.within"),
+        (Command(within=[0.1]), "command.within"),
+        (Command(within=10**400), "command.within"),
+        (Command(within=1e300), "command.within"),
+        (Command(leg_yaw=[10**400, 0]), "command.leg_yaw"),
+        (Command(leg_yaw=["0.1", "0.1"]), "command.leg_yaw"),
+        (Command(leg_yaw=[0.1j, 0]), "command.leg_yaw"),
+        (Command(leg_yaw=0.1), "command.leg_yaw"),
     ],
 )
 def test_what_is_no_command_is_named_and_changes_nothing(command, field):
@@ -139,35 +148,66 @@ def test_robots_that_no_longer_walk_do_not_obey_and_may_be_told_nonsense():
     assert actuators.driven.tolist() == [True, False]
 
 
-def test_ramps_go_on_when_the_next_command_comes():
-    """Values told on a grid, looked up one by one and all at once, and by the sum of all changes."""
-    rng = np.random.default_rng(0)
-    starts, lengths = np.cumsum(rng.integers(1, 9, 12)), rng.integers(1, 20, 12)
-    goals, times = rng.normal(size=(12, 3, 2)), np.arange(0, 120)
-    expected = np.zeros((120, 3, 2))
-    for i in range(12):
-        change = goals[i] - (goals[i - 1] if i else 0.0)
-        expected += np.clip((times - starts[i]) / lengths[i], 0.0, 1.0)[:, None, None] * change
-    ramps = Ramps(np.zeros((3, 2)))
-    seen, told_so_far = [], 0
-    for time in times:
-        while told_so_far < 12 and starts[told_so_far] <= time:
-            ramps.to(goals[told_so_far], starts[told_so_far], lengths[told_so_far])
-            told_so_far += 1
-        seen.append(ramps.at(np.array([time]))[0])
-    np.testing.assert_allclose(seen, expected, rtol=0, atol=1e-14)
+def test_ramps_start_from_where_they_are_and_arrive_when_told():
+    ramps = Ramps(np.zeros(3), keep=True)
+    ramps.to(np.array([1.0, 1.0, 1.0]), 0.0, 10.0)
+    # Another goal; the same goal again, later and sooner.
+    ramps.to(np.array([-1.0, np.nan, np.nan]), 2.0, 4.0)
+    ramps.to(np.array([-1.0, 1.0, 1.0]), 3.0, 100.0)
+    ramps.to(np.array([-1.0, 1.0, 1.0]), 4.0, 1.0)
+    np.testing.assert_allclose(ramps.at(np.array([4.0, 4.5, 5.0, 20.0])), [
+        [-0.4, 0.4, 0.4], [-0.7, 0.7, 0.7], [-1.0, 1.0, 1.0], [-1.0, 1.0, 1.0],
+    ], atol=1e-15)  # fmt: skip
+    times = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 4.5, 9.0])
+    np.testing.assert_allclose(ramps.over(times)[:, 0], [0.0, 0.1, 0.2, -0.1, -0.4, -0.7, -1.0], atol=1e-15)
+    again = Ramps(np.zeros(3), keep=True)
+    again.restore(ramps.state())
+    np.testing.assert_array_equal(again.over(times), ramps.over(times))
 
 
-def test_leg_yaw_of_overlapping_ramps_over_time_is_the_sum_of_all_changes():
+def test_leg_yaw_over_time_is_what_it_was_at_every_moment():
+    """Looked up as it goes, and afterwards; and it never leaves what was commanded before and after."""
     rng = np.random.default_rng(1)
-    actuators = Actuators([PRESET, PRESET])
+    actuators, told = Actuators([PRESET, PRESET]), np.zeros((1, 2, 2))
     starts, lengths = np.sort(rng.uniform(0.0, 3.0, 30)), rng.uniform(0.0, 0.8, 30) * (rng.uniform(size=30) > 0.2)
     goals = rng.uniform(-0.5, 0.5, (30, 2, 2))
-    times = np.sort(np.concatenate([np.linspace(0.0, 4.0, 401), starts, starts + lengths]))
-    expected = np.zeros((len(times), 2, 2))
-    for i in range(30):
-        actuators.command(float(starts[i]), Command(leg_yaw=goals[i], within=float(lengths[i])), np.ones(2, dtype=bool))
-        change = goals[i] - (goals[i - 1] if i else 0.0)
-        done = (times - starts[i]) / lengths[i] if lengths[i] > 0.0 else times >= starts[i]
-        expected += np.clip(done, 0.0, 1.0)[:, None, None] * change
-    np.testing.assert_allclose(actuators.leg_yaw_over(times), expected, rtol=0, atol=1e-14)
+    goals[10:13] = goals[9]
+    for start, length, goal in zip(starts, lengths, goals, strict=True):
+        actuators.command(float(start), Command(leg_yaw=goal, within=float(length)), np.ones(2, dtype=bool))
+        told = np.concatenate([told, goal[None]])
+    times = np.linspace(0.0, 4.0, 4001)
+    yaw = actuators.leg_yaw_over(times)
+    np.testing.assert_array_equal(yaw[-1], goals[-1])
+    assert (np.abs(yaw) <= np.abs(goals).max()).all()
+    due = (times > (starts + lengths)[:, None]) & (times < np.append(starts[1:], 4.0)[:, None])
+    for event in range(30):
+        np.testing.assert_array_equal(yaw[due[event]], np.broadcast_to(goals[event], (due[event].sum(), 2, 2)))
+    # Continuous but where it was told to be there at once.
+    jumps = np.abs(np.diff(yaw, axis=0)).max(axis=(1, 2)) > 0.05
+    at_once = starts[lengths == 0.0]
+    assert all(np.abs(at_once - time).min() < 2e-3 for time in times[1:][jumps])
+    acting = actuators.leg_yaw_told(np.array([0.0, starts[4], starts[4] + 1e-9]))
+    np.testing.assert_array_equal(acting, [np.zeros((2, 2)), goals[3], goals[4]])
+
+
+def test_a_spring_that_is_told_its_goal_again_is_there_no_later():
+    actuators = Actuators([FREE.override("springs.lag", 0.5)])
+    told(actuators, 0.0, 1.0, within=10.0)
+    told(actuators, 1.0, 1.0, within=20.0)
+    assert actuators.profile[3, 0, 0] == 10.0
+    told(actuators, 2.0, 1.0, within=0.5)
+    assert actuators.profile[3, 0, 0] == 2.5
+    assert actuators.stiffness(2.0)[0, 0] == pytest.approx(
+        START - (2.0 - 0.5 * (1.0 - np.exp(-4.0))) * (START - 1.0) / 10
+    )
+
+
+def test_a_lag_much_longer_than_the_ramp_costs_no_digits():
+    """As good as the limit of a step, which it is to 1e-12."""
+    for lag in (0.5, 10.0, 1e3):
+        stiffness = []
+        for within in (2e-9, 0.0):
+            actuators = Actuators([FREE.override("springs.lag", lag)])
+            told(actuators, 0.0, 1.0, within=within)
+            stiffness.append(actuators.stiffness(1.0)[0, 0])
+        assert stiffness[0] == pytest.approx(stiffness[1], rel=1e-8 / lag)

@@ -17,8 +17,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chilopod.engine.arguments import as_array, as_number
 from chilopod.engine.contract import Command
 from chilopod.errors import ParameterError
+from chilopod.record import LONGEST
 from chilopod.robot import Robot
 
 if TYPE_CHECKING:
@@ -36,47 +38,76 @@ _SAME = 1e-9  # relative: a spring that is told the stiffness it has
 
 
 class Ramps:
-    """Values that move to where they are told at constant rate; what has begun goes on when the next command comes.
+    """Values that move to where they are told at constant rate, each on its own.
+
+    What is told the goal that it has already goes on as it was, but is there no later than it is now told to be.
 
     Parameters
     ----------
     start
         Values before any command, any shape.
+    keep
+        Whether to keep what was told, for :meth:`over`.
     """
 
-    def __init__(self, start: Array) -> None:
-        self.goal: Array = start
-        self._reached: Array = start
-        self._moving: list[tuple[float, float, Array]] = []
+    def __init__(self, start: Array, keep: bool = False) -> None:
+        self.goal: Array = np.array(start, dtype=np.float64)
+        self._from, self._since, self._until = self.goal, np.zeros(self.goal.shape), np.zeros(self.goal.shape)
+        self._told: list[tuple[float, Array]] | None = [(0.0, self._all())] if keep else None
 
     def to(self, goal: Array, now: float, within: float) -> None:
-        """Move to ``goal``, in a time of any unit."""
-        self._moving.append((now, within, goal - self.goal))
-        self.goal = goal
+        """Move to ``goal`` (NaN: as before), from a time on, within a time, both of any unit."""
+        told = ~np.isnan(goal)
+        goal = np.where(told, goal, self.goal)
+        changed = told & ((goal != self.goal) | (now + within < self._until))
+        if changed.any():
+            self._from = np.where(changed, self.at(np.array([now]))[0], self._from)
+            self._since = np.where(changed, now, self._since)
+            self._until = np.where(changed, now + within, self._until)
+            self.goal = goal
+            if self._told is not None:
+                self._told.append((now, self._all()))
 
-    def at(self, times: ArrayLike) -> Array:
-        """Values at times since the last command, shape (times, ...); what was before the first is forgotten."""
-        when = np.asarray(times, dtype=np.float64)
-        while self._moving and self._moving[0][0] + self._moving[0][1] <= when[0]:
-            self._reached = self._reached + self._moving.pop(0)[2]
-        values = np.repeat(self._reached[None], len(when), axis=0)
-        for start, length, change in self._moving:
-            done: Array = (when - start) / length if length > 0.0 else (when >= start).astype(np.float64)
-            values += np.clip(done, 0.0, 1.0)[(...,) + (None,) * change.ndim] * change
+    def at(self, times: Array) -> Array:
+        """Values at times (T,) since the last command, shape (T, ...)."""
+        return _ramp(self._all(), times.reshape(-1, *[1] * self.goal.ndim))
+
+    def over(self, times: Array) -> Array:
+        """Values at any times (T,), rising, shape (T, ...); at the moment of a command they are those before it."""
+        history = self._told or [(0.0, self._all())]
+        values = np.empty((len(times), *self.goal.shape))
+        ends = np.searchsorted(times, [when for when, _ in history[1:]] + [np.inf], side="right")
+        first = 0
+        for (_, told), last in zip(history, ends, strict=True):
+            if last > first:
+                values[first:last] = _ramp(told, times[first:last].reshape(-1, *[1] * self.goal.ndim))
+                first = last
         return values
 
     def state(self) -> dict[str, Array]:
         """All there is to it, for :meth:`restore`."""
-        times = np.array([each[:2] for each in self._moving]).reshape(-1, 2)
-        changes = np.array([each[2] for each in self._moving]).reshape(-1, *self.goal.shape)
-        return {"goal": self.goal, "reached": self._reached, "times": times, "changes": changes}
+        if self._told is None:
+            return {"now": self._all()}
+        history = np.array([each for _, each in self._told])
+        return {"now": self._all(), "times": np.array([when for when, _ in self._told]), "history": history}
 
     def restore(self, state: dict[str, Array]) -> None:
         """Become as another was."""
-        self.goal, self._reached = state["goal"], state["reached"]
-        self._moving = [
-            (float(a), float(b), each) for (a, b), each in zip(state["times"], state["changes"], strict=True)
-        ]
+        self._from, self.goal, self._since, self._until = state["now"]
+        if self._told is not None:
+            self._told = list(zip(state["times"].tolist(), state["history"], strict=True))
+
+    def _all(self) -> Array:
+        return np.stack([self._from, self.goal, self._since, self._until])
+
+
+def _ramp(told: Array, times: Array) -> Array:
+    start, goal, since, until = told
+    length = until - since
+    part = np.divide(
+        times - since, length, out=np.zeros(np.broadcast_shapes(times.shape, length.shape)), where=length > 0
+    )
+    return np.where(times >= until, goal, start + np.clip(part, 0.0, 1.0) * (goal - start))
 
 
 class Actuators:
@@ -91,8 +122,6 @@ class Actuators:
 
     Attributes
     ----------
-    leg_yaw
-        Last commanded, rad, shape (robots, 2).
     joint_torque
         Commanded, N*m, shape (robots, N-1).
     profile
@@ -117,7 +146,7 @@ class Actuators:
         self._fastest = limits([each.rate for each in springs], np.inf)
         self.lag = limits([each.lag for each in springs], 0.0)
         self.lag[self.lag < _SAME_INSTANT] = 0.0
-        self.leg_yaw = np.zeros((len(robots), 2))
+        self._leg_yaw = Ramps(np.zeros((len(robots), 2)), keep)
         self.joint_torque = np.zeros_like(first)
         self.driven = np.zeros(len(robots), dtype=np.bool_)
         self.profile = np.zeros((7, *first.shape))
@@ -125,6 +154,11 @@ class Actuators:
         self._keep = keep
         self._log: list[dict[str, Any]] = []
         self._profiles: list[tuple[float, Array]] = []
+
+    @property
+    def leg_yaw(self) -> Array:
+        """Last commanded, rad, shape (robots, 2)."""
+        return self._leg_yaw.goal
 
     @property
     def adjustable(self) -> bool:
@@ -150,8 +184,10 @@ class Actuators:
         """
         if not isinstance(command, Command):
             raise ParameterError("is no chilopod.engine.Command", field="command", value=type(command).__name__)
-        if not 0.0 <= command.within < np.inf:
-            raise ParameterError("is no time", field="command.within", value=command.within, allowed="0 s or more")
+        within = as_number("command.within", command.within)
+        if not 0.0 <= within <= LONGEST:
+            raise ParameterError("is no time", field="command.within", value=within, allowed=f"0 to {LONGEST:g} s")
+        within = within if within >= _SAME_INSTANT else 0.0
         yaw = self._rows("leg_yaw", command.leg_yaw, 2, walking)
         stiffness = self._rows("stiffness", command.stiffness, self.lag.shape[1], walking)
         torque = self._rows("joint_torque", command.joint_torque, self.lag.shape[1], walking)
@@ -160,15 +196,15 @@ class Actuators:
             raise ParameterError("is too far", field="command.leg_yaw", value=worst, allowed="up to a right angle, rad")
         if stiffness is not None:
             self._check(stiffness, walking)
-            self._soften(time, stiffness, walking, command.within)
+            self._soften(time, stiffness, walking, within)
         if yaw is not None:
-            self.leg_yaw = np.where(walking[:, None], yaw, self.leg_yaw)
+            self._leg_yaw.to(np.where(walking[:, None], yaw, np.nan), time, within)
         if torque is not None:
             self.driven |= walking & (torque != 0.0).any(axis=1)
             self.joint_torque = np.where(walking[:, None], torque, self.joint_torque)
         if self._keep:
             wanted = np.full(self.lag.shape, np.nan) if stiffness is None else stiffness
-            when: dict[str, Any] = {"event": time, "within": command.within}
+            when: dict[str, Any] = {"event": time, "within": within}
             what = {"command": self.leg_yaw, "command_stiffness": wanted, "command_torque": self.joint_torque}
             self._log.append(when | what)
 
@@ -205,28 +241,18 @@ class Actuators:
         data["command"] = (("event", "robot", "side"), self._logged("command"), {"units": "rad"})
         if self.adjustable:
             data["command_stiffness"] = (("event", *over), self._logged("command_stiffness"), {"units": "N*m/rad"})
-        torques = self._logged("command_torque")
-        if torques.any():
-            data["command_torque"] = (("event", *over), torques, {"units": "N*m"})
+        data["command_torque"] = (("event", *over), self._logged("command_torque"), {"units": "N*m"})
 
     def leg_yaw_over(self, times: Array) -> Array:
-        """Leg yaw as commanded at any times of the walk, rad, shape (times, robots, 2): ramps from command to
-        command."""
-        if not self._log:
-            return np.zeros((len(times), *self.leg_yaw.shape))
-        starts, within, commands = (self._logged(name) for name in ("event", "within", "command"))
-        changes = np.diff(commands, axis=0, prepend=np.zeros((1, *self.leg_yaw.shape)))
-        # By the time of a sample, the ramps of so many commands are over, and the next few are under way.
-        over = np.searchsorted(np.maximum.accumulate(starts + within), times - _SAME_INSTANT, side="right")
-        begun = np.searchsorted(starts, times, side="right")
-        yaw = np.concatenate([np.zeros((1, *self.leg_yaw.shape)), np.cumsum(changes, axis=0)])[over]
-        for ahead in range(int((begun - over).max(initial=0))):
-            here = np.flatnonzero(over + ahead < begun)
-            event = over[here] + ahead
-            since, length = times[here] - starts[event], within[event]
-            part = np.clip(np.divide(since, length, out=np.ones(len(here)), where=length > 0.0), 0.0, 1.0)
-            yaw[here] += part[:, None, None] * changes[event]
-        return yaw
+        """Leg yaw as commanded at any times of the walk, rising, rad, shape (times, robots, 2)."""
+        return self._leg_yaw.over(times)
+
+    def leg_yaw_told(self, times: Array) -> Array:
+        """Leg yaw that was last commanded before any times of the walk, rad, shape (times, robots, 2)."""
+        told = np.concatenate(
+            [np.zeros((1, *self.leg_yaw.shape)), self._logged("command").reshape(-1, *self.leg_yaw.shape)]
+        )
+        return told[np.searchsorted(self._logged("event"), times, side="left")]
 
     def state(self) -> dict[str, Array]:
         """All there is to it, for :meth:`restore`."""
@@ -235,13 +261,15 @@ class Actuators:
             "profile_times": np.array([time for time, _ in self._profiles]),
             "profiles": np.array([each for _, each in self._profiles]).reshape(-1, *self.profile.shape),
         }
-        now = {name: getattr(self, name) for name in ("leg_yaw", "joint_torque", "driven", "profile")}
-        return {**now, **history, **logged}
+        now = {"joint_torque": self.joint_torque, "driven": self.driven, "profile": self.profile}
+        yaw = {f"yaw_{name}": values for name, values in self._leg_yaw.state().items()}
+        return {**now, **yaw, **history, **logged}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Become as another was, of the same robots."""
-        for name in ("leg_yaw", "joint_torque", "driven", "profile"):
-            setattr(self, name, state[name])
+        self.joint_torque, self.driven, self.profile = state["joint_torque"], state["driven"], state["profile"]
+        yaw = {name.removeprefix("yaw_"): each for name, each in state.items() if name.startswith("yaw_")}
+        self._leg_yaw.restore(yaw)
         self._profiles = list(zip(state["profile_times"].tolist(), state["profiles"], strict=True))
         logged = {name.removeprefix("log_"): values for name, values in state.items() if name.startswith("log_")}
         count = len(next(iter(logged.values()), ()))
@@ -253,17 +281,10 @@ class Actuators:
     def _rows(self, name: str, value: ArrayLike | None, columns: int, walking: NDArray[np.bool_]) -> Array | None:
         if value is None:
             return None
-        try:
-            array = np.asarray(value, dtype=np.float64)
-            rows = np.array(np.broadcast_to(array, (len(walking), columns)))
-        except (TypeError, ValueError):
-            shape = getattr(value, "shape", None)
-            raise ParameterError(
-                "has the wrong shape" if shape is not None else "is no array of numbers",
-                field=f"command.{name}",
-                value=value if shape is None else shape,
-                allowed=f"({len(walking)}, {columns})",
-            ) from None
+        array, shape = as_array(f"command.{name}", value), (len(walking), columns)
+        if array.ndim == 0 or array.shape not in (shape, (1, columns), (columns,)):
+            raise ParameterError("has the wrong shape", field=f"command.{name}", value=array.shape, allowed=str(shape))
+        rows = np.array(np.broadcast_to(array, shape))
         if not np.isfinite(rows[walking]).all():
             raise ParameterError("must be finite", field=f"command.{name}", allowed="numbers for all that still walk")
         return rows
@@ -285,20 +306,22 @@ class Actuators:
             )
 
     def _soften(self, time: float, stiffness: Array, walking: NDArray[np.bool_], within: float) -> None:
-        wanted = np.clip(stiffness, self._softest, self._stiffest)
-        changed = self._adjustable & walking[:, None] & (wanted != self.profile[GOAL])
+        wanted, present = np.clip(stiffness, self._softest, self._stiffest), self.profile[GOAL]
+        now, reference = self.stiffness(time), _reference(self.profile, time)
+        length = np.maximum(within, np.abs(wanted - reference) / self._fastest)
+        length[length < _SAME_INSTANT] = 0.0
+        # What is told the goal that it has already goes on, but is there no later than it is now told to be.
+        changed = self._adjustable & walking[:, None] & ((wanted != present) | (time + length < self.profile[UNTIL]))
         if not changed.any():
             return
-        now, reference = self.stiffness(time), _reference(self.profile, time)
         goal = np.where(changed, wanted, reference)
-        length = np.maximum(within, np.abs(goal - reference) / self._fastest)
-        length[length < _SAME_INSTANT] = 0.0
         slope = np.divide(goal - reference, length, out=np.zeros_like(goal), where=length > 0.0)
         begun = np.empty_like(self.profile)
         begun[SINCE], begun[FROM], begun[SLOPE], begun[UNTIL], begun[GOAL] = time, reference, slope, time + length, goal
         begun[RAMPING] = now - reference + slope * self.lag
-        at_end = goal - slope * self.lag + begun[RAMPING] * _decay(length, self.lag)
-        begun[SETTLING] = np.where(length > 0.0, at_end, now) - goal
+        # As exactly for a lag much longer than the ramp.
+        caught_up = slope * self.lag * (_decay_less_one(length, self.lag) if self.lag.any() else 0.0)
+        begun[SETTLING] = np.where(length > 0.0, (now - reference) * _decay(length, self.lag) + caught_up, now - goal)
         self.profile = np.where(changed, begun, self.profile)
         self.driven = self.driven | changed.any(axis=1)
         if self._keep:
@@ -324,6 +347,12 @@ def _decay(time: Any, lag: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         decay: Array = np.exp(-np.where(lag > 0.0, time / lag, np.inf))
     return decay
+
+
+def _decay_less_one(time: Array, lag: Array) -> Array:
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        less: Array = np.expm1(-np.where(lag > 0.0, time / lag, np.inf))
+    return less
 
 
 def _reference(profile: Array, time: Any) -> Array:

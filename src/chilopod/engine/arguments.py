@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -12,6 +13,111 @@ from chilopod.record import LONGEST
 from chilopod.robot import Robot
 
 Array = NDArray[np.float64]
+
+
+def as_number(name: str, value: object) -> float:
+    """One plain number.
+
+    Raises
+    ------
+    ParameterError
+        If it is none.
+    """
+    try:
+        if isinstance(value, str | bytes) or np.ndim(value) != 0:  # type: ignore[arg-type]
+            raise TypeError
+        return float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        raise ParameterError("is no number", field=name, value=value) from None
+
+
+def as_array(name: str, value: object) -> Array:
+    """An array of plain numbers, not necessarily a copy.
+
+    Raises
+    ------
+    ParameterError
+        If it is none.
+    """
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind not in "fiu":
+            raise TypeError
+        return array.astype(np.float64, copy=False)
+    except (TypeError, ValueError, OverflowError):
+        raise ParameterError("is no array of numbers", field=name, value=value) from None
+
+
+def as_seeds(seeds: object) -> list[int] | None:
+    """Whole numbers, zero or more; None for None.
+
+    Raises
+    ------
+    ParameterError
+        If they are none.
+    """
+    if seeds is None:
+        return None
+    try:
+        whole = [operator.index(each) for each in seeds]  # type: ignore[attr-defined]
+    except TypeError:
+        whole = []
+    if not whole or min(whole) < 0:
+        raise ParameterError("must be whole numbers, one a walk", field="seeds", value=seeds, allowed="0 or more")
+    return whole
+
+
+def as_robots(robots: object) -> list[Robot]:
+    """One robot or several as a list.
+
+    Raises
+    ------
+    ParameterError
+        If there is none, or something else.
+    """
+    given = [robots] if isinstance(robots, Robot) else robots
+    if not isinstance(given, Sequence) or isinstance(given, str) or not all(isinstance(each, Robot) for each in given):
+        raise ParameterError("is no robot, nor several of them", field="robots", value=type(robots).__name__)
+    if not given:
+        raise ParameterError("there are none", field="robots", allowed="at least one")
+    return list(given)
+
+
+def standing(
+    robot: Robot, joint_angles: ArrayLike, heading: ArrayLike, position: ArrayLike
+) -> tuple[Array, Array, Array]:
+    """Arguments of ``initial_states`` as arrays with one row a robot: (robots, N-1), (robots,), (robots, 2).
+
+    Raises
+    ------
+    ParameterError
+        If one has the wrong shape or is not finite, or their numbers do not agree.
+    """
+    joints = robot.body.modules - 1
+    angles, headings = as_array("joint_angles", joint_angles), as_array("heading", heading)
+    places = as_array("position", position)
+    for name, array, fits, allowed in (
+        ("joint_angles", angles, angles.ndim < 3 and angles.shape[-1:] in ((), (1,), (joints,)), f"({joints},)"),
+        ("heading", headings, headings.ndim < 2, "a number"),
+        ("position", places, places.ndim in (1, 2) and places.shape[-1] == 2, "(2,)"),
+    ):
+        if not fits:
+            raise ParameterError(
+                "has the wrong shape", field=name, value=array.shape, allowed=f"{allowed}, or one each"
+            )
+        if not np.isfinite(array).all():
+            raise ParameterError("must be finite", field=name)
+    angles = np.broadcast_to(np.atleast_2d(angles), (len(np.atleast_2d(angles)), joints))
+    headings, places = np.atleast_1d(headings), np.atleast_2d(places)
+    try:
+        (count,) = np.broadcast_shapes(angles.shape[:1], headings.shape, places.shape[:1])
+    except ValueError:
+        raise ParameterError("do not agree in number", field="joint_angles, heading, position") from None
+    return (
+        np.array(np.broadcast_to(angles, (count, joints))),
+        np.array(np.broadcast_to(headings, (count,))),
+        np.array(np.broadcast_to(places, (count, 2))),
+    )
 
 
 def rows_of(
@@ -39,17 +145,13 @@ def rows_of(
     ParameterError
         If one has the wrong shape, is not finite, or their numbers do not agree.
     """
-    if not robots:
-        raise ParameterError("there are none", field="robots", allowed="at least one")
-    if seeds is not None and min(seeds, default=-1) < 0:
-        raise ParameterError("must be whole numbers, one a walk", field="seeds", allowed="0 or more")
     counts = {"robots": len(robots), "seeds": len(seeds) if seeds else 1}
     arrays: dict[str, Array | None] = {}
     for name, (argument, shape) in arguments.items():
         arrays[name] = None
         if argument is None:
             continue
-        array = np.asarray(argument, dtype=np.float64)
+        array = as_array(name, argument)
         if array.shape[array.ndim - len(shape) :] != shape or array.ndim > len(shape) + 1 or array.size == 0:
             allowed = f"{shape} or (walks, {', '.join(map(str, shape))})"
             raise ParameterError("has the wrong shape", field=name, value=array.shape, allowed=allowed)
@@ -69,16 +171,18 @@ def rows_of(
     return count, arrays
 
 
-def check_time(until: float, now: float) -> None:
-    """Refuse to walk back, and beyond all reason.
+def check_time(until: float, now: float) -> float:
+    """The time to walk on to, s; refuses to walk back, and beyond all reason.
 
     Raises
     ------
     ParameterError
         If ``until`` is before ``now`` (s), or no such time.
     """
+    until = as_number("until", until)
     if not now <= until <= LONGEST:
         problem = "has passed" if until < now else "is no time"
         raise ParameterError(
             problem, field="until", value=f"{until:g} s", allowed=f"{now:g} s or later, at most {LONGEST:g} s"
         )
+    return until

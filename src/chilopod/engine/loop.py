@@ -10,6 +10,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from chilopod.engine.arguments import as_number, check_time
 from chilopod.engine.contract import Command, Controller, Event, Observation, Walk
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.gait import Gait
@@ -33,7 +34,7 @@ def event_times(controller: Controller, gait: Gait, duration: float) -> Iterator
     for event in events:
         if not isinstance(event, Event):
             raise ParameterError("is no chilopod.engine.Event", field=_of(controller, "events"), value=event)
-        if not 0.0 <= event.phase < 1.0:
+        if not 0.0 <= as_number(_of(controller, "events"), event.phase) < 1.0:
             raise ParameterError(
                 "is no phase", field=_of(controller, "events"), value=event.phase, allowed="0 to less than 1"
             )
@@ -78,12 +79,22 @@ def steer(
         If the controller raises, with its exception as the cause.
     """
     gait, begun = walk.robots[0].gait, walk.time
+    until = check_time(until, begun)
+    if bearing_noise is not None and (bearing_noise.ndim != 2 or len(bearing_noise) != len(walk.robots)):
+        raise ParameterError(
+            "has the wrong shape",
+            field="bearing_noise",
+            value=bearing_noise.shape,
+            allowed=f"({len(walk.robots)}, as many as events)",
+        )
     for index, (time, event) in enumerate(event_times(controller, gait, until) if controller else ()):
         if time < begun:
             continue
         walk.advance(time)
         seen = walk.observe()
         if bearing_noise is not None:
+            if index >= bearing_noise.shape[1]:
+                raise ParameterError("is for fewer events", field="bearing_noise", value=bearing_noise.shape[1])
             seen = replace(seen, bearing=(seen.bearing + bearing_noise[:, index] + np.pi) % (2.0 * np.pi) - np.pi)
         assert controller is not None
         command = _answer(controller, event, seen)

@@ -6,7 +6,8 @@ import hashlib
 import io
 import json
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from importlib.metadata import version
 from typing import Any
 
@@ -44,7 +45,7 @@ def pack(traits: Traits, robots: Sequence[Robot], settings: Mapping[str, Any], a
     return _MAGIC + hashlib.sha256(content).digest() + content
 
 
-def unpack(traits: Traits, saved: bytes) -> tuple[list[Robot], dict[str, Any], dict[str, Any]]:
+def unpack(traits: Traits, saved: object) -> tuple[list[Robot], dict[str, Any], dict[str, Any]]:
     """Robots, settings and arrays of a walk that :func:`pack` made.
 
     Raises
@@ -52,6 +53,9 @@ def unpack(traits: Traits, saved: bytes) -> tuple[list[Robot], dict[str, Any], d
     ParameterError
         If it is no such thing, damaged, or another engine's or version's.
     """
+    if not isinstance(saved, bytes | bytearray | memoryview):
+        raise ParameterError("is no saved walk", field="saved", value=type(saved).__name__, allowed="bytes")
+    saved = bytes(saved)
     content = saved[len(_MAGIC) + _DIGEST :]
     if saved[: len(_MAGIC)] != _MAGIC:
         raise ParameterError("is no saved walk", field="saved", allowed="what save() gave")
@@ -61,14 +65,34 @@ def unpack(traits: Traits, saved: bytes) -> tuple[list[Robot], dict[str, Any], d
         with np.load(io.BytesIO(content), allow_pickle=False) as read:
             arrays: dict[str, Any] = dict(read)
         header = json.loads(str(arrays.pop("header")))
-        robots = [Robot.from_toml(text) for text in header.pop("robots")]
-        settings = header.pop("settings")
-    except (ValueError, KeyError, OSError, zipfile.BadZipFile) as error:
-        raise ParameterError(f"cannot be read ({error})", field="saved") from None
-    for name, here in _made_by(traits).items():
-        if header.get(name) != here:
-            raise ParameterError(f"was saved with another {name}", field="saved", value=header.get(name), allowed=here)
-    return [robots[i] for i in arrays.pop("which")], settings, arrays
+        made_by = {name: header.get(name) for name in _made_by(traits)}
+        distinct, which = header["robots"], arrays.pop("which")
+        for name, here in _made_by(traits).items():
+            if made_by[name] != here:
+                raise ParameterError(f"was saved with another {name}", field="saved", value=made_by[name], allowed=here)
+        robots = [Robot.from_toml(text) for text in distinct]
+        return [robots[i] for i in which], header["settings"], arrays
+    except (ValueError, KeyError, IndexError, TypeError, AttributeError, OSError, zipfile.BadZipFile) as error:
+        if isinstance(error, ParameterError):
+            raise
+        raise ParameterError(f"cannot be read ({error})", field="saved", allowed="what save() gave") from None
+
+
+@contextmanager
+def read_back() -> Iterator[None]:
+    """While a walk is made from what was unpacked: what does not fit together is no saved walk.
+
+    Raises
+    ------
+    ParameterError
+        For whatever is missing, or of another kind or shape.
+    """
+    try:
+        yield
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
+        if isinstance(error, ParameterError):
+            raise
+        raise ParameterError(f"does not fit together ({error})", field="saved", allowed="what save() gave") from None
 
 
 def _made_by(traits: Traits) -> dict[str, str]:

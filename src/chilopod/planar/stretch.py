@@ -161,41 +161,65 @@ def drive(
     profile, lag, torque
         See :class:`chilopod.engine.Actuators`, shapes (7, robots, N-1), (robots, N-1), (robots, N-1).
     """
-    n = contact.shape[1]
     for row in numba.prange(rows.size):
-        r = rows[row]
+        _drive_one(
+            rows[row], begins, starts, widths, interval, sample, contact, stroke, scalars, feet, profile, lag, torque,
+            damping, friction, yaw, tolerance, states, step, status, record,
+        )  # fmt: skip
+
+
+@njit
+def drive_alone(
+    row: int, begins: Any, starts: Any, widths: Any, interval: Any, sample: Any, contact: Any, stroke: Any,
+    scalars: Any, feet: Any, profile: Any, lag: Any, torque: Any, damping: Any, friction: Any, yaw: Any,
+    tolerance: float, states: Any, step: Any, status: Any, record: Any,
+) -> None:  # fmt: skip
+    """As :func:`drive`, for one robot on this thread."""
+    _drive_one(
+        row, begins, starts, widths, interval, sample, contact, stroke, scalars, feet, profile, lag, torque, damping,
+        friction, yaw, tolerance, states, step, status, record,
+    )  # fmt: skip
+
+
+@njit
+def _drive_one(
+    r: int, begins: Any, starts: Any, widths: Any, interval: Any, sample: Any, contact: Any, stroke: Any,
+    scalars: Any, feet: Any, profile: Any, lag: Any, torque: Any, damping: Any, friction: Any, yaw: Any,
+    tolerance: float, states: Any, step: Any, status: Any, record: Any,
+) -> None:  # fmt: skip
+    if status[r] != WALKING:
+        return
+    n = contact.shape[1]
+    x = states[r].copy()
+    work = np.empty((16, x.size))
+    scratch = np.empty((n, SCRATCH))
+    moments = np.empty((n, MOMENTS))
+    springs = np.empty((n - 1, 6))
+    args = (scalars[r], springs, damping[r], moments, scratch)
+    current = -1
+    h = step[r]
+    for s in range(widths.size):
+        if interval[s] != current:
+            current = interval[s]
+            sum_moments(contact[current], stroke[current], friction[r], feet[r, 0], feet[r, 1], yaw[r], moments)
+        done = 0.0
+        while done < widths[s] and status[r] == WALKING:
+            end = widths[s]
+            for j in range(n - 1):
+                ramp_left = profile[UNTIL, r, j] - begins[s]
+                if done < ramp_left < end:
+                    end = ramp_left
+            middle = begins[s] + 0.5 * (done + end)
+            _describe(profile[:, r], lag[r], torque[r], middle, begins[s] - starts[s], springs)
+            h, reached = _integrate(args, x, starts[s] + done, starts[s] + end, h, tolerance, work)
+            status[r] = _judged(x, n, reached)
+            done = end
         if status[r] != WALKING:
-            continue
-        x = states[r].copy()
-        work = np.empty((16, x.size))
-        scratch = np.empty((n, SCRATCH))
-        moments = np.empty((n, MOMENTS))
-        springs = np.empty((n - 1, 6))
-        args = (scalars[r], springs, damping[r], moments, scratch)
-        current = -1
-        h = step[r]
-        for s in range(widths.size):
-            if interval[s] != current:
-                current = interval[s]
-                sum_moments(contact[current], stroke[current], friction[r], feet[r, 0], feet[r, 1], yaw[r], moments)
-            done = 0.0
-            while done < widths[s] and status[r] == WALKING:
-                end = widths[s]
-                for j in range(n - 1):
-                    ramp_left = profile[UNTIL, r, j] - begins[s]
-                    if done < ramp_left < end:
-                        end = ramp_left
-                middle = begins[s] + 0.5 * (done + end)
-                _describe(profile[:, r], lag[r], torque[r], middle, begins[s] - starts[s], springs)
-                h, reached = _integrate(args, x, starts[s] + done, starts[s] + end, h, tolerance, work)
-                status[r] = _judged(x, n, reached)
-                done = end
-            if status[r] != WALKING:
-                break
-            if sample[s] >= 0:
-                record[sample[s], r] = x
-        states[r] = x
-        step[r] = h
+            break
+        if sample[s] >= 0:
+            record[sample[s], r] = x
+    states[r] = x
+    step[r] = h
 
 
 @njit

@@ -10,8 +10,8 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.engine import Actuators, Command, Observation, Status, Traits
-from chilopod.engine.arguments import check_time, rows_of
-from chilopod.engine.saved import pack, unpack
+from chilopod.engine.arguments import as_array, as_number, as_robots, as_seeds, check_time, rows_of, standing
+from chilopod.engine.saved import pack, read_back, unpack
 from chilopod.errors import ParameterError
 from chilopod.planar import stretch
 from chilopod.planar.model import PlanarModel
@@ -69,16 +69,12 @@ def initial_states(
     -------
     Shape (robots, 2N+4): reduced state (see :mod:`chilopod.planar.dynamics`), then x, y and heading.
     """
-    n = robot.body.modules
-    angles = np.atleast_2d(np.asarray(joint_angles, dtype=np.float64))
-    angles = np.broadcast_to(angles, (len(angles), n - 1))
-    heading, position = np.atleast_1d(np.asarray(heading, float)), np.atleast_2d(np.asarray(position, float))
-    count = np.broadcast_shapes(angles.shape[:1], heading.shape, position.shape[:1])[0]
-    states = np.zeros((count, 2 * n + 4))
+    n, (angles, headings, places) = robot.body.modules, standing(robot, joint_angles, heading, position)
+    states = np.zeros((len(angles), 2 * n + 4))
     states[:, 0] = robot.gait.speed
     states[:, 3 : n + 2] = angles
-    states[:, 2 * n + 1 : 2 * n + 3] = position
-    states[:, 2 * n + 3] = heading
+    states[:, 2 * n + 1 : 2 * n + 3] = places
+    states[:, 2 * n + 3] = headings
     return states
 
 
@@ -108,13 +104,15 @@ def start(
     expected
         How long the walk is likely to be, s; memory for its record is taken at once.
     """
-    in_range("tolerance", tolerance, 1e-2)
-    given = [robots] if isinstance(robots, Robot) else list(robots)
-    n = given[0].body.modules if given else 2
+    in_range("tolerance", as_number("tolerance", tolerance), 1e-2)
+    given = as_robots(robots)
+    n = given[0].body.modules
     if record is not None and record.poses:
         raise ParameterError("the planar model has none", field="poses", value=True, allowed="False, or the twin")
     count, rows = rows_of(
-        given, {"initial": (initial, (2 * n + 4,)), "friction": (friction, (n, 2)), "target": (target, (2,))}, seeds
+        given,
+        {"initial": (initial, (2 * n + 4,)), "friction": (friction, (n, 2)), "target": (target, (2,))},
+        as_seeds(seeds),
     )
     if any(common(robot) != common(given[0]) for robot in given[1:]):
         raise ParameterError("must have the same gait and number of modules", field="robots")
@@ -134,15 +132,16 @@ def start(
 def resume(saved: bytes) -> PlanarWalk:
     """A walk that was saved, see :class:`chilopod.engine.Engine`."""
     robots, settings, arrays = unpack(traits, saved)
-    walk = PlanarWalk(
-        robots,
-        arrays["states"],
-        arrays["factors"],
-        arrays.get("target"),
-        None if settings["record"] is None else Recording(**settings["record"]),
-        settings["tolerance"],
-    )
-    walk.restore(settings, arrays)
+    with read_back():
+        walk = PlanarWalk(
+            robots,
+            arrays["states"],
+            arrays["factors"],
+            as_array("target", arrays["target"]) if "target" in arrays else None,
+            None if settings["record"] is None else Recording(**settings["record"]),
+            as_number("tolerance", settings["tolerance"]),
+        )
+        walk.restore(settings, arrays)
     return walk
 
 
@@ -207,12 +206,10 @@ class PlanarWalk:
     def observe(self) -> Observation:
         """See :class:`chilopod.engine.Walk`; a target is seen wherever it is."""
         states, _, status = self._now()
-        n, gone = self._modules, status != stretch.WALKING
-        if self._target is None:
-            bearing = distance = np.full(len(states), np.nan)
-        else:
-            place, heading = states[:, 2 * n + 1 : 2 * n + 3], states[:, 2 * n + 3]
-            bearing, distance = bearing_and_distance(place, heading, self._target)
+        # What fails is judged where the walk stops for good; what cannot be followed any more shows nothing.
+        n, gone = self._modules, (self._status != stretch.WALKING) | (status == stretch.DIVERGED)
+        target = np.full(2, np.nan) if self._target is None else self._target
+        bearing, distance = bearing_and_distance(states[:, 2 * n + 1 : 2 * n + 3], states[:, 2 * n + 3], target)
         angles = states[:, 3 : n + 2].copy()
         for seen in (bearing, distance, angles):
             seen[gone] = np.nan
@@ -234,10 +231,10 @@ class PlanarWalk:
 
     def advance(self, until: float) -> None:
         """See :class:`chilopod.engine.Walk`."""
-        check_time(until, self._time)
+        until = check_time(until, self._time)
         check_size(self._record, until, self._states.size)
         pieces = self._timeline.whole_pieces(until)
-        self._time, self._here = float(until), None
+        self._time, self._here = until, None
         if pieces[0].size:
             self._carry(pieces, self._states, self._step, self._status)
 
@@ -263,7 +260,7 @@ class PlanarWalk:
 
     def restore(self, settings: dict[str, Any], arrays: dict[str, Any]) -> None:
         """Become as the walk was that was saved, of the same robots."""
-        self._time = settings["time"]
+        self._time = as_number("time", settings["time"])
         self._step, self._status = arrays["step"], arrays["status"]
         self._timeline.position = arrays["position"]
         if len(arrays["samples"]):
@@ -278,10 +275,11 @@ class PlanarWalk:
         times = np.arange(len(states)) / rate
         leg_yaw = self._actuators.leg_yaw_over(times)
         data = planar_record(self._models[0], times, states, leg_yaw)
-        add_outcome(data, [each.label for each in self.status], self._target)
         self._actuators.add_to(data)
         if self._record and self._record.forces:
-            data["foot_force"] = foot_forces(self._models, times, states, leg_yaw, self._friction)
+            acting = self._actuators.leg_yaw_told(times)
+            data["foot_force"] = foot_forces(self._models, times, states, acting, self._friction)
+        add_outcome(data, [each.label for each in self.status], self._target)
         data.attrs = {
             "engine": traits.name,
             "robot": self._robots[0].to_toml(),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from operator import itemgetter
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -53,7 +55,7 @@ def failures(
         signs = ((quiet, Status.DIVERGED), (straight, Status.OUT_OF_RANGE), (standing, Status.FALLEN))
         bad = [(int(np.argmin(good[row])), status) for good, status in signs if not good[row].all()]
         if bad:
-            found[row] = bad[0]
+            found[row] = min(bad, key=itemgetter(0))
         elif warned[row]:
             found[row] = _stopped(positions[row], rates[row], (before[0][row], before[1][row])), Status.DIVERGED
     return found

@@ -61,9 +61,9 @@ class Scanner:
             Which robots.
         """
         number = int(now / self._every + _SAME_INSTANT)
-        tick = round(number * self._every)
-        if tick > before:
-            self._poses[ids] = poses[:, tick - before - 1]
+        if number > self._number:
+            tick = int(np.ceil(number * self._every - _SAME_INSTANT))
+            self._poses[ids] = poses[:, max(tick - before - 1, 0)]
             self._number = number
 
     def look(self, ids: NDArray[np.intp]) -> Array:

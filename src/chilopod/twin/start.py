@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.engine import Traits
-from chilopod.engine.arguments import rows_of
-from chilopod.engine.saved import unpack
+from chilopod.engine.arguments import as_number, as_robots, as_seeds, rows_of, standing
+from chilopod.engine.saved import read_back, unpack
 from chilopod.errors import ParameterError
-from chilopod.record import Recording
+from chilopod.record import Recording, in_range
 from chilopod.robot import Robot
 from chilopod.twin.legs import twin_of
 from chilopod.twin.model import compiled, without_springs
@@ -61,15 +61,10 @@ def initial_states(
     -------
     Positions of all joints (MuJoCo's ``qpos``), shape (robots, nq).
     """
-    plan = compiled(common(robot))
-    joints = len(plan.yaw_positions)
-    angles = np.atleast_2d(np.asarray(joint_angles, dtype=np.float64))
-    angles = np.broadcast_to(angles, (len(angles), joints))
-    heading, position = np.atleast_1d(np.asarray(heading, float)), np.atleast_2d(np.asarray(position, float))
-    count = np.broadcast_shapes(angles.shape[:1], heading.shape, position.shape[:1])[0]
-    states = np.tile(plan.initial_positions(), (count, 1))
-    states[:, :2] = position
-    states[:, 3], states[:, 6] = np.cos(0.5 * heading), np.sin(0.5 * heading)
+    plan, (angles, headings, places) = compiled(common(robot)), standing(robot, joint_angles, heading, position)
+    states = np.tile(plan.initial_positions(), (len(angles), 1))
+    states[:, :2] = places
+    states[:, 3], states[:, 6] = np.cos(0.5 * headings), np.sin(0.5 * headings)
     states[:, plan.yaw_positions] = angles
     return states
 
@@ -106,15 +101,16 @@ def start(
     expected
         How long the walk is likely to be, s; memory for its record is taken at once.
     """
-    given = [robots] if isinstance(robots, Robot) else list(robots)
-    if not given:
-        raise ParameterError("there are none", field="robots", allowed="at least one")
+    in_range("tolerance", as_number("tolerance", tolerance), 1.0)
+    if as_number("threads", threads) not in range(1 << 16):
+        raise ParameterError("is no number of threads", field="threads", value=threads, allowed="0 (all cores) or more")
+    given, noise = as_robots(robots), as_seeds(seeds)
     first = common(given[0])
     if any(common(each) != first for each in given[1:]):
         raise ParameterError("may differ in their springs only", field="robots")
     size, n = compiled(first).model.nq, first.body.modules
     count, rows = rows_of(
-        given, {"initial": (initial, (size,)), "friction": (friction, (n, 2)), "target": (target, (2,))}, seeds
+        given, {"initial": (initial, (size,)), "friction": (friction, (n, 2)), "target": (target, (2,))}, noise
     )
     states = rows["initial"]
     return TwinWalk(
@@ -123,7 +119,7 @@ def start(
         np.tile(initial_states(given[0]), (count, 1)) if states is None else states,
         np.ones((count, n, 2)) if rows["friction"] is None else rows["friction"],
         rows["target"],
-        None if seeds is None else list(seeds) * (count if len(seeds) == 1 else 1),
+        None if noise is None else noise * (count if len(noise) == 1 else 1),
         record,
         tolerance=tolerance,
         threads=threads,
@@ -134,16 +130,17 @@ def start(
 def resume(saved: bytes, threads: int = 0) -> TwinWalk:
     """A walk that was saved, see :class:`chilopod.engine.Engine`; the number of threads does not matter."""
     robots, settings, arrays = unpack(traits, saved)
-    walk = TwinWalk(
-        traits,
-        robots,
-        arrays["positions"],
-        arrays["factors"],
-        arrays.get("target"),
-        settings["seeds"],
-        None if settings["record"] is None else Recording(**settings["record"]),
-        tolerance=settings["tolerance"],
-        threads=threads,
-    )
-    walk.restore(settings, arrays)
+    with read_back():
+        walk = TwinWalk(
+            traits,
+            robots,
+            arrays["positions"],
+            arrays["factors"],
+            arrays.get("target"),
+            as_seeds(settings["seeds"]),
+            None if settings["record"] is None else Recording(**settings["record"]),
+            tolerance=as_number("tolerance", settings["tolerance"]),
+            threads=threads,
+        )
+        walk.restore(settings, arrays)
     return walk

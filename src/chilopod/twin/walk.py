@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,7 +12,7 @@ from mujoco.batch import Batch
 from numpy.typing import NDArray
 
 from chilopod.engine import Actuators, Command, Observation, Ramps, Status, Traits
-from chilopod.engine.arguments import check_time
+from chilopod.engine.arguments import as_number, check_time
 from chilopod.engine.saved import pack
 from chilopod.record import Recording, Samples, add_outcome, check_size, walk_record
 from chilopod.robot import Robot
@@ -111,16 +112,17 @@ class TwinWalk:
 
     def command(self, command: Command) -> None:
         """See :class:`chilopod.engine.Walk`."""
-        interval = self._plan.twin.control_interval
         self._actuators.command(self._time, command, self._on_foot())
-        self._leg_yaw.to(self._actuators.leg_yaw, self._tick, max(1, round(command.within / interval)))
+        self._leg_yaw.to(
+            self._actuators.leg_yaw, self._tick, max(1, round(command.within / self._plan.twin.control_interval))
+        )
         self._batch.bind("qfrc_applied")[:, self._plan.yaw_rates] = self._actuators.joint_torque
         if self._record is not None and self._target is not None:
             self._seen.append(self._look())
 
     def advance(self, until: float) -> None:
         """See :class:`chilopod.engine.Walk`."""
-        check_time(until, self._time)
+        until = check_time(until, self._time)
         check_size(self._record, until, len(self._robots) * (self._plan.model.nq + self._plan.model.nv))
         interval = self._plan.twin.control_interval
         last, longest = int(np.ceil(until / interval - _SAME_INSTANT)), max(1, int(_LONGEST_STRETCH / interval))
@@ -130,7 +132,11 @@ class TwinWalk:
                 if len(self._walking):
                     self._step_to(tick)
                 self._tick = tick
-        self._time = float(until)
+        self._time = until
+        if not len(self._walking):
+            # Nobody walks on, but the record goes on with nothing.
+            for store in self._kept().values():
+                store.grown(self._samples_up_to(self._tick * self._plan.steps_per_control))
 
     def save(self) -> bytes:
         """See :class:`chilopod.engine.Walk`."""
@@ -162,11 +168,11 @@ class TwinWalk:
         def part(prefix: str) -> dict[str, Any]:
             return {name.removeprefix(prefix): each for name, each in arrays.items() if name.startswith(prefix)}
 
-        self._time, self._tick = settings["time"], settings["tick"]
+        self._time, self._tick = as_number("time", settings["time"]), operator.index(settings["tick"])
         self._status = [Status[name] for name in settings["status"]]
         self._walking = np.flatnonzero(self._on_foot())
-        for name, values in part("state_").items():
-            self._batch.bind(name)[:] = values
+        for name in _STATE:
+            self._batch.bind(name)[:] = arrays[f"state_{name}"]
         for name, samples in self._kept().items():
             rows = arrays[f"samples_{name}"]
             samples.grown(len(rows))[:] = rows
@@ -193,7 +199,6 @@ class TwinWalk:
             joint_rate=rates[..., plan.yaw_rates],
             leg_yaw=positions[..., plan.leg_yaw_positions],
         )
-        add_outcome(data, [each.label for each in self._status], self._target)
         self._actuators.add_to(data)
         if self._seen:
             seen = np.array(self._seen)
@@ -209,6 +214,7 @@ class TwinWalk:
             data["foot_load"] = (over, -forces.reshape(shape)[..., 2], {"units": "N"})
         if self._record and self._record.poses:
             data["pose"] = (("time", "robot", "coordinate"), positions, {"units": "m, 1, rad: MuJoCo's qpos"})
+        add_outcome(data, [each.label for each in self._status], self._target)
         data.attrs = {"engine": self._traits.name, "robot": self._robots[0].to_toml(), "duration": self._time}
         return data
 
@@ -226,17 +232,22 @@ class TwinWalk:
     def _sample_steps(self, samples: NDArray[np.intp]) -> NDArray[np.intp]:
         """The simulation steps that are nearest to samples."""
         rate = self._record.rate if self._record else 1.0
-        return np.round(samples / rate / self._plan.twin.timestep).astype(np.intp)
+        return np.rint(samples / rate / self._plan.twin.timestep).astype(np.intp)
+
+    def _samples_up_to(self, step: int) -> int:
+        """How many samples are at steps up to one."""
+        if self._record is None or step < 0:
+            return 0
+        near = int(step * self._in_a_step) + np.arange(-2, 4 + int(self._in_a_step))
+        return int(near[self._sample_steps(near) <= step][-1]) + 1
+
+    @property
+    def _in_a_step(self) -> float:
+        return self._record.rate * self._plan.twin.timestep if self._record else 0.0
 
     def _samples(self, after: int, up_to: int) -> NDArray[np.intp]:
         """The samples at steps after one and up to another."""
-        if self._record is None:
-            return np.empty(0, dtype=np.intp)
-        in_a_step = self._record.rate * self._plan.twin.timestep
-        first, last = (max(0, int(step * in_a_step) - 1) for step in (after, up_to))
-        near = np.arange(first, last + int(in_a_step) + 4)
-        steps = self._sample_steps(near)
-        return near[(steps > after) & (steps <= up_to)]
+        return np.arange(self._samples_up_to(after), self._samples_up_to(up_to))
 
     def _look(self) -> tuple[Array, Array]:
         """Bearing and distance of the target in the last scan; NaN for robots that no longer walk."""
@@ -277,7 +288,9 @@ class TwinWalk:
         control = np.zeros((len(self._walking), len(ticks), plan.model.nu))
         # Both legs at the knees and hips, then the yaw of module 1's.
         control[..., plan.leg_controls.ravel()] = self._leg_targets(ticks)
-        control[..., plan.leg_yaw_controls] = np.swapaxes(self._leg_yaw.at(ticks), 0, 1)[self._walking]
+        control[..., plan.leg_yaw_controls] = np.swapaxes(self._leg_yaw.at(ticks.astype(np.float64)), 0, 1)[
+            self._walking
+        ]
         control = np.repeat(control, per_tick, axis=1)
         if self._actuators.driven.any() and len(plan.spring_controls):
             edges = np.arange(self._tick * per_tick, tick * per_tick + 1) * plan.twin.timestep

@@ -1,0 +1,242 @@
+"""What outsiders broke in walks of both engines, and its relatives."""
+
+import io
+import json
+
+import numpy as np
+import pytest
+
+from chilopod import load_robot, planar, twin
+from chilopod.engine import Command, Event, Status, steer
+from chilopod.errors import AnalysisError, ChilopodError, ParameterError
+from chilopod.record import Recording
+
+PLANAR, TWIN = load_robot("aoi2022-planar"), load_robot("aoi2022")
+BOTH = pytest.mark.parametrize(("engine", "robot"), [(planar, PLANAR), (twin, TWIN)], ids=["planar", "twin"])
+TORN = Command(joint_torque=[[30.0, 0.0, 0.0, 0.0, 0.0]])
+
+
+def torn(engine, robot, steps):
+    walk = engine.start(robot, record=Recording(rate=50.0))
+    walk.advance(0.5)
+    walk.command(TORN)
+    for time in np.linspace(0.5, 2.0, steps + 1)[1:]:
+        walk.advance(time)
+    return walk
+
+
+@BOTH
+def test_when_and_how_a_robot_ends_does_not_hang_on_how_it_is_advanced(engine, robot):
+    whole, pieces = torn(engine, robot, 1), torn(engine, robot, 750)
+    assert whole.status == pieces.status == (Status.OUT_OF_RANGE,)
+    assert whole.to_dataset().equals(pieces.to_dataset())
+
+
+@BOTH
+def test_the_record_goes_on_when_nobody_walks_any_more(engine, robot):
+    data = torn(engine, robot, 3).to_dataset()
+    assert data.sizes["time"] == 101
+    for name, values in data.data_vars.items():
+        if values.dims[:2] == ("time", "robot"):
+            assert np.isnan(values.values[-1]).all(), name
+
+
+@pytest.mark.parametrize("period", ["25 ms", "33 ms", "1 ms", "100 ms"])
+def test_what_the_scanner_shows_does_not_hang_on_how_the_robot_is_advanced(period):
+    robot = TWIN.override("twin.scanner_period", period)
+    seen = []
+    for stops in ((0.134,), (0.024, 0.1, 0.134), tuple(np.arange(1, 68) * 0.002)):
+        walk = twin.start(robot, target=(1.0, 0.5), seeds=[3])
+        for time in stops:
+            walk.advance(time)
+        seen.append(walk.observe().bearing[0])
+    assert seen[0] == seen[1] == seen[2]
+
+
+def test_the_last_scan_is_never_from_the_future_nor_older_than_its_period():
+    robot = TWIN.set_from_text(["twin.scanner_period=25 ms", "twin.scanner_noise=0 mm", "twin.scanner_resolution=0 mm"])
+    often = twin.start(robot, target=(1.0, 0.5), initial=twin.initial_states(robot, heading=0.3))
+    bearings = []
+    for tick in range(200):
+        often.advance(tick * 0.002)
+        bearings.append(float(often.observe().bearing[0]))
+    changes = np.flatnonzero(np.diff(bearings)) + 1
+    np.testing.assert_array_equal(changes[:10], [13, 25, 38, 50, 63, 75, 88, 100, 113, 125])
+
+
+def test_recorded_foot_forces_are_those_that_acted_while_legs_turn_slowly():
+    walk = planar.start(PLANAR, record=Recording(rate=2000.0, forces=True), tolerance=1e-12)
+    walk.advance(0.05)
+    walk.command(Command(leg_yaw=[0.4, 0.4], within=1.0))
+    walk.advance(0.25)
+    data = walk.to_dataset().isel(time=slice(120, None))
+    mass, length = PLANAR.module_mass, PLANAR.module_length
+    headings = data.heading.values[:, 0, None] + np.cumsum(
+        np.pad(data.joint_angle.values[:, 0], ((0, 0), (1, 0))), axis=1
+    )
+    ahead = np.stack([np.cos(headings), np.sin(headings)], -1)
+    centres = data.position.values[:, 0, None] - 0.5 * length * np.cumsum(
+        np.concatenate([np.zeros_like(ahead[:, :1]), ahead[:, :-1] + ahead[:, 1:]], axis=1), axis=1
+    )
+    acceleration = np.diff(mass * centres.sum(axis=1), n=2, axis=0) * 2000.0**2
+    force = data.foot_force.values[1:-1, 0].sum(axis=(1, 2))
+    assert np.median(np.abs(acceleration - force)) < 1e-3 * np.abs(force).max()
+
+
+@BOTH
+def test_a_robot_alone_and_in_a_batch_have_the_same_variables(engine, robot):
+    names = []
+    for robots in ([robot], [robot, robot]):
+        walk = engine.start(robots)
+        walk.command(Command(leg_yaw=[0.1, 0.1]))
+        if len(robots) == 2:
+            walk.command(Command(joint_torque=[[0.0] * 5, [0.01] * 5]))
+        walk.advance(0.1)
+        names.append(set(walk.to_dataset().variables))
+    assert names[0] == names[1]
+
+
+NONSENSE = ["three", None, [0.1], {}, 1j, object()]
+
+
+@BOTH
+def test_nonsense_is_one_line_and_changes_nothing(engine, robot):
+    walk = engine.start(robot)
+    walk.advance(0.1)
+    before = walk.save()
+    for value in NONSENSE:
+        with pytest.raises(ParameterError):
+            walk.advance(value)
+        with pytest.raises(ParameterError):
+            walk.command(Command(leg_yaw=[0.1, 0.1], within=value))
+        if value is not None:
+            with pytest.raises(ParameterError):
+                walk.command(Command(joint_torque=value, leg_yaw=[0.1, 0.1]))
+    for value in (10**400, -(10**400), 1e308, float("nan"), 0.05):
+        with pytest.raises(ParameterError):
+            walk.advance(value)
+    assert walk.save() == before
+
+
+@BOTH
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"robots": "aoi2022"},
+        {"robots": [None]},
+        {"robots": []},
+        {"initial": "there"},
+        {"friction": {}},
+        {"target": "there"},
+        {"seeds": 3},
+        {"seeds": "ab"},
+        {"seeds": [1.5]},
+        {"seeds": [-1]},
+        {"seeds": []},
+        {"tolerance": "small"},
+        {"tolerance": 0.0},
+        {"tolerance": float("nan")},
+        {"initial": np.full((2, 3), 1.0)},
+        {"friction": np.full((6, 2), -1.0)},
+    ],
+    ids=str,
+)
+def test_a_start_that_is_none_is_named(engine, robot, arguments):
+    with pytest.raises(ParameterError) as caught:
+        engine.start(**{"robots": robot, **arguments})
+    assert caught.value.field == next(iter(arguments))
+    assert "\n" not in str(caught.value)
+
+
+@BOTH
+def test_seeds_may_be_numpy_s(engine, robot):
+    walk = engine.start(robot, seeds=np.array([3, 4]), target=(1.0, 0.0))
+    walk.advance(0.2)
+    assert engine.resume(walk.save()).save() == walk.save()
+
+
+@BOTH
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"joint_angles": [0.1] * 4},
+        {"joint_angles": "bent"},
+        {"joint_angles": float("nan")},
+        {"heading": [[0.1]]},
+        {"position": 0.1},
+        {"position": [0.0, 0.0, 0.0]},
+        {"heading": [0.1, 0.2], "position": np.zeros((3, 2))},
+    ],
+    ids=str,
+)
+def test_a_state_that_is_none_is_named(engine, robot, arguments):
+    with pytest.raises(ParameterError):
+        engine.initial_states(robot, **arguments)
+
+
+@BOTH
+def test_what_was_saved_and_edited_is_no_walk(engine, robot):
+    import hashlib
+
+    walk = engine.start(robot, target=(1.0, 0.0))
+    walk.advance(0.1)
+    saved = walk.save()
+    head, content = saved[:16], saved[48:]
+    with np.load(io.BytesIO(content), allow_pickle=False) as read:
+        arrays = dict(read)
+    header = json.loads(str(arrays["header"]))
+
+    def edited(arrays):
+        body = io.BytesIO()
+        np.savez(body, **arrays)
+        return head + hashlib.sha256(body.getvalue()).digest() + body.getvalue()
+
+    assert engine.resume(edited(arrays)).save() == saved
+    for name in arrays:
+        with pytest.raises(ChilopodError):
+            engine.resume(edited({key: each for key, each in arrays.items() if key != name} | _needed(arrays, name)))
+    for key in header["settings"]:
+        settings = {**header["settings"], key: {"a": "dict"}}
+        with pytest.raises(ChilopodError):
+            engine.resume(edited(arrays | {"header": np.array(json.dumps({**header, "settings": settings}))}))
+    for wrong in (None, 3, "text", bytearray(b"x"), b""):
+        with pytest.raises(ParameterError):
+            engine.resume(wrong)
+
+
+def _needed(arrays, name):
+    """A target may be missing; then it is another walk, so it is made no number here."""
+    return {"target": np.array("there")} if name == "target" else {}
+
+
+@BOTH
+def test_controllers_that_are_none_are_named(engine, robot):
+    class Asked:
+        def __init__(self, phase=0.5, answer=None, error=None):
+            self.phase, self.answer, self.error = phase, answer, error
+
+        def events(self, gait):
+            return [Event("now", self.phase, 0.1)]
+
+        def act(self, event, seen):
+            if self.error:
+                raise self.error
+            return self.answer
+
+    for controller, words in (
+        (Asked(phase=1.0), "Asked.events"),
+        (Asked(phase="half"), "Asked.events"),
+        (Asked(phase=None), "Asked.events"),
+        (Asked(answer=3), "Asked.command"),
+        (Asked(answer=Command(leg_yaw=[np.nan, 0.0])), "Asked.command.leg_yaw"),
+        (Asked(error=ZeroDivisionError("by\nnothing")), "ZeroDivisionError: by nothing"),
+    ):
+        with pytest.raises((ParameterError, AnalysisError), match=words) as caught:
+            steer(engine.start(robot), 1.0, controller)
+        assert "\n" not in str(caught.value)
+    with pytest.raises(ParameterError, match="until"):
+        steer(engine.start(robot), float("nan"))
+    with pytest.raises(ParameterError, match="bearing_noise"):
+        steer(engine.start(robot), 1.0, Asked(answer=Command()), bearing_noise=np.zeros((2, 9)))
+    with pytest.raises(ParameterError, match="bearing_noise"):
+        steer(engine.start(robot), 9.0, Asked(answer=Command()), bearing_noise=np.zeros((1, 2)))
