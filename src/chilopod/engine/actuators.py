@@ -308,7 +308,7 @@ class Actuators:
     def _stiffness_over(self, times: Array) -> Array:
         values = np.repeat(self._start[None], len(times), axis=0)
         starts = [start for start, _ in self._profiles]
-        for (start, profile), end in zip(self._profiles, [*starts[1:], np.inf], strict=True):
+        for (start, profile), end in zip(self._profiles, [*starts[1:], np.inf], strict=False):
             # A sample at the very moment of a command is from before it.
             here = (times > start) & (times <= end)
             values[here] = _stiffness(profile, self.lag, times[here, None, None])
