@@ -131,7 +131,7 @@ def turn(
     ] = "auto",
     strategy: Annotated[str, typer.Option(metavar="NAME", help="pitchfork, hopf, leg-yaw or open-loop.")] = "pitchfork",
     duration: Annotated[
-        str | None, typer.Option(metavar="TIME", help="How long; by default 1.6 times what the circle takes.")
+        str | None, typer.Option(metavar="TIME", help="How long; by default what the circle takes, and some more.")
     ] = None,
     seed: SeedOption = None,
     repeats: RepeatsOption = 1,
