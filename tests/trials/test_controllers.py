@@ -153,6 +153,22 @@ def test_a_class_that_only_this_process_knows_is_not_kept(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def made_with(yaw):
+    @dataclass(frozen=True)
+    class Made(Proportional):
+        def act(self, event: Event, seen: Observation):
+            return Command(leg_yaw=[[yaw, yaw]])
+
+    return Made()
+
+
+def test_classes_that_a_function_makes_are_told_apart(tmp_path):
+    asked = [trial(made_with(0.1)), trial(made_with(0.2))]
+    assert [record.command.max().item() for record in run(asked)] == [0.1, 0.2]
+    with pytest.raises(ParameterError, match="known to this process only"):
+        run([trial(Anything(made_with(0.1)))], tmp_path)
+
+
 def test_an_edited_class_is_another(tmp_path, monkeypatch):
     text = """
 from dataclasses import dataclass

@@ -49,13 +49,30 @@ def plain(value: object, field: str) -> Any:
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         own = [each.name for each in dataclasses.fields(value) if each.compare]
         fields = {name: plain(getattr(value, name), f"{field}.{name}") for name in own}
-        return {"class": path_of(value), "code": _code_of(type(value)), "fields": fields}
+        path, code = path_of(value), _code_of(type(value))
+        # Classes that a function makes may differ in what it had at hand, and nowhere else.
+        return {"class": path, "code": code if is_findable(path) else f"{code} {id(type(value)):x}", "fields": fields}
     raise ParameterError(
         "is no plain data, so nobody could tell trials apart",
         field=field,
         value=type(value).__name__,
         allowed="numbers, text, None, enums, arrays, and tuples or dataclasses of these",
     )
+
+
+def is_findable(path: str) -> bool:
+    """Whether another process can find what has this path: not in a notebook, a script or a function."""
+    return not path.startswith("__main__:") and "<locals>" not in path
+
+
+def classes_in(described: Any) -> list[str]:
+    """Paths of all classes in what :func:`plain` gave."""
+    if isinstance(described, list):
+        return [path for each in described for path in classes_in(each)]
+    if not isinstance(described, dict):
+        return []
+    own = [described[name] for name in ("class", "enum") if isinstance(described.get(name), str)]
+    return own + [path for each in described.values() for path in classes_in(each)]
 
 
 @lru_cache(maxsize=4096)
@@ -74,7 +91,7 @@ def robot_text(robot: Robot) -> str:
 def _code_of(kind: type) -> str:
     """What tells the text of somebody's class from what it was before an edit; empty for our own, and without text.
 
-    Our own have :data:`chilopod.trials.store.RECORD_VERSION`.
+    Our own have :data:`chilopod.trials.trial.RECORD_VERSION`.
     """
     texts = []
     for each in kind.__mro__:

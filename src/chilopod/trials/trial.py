@@ -9,12 +9,12 @@ from functools import cached_property
 from typing import Any
 
 from chilopod.engine import Controller, engine_named
-from chilopod.engine.named import check_controller, path_of
+from chilopod.engine.named import check_controller
 from chilopod.errors import ParameterError
 from chilopod.record import LONGEST, RATE, Recording, in_range
 from chilopod.robot import Robot
 from chilopod.steering import Target
-from chilopod.trials.description import plain, robot_text
+from chilopod.trials.description import classes_in, is_findable, plain, robot_text
 from chilopod.trials.disturbance import Disturbance
 
 RECORD_VERSION = 5
@@ -132,9 +132,10 @@ class Trial:
         ParameterError
             If the class of the controller, or the engine, is known to this process only.
         """
-        controller = None if self.controller is None else path_of(self.controller)
-        for name, path in (("controller", controller), ("engine", self.engine)):
-            if path is not None and (path.startswith("__main__:") or "<locals>" in path):
+        for name, paths in (("controller", classes_in(self.steering)), ("engine", [self.engine])):
+            for path in paths:
+                if is_findable(path):
+                    continue
                 raise ParameterError(
                     "is known to this process only: its trials can be neither kept nor walked elsewhere",
                     field=name,
