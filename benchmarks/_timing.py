@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import platform
 import time
 from collections.abc import Callable, Sequence
@@ -10,6 +9,8 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from statistics import median
+
+from chilopod.cores import cores
 
 README = Path(__file__).with_name("README.md")
 
@@ -32,7 +33,6 @@ def machine() -> str:
     if cpuinfo.exists():
         models = [line.split(":", 1)[1].strip() for line in cpuinfo.read_text().splitlines() if "model name" in line]
         name = models[0] if models else name
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     packages = []
     for package in ("chilopod", "numpy", "scipy", "numba", "heyoka", "numbalsoda"):
         try:
@@ -41,7 +41,7 @@ def machine() -> str:
             packages.append(f"no {package}")
     today = datetime.now(UTC).date().isoformat()
     system = f"{platform.system()}, Python {platform.python_version()}"
-    return f"{name}, {cores} cores, {system}; {', '.join(packages)}; {today}."
+    return f"{name}, {cores()} cores, {system}; {', '.join(packages)}; {today}."
 
 
 def duration(seconds: float) -> str:

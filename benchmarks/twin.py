@@ -22,6 +22,7 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
+from chilopod.cores import cores
 from chilopod.robot import load_robot
 from chilopod.steering import LegYawController, Target
 from chilopod.twin import TwinModel, initial_states, simulate
@@ -107,7 +108,7 @@ def main() -> None:
     load = os.getloadavg()[0]
     model = TwinModel(ROBOT).model
     controls, last = controls_of(TRIALS)
-    threads = min(2, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1)
+    threads = min(2, cores())
     ends = bare(model, controls, 1)
     same = np.array_equal(ends[:, :2], last.position.values) and np.array_equal(python_loop(model, controls), ends)
     # Who, on how many threads, how many walks, and the bare loop to compare with.

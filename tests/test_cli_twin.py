@@ -1,5 +1,6 @@
 """The whole robot on the command line: ``walk`` and ``turn`` with ``--engine twin``, ``identify twin``."""
 
+import importlib
 import json
 import os
 import signal
@@ -55,7 +56,7 @@ def test_a_turn_in_three_dimensions_comes_with_a_replay(capsys, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (["walk", "aoi2022-planar", "--engine", "twin"], "the robot has no [twin]"),
+        (["walk", "aoi2022-planar", "--engine", "twin"], "this robot has none, so the three-dimensional model cannot"),
         (["walk", ROBOT, "--engine", "twn"], "did you mean 'twin'?"),
         (["walk", ROBOT, "--engine", "twin", "--set", "twin.hip_height=130 mm"], "cannot reach its path"),
         (["walk", ROBOT, "--engine", "twin", "--set", "twin.link_mass=1 kg"], "leaves no mass for the bodies"),
@@ -70,6 +71,19 @@ def test_what_cannot_walk_is_refused_in_one_line(capsys, arguments, complaint, t
     message = capsys.readouterr().err.splitlines()[-1]
     assert message.startswith("error: ")
     assert complaint in message
+
+
+def test_a_turn_does_not_walk_its_law_anew(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr(importlib.import_module("chilopod.tasks.radius_law"), "DURATION", 45.0)
+    arguments = ["turn", ROBOT, "--engine", "twin", "--target", "45 deg, 1.3 m", "--k1", "law", "--duration", "2 s"]
+    first = printed(capsys, *arguments, "--trials", str(tmp_path), "--json")
+    kept = {file.name: file.stat().st_mtime_ns for file in tmp_path.iterdir()}
+    assert len(kept) == 9 + 1
+    other = [*arguments[:5], "40 deg, 1.5 m", *arguments[6:]]
+    assert printed(capsys, *other, "--trials", str(tmp_path), "--json")["spring_by_law_N_m_rad"] > 0.0
+    assert {name: (tmp_path / name).stat().st_mtime_ns for name in kept} == kept
+    assert len(list(tmp_path.iterdir())) == 9 + 2
+    assert printed(capsys, *arguments, "--trials", str(tmp_path), "--json") == first
 
 
 def test_a_robot_that_blows_up_says_so(capsys):

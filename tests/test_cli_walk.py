@@ -1,12 +1,16 @@
 """``chilopod walk`` and ``chilopod turn`` as they are typed."""
 
 import json
+import os
+import sys
 
 import numpy as np
 import pytest
 import xarray as xr
 
 from chilopod.cli import main
+from chilopod.cli.options import EngineOption
+from chilopod.engine import ENGINES
 from chilopod.record import RATE
 
 ROBOT = "aoi2022-planar"
@@ -84,6 +88,7 @@ def test_a_walk_that_leaves_the_range_says_so(capsys):
         (["--rate", "0"], ["rate"]),
         (["--repeats", "0"], ["--repeats"]),
         (["--repeats", "3"], ["repeats", "seed"]),
+        (["--trials", "/dev/null/trials"], ["/dev/null/trials", "cannot be written"]),
         (["--initial-joints", "1,2 deg"], ["2 angles", "5"]),
         (["--initial-joints", "120 deg"], ["bent too far"]),
         (["--initial-joints", "1,x,0,0,0 deg"], ["x"]),
@@ -152,6 +157,7 @@ def test_turn_with_a_given_spring_and_the_other_strategies(capsys):
         (["--target", "45 deg, 1 m", "--strategy", "hopf", "--k1", "law"], ["radius law"]),
         (["--target", "45 deg, 1 m", "--repeats", "2"], ["seed"]),
         (["--target", "45 deg, 1 m", "--duration", "0 s"], ["duration"]),
+        (["--target", "45 deg, 1 m", "--duration", "1e9 s"], ["duration", "100000"]),
         (["--target", "45 deg, 1 m", "--set", "legs.half_width=0.3 m"], ["no pitchfork"]),
     ],
 )
@@ -164,3 +170,164 @@ def test_the_rate_that_the_help_names_is_that_of_records(capsys):
     assert main(["walk", "--help"]) == 0
     words = capsys.readouterr().out.replace("│", " ").split()
     assert f"by default {RATE:g}." in " ".join(words)
+
+
+OWN = """
+import time
+from dataclasses import dataclass
+import numpy as np
+from chilopod.engine import Command, Event
+
+@dataclass(frozen=True)
+class Left:
+    yaw: float = 0.08
+    pause: float = 0.0
+
+    def events(self, gait):
+        return [Event("now", 0.0, 0.1)]
+
+    def act(self, event, seen):
+        time.sleep(self.pause)
+        return Command(leg_yaw=np.full((len(seen.bearing), 2), self.yaw), within=event.window)
+
+@dataclass(frozen=True)
+class Right(Left):
+    yaw: float = -0.08
+
+@dataclass(frozen=True)
+class Slow(Left):
+    pause: float = 0.25
+
+@dataclass(frozen=True)
+class Raises(Left):
+    def act(self, event, seen):
+        raise RuntimeError("nobody at home")
+
+@dataclass(frozen=True)
+class Nonsense(Left):
+    def act(self, event, seen):
+        return 7
+
+@dataclass(frozen=True)
+class Endless(Left):
+    def events(self, gait):
+        return [Event("never", 2.0, 0.1)]
+
+class Loose:
+    events, act = Left.events, Left.act
+
+import chilopod.planar as model
+
+class Engine:
+    def __getattr__(self, name):
+        return getattr(model, name)
+
+toy = Engine()
+"""
+
+
+@pytest.fixture
+def own(tmp_path, monkeypatch):
+    """The name of a module in the current folder that nothing else has imported."""
+    name = f"own_{tmp_path.name.replace('-', '_')}"
+    (tmp_path / f"{name}.py").write_text(OWN)
+    monkeypatch.chdir(tmp_path)
+    yield name
+    sys.modules.pop(name, None)
+
+
+def test_a_controller_of_ones_own_steers_a_walk(capsys, own):
+    arguments = ["walk", ROBOT, *SOFT, "--duration", "20 s", "--json"]
+    ends = {}
+    for name in ("Left", "Right"):
+        found = printed(capsys, *arguments, "--controller", f"{own}:{name}")
+        assert found["controller"] == f"{own}:{name}"
+        ends[name] = found["walks"][0]["y_m"]
+    assert ends["Left"] > 0.05
+    assert ends["Right"] == pytest.approx(-ends["Left"], rel=1e-2)  # mirrored, half a cycle later
+    assert os.getcwd() not in sys.path
+
+
+def test_a_controller_of_ones_own_turns_in_place_of_the_strategys(capsys, own, tmp_path):
+    arguments = ["turn", ROBOT, "--target", "45 deg, 1.3 m", "--json", "--duration", "15 s"]
+    left, right = (
+        printed(capsys, *arguments, "--k1", "9 N*mm/deg", "--controller", f"{own}:{name}") for name in ("Left", "Right")
+    )
+    assert left["controller"] == f"{own}:Left"
+    assert left["walks"][0]["nearest_m"] < right["walks"][0]["nearest_m"]
+    # Also where the strategy has none, and in the search for the spring.
+    found = printed(capsys, *arguments, "--strategy", "open-loop", "--controller", f"{own}:Left", "--trials", "kept")
+    assert found["walks"][0]["nearest_m"] <= left["walks"][0]["nearest_m"]
+    assert found["spring_N_m_rad"] != found["spring_by_law_N_m_rad"]
+    assert len(list((tmp_path / "kept").iterdir())) > 48
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("Raises", ["Raises.act", "RuntimeError", "nobody at home"]),
+        ("Nonsense", ["Nonsense", "is no chilopod.engine.Command"]),
+        ("Endless", ["Endless.events", "is no phase"]),
+        ("Loose", ["frozen dataclass"]),
+        ("Lefft", ["has no Lefft", "did you mean 'Left'"]),
+        ("toy", ["is no class"]),
+    ],
+)
+@pytest.mark.parametrize("command", [["walk"], ["turn", "--target", "45 deg, 1.3 m", "--k1", "10 N*mm/deg"]])
+def test_controllers_that_are_none_are_refused_in_one_line(capsys, own, command, name, words):
+    message = refused(capsys, command[0], ROBOT, *command[1:], "--controller", f"{own}:{name}")
+    assert all(word in message for word in words), message
+
+
+@pytest.mark.parametrize(
+    ("path", "words"),
+    [
+        ("nosuch.module:Class", ["cannot be imported", "nosuch"]),
+        ("Class", ["names nothing", "package.module:Class"]),
+        ("", ["names nothing"]),
+        ("os; rm:Class", ["names nothing"]),
+    ],
+)
+def test_paths_that_do_not_import_are_refused_in_one_line(capsys, path, words):
+    message = refused(capsys, "walk", ROBOT, "--controller", path)
+    assert all(word in message for word in words), message
+
+
+def test_a_controller_that_takes_most_of_the_time_is_named(capsys, own):
+    assert main(["walk", ROBOT, "--duration", "2 s", "--controller", f"{own}:Slow", "--json"]) == 0
+    captured = capsys.readouterr()
+    assert "the controller took" in captured.err.splitlines()[-1]
+    assert "slow" not in str(json.loads(captured.out)["walks"])
+    assert main(["walk", ROBOT, "--duration", "2 s", "--controller", f"{own}:Left"]) == 0
+    assert "the controller took" not in capsys.readouterr().err
+
+
+def test_an_engine_of_ones_own_walks(capsys, own):
+    arguments = ["walk", ROBOT, *SOFT, "--duration", "2 s", "--seed", "1", "--json"]
+    found, planar = printed(capsys, *arguments, "--engine", f"{own}:toy"), printed(capsys, *arguments)
+    assert found["engine"] == f"{own}:toy"
+    assert found["walks"] == planar["walks"]
+    assert "is no engine" in refused(capsys, "walk", ROBOT, "--engine", f"{own}:Left")
+
+
+def test_the_engines_are_choices_in_the_help(capsys):
+    assert main(["walk", "--help"]) == 0
+    assert "planar|twin|MODULE:OBJECT" in capsys.readouterr().out
+    assert EngineOption.__metadata__[0].metavar.split("|")[:-1] == list(ENGINES)
+
+
+def test_walks_are_kept_and_not_walked_again(capsys, tmp_path):
+    folder = tmp_path / "kept"
+    arguments = ["walk", ROBOT, *SOFT, "--duration", "3 s", "--seed", "1", "--json", "--trials", str(folder)]
+    first = printed(capsys, *arguments, "--repeats", "2")
+    kept = {file.name: file.stat().st_mtime_ns for file in folder.iterdir()}
+    assert len(kept) == 2
+    third = printed(capsys, *arguments, "--repeats", "3")
+    assert third["walks"][:2] == first["walks"]
+    assert {name: (folder / name).stat().st_mtime_ns for name in kept} == kept
+    assert len(list(folder.iterdir())) == 3
+    # Another's record in the place of one's own does not count.
+    one, other = list(kept)
+    (folder / one).write_bytes((folder / other).read_bytes())
+    assert printed(capsys, *arguments, "--repeats", "2") == first
+    assert (folder / f"{one}.aside").exists()

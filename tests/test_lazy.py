@@ -31,7 +31,7 @@ def test_the_theory_loads_no_engine_in_3d_no_drawing_and_no_records():
 
 
 def test_what_walks_loads_the_twin_only_where_it_walks():
-    code = "from chilopod.tasks import turn, twin_radius_law\nfrom chilopod.trials import NONE, Trial, run, together"
+    code = "from chilopod.tasks import turn, radius_law\nfrom chilopod.trials import NONE, Trial, run, together"
     assert loaded(code, "mujoco", "matplotlib", "cmaes") == set()
 
 
@@ -45,7 +45,12 @@ def test_every_name_is_there_and_listed(package):
 
 
 def test_a_verb_named_like_its_module_is_the_verb_whatever_was_loaded_first():
-    for name in ("chilopod.analysis.straight_walk", "chilopod.tasks.turn", "chilopod.trials.run"):
+    for name in (
+        "chilopod.analysis.straight_walk",
+        "chilopod.tasks.turn",
+        "chilopod.tasks.radius_law",
+        "chilopod.trials.run",
+    ):
         package, _, verb = name.rpartition(".")
         loaded(f"import {name}\nfrom {package} import {verb}\nassert callable({verb}) and callable({name})")
         assert getattr(importlib.import_module(name), verb) is getattr(sys.modules[package], verb)

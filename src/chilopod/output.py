@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +14,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def write_atomic(path: str | Path, content: str | bytes, *, replace: bool = True) -> Path:
+def write_atomic(
+    path: str | Path, content: str | bytes | bytearray, *, replace: bool = True, durable: bool = False
+) -> Path:
     """Write a file so that it never exists half-written.
 
     Parameters
@@ -24,6 +27,8 @@ def write_atomic(path: str | Path, content: str | bytes, *, replace: bool = True
         Text is written as UTF-8.
     replace
         Whether a file that is already there may be replaced.
+    durable
+        Whether it is to outlast a power failure; :func:`sync_folder` makes its name do so.
 
     Returns
     -------
@@ -46,6 +51,9 @@ def write_atomic(path: str | Path, content: str | bytes, *, replace: bool = True
         try:
             with os.fdopen(handle, "wb") as file:
                 file.write(content.encode() if isinstance(content, str) else content)
+                if durable:
+                    file.flush()
+                    os.fsync(file.fileno())
             # mkstemp makes files private; what users write follows their umask.
             os.chmod(temporary, 0o666 & ~_umask())
             os.replace(temporary, path)
@@ -57,6 +65,18 @@ def write_atomic(path: str | Path, content: str | bytes, *, replace: bool = True
     except (OSError, ValueError) as error:
         raise _refused(path, error) from None
     return path
+
+
+def sync_folder(path: Path) -> None:
+    """Make sure that the files of a folder keep their names after a power failure, where the system can do that."""
+    if not hasattr(os, "O_DIRECTORY"):
+        return
+    handle = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        with suppress(OSError):  # some file systems cannot
+            os.fsync(handle)
+    finally:
+        os.close(handle)
 
 
 def free_path(path: str | Path, force: bool = False) -> Path:

@@ -1,14 +1,15 @@
 """Trials: names, files, and what a seed does."""
 
 import dataclasses
+import pickle
 
 import numpy as np
 import pytest
 
-from chilopod import load_robot
+from chilopod import load_robot, twin
 from chilopod.errors import ParameterError
 from chilopod.steering import LegYawController, Target
-from chilopod.trials import NONE, Disturbance, Trial, run, together
+from chilopod.trials import NONE, Disturbance, Trial, batches, run, together
 
 ROBOT = load_robot("aoi2022-planar")
 WHOLE = load_robot("aoi2022")
@@ -37,22 +38,6 @@ def test_everything_that_makes_a_trial_is_in_its_name():
     # The robot's own name and the provenance of its numbers change no walk.
     renamed = dataclasses.replace(BASE, robot=ROBOT.with_(name="other", provenance={}))
     assert renamed.file_name == BASE.file_name
-
-
-def test_records_are_read_back_and_damaged_ones_walked_again(tmp_path):
-    trials = [dataclasses.replace(BASE, seed=seed) for seed in range(4)]
-    walked = run(trials, tmp_path)
-    files = [tmp_path / trial.file_name for trial in trials]
-    whole = [file.read_bytes() for file in files]
-    files[0].write_bytes(whole[0][: len(whole[0]) // 2])
-    files[1].write_bytes(b"")
-    files[2].write_bytes(b"no record")
-    kept = files[3].stat().st_mtime_ns
-    again = run(trials, tmp_path)
-    assert all(a.equals(b) for a, b in zip(walked, again, strict=True))
-    assert [file.read_bytes() for file in files] == whole
-    assert files[3].stat().st_mtime_ns == kept
-    assert {file.name for file in tmp_path.iterdir()} == {file.name for file in files}
 
 
 def test_the_same_trial_twice_is_walked_once():
@@ -88,3 +73,43 @@ def test_a_trial_of_the_twin_is_not_one_of_the_planar_model():
     other = Trial(WHOLE, 1.0, engine="twin")
     assert one.file_name != other.file_name
     assert other.file_name.startswith("twin-")
+
+
+def test_an_engine_that_is_not_there_or_does_not_know_the_robot_is_refused():
+    with pytest.raises(ParameterError, match="did you mean 'twin'"):
+        Trial(WHOLE, 1.0, engine="twn")
+    with pytest.raises(ParameterError, match="this robot has none"):
+        Trial(ROBOT, 1.0, engine="twin")
+    with pytest.raises(ParameterError, match="poses"):
+        Trial(ROBOT, 1.0, poses=True)
+    with pytest.raises(ParameterError, match="duration = 1000000000"):
+        Trial(ROBOT, 1e9)
+
+
+def test_a_trial_names_its_engines_version(monkeypatch):
+    trial = Trial(WHOLE, 1.0, engine="twin")
+    assert "MuJoCo" in trial.text
+    sent = pickle.dumps(trial)
+    monkeypatch.setattr(twin, "traits", dataclasses.replace(twin.traits, version="MuJoCo of tomorrow"))
+    # Who gets a trial sent finds out what it is there.
+    assert pickle.loads(sent).file_name != trial.file_name
+    assert pickle.loads(sent) == trial
+
+
+def test_batches_are_as_large_as_cores_and_memory_allow():
+    trials = [Trial(ROBOT, 1.0, seed) for seed in range(100)]
+    assert [len(batch) for batch in batches(trials, on_cores=3)] == [48, 48, 4]
+    long = [dataclasses.replace(trial, duration=3000.0) for trial in trials]
+    sizes = [len(batch) for batch in batches(long, on_cores=64)]
+    assert sum(sizes) == 100
+    assert 1 <= sizes[0] < 20
+    longer = [dataclasses.replace(trial, duration=90_000.0) for trial in trials[:3]]
+    assert [len(batch) for batch in batches(longer, on_cores=64)] == [1, 1, 1]
+
+
+def test_batches_keep_apart_what_cannot_walk_together():
+    other = dataclasses.replace(BASE, disturbance=NONE)
+    quick = dataclasses.replace(BASE, controller=LegYawController(limit=0.01))
+    stride = dataclasses.replace(BASE, robot=ROBOT.set_from_text(["gait.stride=2 cm"]))
+    spring = dataclasses.replace(BASE, robot=ROBOT.set_from_text(["springs.stiffness[0]=12 N*mm/deg"]))
+    assert [len(each) for each in batches([BASE, other, quick, stride, spring])] == [2, 1, 1, 1]

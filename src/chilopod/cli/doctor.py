@@ -128,8 +128,9 @@ def _fault(module: str) -> str:
 
 
 def _cores() -> list[Finding]:
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    found = [Finding("cores", f"{cores} to be used")]
+    from chilopod.cores import cores
+
+    found = [Finding("cores", f"{cores()} to be used")]
 
     def threads() -> Finding:
         import numba

@@ -37,7 +37,18 @@ SeedOption = Annotated[
 ]
 EngineOption = Annotated[
     str,
-    typer.Option(metavar="NAME", help="planar: the paper's model; twin: the whole robot in three dimensions (MuJoCo)."),
+    typer.Option(
+        metavar="planar|twin|MODULE:OBJECT",
+        help="The paper's model, the whole robot in three dimensions (MuJoCo), or an engine of your own.",
+    ),
+]
+ControllerOption = Annotated[
+    str | None,
+    typer.Option(metavar="MODULE:CLASS", help="A controller of your own, from this folder or an installed package."),
+]
+TrialsOption = Annotated[
+    Path | None,
+    typer.Option("--trials", metavar="FOLDER", help="Keep all trials here, and walk none that is there already."),
 ]
 RepeatsOption = Annotated[
     int, typer.Option(metavar="N", min=1, max=100_000, help="Walks, with seeds counting up from --seed.")

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from chilopod.cli.options import (
+    ControllerOption,
     EngineOption,
     ForceOption,
     JsonOption,
@@ -17,10 +19,12 @@ from chilopod.cli.options import (
     RobotArg,
     SeedOption,
     SetOption,
+    TrialsOption,
     prepared,
     print_json,
     read_robot,
 )
+from chilopod.cli.own import own_code, own_controller
 from chilopod.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -40,6 +44,8 @@ def walk(
     rate: Annotated[float | None, typer.Option(metavar="HZ", help="Samples per second, by default 100.")] = None,
     forces: Annotated[bool, typer.Option("--forces", help="Record the force on every foot.")] = False,
     engine: EngineOption = "planar",
+    controller: ControllerOption = None,
+    trials: TrialsOption = None,
     overrides: SetOption = None,
     as_json: JsonOption = False,
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE.nc", help="Write the record as netCDF.")] = None,
@@ -60,54 +66,53 @@ def walk(
         raise ParameterError("are all alike without --seed", field="repeats", value=repeats, allowed="1")
     path = None if out is None else free_path(out, force)
     from chilopod.record import RATE
-    from chilopod.trials import NONE, Disturbance, Trial, check_engine, run, summaries, together
+    from chilopod.trials import NONE, Disturbance, Trial, run, summaries, together
 
-    check_engine(engine, described)
-    disturbance = NONE if seed is None else Disturbance()
-    trials = [
-        Trial(
+    with own_code(), progress_bar() as show:
+        first = Trial(
             described,
             seconds,
-            (seed or 0) + i,
+            seed or 0,
             angles,
-            disturbance=disturbance,
+            controller=own_controller(controller),
+            disturbance=NONE if seed is None else Disturbance(),
             rate=RATE if rate is None else rate,
             forces=forces,
             engine=engine,
         )
-        for i in range(repeats)
-    ]
-    with progress_bar() as show:
-        record = together(run(trials, progress=lambda done, words: show("walk", done, words)))
+        asked = [replace(first, seed=first.seed + i) for i in range(repeats)]
+        record = together(run(asked, trials, lambda done, words: show("walk", done, words)))
+        added = creep(described, engine)
     found = summaries(described, record)
     if path:
         write_atomic(path, netcdf(record))
         typer.echo(f"wrote {path}", err=True)
     if as_json:
-        walks = [{"seed": trial.seed, **each.as_json()} for trial, each in zip(trials, found, strict=True)]
-        result = {"robot": described.name, "engine": engine, "duration_s": seconds, "seeded": seed is not None}
-        print_json({**result, "walks": walks} | creep(described, engine))
+        walks = [{"seed": trial.seed, **each.as_json()} for trial, each in zip(asked, found, strict=True)]
+        result = {"robot": described.name, "engine": engine, "controller": controller}
+        print_json({**result, "duration_s": seconds, "seeded": seed is not None, "walks": walks} | added)
         return
     typer.echo(f"{described.name}, {engine}: {repeats} walk{'s' if repeats > 1 else ''} of {seconds:g} s")
     typer.echo("  seed    x (m)     y (m)     radius (m)  joint angles, mean of the last 5 s (deg)")
-    for trial, each in zip(trials, found, strict=True):
+    for trial, each in zip(asked, found, strict=True):
         label = "-" if seed is None else str(trial.seed)
         if each.failed:
             typer.echo(f"  {label:<6}  {each.sentence}")
             continue
         bends = "  ".join(f"{angle:+7.2f}" for angle in each.joint_angles_deg)
         typer.echo(f"  {label:<6}  {each.x:<8.3f}  {each.y:<8.3f}  {each.axis_radius:<10.4g}  {bends}")
-    for value in creep(described, engine).values():
+    for value in added.values():
         typer.echo(f"  standing feet creep like viscous ones of {value:.0f} N*s/m")
 
 
 def creep(robot: Robot, engine: str) -> dict[str, float]:
-    """How firmly the floor of the twin holds standing feet, for every run to show; nothing for another engine."""
-    if engine != "twin":
-        return {}
-    from chilopod.twin import foot_creep
+    """How firmly the floor holds standing feet, for every run to show, where the engine's feet creep."""
+    from chilopod.engine import HasFootCreep, engine_named
 
-    found = foot_creep(robot).across
+    walks = engine_named(engine)
+    if not isinstance(walks, HasFootCreep):
+        return {}
+    found = walks.foot_creep(robot).across
     return {"foot_creep_N_s_m": found} if math.isfinite(found) else {}
 
 
@@ -126,11 +131,13 @@ def turn(
     ] = "auto",
     strategy: Annotated[str, typer.Option(metavar="NAME", help="pitchfork, hopf, leg-yaw or open-loop.")] = "pitchfork",
     duration: Annotated[
-        str | None, typer.Option(metavar="TIME", help="How long; by default 1.6 times what the circle takes.")
+        str | None, typer.Option(metavar="TIME", help="How long; by default what the circle takes, and some more.")
     ] = None,
     seed: SeedOption = None,
     repeats: RepeatsOption = 1,
     engine: EngineOption = "planar",
+    controller: ControllerOption = None,
+    trials: TrialsOption = None,
     overrides: SetOption = None,
     as_json: JsonOption = False,
     out: OutOption = None,
@@ -156,7 +163,7 @@ def turn(
 
         for path in files_of_turn(folder):
             free_path(path, force)
-    with progress_bar() as show:
+    with own_code(), progress_bar() as show:
         done = walk_there(
             described,
             goal,
@@ -166,18 +173,21 @@ def turn(
             seed=seed,
             repeats=repeats,
             engine=engine,
+            controller=own_controller(controller),
+            folder=trials,
             progress=lambda part, words: show("turn", part, words),
         )
+        added = creep(described, engine)
     if folder:
         from chilopod.report.turn import write_turn
 
         for path in write_turn(done, folder):
             typer.echo(f"wrote {path}", err=True)
     if as_json:
-        print_json(done.as_json() | creep(described, engine))
+        print_json(done.as_json() | added)
         return
     _print_turn(done, seed)
-    for value in creep(described, engine).values():
+    for value in added.values():
         typer.echo(f"  standing feet creep like viscous ones of {value:.0f} N*s/m")
 
 

@@ -13,12 +13,13 @@ from chilopod.engine.contract import (
     Controller,
     Engine,
     Event,
+    HasFootCreep,
     Observation,
     Status,
     Traits,
     Walk,
 )
-from chilopod.engine.loop import event_times, steer
+from chilopod.engine.loop import Spent, event_times, steer, watched
 from chilopod.engine.named import ENGINES, controller_named, engine_named
 
 __all__ = [
@@ -29,8 +30,10 @@ __all__ = [
     "Controller",
     "Engine",
     "Event",
+    "HasFootCreep",
     "Observation",
     "Ramps",
+    "Spent",
     "Status",
     "Traits",
     "Walk",
@@ -39,4 +42,5 @@ __all__ = [
     "engine_named",
     "event_times",
     "steer",
+    "watched",
 ]

@@ -332,11 +332,11 @@ class Actuators:
 
     def _stiffness_over(self, times: Array) -> Array:
         values = np.repeat(self._start[None], len(times), axis=0)
-        ends = [*(start for start, _ in self._profiles[1:]), np.inf]
-        for (start, profile), end in zip(self._profiles, ends, strict=False):
-            # A sample at the very moment of a command is from before it.
-            here = (times > start) & (times <= end)
-            values[here] = _stiffness(profile, self.lag, times[here, None, None])
+        # A sample at the very moment of a command is from before it.
+        edges = np.searchsorted(times, [start for start, _ in self._profiles] + [np.inf], side="right")
+        for (_, profile), first, last in zip(self._profiles, edges[:-1], edges[1:], strict=True):
+            if last > first:
+                values[first:last] = _stiffness(profile, self.lag, times[first:last, None, None])
         return values
 
 

@@ -295,3 +295,19 @@ class Engine(Protocol):
         ParameterError
             If it was not saved by this engine and version, or is damaged.
         """
+
+
+class FootCreep(Protocol):
+    """How firmly a floor holds standing feet."""
+
+    @property
+    def across(self) -> float:
+        """Coefficient of the viscous friction that lets a foot creep as much, across the way, N*s/m."""
+
+
+@runtime_checkable
+class HasFootCreep(Protocol):
+    """An engine on whose floor standing feet creep."""
+
+    def foot_creep(self, robot: Robot) -> FootCreep:
+        """Measure it, for every run to show."""

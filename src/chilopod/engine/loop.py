@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import time as clock
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -20,6 +22,41 @@ _T = TypeVar("_T")
 
 _LOOKS = 10
 """Times that the progress of a walk without a controller is told."""
+
+
+@dataclass
+class Spent:
+    """Where the time of walks went.
+
+    Attributes
+    ----------
+    controller
+        In controllers, s.
+    total
+        s.
+    """
+
+    controller: float = 0.0
+    total: float = 0.0
+
+    @property
+    def share(self) -> float:
+        """Of controllers, 0 to 1."""
+        return self.controller / self.total if self.total > 0.0 else 0.0
+
+
+_watching: list[Spent] = []
+
+
+@contextmanager
+def watched() -> Iterator[Spent]:
+    """Sum up where the time of all walks goes that :func:`steer` steers in this process meanwhile."""
+    spent = Spent()
+    _watching.append(spent)
+    try:
+        yield spent
+    finally:
+        _watching[:] = [each for each in _watching if each is not spent]
 
 
 def event_times(controller: Controller, gait: Gait, duration: float) -> Iterator[tuple[float, Event]]:
@@ -87,6 +124,7 @@ def steer(
             value=bearing_noise.shape,
             allowed=f"({len(walk.robots)}, as many as events)",
         )
+    since, thought = clock.perf_counter(), 0.0
     for index, (time, event) in enumerate(event_times(controller, gait, until) if controller else ()):
         if time < begun:
             continue
@@ -97,7 +135,9 @@ def steer(
                 raise ParameterError("is for fewer events", field="bearing_noise", value=bearing_noise.shape[1])
             seen = replace(seen, bearing=(seen.bearing + bearing_noise[:, index] + np.pi) % (2.0 * np.pi) - np.pi)
         assert controller is not None
+        asked = clock.perf_counter()
         command = _answer(controller, event, seen)
+        thought += clock.perf_counter() - asked
         try:
             walk.command(command)
         except ParameterError as error:
@@ -107,6 +147,9 @@ def steer(
     for time in np.linspace(walk.time, until, _LOOKS + 1)[1:]:
         walk.advance(float(time))
         progress(time / until, f"{time:.1f} s")
+    for spent in _watching:
+        spent.controller += thought
+        spent.total += clock.perf_counter() - since
 
 
 def _answer(controller: Controller, event: Event, seen: Observation) -> Command:

@@ -42,7 +42,7 @@ def engine_named(name: str) -> Engine:
             nearest=nearest_name(name, ENGINES),
         )
     engine = _imported("engine", name)
-    missing = [each for each in ("traits", "common", "start", "resume") if not hasattr(engine, each)]
+    missing = [each for each in ("traits", "common", "initial_states", "start", "resume") if not hasattr(engine, each)]
     if missing:
         raise ParameterError(f"is no engine: it has no {missing[0]}", field="engine", value=name)
     return engine

@@ -125,7 +125,7 @@ def turning_task(
     shown
         Springs of ``paths``, N*mm/deg.
     engine
-        Of :data:`chilopod.trials.ENGINES`.
+        Of :data:`chilopod.engine.ENGINES`.
     folder
         Where records are kept, so that a study that was stopped goes on where it was.
     progress

@@ -219,7 +219,7 @@ def farther_targets(
         record = trials.together(trials.run(asked, folder))
         earliest = earliest_arrival(record)
         result = evaluate(record, earliest)
-        limit = asked[0].controller.limit if asked[0].controller else 0.0
+        limit = controller.limit if controller else 0.0
         rows["nearest"].append(result.nearest)
         rows["effort"].append(result.effort)
         rows["effort_part"].append(result.effort / (2.0 * limit**2 * earliest))

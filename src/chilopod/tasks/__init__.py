@@ -6,16 +6,16 @@ from chilopod.lazy import exports
 
 if TYPE_CHECKING:
     from chilopod.tasks.identify import identify_planar, identify_twin
-    from chilopod.tasks.radius_law import twin_radius_law
+    from chilopod.tasks.radius_law import radius_law
     from chilopod.tasks.turn import Turn, best_spring, turn
 else:
     __getattr__, __dir__ = exports(
         __name__,
         {
             "identify": ("identify_planar", "identify_twin"),
-            "radius_law": ("twin_radius_law",),
+            "radius_law": ("radius_law",),
             "turn": ("Turn", "best_spring", "turn"),
         },
     )
 
-__all__ = ["Turn", "best_spring", "identify_planar", "identify_twin", "turn", "twin_radius_law"]
+__all__ = ["Turn", "best_spring", "identify_planar", "identify_twin", "radius_law", "turn"]

@@ -1,6 +1,8 @@
-"""How tightly the twin turns with which first spring, from walks of its own: there is no exact branch to follow."""
+"""How tightly a robot turns with which first spring: by its exact branch where there is one, by walks elsewhere."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -8,8 +10,9 @@ from numpy.typing import NDArray
 
 from chilopod import units
 from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
+from chilopod.analysis.radius_law import radius_laws
 from chilopod.analysis.square_root import square_root_fit
-from chilopod.engine import Status
+from chilopod.engine import Status, engine_named
 from chilopod.errors import AnalysisError
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
@@ -26,14 +29,32 @@ _LAW_SPRINGS = (0.2, 0.3, 0.37, 0.44, 0.51, 0.59, 0.68, 0.78, 0.9)  # of the sti
 _LAW_BEND = 0.8  # rad in all, to start with
 
 
-def twin_radius_law(robot: Robot, progress: Progress = silent) -> RadiusLaw:
-    """Radius of the twin's curved walks over k1, from undisturbed walks that start bent.
+def radius_law(
+    robot: Robot, engine: str = "planar", folder: str | Path | None = None, progress: Progress = silent
+) -> RadiusLaw:
+    """Radius of the curved walks over k1, by the paper's measure of it.
+
+    An engine whose walks are those of the planar theory has the law of the exact branch. That of any other is measured
+    in undisturbed walks that start bent.
+
+    Parameters
+    ----------
+    robot
+        Its first spring does not matter.
+    engine
+        Name of an engine, see :func:`chilopod.engine.engine_named`.
+    folder
+        Where trials are kept, if anywhere.
+    progress
+        Called with the part done (0 to 1) and a few words.
 
     Raises
     ------
     AnalysisError
-        If fewer than three springs curve, or softer ones do not curve more tightly.
+        If there is no such branch; or fewer than three springs curve, or softer ones do not curve more tightly.
     """
+    if engine_named(engine).traits.exact:
+        return radius_laws(robot, progress).axis
     stiffest = units.from_si(max(robot.springs.stiffness), PAPER_UNIT)
     springs = [float(round(part * stiffest, 2)) for part in _LAW_SPRINGS]
     joints = robot.body.modules - 1
@@ -46,11 +67,11 @@ def twin_radius_law(robot: Robot, progress: Progress = silent) -> RadiusLaw:
             bend,
             disturbance=NONE,
             rate=10.0,
-            engine="twin",
+            engine=engine,
         )
         for spring in springs
     ]
-    ends = xr.concat([end_of_walk(each, robot) for each in run(asked, progress=progress)], "spring")
+    ends = xr.concat([end_of_walk(each, robot) for each in run(asked, folder, progress)], "spring")
     curved = is_curved(ends)
     if curved.sum() < 3:
         raise AnalysisError("the walks at fewer than three springs curve: there is no radius law", field="springs")

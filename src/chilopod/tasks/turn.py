@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,21 +11,19 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chilopod.analysis.parameters import K1
-from chilopod.analysis.radius_law import radius_laws
+from chilopod.engine import Controller, engine_named
+from chilopod.engine.named import check_controller, path_of
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import Criteria, Strategy, Target, earliest_arrival, evaluate, steered
-from chilopod.tasks.radius_law import twin_radius_law
-from chilopod.trials import NONE, Disturbance, Trial, check_engine, run, together
+from chilopod.tasks.radius_law import radius_law
+from chilopod.trials import NONE, Disturbance, Trial, run, together
 
 Array = NDArray[np.float64]
 
 _SOFTEST = 1.0 / 20.0  # of the stiffest spring: where a strategy without a radius law starts to look
-_TRIED = {"planar": 48, "twin": 8}  # springs a round
 _ROUNDS = 2
-# A task lasts so many times what the circle takes at the speed of the straight walk without slipping; the twin slips.
-_HASTE = {"planar": 1.6, "twin": 1.9}
 _LEAST = 5.0  # s
 _AS_NEAR = 1e-9  # m
 
@@ -39,6 +38,8 @@ class Turn:
         With the spring it walked with.
     target, strategy, engine
         What was asked for.
+    controller
+        What steered, if anything: the strategy's or one's own.
     by_law
         The spring whose settled walk has the radius of the circle to the target, the paper's k1-hat, N*m/rad; None
         where there is no such spring or none was asked for.
@@ -54,6 +55,7 @@ class Turn:
     target: Target
     strategy: Strategy
     engine: str
+    controller: Controller | None
     by_law: float | None
     stiffness: float | None
     record: xr.Dataset
@@ -70,6 +72,7 @@ class Turn:
             "robot": self.robot.name,
             "strategy": self.strategy.name,
             "engine": self.engine,
+            "controller": None if self.controller is None else path_of(self.controller),
             "target": {"bearing_rad": self.target.bearing, "distance_m": self.target.distance},
             "circle_radius_m": plain(self.target.radius),
             "spring_by_law_N_m_rad": plain(self.by_law),
@@ -99,6 +102,8 @@ def turn(
     seed: int | None = None,
     repeats: int = 1,
     engine: str = "planar",
+    controller: Controller | None = None,
+    folder: str | Path | None = None,
     progress: Progress = silent,
 ) -> Turn:
     """Walk to a target.
@@ -116,14 +121,19 @@ def turn(
         to the target in undisturbed simulated trials, which takes into account that a walk needs time to bend. Without
         leg yaw nothing bends undisturbed, and ``auto`` is ``law``.
     duration
-        s; by default 1.6 times (twin: 1.9 times) what the circle takes at the speed of the straight walk without slip.
+        s; by default what the circle takes at the speed of the straight walk without slip, times the engine's haste
+        (planar 1.6, twin 1.9).
     seed
         Of the first repeat's disturbances, the others count up from it; None for no disturbance at all.
     repeats
         How many walks.
     engine
-        Of :data:`chilopod.trials.ENGINES`. The radius law of the planar model is that of its exact branch, the
-        twin's that of trials.
+        Of :data:`chilopod.engine.ENGINES`, or one's own as ``package.module:object``. The radius law of the planar
+        model is that of its exact branch, any other's that of trials.
+    controller
+        In place of the strategy's: a frozen dataclass, see :class:`chilopod.trials.Trial`.
+    folder
+        Where all trials are kept, those of the radius law and of the search too; without one nothing is kept.
     progress
         Called with the part done (0 to 1) and a few words.
 
@@ -138,36 +148,40 @@ def turn(
         raise ParameterError("must be positive", field="repeats", value=repeats)
     if repeats > 1 and seed is None:
         raise ParameterError("are all alike without a seed", field="repeats", value=repeats, allowed="1, or a seed")
-    check_engine(engine, robot)
-    time = duration if duration is not None else _time_for(robot, target, engine)
+    traits = engine_named(engine).traits
+    engine_named(engine).common(robot)
+    if controller is not None:
+        check_controller(controller)
+    time = duration if duration is not None else _time_for(robot, target, traits.haste)
     law = None
     if isinstance(spring, str) and strategy.springs == K1:
 
         def shown(done: float, words: str) -> None:
             progress(0.4 * done, f"radius law, {words}")
 
-        law = twin_radius_law(robot, shown) if engine == "twin" else radius_laws(robot, shown).axis
+        law = radius_law(robot, engine, folder, shown)
     by_law = law.value(target.radius) if law else None
     if strategy.springs is None:
         stiffness = None
     elif not isinstance(spring, str):
         stiffness = spring
-    elif spring == "law" or not strategy.leg_yaw:
+    elif spring == "law" or not (strategy.leg_yaw or controller):
         if by_law is None:
             raise AnalysisError("only the first spring has a radius law", field="spring", value=spring)
         stiffness = by_law
     else:
         between = (float(law.values[0]), 1.5 * law.pitchfork) if law else _around(robot)
         progress(0.4, "trials with many springs")
-        stiffness = best_spring(robot, target, strategy, between, time, engine)
+        stiffness = best_spring(robot, target, strategy, between, time, engine, controller, folder)
     progress(0.9, "walk")
-    walker, controller = steered(robot, strategy, stiffness)
+    walker, chosen = steered(robot, strategy, stiffness)
+    steering = controller or chosen
     spread = Disturbance() if seed is not None else NONE
-    trial = Trial(walker, time, 0, (), target, controller, spread, engine=engine, poses=engine == "twin")
-    record = together(run([replace(trial, seed=(seed or 0) + repeat) for repeat in range(repeats)]))
+    trial = Trial(walker, time, 0, (), target, steering, spread, engine=engine, poses=traits.poses)
+    record = together(run([replace(trial, seed=(seed or 0) + repeat) for repeat in range(repeats)], folder))
     when = earliest_arrival(record)
     criteria = evaluate(record, when if np.isfinite(when) else float(record.time[-1]))
-    return Turn(walker, target, strategy, engine, by_law, stiffness, record, criteria)
+    return Turn(walker, target, strategy, engine, steering, by_law, stiffness, record, criteria)
 
 
 def best_spring(
@@ -177,10 +191,12 @@ def best_spring(
     between: tuple[float, float],
     duration: float,
     engine: str = "planar",
+    controller: Controller | None = None,
+    folder: str | Path | None = None,
 ) -> float:
     """The spring of a strategy that comes nearest to the target, by undisturbed trials on ever finer grids, N*m/rad."""
     low, high = between
-    tried = _TRIED[engine]
+    tried = engine_named(engine).traits.a_round
     values = np.geomspace(low, high, tried)
     best = 0
     for round_ in range(_ROUNDS):
@@ -188,9 +204,9 @@ def best_spring(
             values = np.linspace(values[max(best - 1, 0)], values[min(best + 1, tried - 1)], tried)
         trials = []
         for value in values:
-            walker, controller = steered(robot, strategy, float(value))
-            trials.append(Trial(walker, duration, 0, (), target, controller, NONE, rate=20.0, engine=engine))
-        record = together(run(trials))
+            walker, chosen = steered(robot, strategy, float(value))
+            trials.append(Trial(walker, duration, 0, (), target, controller or chosen, NONE, rate=20.0, engine=engine))
+        record = together(run(trials, folder))
         nearest = evaluate(record, duration).nearest
         # Of springs that do equally well the stiffest.
         best = int(np.flatnonzero(nearest <= np.nanmin(nearest) + _AS_NEAR)[-1])
@@ -202,7 +218,7 @@ def _around(robot: Robot) -> tuple[float, float]:
     return _SOFTEST * stiffest, stiffest
 
 
-def _time_for(robot: Robot, target: Target, engine: str) -> float:
+def _time_for(robot: Robot, target: Target, haste: float) -> float:
     angle = abs(target.bearing)
     arc = target.distance * (angle / np.sin(angle) if angle > 0.0 else 1.0)
-    return float(max(_LEAST, _HASTE[engine] * arc / robot.gait.speed))
+    return float(max(_LEAST, haste * arc / robot.gait.speed))

@@ -10,32 +10,37 @@ from typing import TYPE_CHECKING
 from chilopod.lazy import exports
 
 if TYPE_CHECKING:
+    from chilopod.trials.batch import batches, walked
     from chilopod.trials.disturbance import NONE, Disturbance
     from chilopod.trials.run import run, together
+    from chilopod.trials.store import Store
     from chilopod.trials.summary import AVERAGED, WalkSummary, axis_radius, mean_joint_angles, summaries
-    from chilopod.trials.trial import ENGINES, Trial, check_engine
+    from chilopod.trials.trial import Trial
 else:
     __getattr__, __dir__ = exports(
         __name__,
         {
+            "batch": ("batches", "walked"),
             "disturbance": ("NONE", "Disturbance"),
             "run": ("run", "together"),
+            "store": ("Store",),
             "summary": ("AVERAGED", "WalkSummary", "axis_radius", "mean_joint_angles", "summaries"),
-            "trial": ("ENGINES", "Trial", "check_engine"),
+            "trial": ("Trial",),
         },
     )
 
 __all__ = [
     "AVERAGED",
-    "ENGINES",
     "NONE",
     "Disturbance",
+    "Store",
     "Trial",
     "WalkSummary",
     "axis_radius",
-    "check_engine",
+    "batches",
     "mean_joint_angles",
     "run",
     "summaries",
     "together",
+    "walked",
 ]

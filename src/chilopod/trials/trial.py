@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
+from functools import cached_property
 from typing import Any
 
-from chilopod.errors import ParameterError, nearest_name
-from chilopod.record import RATE
+from chilopod.engine import Controller, engine_named
+from chilopod.engine.named import check_controller
+from chilopod.errors import ParameterError
+from chilopod.record import LONGEST, RATE, Recording, in_range
 from chilopod.robot import Robot
-from chilopod.steering import LegYawController, Target
+from chilopod.steering import Target
+from chilopod.trials.description import classes_in, is_findable, plain, robot_text
 from chilopod.trials.disturbance import Disturbance
-from chilopod.trials.store import RECORD_VERSION
 
-ENGINES = ("planar", "twin")
-"""What walks: the planar model, or the whole robot in three dimensions."""
+RECORD_VERSION = 5
+"""Goes up whenever the same trial would give another record; files of other versions are left alone."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +38,8 @@ class Trial:
     target
         Where the robot is to go, if anywhere.
     controller
-        What steers it, if anything.
+        What steers it, if anything: any frozen dataclass with ``events`` and ``act``, whose fields are plain data. Its
+        class, the text of that class and its fields are part of what the trial is.
     disturbance
         How much differs from trial to trial.
     rate
@@ -43,9 +47,15 @@ class Trial:
     forces
         Whether the record has the force on every foot.
     engine
-        One of :data:`ENGINES`.
+        One of :data:`chilopod.engine.ENGINES`, or one's own as ``package.module:object``.
     poses
-        Whether the record has the positions of all joints, to be drawn (twin only).
+        Whether the record has the positions of all joints, to be drawn, which not every engine has.
+
+    Raises
+    ------
+    ParameterError
+        If something is out of range, there is no such engine, it does not know such a robot, or the controller cannot
+        be told from others.
     """
 
     robot: Robot
@@ -53,7 +63,7 @@ class Trial:
     seed: int = 0
     joint_angles: tuple[float, ...] = ()
     target: Target | None = None
-    controller: LegYawController | None = None
+    controller: Controller | None = None
     disturbance: Disturbance = field(default_factory=Disturbance)
     rate: float = RATE
     forces: bool = False
@@ -61,54 +71,74 @@ class Trial:
     poses: bool = False
 
     def __post_init__(self) -> None:
-        check_engine(self.engine, self.robot)
+        in_range("duration", self.duration, LONGEST)
+        engine = engine_named(self.engine)
+        engine.common(self.robot)
+        if self.recording.poses and not engine.traits.poses:
+            raise ParameterError("this engine has none", field="poses", value=True, allowed="False")
+        if self.controller is not None:
+            check_controller(self.controller)
+            self.steering  # noqa: B018  (as it is now; what is in a frozen dataclass may still change)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Another process finds out anew what it makes of a trial: its versions may be others.
+        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @property
-    def description(self) -> dict[str, Any]:
-        """All of it as plain data; equal descriptions are equal trials."""
-        return {
-            "version": RECORD_VERSION,
-            "engine": self.engine,
-            # What it is called and where its numbers come from makes no difference.
-            "robot": self.robot.with_(name="robot", provenance={}).to_toml(),
-            "duration": self.duration,
-            "seed": self.seed,
-            "joint_angles": list(self.joint_angles),
-            "target": asdict(self.target) if self.target else None,
-            "controller": asdict(self.controller) if self.controller else None,
-            "disturbance": asdict(self.disturbance),
-            "rate": self.rate,
-            "forces": self.forces,
-            "poses": self.poses,
-        }
+    def recording(self) -> Recording:
+        """What is written down."""
+        return Recording(self.rate, self.forces, self.poses)
 
-    @property
+    @cached_property
+    def steering(self) -> Any:
+        """The controller as plain data, see :func:`chilopod.trials.description.plain`."""
+        return None if self.controller is None else plain(self.controller, type(self.controller).__name__)
+
+    @cached_property
+    def text(self) -> str:
+        """All of it as JSON; equal texts are equal trials."""
+        return json.dumps(
+            {
+                "version": RECORD_VERSION,
+                "engine": self.engine,
+                "engine_version": engine_named(self.engine).traits.version,
+                "robot": robot_text(self.robot),
+                "duration": self.duration,
+                "seed": self.seed,
+                "joint_angles": list(self.joint_angles),
+                "target": asdict(self.target) if self.target else None,
+                "controller": self.steering,
+                "disturbance": asdict(self.disturbance),
+                "rate": self.rate,
+                "forces": self.forces,
+                "poses": self.poses,
+            },
+            sort_keys=True,
+        )
+
+    @cached_property
     def file_name(self) -> str:
         """Of its record."""
-        text = json.dumps(self.description, sort_keys=True)
-        return f"{self.engine}-{hashlib.sha256(text.encode()).hexdigest()[:20]}.nc"
+        engine = engine_named(self.engine).traits.name
+        kind = "".join(each if each.isalnum() else "-" for each in engine)
+        return f"{kind}-{hashlib.sha256(self.text.encode()).hexdigest()[:20]}.nc"
 
+    def check_findable(self) -> None:
+        """Make sure that other processes, now or later, can find what walks and what steers: the folder of trials
+        outlives this one.
 
-def check_engine(engine: str, robot: Robot) -> None:
-    """Make sure that there is such an engine and that it knows such a robot.
-
-    Raises
-    ------
-    ParameterError
-        If not.
-    """
-    if engine not in ENGINES:
-        raise ParameterError(
-            "there is no such engine",
-            field="engine",
-            value=engine,
-            allowed=", ".join(ENGINES),
-            nearest=nearest_name(engine, ENGINES),
-        )
-    if engine == "twin" and robot.twin is None:
-        raise ParameterError(
-            "the robot has no [twin], only the planar model knows it",
-            field="engine",
-            value=engine,
-            allowed="planar, or a robot file with a [twin], such as the preset aoi2022",
-        )
+        Raises
+        ------
+        ParameterError
+            If the class of the controller, or the engine, is known to this process only.
+        """
+        for name, paths in (("controller", classes_in(self.steering)), ("engine", [self.engine])):
+            for path in paths:
+                if is_findable(path):
+                    continue
+                raise ParameterError(
+                    "is known to this process only: its trials can be neither kept nor walked elsewhere",
+                    field=name,
+                    value=path,
+                    allowed="what stands at the top of a module that can be imported, or trials without a folder",
+                )

@@ -230,11 +230,13 @@ def format(value: float, unit_text: str, digits: int | None = None) -> str:
     elif value == 0.0:
         number = "0"
     else:
-        number = _shortest(value, unit(unit_text).size)
+        number = _shortest(value, unit_text)
     return f"{number} {unit_text}" if unit_text else number
 
 
-def _shortest(value: float, size: Fraction) -> str:
+@lru_cache(maxsize=4096)
+def _shortest(value: float, unit_text: str) -> str:
+    size = unit(unit_text).size
     exact = Fraction(value) / size
     # 17 digits tell any two doubles apart in one unit; after a change of unit one more always does.
     for digits in range(1, 19):

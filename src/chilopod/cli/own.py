@@ -1,0 +1,49 @@
+"""Controllers and engines of a user's own on the command line: where they are found, and what their time is."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import typer
+
+if TYPE_CHECKING:
+    from chilopod.engine import Controller
+
+_SLOW = 0.5  # of the time of walks
+_NOTICED = 1.0  # s
+
+
+def own_controller(path: str | None) -> Controller | None:
+    """The controller of ``--controller``, if any."""
+    if path is None:
+        return None
+    from chilopod.engine import controller_named
+
+    return controller_named(path)
+
+
+@contextmanager
+def own_code() -> Iterator[None]:
+    """Find modules in the current folder too, after all others; and say at the end if controllers took most of the
+    time."""
+    from chilopod.engine import watched
+
+    here = os.getcwd()
+    added = here not in sys.path and "" not in sys.path
+    if added:
+        sys.path.append(here)
+    try:
+        with watched() as spent:
+            yield
+    finally:
+        if added:
+            sys.path.remove(here)
+    if spent.share > _SLOW and spent.controller > _NOTICED:
+        typer.echo(
+            f"the controller took {100.0 * spent.share:.0f} % of the time of all walks, {spent.controller:.1f} s",
+            err=True,
+        )

@@ -1,0 +1,138 @@
+"""Trials that walk together, in any engine."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from chilopod.cores import cores
+from chilopod.engine import engine_named, event_times, steer
+from chilopod.trials.description import file_text
+from chilopod.trials.trial import Trial
+
+Array = NDArray[np.float64]
+
+_MOST_BYTES = 256e6
+"""Of the records of a batch, about."""
+
+
+def batches(trials: Sequence[Trial], on_cores: int | None = None) -> list[list[Trial]]:
+    """Trials in groups that can walk together and take a few seconds, within so much memory.
+
+    Parameters
+    ----------
+    trials
+        In any order.
+    on_cores
+        How many cores a batch has for itself; by default all there are.
+    """
+    groups: dict[tuple[Any, ...], list[Trial]] = {}
+    for trial in trials:
+        alike = (
+            trial.engine,
+            engine_named(trial.engine).common(trial.robot),
+            trial.robot.gait,
+            trial.robot.body.modules,
+            trial.duration,
+            trial.recording,
+            trial.target is None,
+            json.dumps(trial.steering, sort_keys=True),
+            # Whether its sensors are noisy is said once for a batch.
+            trial.disturbance.bearing > 0.0,
+        )
+        groups.setdefault(alike, []).append(trial)
+    split = []
+    for group in groups.values():
+        a_core = engine_named(group[0].engine).traits.a_core
+        size = max(1, min(a_core * (on_cores or cores()), int(_MOST_BYTES / _bytes_of(group[0]))))
+        split += [group[i : i + size] for i in range(0, len(group), size)]
+    return split
+
+
+def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
+    """Walk trials of one batch.
+
+    Parameters
+    ----------
+    trials
+        Of one of :func:`batches`.
+
+    Returns
+    -------
+    The record of each, with one ``robot``, and robot file and trial in the attributes. They share memory: each is a
+    view of all.
+
+    Raises
+    ------
+    ParameterError, AnalysisError
+        If an argument is out of range, or the controller fails.
+    """
+    first = trials[0]
+    engine, seen = engine_named(first.engine), first.target is not None
+    asked = sum(1 for _ in event_times(first.controller, first.robot.gait, first.duration)) if first.controller else 0
+    drawn = [_drawn(trial, asked) for trial in trials]
+    own_noise = engine.traits.noisy
+    walk = engine.start(
+        [trial.robot for trial in trials],
+        initial=engine.initial_states(
+            first.robot, np.stack([each.joint_angles for each in drawn]), np.array([each.heading for each in drawn])
+        ),
+        friction=np.stack([each.friction for each in drawn]),
+        target=np.stack([trial.target.position for trial in trials if trial.target]) if seen else None,
+        seeds=[each.scan_seed for each in drawn] if own_noise and seen and first.disturbance.bearing > 0.0 else None,
+        record=first.recording,
+        expected=first.duration,
+    )
+    noise = None if own_noise or not asked else np.stack([each.bearing for each in drawn])
+    steer(walk, first.duration, first.controller, bearing_noise=noise)
+    return _apart(walk.to_dataset(), trials)
+
+
+def _apart(data: xr.Dataset, trials: Sequence[Trial]) -> list[xr.Dataset]:
+    """The records of single robots."""
+    # Slices are views; and to number each robot 0 afterwards would take longer than all else.
+    data = data.assign_coords(robot=np.zeros(len(trials), dtype=np.int64))
+    records = []
+    for index, trial in enumerate(trials):
+        record = data.isel(robot=slice(index, index + 1))
+        record.attrs = {**data.attrs, "robot": file_text(trial.robot), "trial": trial.text}
+        records.append(record)
+    return records
+
+
+def _bytes_of(trial: Trial) -> float:
+    """About what a trial's record takes while it walks."""
+    modules = trial.robot.body.modules
+    # A module's joint, legs and servos at every sample, as the engine has them and as they are recorded.
+    numbers = 20 * modules + (6 * modules if trial.forces else 0) + (8 * modules if trial.poses else 0)
+    return 8.0 * numbers * (trial.duration * trial.rate + 1.0)
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    joint_angles: Array
+    heading: float
+    friction: Array
+    bearing: Array
+    scan_seed: int
+
+
+def _drawn(trial: Trial, events: int) -> _Drawn:
+    """What a trial's seed makes of its disturbance; each kind has its own stream of numbers."""
+    n, spread = trial.robot.body.modules, trial.disturbance
+    streams = np.random.SeedSequence(trial.seed).spawn(5)
+    joints, heading, friction, bearing = (np.random.default_rng(each) for each in streams[:4])
+    nominal = np.array(trial.joint_angles) if trial.joint_angles else np.zeros(n - 1)
+    return _Drawn(
+        nominal + spread.joint_angle * joints.standard_normal(n - 1),
+        float(spread.heading * heading.standard_normal()),
+        np.exp(spread.friction * friction.standard_normal((n, 2))),
+        spread.bearing * bearing.standard_normal(events),
+        int(streams[4].generate_state(1)[0]),
+    )
