@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from chilopod.cli.options import (
+    ClusterOption,
     EngineOption,
     ForceOption,
     JsonOption,
@@ -20,6 +21,7 @@ from chilopod.cli.options import (
     prepared,
     print_json,
     read_robot,
+    walking_on,
 )
 from chilopod.cli.progress import progress_bar
 
@@ -40,6 +42,7 @@ def walk(
     rate: Annotated[float | None, typer.Option(metavar="HZ", help="Samples per second, by default 100.")] = None,
     forces: Annotated[bool, typer.Option("--forces", help="Record the force on every foot.")] = False,
     engine: EngineOption = "planar",
+    cluster: ClusterOption = None,
     overrides: SetOption = None,
     as_json: JsonOption = False,
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE.nc", help="Write the record as netCDF.")] = None,
@@ -77,7 +80,7 @@ def walk(
         )
         for i in range(repeats)
     ]
-    with progress_bar() as show:
+    with walking_on(cluster), progress_bar() as show:
         record = together(run(trials, progress=lambda done, words: show("walk", done, words)))
     found = summaries(described, record)
     if path:
@@ -131,6 +134,7 @@ def turn(
     seed: SeedOption = None,
     repeats: RepeatsOption = 1,
     engine: EngineOption = "planar",
+    cluster: ClusterOption = None,
     overrides: SetOption = None,
     as_json: JsonOption = False,
     out: OutOption = None,
@@ -156,7 +160,7 @@ def turn(
 
         for path in files_of_turn(folder):
             free_path(path, force)
-    with progress_bar() as show:
+    with walking_on(cluster), progress_bar() as show:
         done = walk_there(
             described,
             goal,

@@ -1,8 +1,8 @@
 """Trials: one walk each, with its conditions, its disturbances drawn from a seed, and its file.
 
-A study is a list of trials. They run in batches on all cores, each batch's records are written as soon as it is done,
-every file whole or not at all and under a name derived from all that makes the trial, so a study that was stopped in
-any way goes on where it was, and a trial that several studies share is run once.
+A study is a list of trials. They run in batches on all cores, or on a cluster, each batch's records are written as soon
+as it is done, every file whole or not at all and under a name derived from all that makes the trial, so a study that
+was stopped in any way goes on where it was, and a trial that several studies share is run once.
 """
 
 from typing import TYPE_CHECKING
@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING
 from chilopod.lazy import exports
 
 if TYPE_CHECKING:
+    from chilopod.trials.cluster import Cluster
     from chilopod.trials.disturbance import NONE, Disturbance
+    from chilopod.trials.executors import Executor, Here, using
     from chilopod.trials.run import run, together
     from chilopod.trials.summary import AVERAGED, WalkSummary, axis_radius, mean_joint_angles, summaries
     from chilopod.trials.trial import ENGINES, Trial, check_engine
@@ -18,7 +20,9 @@ else:
     __getattr__, __dir__ = exports(
         __name__,
         {
+            "cluster": ("Cluster",),
             "disturbance": ("NONE", "Disturbance"),
+            "executors": ("Executor", "Here", "using"),
             "run": ("run", "together"),
             "summary": ("AVERAGED", "WalkSummary", "axis_radius", "mean_joint_angles", "summaries"),
             "trial": ("ENGINES", "Trial", "check_engine"),
@@ -29,7 +33,10 @@ __all__ = [
     "AVERAGED",
     "ENGINES",
     "NONE",
+    "Cluster",
     "Disturbance",
+    "Executor",
+    "Here",
     "Trial",
     "WalkSummary",
     "axis_radius",
@@ -38,4 +45,5 @@ __all__ = [
     "run",
     "summaries",
     "together",
+    "using",
 ]
