@@ -24,7 +24,7 @@ from chilopod.trials import Cluster, Here, Trial, run, using
 
 KILLS = range(int(os.environ.get("CHILOPOD_KILLS", "1")))
 ROBOT = load_robot("aoi2022-planar")
-BASE = Trial(ROBOT, 30.0, target=Target(0.7, 1.3), controller=LegYawController(), rate=20.0)
+BASE = Trial(ROBOT, 15.0, target=Target(0.7, 1.3), controller=LegYawController(), rate=20.0)
 TRIALS = [replace(BASE, seed=seed) for seed in range(96)]
 PATIENCE = 30.0  # s, on a busy machine
 CONTROLLERS = '''
@@ -80,7 +80,7 @@ CLIENT = """
     if __name__ == "__main__":
         robot = load_robot("aoi2022-planar")
         asked = [
-            Trial(robot, 30.0, seed, target=Target(0.7, 1.3), controller=LegYawController(), rate=20.0)
+            Trial(robot, 15.0, seed, target=Target(0.7, 1.3), controller=LegYawController(), rate=20.0)
             for seed in range(96)
         ]
         with Cluster(2) as cluster:
