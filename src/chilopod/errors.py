@@ -83,6 +83,10 @@ class AnalysisError(ChilopodError, RuntimeError):
     """A computation cannot deliver what was asked of it."""
 
 
+class ClusterError(ChilopodError, RuntimeError):
+    """A cluster is not there, is not what this machine is, or went away."""
+
+
 def nearest_name(name: str, valid: Iterable[str]) -> str | None:
     """Return the member of `valid` most like `name`, or None when none is alike.
 

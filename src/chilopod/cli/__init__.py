@@ -88,6 +88,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             f"this is a fault of chilopod, please report it: {type(error).__name__}: {error} (--debug shows more)",
             INTERNAL_ERROR,
         )
+    if code == INTERRUPTED:  # recent versions of typer make this of a KeyboardInterrupt
+        return _fail("interrupted", INTERRUPTED)
     return code if isinstance(code, int) else 0
 
 

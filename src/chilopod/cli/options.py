@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -53,6 +54,14 @@ TrialsOption = Annotated[
 RepeatsOption = Annotated[
     int, typer.Option(metavar="N", min=1, max=100_000, help="Walks, with seeds counting up from --seed.")
 ]
+ClusterOption = Annotated[
+    str | None,
+    typer.Option(
+        "--cluster",
+        metavar="ADDRESS|N",
+        help="Trials walk on a dask cluster: the address of its scheduler, or N worker processes on this machine.",
+    ),
+]
 
 
 def new_app(help_text: str) -> typer.Typer:
@@ -65,6 +74,19 @@ def new_app(help_text: str) -> typer.Typer:
         add_completion=False,
         no_args_is_help=False,
     )
+
+
+@contextmanager
+def walking_on(cluster: str | None) -> Iterator[None]:
+    """Let trials of this block walk where ``--cluster`` says."""
+    if cluster is None:
+        yield
+        return
+    from chilopod.trials import Cluster, using
+
+    is_number = cluster.lstrip("-").isdecimal()
+    with Cluster(int(cluster) if is_number else cluster) as there, using(there):
+        yield
 
 
 def read_robot(robot: str, overrides: Sequence[str] | None) -> Robot:

@@ -7,7 +7,16 @@ from typing import Annotated
 
 import typer
 
-from chilopod.cli.options import JsonOption, SetOption, new_app, print_json, read_robot, save_json
+from chilopod.cli.options import (
+    ClusterOption,
+    JsonOption,
+    SetOption,
+    new_app,
+    print_json,
+    read_robot,
+    save_json,
+    walking_on,
+)
 from chilopod.cli.progress import progress_bar
 
 PRESET, WHOLE = "aoi2022-planar", "aoi2022"
@@ -27,6 +36,7 @@ def reproduce(
     ] = None,
     out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Where the report goes.")] = Path("report"),
     quick: Annotated[bool, typer.Option("--quick", help="Coarser sweeps, fewer trials.")] = False,
+    cluster: ClusterOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Repeat the paper with its planar model and with its robot in 3-D, and write a report beside its own numbers.
@@ -41,7 +51,7 @@ def reproduce(
     from chilopod import studies
     from chilopod.report import write_report
 
-    with progress_bar() as show:
+    with walking_on(cluster), progress_bar() as show:
         results = studies.reproduce(
             read_robot(PRESET, None),
             only,

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from chilopod.cli.options import (
+    ClusterOption,
     ControllerOption,
     EngineOption,
     ForceOption,
@@ -23,6 +24,7 @@ from chilopod.cli.options import (
     prepared,
     print_json,
     read_robot,
+    walking_on,
 )
 from chilopod.cli.own import own_code, own_controller
 from chilopod.cli.progress import progress_bar
@@ -46,6 +48,7 @@ def walk(
     engine: EngineOption = "planar",
     controller: ControllerOption = None,
     trials: TrialsOption = None,
+    cluster: ClusterOption = None,
     overrides: SetOption = None,
     as_json: JsonOption = False,
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE.nc", help="Write the record as netCDF.")] = None,
@@ -68,7 +71,7 @@ def walk(
     from chilopod.record import RATE
     from chilopod.trials import NONE, Disturbance, Trial, run, summaries, together
 
-    with own_code(), progress_bar() as show:
+    with own_code(), walking_on(cluster), progress_bar() as show:
         first = Trial(
             described,
             seconds,
@@ -138,6 +141,7 @@ def turn(
     engine: EngineOption = "planar",
     controller: ControllerOption = None,
     trials: TrialsOption = None,
+    cluster: ClusterOption = None,
     overrides: SetOption = None,
     as_json: JsonOption = False,
     out: OutOption = None,
@@ -163,7 +167,7 @@ def turn(
 
         for path in files_of_turn(folder):
             free_path(path, force)
-    with own_code(), progress_bar() as show:
+    with own_code(), walking_on(cluster), progress_bar() as show:
         done = walk_there(
             described,
             goal,

@@ -1,8 +1,8 @@
 """Trials: one walk each, with its conditions, its disturbances drawn from a seed, and its file.
 
-A study is a list of trials. They run in batches on all cores, each batch's records are written as soon as it is done,
-every file whole or not at all and under a name derived from all that makes the trial, so a study that was stopped in
-any way goes on where it was, and a trial that several studies share is run once.
+A study is a list of trials. They run in batches on all cores, or on a cluster, each batch's records are written as soon
+as it is done, every file whole or not at all and under a name derived from all that makes the trial, so a study that
+was stopped in any way goes on where it was, and a trial that several studies share is run once.
 """
 
 from typing import TYPE_CHECKING
@@ -11,7 +11,9 @@ from chilopod.lazy import exports
 
 if TYPE_CHECKING:
     from chilopod.trials.batch import batches, walked
+    from chilopod.trials.cluster import Cluster
     from chilopod.trials.disturbance import NONE, Disturbance
+    from chilopod.trials.executors import Executor, Here, using
     from chilopod.trials.run import run, together
     from chilopod.trials.store import Store
     from chilopod.trials.summary import AVERAGED, WalkSummary, axis_radius, mean_joint_angles, summaries
@@ -21,7 +23,9 @@ else:
         __name__,
         {
             "batch": ("batches", "walked"),
+            "cluster": ("Cluster",),
             "disturbance": ("NONE", "Disturbance"),
+            "executors": ("Executor", "Here", "using"),
             "run": ("run", "together"),
             "store": ("Store",),
             "summary": ("AVERAGED", "WalkSummary", "axis_radius", "mean_joint_angles", "summaries"),
@@ -32,7 +36,10 @@ else:
 __all__ = [
     "AVERAGED",
     "NONE",
+    "Cluster",
     "Disturbance",
+    "Executor",
+    "Here",
     "Store",
     "Trial",
     "WalkSummary",
@@ -42,5 +49,6 @@ __all__ = [
     "run",
     "summaries",
     "together",
+    "using",
     "walked",
 ]

@@ -9,7 +9,8 @@ import numpy as np
 import xarray as xr
 
 from chilopod.progress import Progress, silent
-from chilopod.trials.batch import batches, walked
+from chilopod.trials.batch import batches
+from chilopod.trials.executors import Executor, current
 from chilopod.trials.store import Store
 from chilopod.trials.trial import Trial
 
@@ -18,6 +19,7 @@ def run(
     trials: Sequence[Trial],
     folder: str | Path | None = None,
     progress: Progress = silent,
+    executor: Executor | None = None,
 ) -> list[xr.Dataset]:
     """Run trials, or read what has been run before.
 
@@ -29,6 +31,9 @@ def run(
         Where records are kept, see :class:`chilopod.trials.Store`; without one nothing is kept.
     progress
         Called with the part done (0 to 1) and a few words.
+    executor
+        What walks the batches; by default what :func:`using` says, and without that all cores of this machine. The
+        records are the same to the bit.
 
     Returns
     -------
@@ -42,14 +47,17 @@ def run(
         found = store.read(trial) if store else None
         if found is not None:
             records[name] = found
-    for batch in batches([trial for name, trial in asked.items() if name not in records]):
-        progress(len(records) / len(asked), f"{len(records)} of {len(asked)} trials")
-        for trial, record in zip(batch, walked(batch), strict=True):
+    executor = current() if executor is None else executor
+    share = executor.cut(batches([trial for name, trial in asked.items() if name not in records]))
+    progress(len(records) / max(len(asked), 1), f"{len(records)} of {len(asked)} trials")
+    for index, walked in executor.walk(share):
+        for trial, record in zip(share[index], walked, strict=True):
             if store:
                 store.write(trial, record)
             records[trial.file_name] = record
         if store:
             store.sync()
+        progress(len(records) / len(asked), f"{len(records)} of {len(asked)} trials{executor.words}")
     progress(1.0, f"{len(records)} trials")
     return [records[trial.file_name] for trial in trials]
 

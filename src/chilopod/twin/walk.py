@@ -11,6 +11,7 @@ import xarray as xr
 from mujoco.batch import Batch
 from numpy.typing import NDArray
 
+from chilopod.cores import cores
 from chilopod.engine import Actuators, Command, Observation, Ramps, Status, Traits
 from chilopod.engine.arguments import as_number, check_time
 from chilopod.engine.saved import pack
@@ -58,7 +59,7 @@ class TwinWalk:
         self._seeds, self._record, self._tolerance = seeds, record, tolerance
         self._plan = compiled(without_springs(robots[0]), bool(record and record.forces))
         plan, count = self._plan, len(robots)
-        self._batch = Batch(plan.model, count, threads)
+        self._batch = Batch(plan.model, count, threads or cores())
         self._springs = np.array([each.springs.stiffness for each in robots])
         self._batch.expand("jnt_stiffness")[:, plan.yaw_joints] = self._springs
         self._batch.expand("dof_damping")[:, plan.yaw_rates] = [each.springs.damping for each in robots]

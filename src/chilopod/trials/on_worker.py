@@ -1,0 +1,143 @@
+"""What happens on a worker of a cluster: one batch at a time, bytes in, bytes out.
+
+Nothing here imports more than it must before it is called: the scheduler, which walks nothing, reads this file too.
+"""
+
+from __future__ import annotations
+
+import pickle
+import threading
+import traceback
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from importlib import metadata
+from typing import TYPE_CHECKING, Any
+
+from chilopod.cores import use_at_most
+from chilopod.errors import ClusterError, ParameterError, one_line
+from chilopod.trials.trial import RECORD_VERSION
+
+if TYPE_CHECKING:
+    from chilopod.trials.trial import Trial
+
+PACKAGES = ("chilopod", "numpy", "numba")
+"""That have to be the same on all machines."""
+
+TWIN_PACKAGE = "mujoco-core"
+"""That has to be where there are trials of the twin."""
+
+_RECORDS = "version of records"
+_ONE_AT_A_TIME = threading.Lock()
+_PR_SET_PDEATHSIG = 1  # of prctl(2)
+
+
+def versions(packages: Sequence[str] = (*PACKAGES, TWIN_PACKAGE)) -> dict[str, str]:
+    """Of what makes a record what it is, in this process."""
+    found = {_RECORDS: str(RECORD_VERSION)}
+    for package in packages:
+        try:
+            found[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            found[package] = "none"
+    return found
+
+
+def check_versions(expected: Mapping[str, str], found: Mapping[str, str], place: str) -> None:
+    """Make sure that a worker has the versions that the client has.
+
+    Raises
+    ------
+    ClusterError
+        If one is another; says which.
+    """
+    for name, wanted in expected.items():
+        there = found.get(name, "none")
+        if there != wanted:
+            raise ClusterError(f"{name} is {there} on a worker and {wanted} here", field="cluster", value=place)
+
+
+def packed(batch: Sequence[Trial]) -> bytes:
+    """A batch as it travels to a worker: what it needs there, and its trials.
+
+    Raises
+    ------
+    ParameterError
+        If the trials cannot travel: their controller's class is not one that a module has by its name.
+    """
+    for trial in batch:
+        trial.check_findable()
+    packages = (*PACKAGES, TWIN_PACKAGE) if batch[0].engine == "twin" else PACKAGES
+    try:
+        trials = pickle.dumps(list(batch), pickle.HIGHEST_PROTOCOL)
+    except Exception as error:  # whatever a class of one's own does
+        raise _not_importable(batch[0].controller, error) from error
+    return pickle.dumps((versions(packages), trials), pickle.HIGHEST_PROTOCOL)
+
+
+def walked_there(job: bytes, place: str) -> bytes:
+    """Walk a batch on the worker that this is called on; what goes back is for :func:`unpacked`.
+
+    A fault is an answer too: raised here, dask would write its traceback on the terminal.
+    """
+    try:
+        with _ONE_AT_A_TIME:  # the batch has all threads of this worker
+            answer = pickle.dumps(_walked(job, place), pickle.HIGHEST_PROTOCOL)
+    except Exception as error:
+        error.add_note("On the worker:\n" + traceback.format_exc())
+        try:
+            answer = pickle.dumps(error, pickle.HIGHEST_PROTOCOL)
+            pickle.loads(answer)
+        except Exception:  # an exception of somebody else's that does not travel
+            answer = pickle.dumps(ClusterError(one_line(f"{type(error).__name__}: {error}")))
+    return answer
+
+
+def unpacked(answer: bytes) -> Any:
+    """The records that a worker sent, or what went wrong there."""
+    found = pickle.loads(answer)
+    if isinstance(found, Exception):
+        raise found
+    return found
+
+
+def dask_setup(worker: object) -> None:
+    """Called in every worker process that a client starts on its own machine: it dies with its client, not by Ctrl-C.
+
+    Dask sees to that too, but only between two batches: a thread of Python's does it, and compiled code holds the lock.
+    """
+    import ctypes
+    import signal
+    import sys
+
+    with suppress(ValueError):  # only the main thread may say so
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+def _walked(job: bytes, place: str) -> Any:
+    expected, packed_trials = pickle.loads(job)
+    check_versions(expected, versions(tuple(name for name in expected if name != _RECORDS)), place)
+    try:
+        trials = pickle.loads(packed_trials)
+    except Exception as error:  # whatever somebody else's module does when it is imported
+        raise _not_importable(None, error) from error
+    import numba
+    from distributed import get_worker
+
+    from chilopod.trials.batch import walked
+
+    threads = get_worker().state.nthreads
+    use_at_most(threads)
+    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
+    return walked(trials)
+
+
+def _not_importable(controller: object, error: Exception) -> ParameterError:
+    kind = type(controller)
+    return ParameterError(
+        f"cannot be imported on a worker ({one_line(f'{type(error).__name__}: {error}')})",
+        field="controller",
+        value=None if controller is None else f"{kind.__module__}:{kind.__qualname__}",
+        allowed="a class in a module that is on the path of the workers",
+    )
