@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, field, fields
 from functools import cached_property
 from typing import Any
 
+import chilopod
 from chilopod.engine import Controller, engine_named
 from chilopod.engine.named import check_controller
 from chilopod.errors import ParameterError
@@ -100,6 +101,7 @@ class Trial:
         return json.dumps(
             {
                 "version": RECORD_VERSION,
+                "chilopod": chilopod.__version__,
                 "engine": self.engine,
                 "engine_version": engine_named(self.engine).traits.version,
                 "robot": robot_text(self.robot),
