@@ -107,6 +107,15 @@ def one_line(text: str) -> str:
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in " ".join(text.split()))
 
 
+def in_words(error: BaseException) -> str:
+    """Return the kind of an exception of somebody else's and what it says, as one line."""
+    try:
+        said = str(error)
+    except Exception:  # one that cannot even be printed
+        said = ""
+    return one_line(f"{type(error).__name__}: {said}" if said else type(error).__name__)
+
+
 def _brief(value: object) -> str:
     try:
         text = repr(value)

@@ -103,7 +103,8 @@ def test_two_classes_with_equal_fields_do_not_share_a_file(tmp_path):
 def test_the_fields_of_a_controller_are_told_apart_whatever_they_are():
     values = [
         0.5, 1, 1.0, True, None, "a", (1, 2), (1, (2, 3)), np.array([1.0, 2.0]), np.array([1, 2]), Side.LEFT,
-        Side.RIGHT, Weights(), Weights(1.0), Weights(np.eye(2)), Weights(Weights()), {"a": 1.0}, {"a": (1.0,)},
+        Side.RIGHT, Weights(), Weights(1.0), Weights(np.eye(2)), Weights(Weights()), np.float32(0.5), np.float64(0.5),
+        np.int8(100), 100, np.zeros((0, 3)), np.zeros(0), -0.0, 0.0, float("nan"), float("inf"), (), ((),),
     ]  # fmt: skip
     names = [trial(Anything(value)).file_name for value in values]
     assert len(set(names)) == len(names)
@@ -121,7 +122,11 @@ def test_the_fields_of_a_controller_are_told_apart_whatever_they_are():
         (Weights, "Anything.gain"),
         ((1.0, lambda: 0), "Anything.gain[1]"),
         (Weights(bias=b"x"), "Anything.gain.bias"),
-        ({"a": object()}, "Anything.gain['a']"),
+        ({"a": 1.0}, "Anything.gain"),
+        ([1.0], "Anything.gain"),
+        (10**400, "Anything.gain"),
+        (np.longdouble(1.0), "Anything.gain"),
+        (np.array(["a"]), "Anything.gain"),
         (np.array([object()]), "Anything.gain"),
     ],
 )
@@ -192,12 +197,118 @@ class Own:
 
         names.append(trial(Own()).file_name)
         sent.append(pickle.loads(pickle.dumps(trial(Own()))).file_name)
-    assert len(set(names)) == 3
+    # The second says the same in other words.
+    assert names[0] == names[1] != names[2]
     assert sent == names
 
 
+def test_what_counts_is_the_code_that_walks_not_what_its_file_says_by_now(tmp_path, monkeypatch):
+    text = """
+from dataclasses import dataclass
+from chilopod.engine import Command, Event
+
+if YAW > 0.1:
+    @dataclass(frozen=True)
+    class Stale:
+        def events(self, gait): return [Event("now", 0.0, 0.1)]
+        def act(self, event, seen): return Command(leg_yaw=[[YAW, YAW]])
+else:
+    @dataclass(frozen=True)
+    class Stale:
+        def events(self, gait): return [Event("now", 0.0, 0.1)]
+        def act(self, event, seen): return Command(leg_yaw=[[0.05, YAW]])
+"""
+    monkeypatch.syspath_prepend(tmp_path)
+    names = []
+    for yaw in ("0.1", "0.2"):
+        (tmp_path / "stale_controller.py").write_text(text.replace("YAW", yaw))
+        sys.modules.pop("stale_controller", None)
+        sys.path_importer_cache.clear()
+        from stale_controller import Stale
+
+        (tmp_path / "stale_controller.py").write_text("nothing = 0")  # before anybody asks
+        names.append(trial(Stale()).file_name)
+    assert names[0] != names[1]
+
+
+def test_classes_without_a_text_or_a_module_are_told_apart_and_not_kept(tmp_path):
+    def made(yaw):
+        return dataclasses.make_dataclass(
+            "Made",
+            [],
+            namespace={"events": Proportional.events, "act": lambda self, event, seen: Command(leg_yaw=[[yaw, yaw]])},
+            frozen=True,
+        )()
+
+    one, other = trial(made(0.1)), trial(made(-0.1))
+    assert [float(record.command[0, 0, 0]) for record in run([one, other])] == [0.1, -0.1]
+    with pytest.raises(ParameterError, match="known to this process only"):
+        run([one], tmp_path)
+
+
+def test_an_enum_with_another_value_is_another():
+    def with_value(value):
+        kind = enum.Enum("Side", {"LEFT": value}, module=__name__, qualname="Side")
+        return trial(Anything(kind.LEFT)).text
+
+    assert with_value(1) != with_value(2)
+
+
+@dataclass(frozen=True)
+class Remembering(Proportional):
+    """Keeps count in an array of its own, as nobody should."""
+
+    kept: Any = None
+
+    def act(self, event: Event, seen: Observation):
+        self.kept[0] += 0.01
+        return Command(leg_yaw=[[self.kept[0], 0.0]])
+
+
+def test_a_controller_that_changes_itself_is_found_out(tmp_path):
+    with pytest.raises(AnalysisError, match="Remembering: changed its own fields"):
+        run([trial(Remembering(kept=np.zeros(1)))], tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "field"),
+    [
+        ({"seed": None}, "seed"),
+        ({"seed": 1.5}, "seed"),
+        ({"seed": -1}, "seed"),
+        ({"duration": "1"}, "duration"),
+        ({"duration": None}, "duration"),
+        ({"duration": 0.0}, "duration"),
+        ({"rate": "often"}, "rate"),
+        ({"joint_angles": (0.1, 0.2)}, "joint_angles"),
+        ({"joint_angles": (0.1, 0.2, 0.3, 0.4, float("nan"))}, "joint_angles"),
+        ({"target": (1.0, 1.0)}, "target"),
+        ({"forces": "yes"}, "forces"),
+        ({"engine": None}, "engine"),
+        ({"engine": "plannar"}, "engine"),
+        ({"robot": None}, "robot"),
+        ({"disturbance": 0.0}, "disturbance"),
+    ],
+)
+def test_a_trial_that_is_none_is_named(arguments, field):
+    with pytest.raises(ParameterError) as raised:
+        Trial(**{"robot": PLANAR, "duration": 1.0, **arguments})
+    assert raised.value.field == field
+    assert "\n" not in str(raised.value)
+
+
+def test_equal_trials_have_one_file_whatever_kinds_of_numbers_they_were_given():
+    one = Trial(PLANAR, 1.0, 3, (0.1, 0.0, 0.0, 0.0, 0.0), Target(0.5, 1.0), rate=20.0, forces=True)
+    other = Trial(
+        PLANAR, 1, np.int64(3), np.array([0.1, 0, 0, 0, 0]), Target(0.5, 1), rate=np.float32(20), forces=np.True_
+    )
+    assert one == other
+    assert one.file_name == other.file_name
+
+
 def test_our_own_controllers_have_a_version_instead_of_a_text():
-    assert '"code": ""' in trial(LegYawController()).text
+    assert '"class": "chilopod.steering.leg_yaw:LegYawController "' in trial(LegYawController()).text
 
 
 @pytest.mark.parametrize("engine", ["planar", "twin"])

@@ -85,7 +85,7 @@ def walking_on(cluster: str | None) -> Iterator[None]:
     from chilopod.trials import Cluster, using
 
     is_number = cluster.lstrip("-").isdecimal()
-    with Cluster(int(cluster) if is_number else cluster) as there, using(there):
+    with Cluster(int(cluster[:9]) if is_number else cluster) as there, using(there):
         yield
 
 

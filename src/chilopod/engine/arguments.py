@@ -48,7 +48,7 @@ def as_array(name: str, value: object) -> Array:
         raise ParameterError("is no array of numbers", field=name, value=value) from None
 
 
-def as_seeds(seeds: object) -> list[int] | None:
+def as_seeds(seeds: object, name: str = "seeds") -> list[int] | None:
     """Whole numbers, zero or more; None for None.
 
     Raises
@@ -63,7 +63,7 @@ def as_seeds(seeds: object) -> list[int] | None:
     except TypeError:
         whole = []
     if not whole or min(whole) < 0:
-        raise ParameterError("must be whole numbers, one a walk", field="seeds", value=seeds, allowed="0 or more")
+        raise ParameterError("must be whole numbers, one a walk", field=name, value=seeds, allowed="0 or more")
     return whole
 
 

@@ -74,8 +74,9 @@ class _Trial:
         self, which: Sequence[int] = (0, 1, 2), seeds: Sequence[int] | None = (7, 8, 9), **options: object
     ) -> Walk:
         """Some of the robots, bent, with a target."""
-        given = {"target": (0.9, 0.4), "record": Recording(rate=50.0), **options}
-        initial = self.engine.initial_states(self.robot, self.bends[list(which)], heading=0.3, position=(0.2, -0.1))
+        given = {"target": (0.9, 0.4), "record": Recording(rate=50.0), "expected": _END, **options}
+        headings, places = np.full(len(which), 0.3), np.tile([0.2, -0.1], (len(which), 1))
+        initial = self.engine.initial_states(self.robot, self.bends[list(which)], headings, places)
         chosen = None if seeds is None else [seeds[i] for i in which]
         return self.engine.start([self.robots[i] for i in which], initial=initial, seeds=chosen, **given)  # type: ignore[arg-type]
 

@@ -260,6 +260,7 @@ class Engine(Protocol):
         target: ArrayLike | None = None,
         seeds: Sequence[int] | None = None,
         record: Recording | None = Recording(),  # noqa: B008  (frozen)
+        expected: float = 0.0,
         **options: Any,
     ) -> Walk:
         """Put robots on the floor.
@@ -278,6 +279,8 @@ class Engine(Protocol):
             Of the noise of the sensors, one a walk; without them there is none.
         record
             What is written down; by default the motion, :data:`chilopod.record.RATE` times a second. None: nothing.
+        expected
+            How long the walk is likely to be, s, so that memory may be taken at once; 0: not known.
         options
             The engine's own.
 

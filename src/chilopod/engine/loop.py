@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from chilopod.engine.arguments import as_number, check_time
 from chilopod.engine.contract import Command, Controller, Event, Observation, Walk
-from chilopod.errors import AnalysisError, ChilopodError, ParameterError
+from chilopod.errors import AnalysisError, ParameterError, in_words
 from chilopod.gait import Gait
 
 Array = NDArray[np.float64]
@@ -159,10 +159,8 @@ def _answer(controller: Controller, event: Event, seen: Observation) -> Command:
 def _asked(controller: Controller, name: str, ask: Callable[[], _T]) -> _T:
     try:
         return ask()
-    except ChilopodError:
-        raise
-    except Exception as error:
-        raise AnalysisError(f"raised {type(error).__name__}: {error}", field=_of(controller, name)) from error
+    except (Exception, SystemExit) as error:  # whatever somebody else's code does
+        raise AnalysisError(f"raised {in_words(error)}", field=_of(controller, name)) from error
 
 
 def _of(controller: Controller, name: str) -> str:

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from importlib import import_module
 from typing import Any, Final
 
-from chilopod.engine.contract import Controller, Engine
-from chilopod.errors import ParameterError, nearest_name, one_line
+from chilopod.engine.contract import Array, Controller, Engine, Traits, Walk
+from chilopod.errors import AnalysisError, ChilopodError, ParameterError, in_words, nearest_name
+from chilopod.robot import Robot
 
 _MODULES: Final[Mapping[str, str]] = {"planar": "chilopod.planar", "twin": "chilopod.twin"}
 
 ENGINES: Final = tuple(_MODULES)
 """What walks: the planar model, or the whole robot in three dimensions."""
 
+_PARTS: Final = ("traits", "common", "initial_states", "start", "resume")
 _PATH: Final = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_][\w.]*")
 
 
@@ -41,11 +43,53 @@ def engine_named(name: str) -> Engine:
             allowed=f"{', '.join(ENGINES)}, or package.module:object",
             nearest=nearest_name(name, ENGINES),
         )
-    engine = _imported("engine", name)
-    missing = [each for each in ("traits", "common", "initial_states", "start", "resume") if not hasattr(engine, each)]
-    if missing:
-        raise ParameterError(f"is no engine: it has no {missing[0]}", field="engine", value=name)
-    return engine
+    return _Own(name, _imported("engine", name))
+
+
+class _Own:
+    """An engine of somebody else's: what goes wrong in it is said to be its own fault."""
+
+    def __init__(self, name: str, engine: Any) -> None:
+        if isinstance(engine, type):
+            raise ParameterError(
+                "is a class", field="engine", value=name, allowed="an object, such as one of that class"
+            )
+        missing = [each for each in _PARTS if not hasattr(engine, each)]
+        if missing:
+            raise ParameterError(f"is no engine: it has no {missing[0]}", field="engine", value=name)
+        if not isinstance(engine.traits, Traits):
+            raise ParameterError("is no engine: its traits are no chilopod.engine.Traits", field="engine", value=name)
+        self._name, self._engine = name, engine
+        self.traits: Traits = engine.traits
+
+    def common(self, robot: Robot) -> Hashable:
+        shared = self._blamed("common", robot)
+        try:
+            hash(shared)
+        except TypeError:
+            raise AnalysisError("common gave what has no hash", field=f"engine {self._name}") from None
+        return shared
+
+    def initial_states(self, *arguments: Any, **named: Any) -> Array:
+        return self._blamed("initial_states", *arguments, **named)
+
+    def start(self, *arguments: Any, **named: Any) -> Walk:
+        walk = self._blamed("start", *arguments, **named)
+        if not isinstance(walk, Walk):
+            raise AnalysisError("start gave no chilopod.engine.Walk", field=f"engine {self._name}")
+        return walk
+
+    def resume(self, saved: bytes) -> Walk:
+        walk: Walk = self._blamed("resume", saved)
+        return walk
+
+    def _blamed(self, name: str, *arguments: Any, **named: Any) -> Any:
+        try:
+            return getattr(self._engine, name)(*arguments, **named)
+        except ChilopodError:
+            raise
+        except (Exception, SystemExit) as error:
+            raise AnalysisError(f"{name} raised {in_words(error)}", field=f"engine {self._name}") from error
 
 
 def controller_named(path: str) -> Controller:
@@ -63,9 +107,9 @@ def controller_named(path: str) -> Controller:
         controller: Controller = made()
     except ParameterError:
         raise
-    except Exception as error:  # it is somebody else's code
+    except (Exception, SystemExit) as error:  # it is somebody else's code
         raise ParameterError(
-            f"cannot be made: {one_line(f'{type(error).__name__}: {error}')}",
+            f"cannot be made: {in_words(error)}",
             field="controller",
             value=path,
             allowed="a class whose fields all have defaults",
@@ -96,26 +140,24 @@ def check_controller(controller: Controller) -> None:
         )
 
 
-def path_of(thing: object) -> str:
-    """``package.module:Class`` of an object's class."""
-    kind = type(thing)
+def path_of(kind: type) -> str:
+    """``package.module:Class`` of a class."""
     return f"{kind.__module__}:{kind.__qualname__}"
 
 
 def _imported(field: str, path: str) -> Any:
     if not _PATH.fullmatch(path):
-        raise ParameterError("names nothing", field=field, value=path, allowed="package.module:Class")
+        kind = "Class" if field == "controller" else "object"
+        raise ParameterError("names nothing", field=field, value=path, allowed=f"package.module:{kind}")
     module_name, _, name = path.partition(":")
     try:
         found: Any = import_module(module_name)
-    except Exception as error:  # whatever somebody else's module does when it is imported
-        raise ParameterError(
-            f"cannot be imported: {one_line(f'{type(error).__name__}: {error}')}", field=field, value=path
-        ) from error
+    except (Exception, SystemExit) as error:  # whatever somebody else's module does when it is imported
+        raise ParameterError(f"cannot be imported: {in_words(error)}", field=field, value=path) from error
     for part in name.split("."):
         if not hasattr(found, part):
             raise ParameterError(
-                f"{module_name} has no {name}", field=field, value=path, nearest=nearest_name(part, vars(found))
+                f"{module_name} has no {name}", field=field, value=path, nearest=nearest_name(part, dir(found))
             )
         found = getattr(found, part)
     return found

@@ -93,7 +93,7 @@ def start(
 
     Parameters
     ----------
-    robots, friction, target, record
+    robots, friction, target, record, expected
         As there. Robots share gait and number of modules and may differ in all else.
     initial
         States with poses, shape (walks, 2N+4) or (2N+4,), such as :func:`initial_states` gives.
@@ -101,8 +101,6 @@ def start(
         Not used: what these robots see has no noise.
     tolerance
         Of every step, relative to max(1, |state|).
-    expected
-        How long the walk is likely to be, s; memory for its record is taken at once.
     """
     in_range("tolerance", as_number("tolerance", tolerance), 1e-2)
     given = as_robots(robots)

@@ -72,7 +72,7 @@ class Turn:
             "robot": self.robot.name,
             "strategy": self.strategy.name,
             "engine": self.engine,
-            "controller": None if self.controller is None else path_of(self.controller),
+            "controller": None if self.controller is None else path_of(type(self.controller)),
             "target": {"bearing_rad": self.target.bearing, "distance_m": self.target.distance},
             "circle_radius_m": plain(self.target.radius),
             "spring_by_law_N_m_rad": plain(self.by_law),

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from chilopod.cores import cores
 from chilopod.engine import engine_named, event_times, steer
-from chilopod.trials.description import file_text
+from chilopod.errors import AnalysisError
+from chilopod.trials.description import file_text, plain
 from chilopod.trials.trial import Trial
 
 Array = NDArray[np.float64]
@@ -91,6 +92,9 @@ def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
     )
     noise = None if own_noise or not asked else np.stack([each.bearing for each in drawn])
     steer(walk, first.duration, first.controller, bearing_noise=noise)
+    name = type(first.controller).__name__
+    if first.controller is not None and json.dumps(plain(first.controller, name)) != json.dumps(first.steering):
+        raise AnalysisError("changed its own fields while it steered, so its trials are not what they say", field=name)
     return _apart(walk.to_dataset(), trials)
 
 

@@ -8,9 +8,12 @@ from dataclasses import asdict, dataclass, field, fields
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 import chilopod
 from chilopod.engine import Controller, engine_named
-from chilopod.engine.named import check_controller
+from chilopod.engine.arguments import as_array, as_number, as_seeds
+from chilopod.engine.named import check_controller, path_of
 from chilopod.errors import ParameterError
 from chilopod.record import LONGEST, RATE, Recording, in_range
 from chilopod.robot import Robot
@@ -72,6 +75,33 @@ class Trial:
     poses: bool = False
 
     def __post_init__(self) -> None:
+        for name, kind, allowed in (
+            ("robot", Robot, "a chilopod.Robot"),
+            ("engine", str, "its name"),
+            ("target", Target | None, "a chilopod.steering.Target, or None"),
+            ("disturbance", Disturbance, "a chilopod.trials.Disturbance"),
+            ("forces", bool | np.bool_, "True or False"),
+            ("poses", bool | np.bool_, "True or False"),
+        ):
+            if not isinstance(getattr(self, name), kind):
+                raise ParameterError("is none", field=name, value=getattr(self, name), allowed=allowed)
+        angles, joints = as_array("joint_angles", self.joint_angles), self.robot.body.modules - 1
+        if angles.shape not in ((0,), (joints,)) or not np.isfinite(angles).all():
+            raise ParameterError(
+                "are none", field="joint_angles", value=self.joint_angles, allowed=f"{joints}, or none"
+            )
+        seeds = as_seeds([self.seed], "seed")
+        # Equal trials have one text, whatever kinds of numbers they were given.
+        told = {
+            "duration": as_number("duration", self.duration),
+            "seed": seeds[0] if seeds else 0,
+            "joint_angles": tuple(angles.tolist()),
+            "rate": as_number("rate", self.rate),
+            "forces": bool(self.forces),
+            "poses": bool(self.poses),
+        }
+        for name, value in told.items():
+            object.__setattr__(self, name, value)
         in_range("duration", self.duration, LONGEST)
         engine = engine_named(self.engine)
         engine.common(self.robot)
@@ -108,7 +138,7 @@ class Trial:
                 "duration": self.duration,
                 "seed": self.seed,
                 "joint_angles": list(self.joint_angles),
-                "target": asdict(self.target) if self.target else None,
+                "target": [float(self.target.bearing), float(self.target.distance)] if self.target else None,
                 "controller": self.steering,
                 "disturbance": asdict(self.disturbance),
                 "rate": self.rate,
@@ -134,10 +164,12 @@ class Trial:
         ParameterError
             If the class of the controller, or the engine, is known to this process only.
         """
-        for name, paths in (("controller", classes_in(self.steering)), ("engine", [self.engine])):
+        known_here = [path_of(kind) for kind in classes_in(self.controller) if not is_findable(kind)]
+        for name, paths in (
+            ("controller", known_here),
+            ("engine", [self.engine] if "__main__:" in self.engine else []),
+        ):
             for path in paths:
-                if is_findable(path):
-                    continue
                 raise ParameterError(
                     "is known to this process only: its trials can be neither kept nor walked elsewhere",
                     field=name,

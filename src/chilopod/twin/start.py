@@ -85,7 +85,7 @@ def start(
 
     Parameters
     ----------
-    robots, friction, record
+    robots, friction, record, expected
         As there. Robots may differ in the numbers of their springs and in nothing else.
     initial
         From :func:`initial_states`, shape (walks, nq) or (nq,).
@@ -98,8 +98,6 @@ def start(
         At most; 0 for all cores. Results are the same to the bit at any number.
     tolerance
         At which MuJoCo's solver of contact forces stops, relative.
-    expected
-        How long the walk is likely to be, s; memory for its record is taken at once.
     """
     in_range("tolerance", as_number("tolerance", tolerance), 1.0)
     if as_number("threads", threads) not in range(1 << 16):
