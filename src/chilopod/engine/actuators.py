@@ -51,63 +51,61 @@ class Ramps:
     """
 
     def __init__(self, start: Array, keep: bool = False) -> None:
-        self.goal: Array = np.array(start, dtype=np.float64)
-        self._from, self._since, self._until = self.goal, np.zeros(self.goal.shape), np.zeros(self.goal.shape)
-        self._told: list[tuple[float, Array]] | None = [(0.0, self._all())] if keep else None
+        begun = np.array(start, dtype=np.float64)
+        # Where each ramp begins and ends, and when; never written into, only replaced.
+        self._ramps = np.stack([begun, begun, 0.0 * begun, 0.0 * begun])
+        self._told: list[tuple[float, Array]] | None = [(0.0, self._ramps)] if keep else None
+
+    @property
+    def goal(self) -> Array:
+        """What was told last."""
+        return self._ramps[1]
 
     def to(self, goal: Array, now: float, within: float) -> None:
         """Move to ``goal`` (NaN: as before), from a time on, within a time, both of any unit."""
-        told = ~np.isnan(goal)
-        goal = np.where(told, goal, self.goal)
-        changed = told & ((goal != self.goal) | (now + within < self._until))
+        changed = ~np.isnan(goal) & ((goal != self.goal) | (now + within < self._ramps[3]))
         if changed.any():
-            self._from = np.where(changed, self.at(np.array([now]))[0], self._from)
-            self._since = np.where(changed, now, self._since)
-            self._until = np.where(changed, now + within, self._until)
-            self.goal = goal
+            begun = np.empty_like(self._ramps)
+            begun[0], begun[1], begun[2], begun[3] = _at(self._ramps, now), goal, now, now + within
+            self._ramps = np.where(changed, begun, self._ramps)
             if self._told is not None:
-                self._told.append((now, self._all()))
+                self._told.append((now, self._ramps))
 
     def at(self, times: Array) -> Array:
         """Values at times (T,) since the last command, shape (T, ...)."""
-        return _ramp(self._all(), times.reshape(-1, *[1] * self.goal.ndim))
+        return _at(self._ramps, times.reshape(-1, *[1] * self.goal.ndim))
 
     def over(self, times: Array) -> Array:
         """Values at any times (T,), rising, shape (T, ...); at the moment of a command they are those before it."""
-        history = self._told or [(0.0, self._all())]
+        history = self._told or [(0.0, self._ramps)]
         values = np.empty((len(times), *self.goal.shape))
         ends = np.searchsorted(times, [when for when, _ in history[1:]] + [np.inf], side="right")
         first = 0
-        for (_, told), last in zip(history, ends, strict=True):
+        for (_, ramps), last in zip(history, ends, strict=True):
             if last > first:
-                values[first:last] = _ramp(told, times[first:last].reshape(-1, *[1] * self.goal.ndim))
+                values[first:last] = _at(ramps, times[first:last].reshape(-1, *[1] * self.goal.ndim))
                 first = last
         return values
 
     def state(self) -> dict[str, Array]:
         """All there is to it, for :meth:`restore`."""
         if self._told is None:
-            return {"now": self._all()}
+            return {"now": self._ramps}
         history = np.array([each for _, each in self._told])
-        return {"now": self._all(), "times": np.array([when for when, _ in self._told]), "history": history}
+        return {"now": self._ramps, "times": np.array([when for when, _ in self._told]), "history": history}
 
     def restore(self, state: dict[str, Array]) -> None:
         """Become as another was."""
-        self._from, self.goal, self._since, self._until = state["now"]
+        self._ramps = state["now"]
         if self._told is not None:
             self._told = list(zip(state["times"].tolist(), state["history"], strict=True))
 
-    def _all(self) -> Array:
-        return np.stack([self._from, self.goal, self._since, self._until])
 
-
-def _ramp(told: Array, times: Array) -> Array:
-    start, goal, since, until = told
+def _at(ramps: Array, times: Any) -> Array:
+    start, goal, since, until = ramps
     length = until - since
-    part = np.divide(
-        times - since, length, out=np.zeros(np.broadcast_shapes(times.shape, length.shape)), where=length > 0
-    )
-    return np.where(times >= until, goal, start + np.clip(part, 0.0, 1.0) * (goal - start))
+    part = np.minimum(np.maximum((times - since) / np.where(length > 0.0, length, 1.0), 0.0), 1.0)
+    return np.where(times >= until, goal, start + part * (goal - start))
 
 
 class Actuators:
@@ -307,21 +305,23 @@ class Actuators:
 
     def _soften(self, time: float, stiffness: Array, walking: NDArray[np.bool_], within: float) -> None:
         wanted, present = np.clip(stiffness, self._softest, self._stiffest), self.profile[GOAL]
-        now, reference = self.stiffness(time), _reference(self.profile, time)
+        reference = _reference(self.profile, time)
         length = np.maximum(within, np.abs(wanted - reference) / self._fastest)
         length[length < _SAME_INSTANT] = 0.0
         # What is told the goal that it has already goes on, but is there no later than it is now told to be.
         changed = self._adjustable & walking[:, None] & ((wanted != present) | (time + length < self.profile[UNTIL]))
         if not changed.any():
             return
-        goal = np.where(changed, wanted, reference)
-        slope = np.divide(goal - reference, length, out=np.zeros_like(goal), where=length > 0.0)
-        begun = np.empty_like(self.profile)
+        goal, moves = np.where(changed, wanted, reference), length > 0.0
+        slope = np.where(moves, (goal - reference) / np.where(moves, length, 1.0), 0.0)
+        begun = np.zeros_like(self.profile)
         begun[SINCE], begun[FROM], begun[SLOPE], begun[UNTIL], begun[GOAL] = time, reference, slope, time + length, goal
-        begun[RAMPING] = now - reference + slope * self.lag
-        # As exactly for a lag much longer than the ramp.
-        caught_up = slope * self.lag * (_decay_less_one(length, self.lag) if self.lag.any() else 0.0)
-        begun[SETTLING] = np.where(length > 0.0, (now - reference) * _decay(length, self.lag) + caught_up, now - goal)
+        if self.lag.any():
+            now = self.stiffness(time)
+            begun[RAMPING] = now - reference + slope * self.lag
+            # As exactly for a lag much longer than the ramp.
+            caught_up = slope * self.lag * _decay_less_one(length, self.lag)
+            begun[SETTLING] = np.where(moves, (now - reference) * _decay(length, self.lag) + caught_up, now - goal)
         self.profile = np.where(changed, begun, self.profile)
         self.driven = self.driven | changed.any(axis=1)
         if self._keep:
