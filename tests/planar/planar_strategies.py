@@ -95,3 +95,19 @@ def nonlinear_flow(model, x, t0: float, t1: float) -> tuple[np.ndarray, np.ndarr
     beside[0] = np.nextafter(beside[0], np.inf)
     assert not np.array_equal(beside, model.orbit)
     return model.flow(beside, t0, t1)
+
+
+def energy_rate(model, x, slope, stiffness=None):
+    """d(energy)/dt along ``slope`` with fixed springs, by a complex step through the definition of the energy."""
+    springs = model.stiffness if stiffness is None else stiffness
+    robot, n, half = model.robot, model.modules, 0.5 * model.robot.module_length
+    z = x + 1e-30j * slope
+    heading = np.concatenate([[0.0], np.cumsum(z[3 : n + 2])])
+    rate = z[2] + np.concatenate([[0.0], np.cumsum(z[n + 2 :])])
+    vx, vy, total = z[0], z[1], 0.0
+    for i in range(n):
+        if i:
+            for k in (i - 1, i):
+                vx, vy = vx + half * rate[k] * np.sin(heading[k]), vy - half * rate[k] * np.cos(heading[k])
+        total += 0.5 * robot.module_mass * (vx**2 + vy**2) + 0.5 * robot.module_yaw_inertia * rate[i] ** 2
+    return (total + 0.5 * (springs * z[3 : n + 2] ** 2).sum()).imag / 1e-30

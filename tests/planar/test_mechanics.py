@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from planar_strategies import mid_interval, robots, state_of
+from planar_strategies import energy_rate, mid_interval, robots, state_of
 from scipy.integrate import solve_ivp
 
 from chilopod import Robot, load_robot
@@ -18,21 +18,6 @@ from chilopod.stability import exponents, multipliers
 PRESET = load_robot("aoi2022-planar")
 fractions = st.floats(0.0, 0.999)
 insides = st.floats(0.1, 0.9)
-
-
-def energy_rate(model, x, slope):
-    """d(energy)/dt along ``slope`` by a complex step through the definition of the energy."""
-    robot, n, half = model.robot, model.modules, 0.5 * model.robot.module_length
-    z = x + 1e-30j * slope
-    heading = np.concatenate([[0.0], np.cumsum(z[3 : n + 2])])
-    rate = z[2] + np.concatenate([[0.0], np.cumsum(z[n + 2 :])])
-    vx, vy, total = z[0], z[1], 0.0
-    for i in range(n):
-        if i:
-            for k in (i - 1, i):
-                vx, vy = vx + half * rate[k] * np.sin(heading[k]), vy - half * rate[k] * np.cos(heading[k])
-        total += 0.5 * robot.module_mass * (vx**2 + vy**2) + 0.5 * robot.module_yaw_inertia * rate[i] ** 2
-    return (total + 0.5 * (model.stiffness * z[3 : n + 2] ** 2).sum()).imag / 1e-30
 
 
 @settings(max_examples=100, deadline=None)

@@ -5,7 +5,7 @@ import pytest
 from free_bodies import FreeBodies
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from planar_strategies import mid_interval, robots, state_of
+from planar_strategies import energy_rate, mid_interval, robots, state_of
 
 from chilopod import load_robot
 from chilopod.engine import Command
@@ -38,28 +38,12 @@ def test_power_balances_while_springs_change_and_joints_are_driven(robot, seed, 
     args = (model.scalars[0], springs, model.damping, model.moments(interval[:1])[0], np.empty((joints + 1, SCRATCH)))
     rhs(float(starts[0]), x, tuple(np.array(each) for each in args), slope)
     power = powers(model, x, t, rate, springs[:, TORQUE])
-    # By central differences of the energy along the motion, in extended precision where there is any.
-    gained = _energy_rate(model, x, slope, stiffness) + 0.5 * (x[3 : joints + 3] ** 2 * rate).sum()
+    gained = energy_rate(model, x, slope, stiffness) + 0.5 * (x[3 : joints + 3] ** 2 * rate).sum()
     _, twist = module_motion(model, x)
     size = sum(abs(each) for each in (power.legs, power.floor, power.dampers, power.springs, power.drives))
     size += robot.module_mass * np.abs(twist[:, :2]).sum() * np.abs(slope[:2]).max() * model.modules
     size += (np.abs(stiffness * x[3 : joints + 3] * slope[3 : joints + 3])).sum()
     assert abs(power.total - gained) <= 1e-11 * size
-
-
-def _energy_rate(model, x, slope, stiffness):
-    """d(energy)/dt along ``slope`` with fixed springs, by a complex step through the definition of the energy."""
-    robot, n, half = model.robot, model.modules, 0.5 * model.robot.module_length
-    z = x + 1e-30j * slope
-    heading = np.concatenate([[0.0], np.cumsum(z[3 : n + 2])])
-    rate = z[2] + np.concatenate([[0.0], np.cumsum(z[n + 2 :])])
-    vx, vy, total = z[0], z[1], 0.0
-    for i in range(n):
-        if i:
-            for k in (i - 1, i):
-                vx, vy = vx + half * rate[k] * np.sin(heading[k]), vy - half * rate[k] * np.cos(heading[k])
-        total += 0.5 * robot.module_mass * (vx**2 + vy**2) + 0.5 * robot.module_yaw_inertia * rate[i] ** 2
-    return (total + 0.5 * (stiffness * z[3 : n + 2] ** 2).sum()).imag / 1e-30
 
 
 def walked(robot, within, torque=None, seconds=4.0, tolerance=1e-12, rate=100.0, goal=8.0):
