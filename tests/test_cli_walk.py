@@ -307,7 +307,7 @@ def test_an_engine_of_ones_own_walks(capsys, own):
     found, planar = printed(capsys, *arguments, "--engine", f"{own}:toy"), printed(capsys, *arguments)
     assert found["engine"] == f"{own}:toy"
     assert found["walks"] == planar["walks"]
-    assert "is no engine" in refused(capsys, "walk", ROBOT, "--engine", f"{own}:Left")
+    assert "is a class; allowed: an object" in refused(capsys, "walk", ROBOT, "--engine", f"{own}:Left")
 
 
 def test_the_engines_are_choices_in_the_help(capsys):
