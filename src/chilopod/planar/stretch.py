@@ -77,7 +77,7 @@ def walk(
         States over (samples, robots, 2N+4); what no robot reached is left alone.
     """
     for row in numba.prange(rows.size):
-        _walk_one(
+        walk_alone(
             rows[row], starts, widths, interval, sample, contact, stroke, scalars, feet, stiffness, damping, friction,
             yaw, tolerance, states, step, status, record,
         )  # fmt: skip
@@ -85,23 +85,11 @@ def walk(
 
 @njit
 def walk_alone(
-    row: int, starts: Any, widths: Any, interval: Any, sample: Any, contact: Any, stroke: Any, scalars: Any, feet: Any,
-    stiffness: Any, damping: Any, friction: Any, yaw: Any, tolerance: float, states: Any, step: Any, status: Any,
-    record: Any,
-) -> None:  # fmt: skip
-    """As :func:`walk`, for one robot on this thread: waking the others takes longer than a step of one robot."""
-    _walk_one(
-        row, starts, widths, interval, sample, contact, stroke, scalars, feet, stiffness, damping, friction, yaw,
-        tolerance, states, step, status, record,
-    )  # fmt: skip
-
-
-@njit
-def _walk_one(
     r: int, starts: Any, widths: Any, interval: Any, sample: Any, contact: Any, stroke: Any, scalars: Any, feet: Any,
     stiffness: Any, damping: Any, friction: Any, yaw: Any, tolerance: float, states: Any, step: Any, status: Any,
     record: Any,
 ) -> None:  # fmt: skip
+    """As :func:`walk`, for one robot on this thread: waking the others takes longer than a step of one robot."""
     if status[r] != WALKING:
         return
     n = contact.shape[1]
@@ -162,7 +150,7 @@ def drive(
         See :class:`chilopod.engine.Actuators`, shapes (7, robots, N-1), (robots, N-1), (robots, N-1).
     """
     for row in numba.prange(rows.size):
-        _drive_one(
+        drive_alone(
             rows[row], begins, starts, widths, interval, sample, contact, stroke, scalars, feet, profile, lag, torque,
             damping, friction, yaw, tolerance, states, step, status, record,
         )  # fmt: skip
@@ -170,23 +158,11 @@ def drive(
 
 @njit
 def drive_alone(
-    row: int, begins: Any, starts: Any, widths: Any, interval: Any, sample: Any, contact: Any, stroke: Any,
-    scalars: Any, feet: Any, profile: Any, lag: Any, torque: Any, damping: Any, friction: Any, yaw: Any,
-    tolerance: float, states: Any, step: Any, status: Any, record: Any,
-) -> None:  # fmt: skip
-    """As :func:`drive`, for one robot on this thread."""
-    _drive_one(
-        row, begins, starts, widths, interval, sample, contact, stroke, scalars, feet, profile, lag, torque, damping,
-        friction, yaw, tolerance, states, step, status, record,
-    )  # fmt: skip
-
-
-@njit
-def _drive_one(
     r: int, begins: Any, starts: Any, widths: Any, interval: Any, sample: Any, contact: Any, stroke: Any,
     scalars: Any, feet: Any, profile: Any, lag: Any, torque: Any, damping: Any, friction: Any, yaw: Any,
     tolerance: float, states: Any, step: Any, status: Any, record: Any,
 ) -> None:  # fmt: skip
+    """As :func:`drive`, for one robot on this thread."""
     if status[r] != WALKING:
         return
     n = contact.shape[1]
