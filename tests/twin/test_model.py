@@ -122,7 +122,8 @@ def test_every_constant_has_one_owner(overrides):
     # Motors: the actuators have the gains, the leg joints the inertia.
     legs = np.concatenate([compiled.leg_positions.ravel(), compiled.leg_yaw_positions]) - 1
     inertia = np.zeros(model.nv)
-    inertia[legs] = twin.joint_inertia
+    half = 0.5 * twin.timestep * twin.servo_damping  # what the step adds to a damped joint
+    inertia[legs] = max(twin.joint_inertia + half, 2.0 * half)
     np.testing.assert_array_equal(model.dof_armature, inertia)
     assert (model.actuator_gainprm[:, 0] == twin.servo_stiffness).all()
     expected = [0.0, -twin.servo_stiffness, -twin.servo_damping]
@@ -149,7 +150,8 @@ def test_contacts_are_those_of_feet_and_theirs_is_the_friction(overrides):
     assert (contact.geom1 == model.geom("floor").id).all()
     assert (contact.dim == 3).all()
     np.testing.assert_array_equal(contact.friction[:, :2], robot.twin.sliding_friction)
-    np.testing.assert_array_equal(contact.solref, np.tile([robot.twin.contact_time, 1.0], (len(contact), 1)))
+    # But for what the step changes: time constant and impedance go together.
+    np.testing.assert_allclose(contact.solref[:, 0] * contact.solimp[:, 1], 0.95 * robot.twin.contact_time, rtol=1e-12)
     # Rolled over, it falls through the floor: bodies and links touch nothing.
     data.qpos[2:7] = [0.0, 0.0, 1.0, 0.0, 0.0]
     mujoco.mj_forward(model, data)

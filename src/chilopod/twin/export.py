@@ -26,7 +26,7 @@ _NUMBERS = {
     "body": {"pos": "pos"},
     "inertial": {"pos": "ipos", "mass": "mass", "diaginertia": "inertia"},
     "joint": {name: name for name in ("pos", "axis", "stiffness", "damping", "armature")},
-    "geom": {name: name for name in ("size", "pos", "friction", "solref")},
+    "geom": {name: name for name in ("size", "pos", "friction", "solref", "solimp")},
     "site": {"size": "size", "pos": "pos"},
     "general": {"gainprm": "gainprm", "biasprm": "biasprm"},
     "key": {"qpos": "qpos", "ctrl": "ctrl"},
