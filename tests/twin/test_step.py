@@ -82,7 +82,8 @@ def test_contacts_give_way_at_a_step_as_at_a_small_one():
         # Columns of KBIP: stiffness, damping, impedance. The position's part of the reference is their product.
         stiffness, damping, impedance = data.efc_KBIP[:, :3].T
         seen.append(np.array([data.efc_R, damping, stiffness * impedance]))
-    assert seen[0].shape == seen[1].shape and seen[0].size
+    assert seen[0].shape == seen[1].shape
+    assert seen[0].size
     np.testing.assert_allclose(seen[0], seen[1], rtol=3e-3)
 
 

@@ -6,6 +6,7 @@ from chilopod.twin import gl
 gl.import_mujoco()
 
 from chilopod.twin.creep import Creep, foot_creep  # noqa: E402
+from chilopod.twin.edited import Edited  # noqa: E402
 from chilopod.twin.model import TwinModel  # noqa: E402
 from chilopod.twin.simulate import simulate  # noqa: E402
 from chilopod.twin.start import common, initial_states, resume, start, traits  # noqa: E402
@@ -13,6 +14,7 @@ from chilopod.twin.walk import TwinWalk  # noqa: E402
 
 __all__ = [
     "Creep",
+    "Edited",
     "TwinModel",
     "TwinWalk",
     "common",

@@ -11,7 +11,7 @@ the options.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 
@@ -28,6 +28,9 @@ from chilopod.twin.legs import check_reach, servo_targets, twin_of
 from chilopod.twin.step import with_step
 
 Array = NDArray[np.float64]
+
+Edit = Callable[[mujoco.MjSpec, Robot], None]
+"""Changes a robot's description for MuJoCo in place, before it is compiled."""
 
 SIDES = ("left", "right")
 
@@ -49,6 +52,8 @@ class TwinModel:
         With a twin.
     forces
         Whether to measure the force on every foot (sensors, in the order of :attr:`feet`).
+    edit
+        Makes of MuJoCo's description of the robot one's own, see :class:`chilopod.twin.Edited`.
 
     Attributes
     ----------
@@ -77,9 +82,9 @@ class TwinModel:
         If there is no such robot: legs that cannot reach, bodies that touch the floor, masses that do not add up.
     """
 
-    def __init__(self, robot: Robot, forces: bool = False) -> None:
+    def __init__(self, robot: Robot, forces: bool = False, edit: Edit | None = None) -> None:
         self.robot, self.twin = robot, twin_of(robot)
-        self.model = build(robot, forces).compile()
+        self.model = build(robot, forces, edit).compile()
         count = robot.body.modules
 
         def joint(name: str) -> int:
@@ -114,7 +119,7 @@ class TwinModel:
         return positions
 
 
-def build(robot: Robot, forces: bool = False) -> mujoco.MjSpec:
+def build(robot: Robot, forces: bool = False, edit: Edit | None = None) -> mujoco.MjSpec:
     """The robot as an editable MuJoCo description; see :class:`TwinModel`."""
     twin = twin_of(robot)
     check_reach(robot)
@@ -166,6 +171,8 @@ def build(robot: Robot, forces: bool = False) -> mujoco.MjSpec:
         for side, leg in enumerate(_legs(i)):
             _add_leg(spec, body, leg, robot, twin, side, steered=i == 0)
         parent = body
+    if edit is not None:
+        edit(spec, robot)
     try:
         with_step(spec, twin)
     except ValueError as error:  # in MuJoCo's words; ours have no better ones
@@ -183,9 +190,9 @@ def scanner_place(twin: Twin) -> Array:
 
 
 @lru_cache(maxsize=64)
-def compiled(robot: Robot, forces: bool = False) -> TwinModel:
+def compiled(robot: Robot, forces: bool = False, edit: Edit | None = None) -> TwinModel:
     """The model of a robot, shared between calls with the same arguments."""
-    return TwinModel(robot, forces)
+    return TwinModel(robot, forces, edit)
 
 
 def without_springs(robot: Robot) -> Robot:

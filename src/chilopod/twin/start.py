@@ -15,7 +15,7 @@ from chilopod.errors import ParameterError
 from chilopod.record import Recording, in_range
 from chilopod.robot import Robot
 from chilopod.twin.legs import twin_of
-from chilopod.twin.model import compiled, without_springs
+from chilopod.twin.model import Edit, compiled, without_springs
 from chilopod.twin.walk import TOLERANCE, TwinWalk
 
 Array = NDArray[np.float64]
@@ -43,6 +43,8 @@ def initial_states(
     joint_angles: ArrayLike = 0.0,
     heading: ArrayLike = 0.0,
     position: ArrayLike = (0.0, 0.0),
+    *,
+    edit: Edit | None = None,
 ) -> Array:
     """States of robots that are about to walk: at rest, feet where the gait has them at time 0.
 
@@ -56,12 +58,15 @@ def initial_states(
         Of module 1, rad, a number or shape (robots,).
     position
         Of its centre, m, shape (2,) or (robots, 2).
+    edit
+        See :class:`Edited`.
 
     Returns
     -------
     Positions of all joints (MuJoCo's ``qpos``), shape (robots, nq).
     """
-    plan, (angles, headings, places) = compiled(common(robot)), standing(robot, joint_angles, heading, position)
+    plan = compiled(common(robot), edit=edit)
+    angles, headings, places = standing(robot, joint_angles, heading, position)
     states = np.tile(plan.initial_positions(), (len(angles), 1))
     states[:, :2] = places
     states[:, 3], states[:, 6] = np.cos(0.5 * headings), np.sin(0.5 * headings)
@@ -80,6 +85,8 @@ def start(
     threads: int = 0,
     tolerance: float = TOLERANCE,
     expected: float = 0.0,
+    edit: Edit | None = None,
+    traits: Traits = traits,
 ) -> TwinWalk:
     """Put robots on the floor, see :class:`chilopod.engine.Engine`.
 
@@ -98,6 +105,8 @@ def start(
         At most; 0 for all cores. Results are the same to the bit at any number.
     tolerance
         At which MuJoCo's solver of contact forces stops, relative.
+    edit, traits
+        See :class:`Edited`.
     """
     in_range("tolerance", as_number("tolerance", tolerance), 1.0)
     if as_number("threads", threads) not in range(1 << 16):
@@ -106,7 +115,7 @@ def start(
     first = common(given[0])
     if any(common(each) != first for each in given[1:]):
         raise ParameterError("may differ in their springs only", field="robots")
-    size, n = compiled(first).model.nq, first.body.modules
+    size, n = compiled(first, edit=edit).model.nq, first.body.modules
     count, rows = rows_of(
         given, {"initial": (initial, (size,)), "friction": (friction, (n, 2)), "target": (target, (2,))}, noise
     )
@@ -114,7 +123,7 @@ def start(
     return TwinWalk(
         traits,
         given * count if len(given) == 1 else given,
-        np.tile(initial_states(given[0]), (count, 1)) if states is None else states,
+        np.tile(initial_states(given[0], edit=edit), (count, 1)) if states is None else states,
         np.ones((count, n, 2)) if rows["friction"] is None else rows["friction"],
         rows["target"],
         None if noise is None else noise * (count if len(noise) == 1 else 1),
@@ -122,10 +131,11 @@ def start(
         tolerance=tolerance,
         threads=threads,
         expected=expected,
+        edit=edit,
     )
 
 
-def resume(saved: bytes, threads: int = 0) -> TwinWalk:
+def resume(saved: bytes, threads: int = 0, *, edit: Edit | None = None, traits: Traits = traits) -> TwinWalk:
     """A walk that was saved, see :class:`chilopod.engine.Engine`; the number of threads does not matter."""
     robots, settings, arrays = unpack(traits, saved)
     with read_back():
@@ -139,6 +149,7 @@ def resume(saved: bytes, threads: int = 0) -> TwinWalk:
             None if settings["record"] is None else Recording(**settings["record"]),
             tolerance=as_number("tolerance", settings["tolerance"]),
             threads=threads,
+            edit=edit,
         )
         walk.restore(settings, arrays)
     return walk

@@ -12,8 +12,8 @@ which knows inertias only. Where h D / 2 is more than I the rate would change it
 is given h D, and stops within a step.
 
 MuJoCo scales how far a contact gives way by the inertia that the foot shows the floor. That is not to follow the step,
-so feet's impedance d is changed to keep the regularisation R = (1 - d) / d * A, and their reference acceleration with it
-(MuJoCo documentation, Computation, "Solver parameters").
+so feet's impedance d is changed to keep the regularisation R = (1 - d) / d * A, and their reference acceleration with
+it (MuJoCo documentation, Computation, "Solver parameters").
 """
 
 from __future__ import annotations

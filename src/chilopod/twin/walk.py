@@ -19,7 +19,7 @@ from chilopod.record import Recording, Samples, add_outcome, check_size, walk_re
 from chilopod.robot import Robot
 from chilopod.twin.failures import failures
 from chilopod.twin.legs import servo_targets
-from chilopod.twin.model import SIDES, compiled, silence, without_springs
+from chilopod.twin.model import SIDES, Edit, compiled, silence, without_springs
 from chilopod.twin.scanner import Scanner, rotation
 
 Array = NDArray[np.float64]
@@ -54,10 +54,11 @@ class TwinWalk:
         tolerance: float,
         threads: int,
         expected: float = 0.0,
+        edit: Edit | None = None,
     ) -> None:
         self._traits, self._robots, self._factors, self._target = traits, tuple(robots), factors, target
         self._seeds, self._record, self._tolerance = seeds, record, tolerance
-        self._plan = compiled(without_springs(robots[0]), bool(record and record.forces))
+        self._plan = compiled(without_springs(robots[0]), bool(record and record.forces), edit)
         plan, count = self._plan, len(robots)
         self._batch = Batch(plan.model, count, threads or cores())
         self._springs = np.array([each.springs.stiffness for each in robots])
