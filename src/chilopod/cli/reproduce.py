@@ -142,14 +142,14 @@ def twin(
     starts: Annotated[int, typer.Option(metavar="N", help="Searches, from different places.", min=1, max=100)] = 3,
     generations: Annotated[
         int, typer.Option(metavar="N", help="Of ten evaluations each, in every search.", min=1, max=1000)
-    ] = 9,
+    ] = 14,
     seed: Annotated[int, typer.Option(metavar="N", help="Of the search.", min=0)] = 1,
     fresh: Annotated[bool, typer.Option("--fresh", help="Begin without the constants that are known.")] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Constants of the three-dimensional robot from the paper's base series of walks, and how sure they are.
 
-    A quarter of an hour on two cores; evaluations are kept in the folder, so a search that was stopped goes on where it
+    Half an hour on two cores; evaluations are kept in the folder, so a search that was stopped goes on where it
     was. The preset aoi2022 is what this finds by default.
     """
     from chilopod.output import prepare_folder, write_atomic

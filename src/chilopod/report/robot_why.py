@@ -16,7 +16,7 @@ from chilopod.robot import Robot
 from chilopod.studies.paper import printed
 from chilopod.studies.robot_rows import printed_number
 from chilopod.studies.robot_walks import SPRINGS
-from chilopod.tasks.identify.twin_constants import FREE
+from chilopod.tasks.identify.twin_constants import FREE, parts_of
 
 _WHY = (style.Layout("AB", 4.6, widths=(1.2, 1.0)), style.Layout("A;B", 9.0))
 _SPREAD = (style.Layout("AB", 4.2, widths=(1.0, 1.1)), style.Layout("A;B", 8.2))
@@ -154,7 +154,7 @@ def _draw_spread(data: xr.Dataset, robot: Robot, narrow: bool) -> Figure:
     rows = np.arange(len(FREE))
     colors = (style.BLUE, *style.CURVES[1:])
     for index in data.set.values[::-1]:
-        parts = [each.part(value) for each, value in zip(FREE, data.constants.values[index], strict=True)]
+        parts = parts_of(data.constants.values[index])
         first = index == 0
         axes["A"].plot(
             parts,

@@ -7,6 +7,7 @@ from typing import Any
 
 from chilopod import units
 from chilopod.analysis.parameters import PAPER_UNIT
+from chilopod.steering import ARRIVAL_RADIUS, Target
 from chilopod.studies.paper import printed, printed_stiffness
 from chilopod.tasks.identify import BaseSeries, CriticalMode
 
@@ -35,7 +36,7 @@ def variant_settings() -> Mapping[str, Sequence[str]]:
 
 def base_series_data() -> BaseSeries:
     """Of the robot: walks with k2 to k5 = 41 N*mm/deg and a stride of 3 cm, straight at k1 = 75 and 41, curved at 28,
-    21, 17 and 15, set in at 34, radius 1.2 m at 26 and 0.88 m at 21.
+    21, 17 and 15, set in at 34, radius 1.2 m at 26 and 0.88 m at 21, at a speed of 0.056 m/s (:func:`walking_speed`).
 
     The tolerance is half of what the report calls agreeing.
     """
@@ -47,7 +48,21 @@ def base_series_data() -> BaseSeries:
         onset=_in_paper_unit("robot_critical_k1"),
         law=(9.7, 0.030),  # meets both printed radii
         shape=tuple(value / 2.10 for value in printed()["pitchfork"]["joint_components"]),
+        speeds={21.0: walking_speed()},
     )
+
+
+def walking_speed() -> float:
+    """How fast the robot walked, m/s; the paper prints no speed, but the time at which it was there.
+
+    In task A the target is R = 1.3 m away, psi = 45 deg to the side. The circle to it has the radius R / (2 sin psi)
+    and turns by 2 psi on the way, 1.444 m in all. The robot was within 0.15 m of the target after 23 s at the earliest:
+    1.294 m, 0.056 m/s. It walked at k1 = 21 N*mm/deg, on about that circle.
+    """
+    task = printed()["turning"]["tasks"]["A"]
+    target = Target.parse(task["target"])
+    way = 2.0 * abs(target.bearing) * target.radius - ARRIVAL_RADIUS
+    return way / units.parse(printed()["turning"]["evaluation_time"], "s")
 
 
 def _in_paper_unit(key: str) -> float:

@@ -11,7 +11,7 @@ from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.studies.fit_data import base_series_data
 from chilopod.studies.robot_rows import CHECKED, RobotRow
-from chilopod.tasks.identify.twin import base_series
+from chilopod.tasks.identify.twin_series import base_series
 from chilopod.twin.walk import TOLERANCE
 
 SPRINGS = (15.0, 17.0, 21.0, 26.0, 28.0)
@@ -24,7 +24,7 @@ ALLOWED = 0.05
 
 
 def twin_numerics(robot: Robot, quick: bool = False, progress: Progress = silent) -> xr.Dataset:
-    """Onset and radii with finer steps and a tighter solver.
+    """Onset, radii and speeds with finer steps and a tighter solver.
 
     Parameters
     ----------
@@ -37,14 +37,17 @@ def twin_numerics(robot: Robot, quick: bool = False, progress: Progress = silent
 
     Returns
     -------
-    Dataset over case and spring: ``axis_radius`` (m); over case: ``onset`` by the paper's method (N*mm/deg).
+    Dataset over case and spring: ``axis_radius`` (m) and ``speed`` of module 1 (m/s); over case: ``onset`` by the
+    paper's method (N*mm/deg).
     """
-    radii, onsets = [], []
+    radii, speeds, onsets = [], [], []
     cases = dict(list(CASES.items())[:2]) if quick else CASES
     for index, (name, (step, tolerance)) in enumerate(cases.items()):
         progress(index / len(cases), name)
         finer = robot.with_value("twin.timestep", step)
-        angles = base_series(finer, base_series_data(), SPRINGS, tolerance=tolerance)[1]
+        found = base_series(finer, base_series_data(), SPRINGS, tolerance=tolerance)
+        angles = found.bends
+        speeds.append(found.speeds)
         radii.append((robot.body.modules - 1) * robot.module_length / np.abs(angles).sum(axis=1))
         try:
             onsets.append(square_root_fit(1.0 / np.array(SPRINGS), np.abs(angles[:, 0]), resampled=0).critical)
@@ -53,6 +56,7 @@ def twin_numerics(robot: Robot, quick: bool = False, progress: Progress = silent
     return xr.Dataset(
         {
             "axis_radius": (("case", "spring"), np.array(radii), {"units": "m"}),
+            "speed": (("case", "spring"), np.array(speeds), {"units": "m/s"}),
             "onset": ("case", np.array(onsets), {"units": "N*mm/deg"}),
         },
         coords={"case": list(cases), "spring": ("spring", np.array(SPRINGS), {"units": "N*mm/deg"})},
@@ -61,24 +65,26 @@ def twin_numerics(robot: Robot, quick: bool = False, progress: Progress = silent
 
 
 def largest_move(data: xr.Dataset) -> float:
-    """Largest relative change of the onset or a radius against the first case; NaN if a walk failed."""
-    moves = [data[name].values / data[name].values[0] - 1.0 for name in ("axis_radius", "onset")]
+    """Largest relative change of the onset, a radius or a speed against the first case; NaN if a walk failed."""
+    moves = [data[name].values / data[name].values[0] - 1.0 for name in ("axis_radius", "speed", "onset")]
     return float(max(np.abs(each).max() for each in moves))
 
 
 def rows(data: xr.Dataset) -> list[RobotRow]:
     """The line of the robot's table."""
     moved = data.onset.values / data.onset.values[0] - 1.0
-    at_21 = data.axis_radius.sel(spring=21.0).values
+    at_21 = [data[name].sel(spring=21.0).values for name in ("axis_radius", "speed")]
+    radii, speeds = (each / each[0] - 1.0 for each in at_21)
     said = "; ".join(
-        f"{name}: onset {100.0 * onset:+.1f} %, radius at 21 {100.0 * radius:+.1f} %"
-        for name, onset, radius in zip(data.case.values[1:], moved[1:], (at_21 / at_21[0] - 1.0)[1:], strict=True)
+        f"{name}: onset {100.0 * onset:+.1f} %, radius at 21 {100.0 * radius:+.1f} %, speed {100.0 * speed:+.1f} %"
+        for name, onset, radius, speed in zip(data.case.values[1:], moved[1:], radii[1:], speeds[1:], strict=True)
     )
     return [
         RobotRow(
             "numerics: finer steps, tight contact solver",
             "no counterpart",
-            f"{said}; largest move of onset and radii at 15 to 28 N*mm/deg {100.0 * largest_move(data):.1f} %",
+            f"{said}; largest move of onset, and radii and speeds at 15 to 28 N*mm/deg, "
+            f"{100.0 * largest_move(data):.1f} %",
             "",
             CHECKED,
             "within" if largest_move(data) < ALLOWED else "outside",

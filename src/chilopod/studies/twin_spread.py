@@ -25,7 +25,7 @@ from chilopod.steering import ARRIVAL_RADIUS, Target, steered, strategy_named
 from chilopod.studies.curved_trials import variant_robots
 from chilopod.studies.paper import printed
 from chilopod.studies.robot_walks import undulations
-from chilopod.tasks.identify.twin import Fit, known
+from chilopod.tasks.identify.twin import known, unlike
 from chilopod.tasks.identify.twin_constants import FREE, with_constants
 from chilopod.tasks.radius_law import CURVED
 from chilopod.trials import AVERAGED, NONE, Trial
@@ -42,16 +42,6 @@ COUNT = 4
 
 _DURATION, _TASK = 45.0, 23.0  # s
 _BEND = float(np.deg2rad(5.0))
-
-
-def unlike(fits: list[Fit], count: int = COUNT) -> list[Fit]:
-    """The best fit, and those that lie farthest from it and from each other, in parts of the constants' ranges."""
-    places = np.array([[c.part(v) for c, v in zip(FREE, fit.constants, strict=True)] for fit in fits])
-    chosen = [0]
-    while len(chosen) < min(count, len(fits)):
-        apart = np.linalg.norm(places[:, None] - places[chosen], axis=2).min(axis=1)
-        chosen.append(int(apart.argmax()))
-    return [fits[i] for i in chosen]
 
 
 def twin_spread(

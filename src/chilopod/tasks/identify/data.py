@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,13 +46,15 @@ class BaseSeries:
         Springs at which the robot curves, and at which it walks straight.
     radii
         Radius of the curve (m) at some springs, in the order in which they are to be listed.
+    speeds
+        Of module 1 along its way (m/s) at some springs; none if they are not known.
     onset
         Where curves set in, by a square-root fit to the bend of joint 1 at the springs of ``curved``.
     law, shape
         Bends that evaluations begin near, roughly those of the data: all joints together
         ``law[0] * sqrt(1/k1 - law[1])`` rad, of which each joint has the share ``shape``, front to rear, (N-1,).
     tolerance
-        Of radii and onset, relative.
+        Of radii, speeds and onset, relative.
     """
 
     curved: tuple[float, ...]
@@ -61,28 +63,25 @@ class BaseSeries:
     onset: float
     law: tuple[float, float]
     shape: tuple[float, ...]
+    speeds: Mapping[float, float] = field(default_factory=dict)
     tolerance: float = 0.05
 
     @property
     def springs(self) -> tuple[float, ...]:
         """Of all walks that an evaluation runs, rising."""
-        return tuple(sorted({*self.curved, *self.straight, *self.radii}))
+        return tuple(sorted({*self.curved, *self.straight, *self.radii, *self.speeds}))
 
     @property
     def names(self) -> tuple[str, ...]:
         """What each of the :func:`residuals` is of."""
         return (
             *(f"radius at {spring:g}" for spring in self.radii),
+            *(f"speed at {spring:g}" for spring in self.speeds),
             "onset",
             *(f"straight at {spring:g}" for spring in self.straight),
             f"curved at {max(self.curved):g}",
             "steady",
         )
-
-    @property
-    def near_onset(self) -> tuple[float, ...]:
-        """The two stiffest springs at which the robot curves."""
-        return tuple(sorted({*self.curved, *self.radii}))[-2:]
 
     def start(self, springs: Sequence[float]) -> Array:
         """Joint angles that walks begin with, rad, shape (springs, N-1)."""

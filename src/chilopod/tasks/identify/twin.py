@@ -17,44 +17,43 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from cmaes import CMA
 from numpy.typing import NDArray
 
 from chilopod import units
 from chilopod.analysis.parameters import K1, stiffness
-from chilopod.analysis.square_root import square_root_fit
-from chilopod.errors import AnalysisError, ChilopodError
+from chilopod.errors import ChilopodError
 from chilopod.output import prepare_folder, write_atomic
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.tasks.identify.data import BaseSeries
 from chilopod.tasks.identify.known_fits import known_fits
-from chilopod.tasks.identify.twin_constants import FREE, with_constants
+from chilopod.tasks.identify.twin_constants import FREE, parts_of, values_at, with_constants
+from chilopod.tasks.identify.twin_series import DURATION, Series, base_series, residuals
+from chilopod.tasks.radius_law import DURATION as LONG
+from chilopod.tasks.radius_law import end_of_walk
 from chilopod.trials import Trial, run
-from chilopod.twin import initial_states, simulate
-from chilopod.twin.walk import TOLERANCE
 
 Array = NDArray[np.float64]
 
-VERSION = 2
+VERSION = 3
 """Goes up whenever the same constants would give other bends; evaluations of other versions are left alone."""
 
 GOOD = 1.0
 """A set of constants does as well as any if its misfit is below this: then each datum is within its tolerance."""
 
-_DURATION = 36.0  # s
-_AVERAGED = 4.8  # s, whole periods near the paper's 5 s
-_STEADY = 0.1  # rad that the summed bend may move between the last two averages
 _PRIOR = 0.25  # of its range: standard deviation of a constant about the middle
-_LOST = 30.0  # misfit of constants with which the robot does not walk
 _POPULATION = 10
-_PATIENCE = 100.0  # s
-_SURELY_CURVED = 0.6  # rad in all
+_NEAR = 3.5  # misfit of evaluations that a linear law is fitted to
+_REFINED, _STEPS = 12, 3  # evaluations that are refined, and steps of each
+_CLOSE = 0.5  # misfit at which that ends
+_TRIALS = 10  # from straight on, at each of two springs
 _MOST_CONFIRMED = 20
 
 
@@ -69,12 +68,15 @@ class Fit:
     bends
         Mean angle of each joint over the last 4.8 s, rad, over the springs of the series, shape (springs,
         joints); NaN where a walk failed.
+    speeds
+        Of module 1 along its way over the same time, m/s, shape (springs,).
     residuals
         Of the data in units of their tolerance, see :func:`residuals`.
     """
 
     constants: Array
     bends: Array
+    speeds: Array
     residuals: Array
 
     @property
@@ -86,14 +88,14 @@ class Fit:
     def objective(self) -> float:
         """What the search makes small: sum of the squared residuals, and of the constants' distances from the middle of
         their ranges over a quarter of them."""
-        parts = np.array([each.part(value) for each, value in zip(FREE, self.constants, strict=True)])
-        return float(np.sum(self.residuals**2) + np.sum(((parts - 0.5) / _PRIOR) ** 2))
+        return float(np.sum(self.residuals**2) + np.sum(((parts_of(self.constants) - 0.5) / _PRIOR) ** 2))
 
     def as_json(self) -> dict[str, Any]:
         """Plain numbers."""
         return {
             "constants": dict(zip([each.path for each in FREE], self.constants.tolist(), strict=True)),
             "bends_rad": self.bends.tolist(),
+            "speeds_m_s": self.speeds.tolist(),
             "residuals": self.residuals.tolist(),
             "misfit": self.misfit,
             "objective": self.objective,
@@ -157,106 +159,38 @@ class TwinIdentification:
         }
 
 
-def base_series(
-    robot: Robot,
-    data: BaseSeries,
-    springs: Sequence[float] | None = None,
-    duration: float = _DURATION,
-    tolerance: float = TOLERANCE,
-) -> Array:
-    """Bends that the walks of a series end in, begun near those that the data ask for.
-
-    Parameters
-    ----------
-    robot
-        Its first spring does not matter.
-    data
-        The series.
-    springs
-        Values of k1, N*mm/deg, if not those of the series.
-    duration
-        s.
-    tolerance
-        Of the contact solver.
-
-    Returns
-    -------
-    Mean joint angles over the last two stretches of 4.8 s, rad, shape (2, springs, joints); NaN where a walk failed.
-    """
-    springs = data.springs if springs is None else springs
-    robots = [robot.with_value(K1, stiffness(spring)) for spring in springs]
-    start = data.start(springs)
-    rate = 6.0 / robot.gait.period
-    walked = simulate(robots, duration, initial=initial_states(robot, start), rate=rate, tolerance=tolerance)
-    angles, samples = walked.joint_angle.transpose("time", "robot", "joint").values, round(_AVERAGED * rate)
-    return np.stack([angles[-2 * samples : -samples].mean(0), angles[-samples:].mean(0)])
-
-
-def residuals(robot: Robot, bends: Array, data: BaseSeries) -> Array:
-    """Computed less the data.
-
-    Parameters
-    ----------
-    robot
-        For its size.
-    bends
-        From :func:`base_series`.
-    data
-        The series.
-
-    Returns
-    -------
-    One for each of ``data.names``: radii and onset (each over the tolerance of it); bend where the robot is straight
-    beyond 0.1 rad in all (over 0.05 rad); what it lacks at the stiffest spring that curves of 0.3 rad (the same);
-    motion between the averages (over 0.1 rad).
-    """
-    springs = data.springs
-    summed = np.abs(bends[1]).sum(-1)
-    at = dict(zip(springs, summed, strict=True))
-    if not np.isfinite(bends).all():
-        return np.full(len(data.names), _LOST)
-    length = (robot.body.modules - 1) * robot.module_length
-    # Of curvatures, which are finite where a walk is straight.
-    found = [(at[k] * r / length - 1.0) / data.tolerance for k, r in data.radii.items()]
-    curved = [springs.index(k) for k in data.curved]
-    try:
-        fitted = square_root_fit(1.0 / np.array(data.curved), np.abs(bends[1, curved, 0]), resampled=0).critical
-    except AnalysisError:
-        fitted = 0.5 * data.onset
-    found.append((fitted / data.onset - 1.0) / data.tolerance)
-    found += [max(at[k] - 0.1, 0.0) / 0.05 for k in data.straight]
-    found.append(max(0.3 - at[max(data.curved)], 0.0) / 0.05)
-    moved = np.abs(bends[1].sum(-1) - bends[0].sum(-1))
-    found.append(max(float(moved.max()) - _STEADY, 0.0) / _STEADY)
-    return np.array(found)
-
-
 def evaluate(robot: Robot, constants: Array, data: BaseSeries, folder: Path | None = None) -> Fit:
     """Walk the series with a set of constants, or read what came of it before."""
     given = with_constants(robot, constants)
     series = [data.springs, data.law, data.shape]
-    text = json.dumps([VERSION, given.with_(name="robot", provenance={}).to_toml(), series, _DURATION])
+    text = json.dumps([VERSION, given.with_(name="robot", provenance={}).to_toml(), series, DURATION])
     path = None if folder is None else folder / f"{hashlib.sha256(text.encode()).hexdigest()[:20]}.json"
-    if path is not None and path.exists():
+    found = None if path is None else _read(path)
+    if found is None:
         try:
-            bends = np.array(json.loads(path.read_text())["bends"], dtype=np.float64)
-            return Fit(constants, bends[1], residuals(given, bends, data))
-        except (OSError, ValueError, KeyError):
-            pass
+            found = base_series(given, data)
+        except ChilopodError:  # legs too short, say
+            lost = np.full((len(data.springs), given.body.modules - 1), np.nan)
+            found = Series(lost, lost, lost[:, 0])
+        if path is not None:
+            kept = {name: each.tolist() for name, each in vars(found).items()}
+            write_atomic(path, json.dumps({"constants": constants.tolist(), **kept}))
+    return Fit(constants, found.bends, found.speeds, residuals(given, found, data))
+
+
+def _read(path: Path) -> Series | None:
     try:
-        bends = base_series(given, data)
-    except ChilopodError:  # legs too short, say
-        bends = np.full((2, len(data.springs), given.body.modules - 1), np.nan)
-    if path is not None:
-        write_atomic(path, json.dumps({"constants": constants.tolist(), "bends": bends.tolist()}))
-    return Fit(constants, bends[1], residuals(given, bends, data))
+        kept = json.loads(path.read_text())
+        return Series(*(np.array(kept[each.name], dtype=np.float64) for each in fields(Series)))
+    except (OSError, ValueError, KeyError):
+        return None
 
 
 def search(
     robot: Robot,
     data: BaseSeries,
     starts: int = 3,
-    generations: int = 9,
+    generations: int = 14,
     seed: int = 1,
     folder: str | Path | None = None,
     progress: Progress = silent,
@@ -287,28 +221,82 @@ def search(
     kept = None if folder is None else prepare_folder(folder)
     rng = np.random.default_rng(seed)
     fits: list[Fit] = []
-    for start in range(starts):
-        mean = np.full(len(FREE), 0.5) if start == 0 else rng.uniform(0.25, 0.75, len(FREE))
+    for number in range(starts):
+        mean = np.full(len(FREE), 0.5) if number == 0 else rng.uniform(0.25, 0.75, len(FREE))
         strategy = CMA(
             mean=mean,
             sigma=0.15,
             bounds=np.tile([0.0, 1.0], (len(FREE), 1)),
             population_size=_POPULATION,
-            seed=seed + start,
+            seed=seed + number,
         )
         for generation in range(generations):
             told = []
             for _ in range(_POPULATION):
                 parts = strategy.ask()
-                constants = np.array([each.value(part) for each, part in zip(FREE, parts, strict=True)])
-                fit = evaluate(robot, constants, data, kept)
+                fit = evaluate(robot, values_at(parts), data, kept)
                 told.append((parts, fit.objective))
                 fits.append(fit)
                 best = min(fits, key=lambda each: each.objective)
                 done = len(fits) / (starts * generations * _POPULATION)
-                progress(done, f"start {start + 1}, generation {generation + 1}: best misfit {best.misfit:.2f}")
+                progress(done, f"start {number + 1}, generation {generation + 1}: best misfit {best.misfit:.2f}")
             strategy.tell(told)
     return sorted(fits, key=lambda fit: fit.objective)
+
+
+def unlike(fits: Sequence[Fit], count: int) -> list[Fit]:
+    """The first of some fits, and those that lie farthest from it and from each other, in parts of the constants'
+    ranges."""
+    places = np.array([parts_of(fit.constants) for fit in fits])
+    chosen = [0]
+    while len(chosen) < min(count, len(fits)):
+        apart = np.linalg.norm(places[:, None] - places[chosen], axis=2).min(axis=1)
+        chosen.append(int(apart.argmax()))
+    return [fits[i] for i in chosen]
+
+
+def refined(
+    robot: Robot, data: BaseSeries, fits: Sequence[Fit], folder: Path | None = None, progress: Progress = silent
+) -> list[Fit]:
+    """Go from evaluations that are near the data to where they are met, by the shortest way.
+
+    A search says where to look; few of its evaluations meet the data closely. From those near that are most unlike each
+    other the constants are moved by damped least squares (Levenberg), along a law of the residuals that is linear in
+    the parts of their ranges: fitted to all that are near, then corrected by what each step finds (Broyden). No step
+    knows of the middle of the ranges, so what is found lies spread along the valley that the data leave open.
+
+    Parameters
+    ----------
+    robot, data, folder, progress
+        As for :func:`search`.
+    fits
+        Evaluations, best first.
+
+    Returns
+    -------
+    The evaluations that were made on the way; none if too few of those given are near.
+    """
+    near = [fit for fit in fits if fit.misfit <= _NEAR]
+    if len(near) <= 2 * len(FREE):
+        return []
+    smooth = len(data.radii) + len(data.speeds) + 1  # the other residuals are zero where they are met
+    places = np.array([parts_of(fit.constants) for fit in near])
+    off = np.array([fit.residuals[:smooth] for fit in near])
+    slopes = np.linalg.lstsq(np.c_[np.ones(len(near)), places], off, rcond=None)[0][1:].T
+    found = []
+    for number, fit in enumerate(chosen := unlike(near, _REFINED)):
+        law, here = slopes.copy(), fit
+        for _ in range(_STEPS):
+            if here.misfit <= _CLOSE:
+                break
+            place, rest = parts_of(here.constants), here.residuals[:smooth]
+            step = -np.linalg.solve(law.T @ law + np.eye(len(FREE)) / _PRIOR**2, law.T @ rest)
+            step = np.clip(place + step, 0.0, 1.0) - place
+            here = evaluate(robot, values_at(place + step), data, folder)
+            law += np.outer(here.residuals[:smooth] - rest - law @ step, step) / (step @ step)
+            found.append(here)
+        progress((number + 1) / len(chosen), f"refined {number + 1} of {len(chosen)}: misfit {here.misfit:.2f}")
+    return found
 
 
 def known() -> list[Fit]:
@@ -317,36 +305,40 @@ def known() -> list[Fit]:
         Fit(
             np.array([each["constants"][free.path] for free in FREE]),
             np.array(each["bends_rad"]),
+            np.array(each["speeds_m_s"]),
             np.array(each["residuals"]),
         )
         for each in known_fits()
     ]
 
 
-def confirmed(robot: Robot, springs: Sequence[float]) -> bool:
-    """Whether walks from straight on end in the curves that evaluations begin near: two at each of some springs
-    (N*mm/deg)."""
+def confirmed(robot: Robot, data: BaseSeries) -> bool:
+    """Whether walks from straight on end where evaluations begin near: at the stiffest spring that curves most of them
+    in a curve, to both sides, and at the softest that does not most of them straight."""
+    curves, stays = max(data.curved), min(data.straight)
     asked = [
-        Trial(robot.with_value(K1, stiffness(spring)), _PATIENCE, seed, rate=10.0, engine="twin")
-        for spring in springs
-        for seed in (1, 2)
+        Trial(robot.with_value(K1, stiffness(spring)), LONG, seed, rate=10.0, engine="twin")
+        for spring in (curves, stays)
+        for seed in range(_TRIALS)
     ]
-    ends = [np.abs(each.joint_angle.isel(robot=0)[-50:].mean("time").values).sum() for each in run(asked)]
-    return bool(min(ends) > _SURELY_CURVED)
+    ends = xr.concat([end_of_walk(record, robot) for record in run(asked)], "trial")
+    sides = ends.direction.values.reshape(2, _TRIALS)
+    bent = np.isin(sides, ("left", "right")).sum(axis=1)
+    return bool(2 * bent[0] > _TRIALS > 2 * bent[1] and {"left", "right"} <= set(sides[0]))
 
 
 def identify_twin(
     robot: Robot,
     data: BaseSeries,
     starts: int = 3,
-    generations: int = 9,
+    generations: int = 14,
     seed: int = 1,
     folder: str | Path | None = None,
     fresh: bool = False,
     progress: Progress = silent,
 ) -> TwinIdentification:
-    """Find the constants: the known ones first, then a :func:`search`, then the best of all that walk into the curve
-    from straight on, as a robot does.
+    """Find the constants: the known ones first, then a :func:`search`, whose best are :func:`refined`, then the best of
+    all that walk into the curve from straight on, as a robot does.
 
     Parameters
     ----------
@@ -357,10 +349,12 @@ def identify_twin(
     """
     kept = None if folder is None else prepare_folder(folder)
     fits = [] if fresh else [evaluate(robot, fit.constants, data, kept) for fit in known()]
-    fits += search(robot, data, starts, generations, seed, folder, lambda done, words: progress(0.95 * done, words))
+    fits += search(robot, data, starts, generations, seed, folder, lambda done, words: progress(0.85 * done, words))
+    fits.sort(key=lambda fit: fit.objective)
+    fits += refined(robot, data, fits, kept, lambda done, words: progress(0.85 + 0.1 * done, words))
     fits.sort(key=lambda fit: fit.objective)
     progress(0.95, "walks from straight on")
     for index, fit in enumerate(fits[:_MOST_CONFIRMED]):
-        if fit.misfit <= GOOD and confirmed(with_constants(robot, fit.constants), data.near_onset):
+        if fit.misfit <= GOOD and confirmed(with_constants(robot, fit.constants), data):
             return TwinIdentification(robot, data, [fit, *fits[:index], *fits[index + 1 :]])
     return TwinIdentification(robot, data, fits)

@@ -22,27 +22,18 @@ class Constant:
     path
         In the robot's description.
     low, high
-        Ends of the range, SI.
+        Ends of the range, SI; of its ratio to `per` if that is given.
     logarithmic
         Whether it is its logarithm that is searched evenly.
+    per
+        Path of another constant, before it among :data:`FREE`.
     """
 
     path: str
     low: float
     high: float
     logarithmic: bool = False
-
-    def value(self, part: float) -> float:
-        """The constant at a part (0 to 1) of its range."""
-        if self.logarithmic:
-            return float(self.low * (self.high / self.low) ** part)
-        return self.low + part * (self.high - self.low)
-
-    def part(self, value: float) -> float:
-        """The inverse of :meth:`value`."""
-        if self.logarithmic:
-            return float(np.log(value / self.low) / np.log(self.high / self.low))
-        return (value - self.low) / (self.high - self.low)
+    per: str | None = None
 
 
 FREE = (
@@ -54,20 +45,44 @@ FREE = (
     Constant("twin.clearance", 0.003, 0.015, True),
     Constant("twin.joint_inertia", 5e-4, 4e-3, True),
     Constant("twin.impedance_ratio", 1.0, 30.0, True),
+    Constant("twin.servo_damping", 0.02, 0.15, True, per="twin.servo_stiffness"),  # a time, s
 )
 """The constants that are fitted."""
 
-SERVO_TIME = 0.02
-"""s: damping of the leg servos over their stiffness, not fitted."""
+_PATHS = [each.path for each in FREE]
+_LOW, _HIGH = (np.array([getattr(each, end) for each in FREE]) for end in ("low", "high"))
+_LOGARITHMIC = np.array([each.logarithmic for each in FREE])
+
+
+def values_at(parts: Sequence[float] | Array) -> Array:
+    """Constants (SI, in the order of :data:`FREE`) at parts (0 to 1) of their ranges."""
+    part = np.asarray(parts, dtype=np.float64)
+    values: Array = np.where(_LOGARITHMIC, _LOW * (_HIGH / _LOW) ** part, _LOW + part * (_HIGH - _LOW))
+    for index, each in enumerate(FREE):
+        if each.per is not None:
+            values[index] *= values[_PATHS.index(each.per)]
+    return values
+
+
+def parts_of(values: Sequence[float] | Array) -> Array:
+    """The inverse of :func:`values_at`."""
+    ratios = np.array(values, dtype=np.float64)
+    for index, each in reversed(list(enumerate(FREE))):
+        if each.per is not None:
+            ratios[index] /= ratios[_PATHS.index(each.per)]
+    parts: Array = np.where(
+        _LOGARITHMIC, np.log(ratios / _LOW) / np.log(_HIGH / _LOW), (ratios - _LOW) / (_HIGH - _LOW)
+    )
+    return parts
 
 
 def with_constants(robot: Robot, constants: Sequence[float] | Array) -> Robot:
-    """The robot with other values of :data:`FREE`; its servos' damping follows their stiffness."""
+    """The robot with other values of :data:`FREE`."""
     for each, value in zip(FREE, constants, strict=True):
         robot = robot.with_value(each.path, float(value))
-    return robot.with_value("twin.servo_damping", SERVO_TIME * robot.get("twin.servo_stiffness"))
+    return robot
 
 
 def constants_of(robot: Robot) -> Array:
     """Its values of :data:`FREE`."""
-    return np.array([robot.get(each.path) for each in FREE])
+    return np.array([robot.get(path) for path in _PATHS])

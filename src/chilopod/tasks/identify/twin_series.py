@@ -1,0 +1,141 @@
+"""The walks that a robot's constants are fitted to: what they come to, and how far that is from the data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.analysis.parameters import K1, stiffness
+from chilopod.analysis.square_root import square_root_fit
+from chilopod.engine import Walk, engine_named
+from chilopod.errors import AnalysisError
+from chilopod.record import Recording
+from chilopod.robot import Robot
+from chilopod.tasks.identify.data import BaseSeries
+from chilopod.twin.walk import TOLERANCE
+
+Array = NDArray[np.float64]
+
+DURATION = 60.0
+"""s, of the walks."""
+
+LOST = 30.0
+"""Every residual of constants with which the robot does not walk."""
+
+_SOONER = 36.0  # s, when walks that are far off are given up
+_HOPELESS = 4.0  # misfit
+_AVERAGED = 4.8  # s, whole periods near the paper's 5 s
+_APART = 12.0  # s between the two last averages, a cycle of the slowest swing
+_STEADY = 0.1  # rad that the summed bend may move between them
+_PER_CYCLE = 10  # samples
+
+
+@dataclass(frozen=True)
+class Series:
+    """What the walks of a series come to.
+
+    Attributes
+    ----------
+    before, bends
+        Mean joint angles over 4.8 s, 12 s before the end and at the end, rad, shape (springs, joints); NaN where a walk
+        failed.
+    speeds
+        Of module 1 along its way, gait cycle by gait cycle, over the last 4.8 s, m/s, shape (springs,).
+    """
+
+    before: Array
+    bends: Array
+    speeds: Array
+
+
+def base_series(
+    robot: Robot,
+    data: BaseSeries,
+    springs: Sequence[float] | None = None,
+    tolerance: float = TOLERANCE,
+    engine: str = "twin",
+) -> Series:
+    """Walk a series, for a minute from near the bends that its data ask for.
+
+    Walks of all springs of the data that are far off after 36 s are left there.
+
+    Parameters
+    ----------
+    robot
+        Its first spring does not matter.
+    data
+        The series.
+    springs
+        Values of k1, N*mm/deg, if not those of the series.
+    tolerance
+        Of the contact solver.
+    engine
+        The twin, or one that is edited, see :class:`chilopod.twin.Edited`.
+    """
+    walks: Any = engine_named(engine)  # with arguments that only the twin knows
+    robots = [robot.with_value(K1, stiffness(spring)) for spring in springs or data.springs]
+    initial = walks.initial_states(robot, data.start(springs or data.springs))
+    record = Recording(rate=_PER_CYCLE / robot.gait.period)
+    walk: Walk = walks.start(robots, initial=initial, record=record, tolerance=tolerance, expected=DURATION)
+    if springs is None:
+        walk.advance(_SOONER)
+        early = _series(walk, robot)
+        if np.sqrt(np.mean(residuals(robot, early, data) ** 2)) > _HOPELESS:
+            return early
+    walk.advance(DURATION)
+    return _series(walk, robot)
+
+
+def _series(walk: Walk, robot: Robot) -> Series:
+    data = walk.to_dataset()
+    angles = data.joint_angle.transpose("time", "robot", "joint").values
+    cycles = round(_AVERAGED / robot.gait.period)
+    samples, apart = cycles * _PER_CYCLE, round(_APART / robot.gait.period) * _PER_CYCLE
+    places = data.position.transpose("time", "robot", "axis").values[-samples - 1 :: _PER_CYCLE]
+    steps = np.linalg.norm(np.diff(places, axis=0), axis=-1)
+    before = angles[: len(angles) - apart][-samples:]
+    return Series(before.mean(0), angles[-samples:].mean(0), steps.mean(0) / robot.gait.period)
+
+
+def residuals(robot: Robot, found: Series, data: BaseSeries) -> Array:
+    """Computed less the data.
+
+    Parameters
+    ----------
+    robot
+        For its size.
+    found
+        From :func:`base_series`.
+    data
+        The series.
+
+    Returns
+    -------
+    One for each of ``data.names``: radii, speeds and onset (each over the tolerance of it); bend where the robot is
+    straight beyond 0.1 rad in all (over 0.05 rad); what it lacks at the stiffest spring that curves of 0.3 rad (the
+    same); motion between the averages beyond 0.1 rad (over 0.1 rad).
+    """
+    springs = data.springs
+    summed = np.abs(found.bends).sum(-1)
+    at = dict(zip(springs, summed, strict=True))
+    if not np.isfinite(found.bends).all():
+        return np.full(len(data.names), LOST)
+    length = (robot.body.modules - 1) * robot.module_length
+    # Of curvatures, which are finite where a walk is straight.
+    off = [(at[k] * r / length - 1.0) / data.tolerance for k, r in data.radii.items()]
+    off += [(found.speeds[springs.index(k)] / v - 1.0) / data.tolerance for k, v in data.speeds.items()]
+    curved = [springs.index(k) for k in data.curved]
+    try:
+        fitted = square_root_fit(1.0 / np.array(data.curved), np.abs(found.bends[curved, 0]), resampled=0).critical
+    except AnalysisError:
+        fitted = 0.5 * data.onset
+    off.append((fitted / data.onset - 1.0) / data.tolerance)
+    off += [max(at[k] - 0.1, 0.0) / 0.05 for k in data.straight]
+    off.append(max(0.3 - at[max(data.curved)], 0.0) / 0.05)
+    moved = np.abs(np.abs(found.bends).sum(-1) - np.abs(found.before).sum(-1))
+    off.append(max(float(moved.max()) - _STEADY, 0.0) / _STEADY)
+    return np.array(off)
