@@ -10,14 +10,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from chilopod import units
-from chilopod.report import style
+from chilopod.report import robot_durations, style
 from chilopod.report.curved_trials import INVERSE_UNIT, errorbars, springs_above
 from chilopod.report.panel import Panel
 from chilopod.report.words import SPRING_UNIT, k, listing, number, typeset
-from chilopod.studies.paper import printed
-from chilopod.studies.robot_rows import printed_number
-from chilopod.studies.robot_walks import RobotWalks, onset, radius_at
+from chilopod.studies.robot_rows import printed_radii
+from chilopod.studies.robot_table import ONSET, percent, printed_spring
+from chilopod.studies.robot_walks import RobotWalks
+from chilopod.studies.walk_measures import onset_with_error, radius_at
 from chilopod.tasks.radius_law import is_curved
 
 Array = NDArray[np.float64]
@@ -26,7 +26,7 @@ _WALKS = (style.Layout("AB;CD", 7.4), style.Layout("A;B;C;D", 13.6))
 _ONE = (style.Layout("A", 4.0), style.Layout("A", 4.4))
 _TWO = (style.Layout("AB", 4.2), style.Layout("A;B", 8.0))
 _JOINTS = tuple(zip((style.BLACK, *style.CURVES), "os^vD", strict=False))
-_VARIANTS = tuple(zip((style.BLACK, style.BLUE, style.GREEN, style.ORANGE), "os^D", strict=True))
+_VARIANTS = tuple(zip((style.BLACK, style.BLUE, style.GREEN, style.ORANGE, style.GREY), "os^Dv", strict=True))
 _MARKED = (75.0, 41.0, 28.0, 21.0, 17.0, 15.0)
 _DASHED = (0, (4, 2))
 
@@ -36,6 +36,7 @@ def panels(found: RobotWalks) -> Iterator[Panel]:
     yield walks(found)
     yield joints(found)
     yield different(found)
+    yield robot_durations.panel(found.durations)
 
 
 def walks(found: RobotWalks) -> Panel:
@@ -58,10 +59,10 @@ def walks(found: RobotWalks) -> Panel:
             f"at each of {base.sizes['spring']} values of {k(1)}, 90\u00a0s each, angles averaged over the last "
             f"5\u00a0s as in the paper. {int(here.sum())} of {here.size} end in a curve, {lefts} to the left and "
             f"{rights} to the right. The square-root fit puts the onset at {said} {SPRING_UNIT}; the paper's "
-            f"estimate for its robot is {printed_number('pitchfork', 'robot_critical_k1'):g}.",
+            f"estimate for its robot is {printed_spring('pitchfork', 'robot_critical_k1'):g}.",
             "These are the data that the twin's unknown constants were fitted to (the printed onset, the two printed "
-            "radii, which springs walk straight and which do not), so agreement here is no surprise. What follows was "
-            "not fitted."
+            "radii, which springs walk straight and which do not; and the walking speed), so agreement here is no "
+            "surprise. What follows was not fitted."
             + (
                 f" In {unsettled} walks the bend still moved by more than 0.1 rad in the last seconds."
                 if unsettled
@@ -94,9 +95,9 @@ def joints(found: RobotWalks) -> Panel:
 def different(found: RobotWalks) -> Panel:
     """The paper's Fig. "different"."""
     said = []
-    for name, data in found.variants.items():
-        fit, paper = onset(data), printed_variant(name)
-        said.append(f"{name} {number(fit.critical, 3) if fit else 'none'} (robot: {paper:g})")
+    for title, (name, data) in _variants(found).items():
+        point, paper = onset_with_error(data)[0], printed_spring("variants", name, "robot_critical_k1")
+        said.append(f"{title} {number(point, 3) if np.isfinite(point) else 'none'} (robot: {paper:g})")
     return Panel(
         name="robot-different",
         letter="",
@@ -107,8 +108,15 @@ def different(found: RobotWalks) -> Panel:
         text=(
             "Nothing here was fitted. Where curved walks set in by the paper's method, in "
             f"{SPRING_UNIT}: {listing(said)}. "
-            "Bars in B are what counts as within: 10 % for the base series, 15 % for the variants, 20 % for springs "
-            "all alike, where the body undulates.",
+            f"Bars in B are what counts as within, {percent(ONSET)}; with all springs alike the body undulates. Radii "
+            "are shown at equal springs, at which a variant that sets in at a softer spring turns more widely by that "
+            "alone: the table compares them at equal distance from each one's own onset."
+            + (
+                " The paper does not say whether the leg tips swing as high with the shorter stride, or lower in "
+                "proportion: both are shown."
+                if found.lower_steps
+                else ""
+            ),
         ),
         data=xr.concat(
             [each.assign_coords(variant=name) for name, each in _all(found).items()],
@@ -119,16 +127,14 @@ def different(found: RobotWalks) -> Panel:
     )
 
 
-def printed_variant(name: str) -> float:
-    """Where the robot's curved walks set in, by the paper, N*mm/deg."""
-    return units.from_si(units.parse(printed()["variants"][name]["robot_critical_k1"], "N*m/rad"), SPRING)
-
-
-SPRING = "N*mm/deg"
+def _variants(found: RobotWalks) -> dict[str, tuple[str, xr.Dataset]]:
+    """Of every variant and reading of it, by what they are called here: the paper's name, and the trials."""
+    named = {name: (name, data) for name, data in found.variants.items()}
+    return named | {f"{name}, lower steps": (name, data) for name, data in found.lower_steps.items()}
 
 
 def _all(found: RobotWalks) -> dict[str, xr.Dataset]:
-    return {"as built": found.base, **found.variants}
+    return {"as built": found.base, **{title: data for title, (_, data) in _variants(found).items()}}
 
 
 def _draw_walks(found: RobotWalks, narrow: bool) -> Figure:
@@ -170,7 +176,7 @@ def _draw_fork(axes: Axes, found: RobotWalks) -> None:
     here = base.direction.values == "straight"
     mean, error = means(np.where(here, angles, np.nan))
     errorbars(axes, inverse, mean, error, style.GREY, "D", "straight")
-    onset_ = printed_number("pitchfork", "robot_critical_k1")
+    onset_ = printed_spring("pitchfork", "robot_critical_k1")
     axes.axvline(1.0 / onset_, color=style.ORANGE, lw=1.4, label=f"robot's onset, {onset_:g}")
     axes.set_xlim(0.0, 1.06 * inverse.max())
     springs_above(axes, (75.0, 41.0, 28.0, 21.0, 15.0))
@@ -186,7 +192,7 @@ def _draw_radius(axes: Axes, found: RobotWalks) -> None:
     inverse = 1.0 / base.spring.values
     radius, error = means(np.where(is_curved(base), base.axis_radius.values, np.nan))
     errorbars(axes, inverse, radius, error, style.BLUE, "o", "twin")
-    wanted = {float(key): units.parse(text, "m") for key, text in printed()["curved"]["radius"].items()}
+    wanted = printed_radii()
     axes.plot(
         [1.0 / key for key in wanted],
         list(wanted.values()),
@@ -228,7 +234,7 @@ def _draw_joints(found: RobotWalks, narrow: bool) -> Figure:
 
 def _draw_different(found: RobotWalks, narrow: bool) -> Figure:
     figure, axes = style.figure(*_TWO, narrow)
-    for (name, data), (color, marker) in zip(_all(found).items(), _VARIANTS, strict=True):
+    for (name, data), (color, marker) in zip(_all(found).items(), _VARIANTS, strict=False):
         springs = [float(spring) for spring in data.spring.values]
         radius, error = np.array([radius_at(data, spring) for spring in springs]).T
         errorbars(axes["A"], 1.0 / np.array(springs), radius, error, color, marker, typeset(name))
@@ -241,20 +247,18 @@ def _draw_different(found: RobotWalks, narrow: bool) -> Figure:
     axes["A"].legend(loc="upper right")
     style.grid(axes["A"])
 
-    fit = found.fit
     lines = [
-        ("base series (fitted)", printed_number("pitchfork", "robot_critical_k1"), fit.critical if fit else None, 0.10)
+        ("base series (fitted)", printed_spring("pitchfork", "robot_critical_k1"), onset_with_error(found.base)[0]),
+        *(
+            (title, printed_spring("variants", name, "robot_critical_k1"), onset_with_error(data)[0])
+            for title, (name, data) in _variants(found).items()
+        ),
+        ("all springs alike", printed_spring("uniform", "robot_critical_k"), found.uniform.attrs["critical_k"]),
     ]
-    for name, data in found.variants.items():
-        own = onset(data)
-        lines.append((name, printed_variant(name), own.critical if own else None, 0.15))
-    lines.append(
-        ("all springs alike", printed_number("uniform", "robot_critical_k"), found.uniform.attrs["critical_k"], 0.2)
-    )
-    for row, (_, paper, twin, tolerance) in enumerate(lines):
-        axes["B"].plot([paper * (1 - tolerance), paper * (1 + tolerance)], [row, row], color=style.PALE, lw=9, zorder=1)
+    for row, (_, paper, twin) in enumerate(lines):
+        axes["B"].plot([paper * (1.0 - ONSET), paper * (1.0 + ONSET)], [row, row], color=style.PALE, lw=9, zorder=1)
         axes["B"].plot(paper, row, "D", color=style.ORANGE, markersize=7, label=None if row else "robot, paper")
-        if twin is not None and np.isfinite(twin):
+        if np.isfinite(twin):
             axes["B"].plot(twin, row, "o", color=style.BLUE, markersize=7, label=None if row else "twin")
     axes["B"].set_yticks(range(len(lines)), [typeset(name) for name, *_ in lines])
     axes["B"].invert_yaxis()

@@ -7,6 +7,7 @@ from typing import Any
 
 from chilopod import units
 from chilopod.analysis.parameters import PAPER_UNIT
+from chilopod.steering import ARRIVAL_RADIUS, Target
 from chilopod.studies.paper import printed, printed_stiffness
 from chilopod.tasks.identify import BaseSeries, CriticalMode
 
@@ -48,6 +49,19 @@ def base_series_data() -> BaseSeries:
         law=(9.7, 0.030),  # meets both printed radii
         shape=tuple(value / 2.10 for value in printed()["pitchfork"]["joint_components"]),
     )
+
+
+def walking_speed() -> float:
+    """Of the robot, m/s: what task A and its earliest arrival imply.
+
+    The circle that leads to a target at the distance R and the bearing psi has the radius r = R / (2 sin psi) and the
+    arc 2 psi r to it, of which the last :data:`chilopod.steering.ARRIVAL_RADIUS` is not walked: who is as near has
+    arrived.
+    """
+    turning: Any = printed()["turning"]
+    target = Target.parse(turning["tasks"]["A"]["target"])
+    arc = 2.0 * target.bearing * target.radius - ARRIVAL_RADIUS
+    return arc / units.parse(turning["evaluation_time"], "s")
 
 
 def _in_paper_unit(key: str) -> float:
