@@ -20,7 +20,7 @@ _STYLES = tuple(zip((style.BLUE, style.VERMILLION, style.GREEN, style.ORANGE), "
 def panel(data: xr.Dataset) -> Panel:
     """Onset, radii and shares of curved walks over the duration of the walks."""
     times = listing(f"{each:g}" for each in data.duration.values)
-    said = " ".join(f"{typeset(row.quantity.partition(',')[0])}: {typeset(row.twin)}." for row in duration_rows(data))
+    said = "; ".join(f"{row.quantity.partition(',')[0]} {row.twin}" for row in duration_rows(data))
     return Panel(
         name="robot-durations",
         letter="",
@@ -31,7 +31,8 @@ def panel(data: xr.Dataset) -> Panel:
         text=(
             "The paper does not say how long its robot walked before the angles were averaged. These are the walks of "
             f"the base series, {data.attrs['repeats']} at each spring, cut after {times}\u00a0s and judged as before; "
-            f"a bend takes its time, the longer the closer {k(1)} is to the onset. " + said,
+            f"a bend takes its time, the longer the closer {k(1)} is to the onset.",
+            f"What the table asks, and whether it is met: {typeset(said)}.",
         ),
         data=data,
     )

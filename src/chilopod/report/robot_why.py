@@ -13,6 +13,7 @@ from chilopod.report import style
 from chilopod.report.panel import Panel
 from chilopod.report.words import SPRING_UNIT, listing, number, typeset
 from chilopod.robot import Robot
+from chilopod.studies.minima import AROUND
 from chilopod.studies.paper import printed
 from chilopod.studies.robot_table import ONSET, printed_spring
 from chilopod.studies.robot_walks import SPRINGS
@@ -172,16 +173,18 @@ def _draw_spread(data: xr.Dataset, robot: Robot, narrow: bool) -> Figure:
     axes["A"].invert_yaxis()
     style.grid(axes["A"])
 
-    lines = [("base series (fitted)", printed_spring("pitchfork", "robot_critical_k1"), ONSET, data.onset.values[:, 0])]
+    near = (1.0 - ONSET, 1.0 + ONSET)
+    lines = [("base series (fitted)", printed_spring("pitchfork", "robot_critical_k1"), near, data.onset.values[:, 0])]
     for column, name in enumerate(data.variant.values[1:], 1):
         paper = printed_spring("variants", str(name), "robot_critical_k1")
-        lines.append((str(name), paper, ONSET, data.onset.values[:, column]))
-    lines.append(("all springs alike", printed_spring("uniform", "robot_critical_k"), ONSET, data.uniform.values))
+        lines.append((str(name), paper, near, data.onset.values[:, column]))
+    lines.append(("all springs alike", printed_spring("uniform", "robot_critical_k"), near, data.uniform.values))
     for task in data.task.values:
         paper = float(printed()["turning"]["tasks"][str(task)]["k_hat"].split()[0])
-        lines.append((f"best spring, task {task}", paper, 0.25, data.best.sel(task=task).values))
-    for row, (_, paper, tolerance, values) in enumerate(lines):
-        axes["B"].plot([paper * (1 - tolerance), paper * (1 + tolerance)], [row, row], color=style.PALE, lw=9, zorder=1)
+        lines.append((f"best spring, task {task}", paper, AROUND, data.best.sel(task=task).values))
+    for row, (_, paper, within, values) in enumerate(lines):
+        ends = [part * paper for part in within]
+        axes["B"].plot(ends, [row, row], color=style.PALE, lw=9, zorder=1, solid_capstyle="butt")
         axes["B"].plot(paper, row, "D", color=style.ORANGE, markersize=8, label=None if row else "robot, paper")
         for index, value in enumerate(values):
             axes["B"].plot(

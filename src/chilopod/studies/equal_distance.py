@@ -82,6 +82,12 @@ def law_ratio(springs: Sequence[float], base_onset: float, onset: float) -> floa
     return mean_and_error(np.sqrt((inverse - 1.0 / base_onset) / (inverse - 1.0 / onset)))[0]
 
 
+def onset_of_bend(data: xr.Dataset) -> float:
+    """Where the curved walks of a series set in by the square-root fit to their summed bend, N*mm/deg; NaN if they
+    determine no point."""
+    return _onset(*_bends(data))
+
+
 def change(ratio: float, error: float = 0.0) -> str:
     """What a ratio is more or less than one, in per cent, with its standard error if that is known and not zero."""
     if np.isnan(ratio):
@@ -128,10 +134,17 @@ def _ratios(inverse: Sequence[Array], bends: Sequence[Array]) -> tuple[float, fl
 
 def _squared(inverse: Array, bend: Array) -> tuple[Array, Array]:
     """Distance from the onset of these trials, rising, and the square of their mean bend; NaN if they have no onset."""
+    onset = _onset(inverse, bend)
+    if np.isnan(onset):
+        return np.array([np.nan]), np.array([np.nan])
+    distance = inverse - 1.0 / onset
+    return distance[distance > 0.0], (np.nanmean(bend, axis=1) ** 2)[distance > 0.0]
+
+
+def _onset(inverse: Array, bend: Array) -> float:
     here = np.isfinite(bend)
     try:
-        fit = square_root_fit(np.broadcast_to(inverse[:, None], bend.shape)[here], bend[here], resampled=0)
+        each = np.broadcast_to(inverse[:, None], bend.shape)[here]
+        return square_root_fit(each, bend[here], resampled=0).critical
     except AnalysisError:
-        return np.array([np.nan]), np.array([np.nan])
-    distance = inverse - 1.0 / fit.critical
-    return distance[distance > 0.0], (np.nanmean(bend, axis=1) ** 2)[distance > 0.0]
+        return float("nan")
