@@ -21,7 +21,7 @@ _MODE = np.array([0.64, 0.36, 0.48, 0.46, 0.16]) / 2.10
 _LENGTH = 5 * ROBOT.module_length
 
 
-def series(springs, onset, amplitude=AMPLITUDE, *, repeats=6, scatter=0.01, saturation=np.inf, speed=0.056, seed=0):
+def series(springs, onset, amplitude=AMPLITUDE, *, repeats=10, scatter=0.01, saturation=np.inf, speed=0.056, seed=0):
     """Trials with a bend of amplitude * sqrt(d / (1 + d / saturation)), d = 1/k1 - 1/onset, give or take ``scatter``.
 
     Every second one turns left; springs stiffer than the onset walk straight.
@@ -54,7 +54,7 @@ def series(springs, onset, amplitude=AMPLITUDE, *, repeats=6, scatter=0.01, satu
 
 
 @cache
-def durations(onsets, springs=SPRINGS, repeats=6, scatter=0.01):
+def durations(onsets, springs=SPRINGS, repeats=10, scatter=0.01):
     """The dataset of walks of several lengths, the onset of each given."""
     each = [series(springs, onset, repeats=repeats, scatter=scatter) for onset in onsets]
     points = np.array([onset_with_error(one) for one in each])

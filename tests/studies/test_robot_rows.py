@@ -87,6 +87,19 @@ def test_the_base_series_on_both_sides_of_what_is_asked(found, start, verdict):
     assert row_of(walk_rows(found, {}), start).verdict == verdict
 
 
+@pytest.mark.parametrize(("scatter", "verdict"), [(0.01, "within"), (0.0, "undecided")])
+def test_fluctuation_that_grows_or_does_not(scatter, verdict):
+    assert row_of(walk_rows(base_with(scatter=scatter), {}), "fluctuation").verdict == verdict
+
+
+def test_fluctuation_that_falls_is_not_the_paper_s():
+    base = series(SPRINGS, 34.0)
+    wide = series(SPRINGS, 34.0, scatter=0.1)
+    stiff = base.spring > 27.0
+    mixed = base.assign(mean_angle=base.mean_angle.where(~stiff, wide.mean_angle))
+    assert row_of(walk_rows(walks(base=mixed), {}), "fluctuation").verdict == "outside"
+
+
 def test_curves_to_one_side_only_are_not_the_paper_s():
     base = series(SPRINGS, 34.0)
     right = base.assign(direction=base.direction.where(base.direction != "left", "right"))

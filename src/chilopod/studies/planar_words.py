@@ -12,7 +12,7 @@ from chilopod.studies.curved_findings import CurvedStudy, axis_radius, bent
 from chilopod.studies.equal_distance import change, radius_ratio
 from chilopod.studies.minima import NAMES, SCALES, minima
 from chilopod.studies.paper import printed
-from chilopod.studies.scatter import INCREASES, increases
+from chilopod.studies.scatter import INCREASES, increases, spread_difference
 from chilopod.studies.turning import springs_by_outcome
 from chilopod.studies.turning_findings import Turning
 
@@ -43,6 +43,8 @@ def _curved(study: CurvedStudy) -> dict[str, str]:
         "sides": f"{sides[0]} and {sides[1]}",
         "onset": f"{study.fit.critical:.2f} N*mm/deg; the point is at {trials.attrs['critical_k1']:.2f}",
         "rising": INCREASES[increases([row for row in angles if np.isfinite(row).any()][::-1])],
+        "fluctuation": f"{spread_difference(angles[0], angles[len(curving) - 1])} at {curving[0]:g} than at "
+        f"{curving[-1]:g} N*mm/deg",
     }
     ratio = trials.attrs["critical_k1"] / float(printed()["pitchfork"]["robot_critical_k1"].split()[0])
     for spring in printed()["curved"]["radius"]:

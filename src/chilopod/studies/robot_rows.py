@@ -31,7 +31,16 @@ from chilopod.studies.robot_table import (
 )
 from chilopod.studies.robot_turning import PAPER_SPRING
 from chilopod.studies.robot_walks import RobotWalks
-from chilopod.studies.scatter import INCREASES, Answer, between, every, increases, mean_and_error, near
+from chilopod.studies.scatter import (
+    INCREASES,
+    Answer,
+    between,
+    every,
+    increases,
+    mean_and_error,
+    near,
+    spread_difference,
+)
 from chilopod.studies.walk_measures import onset_with_error, radius_at, shares
 from chilopod.tasks.radius_law import is_curved
 
@@ -56,6 +65,7 @@ def walk_rows(found: RobotWalks, planar: Planar) -> list[RobotRow]:
         *(_radius(base, spring, planar) for spring in printed_radii()),
         _speed(base, planar),
         _rising(base, planar),
+        _fluctuation(base, planar),
     ]
     for name, data in found.variants.items():
         if name not in found.lower_steps:
@@ -136,10 +146,16 @@ def _speed(base: xr.Dataset, planar: Planar) -> RobotRow:
     )
 
 
+def _curved_angles(base: xr.Dataset) -> dict[float, NDArray[np.float64]]:
+    """Of joint 1 in all trials that curve, rad, by spring (N*mm/deg), the stiffest first."""
+    ordered = base.sortby("spring", ascending=False)
+    angles = np.where(is_curved(ordered), np.abs(ordered.mean_angle.sel(joint=1).values), np.nan)
+    pairs = zip(ordered.spring.values, angles, strict=True)
+    return {float(spring): row[np.isfinite(row)] for spring, row in pairs if np.isfinite(row).any()}
+
+
 def _rising(base: xr.Dataset, planar: Planar) -> RobotRow:
-    softer_last = base.sortby("spring", ascending=False)
-    angles = np.where(is_curved(softer_last), np.abs(softer_last.mean_angle.sel(joint=1).values), np.nan)
-    rising = increases([row for row in angles if np.isfinite(row).any()])
+    rising = increases(_curved_angles(base).values())
     return RobotRow(
         "angle of joint 1 over 1/k1",
         "increases",
@@ -148,6 +164,26 @@ def _rising(base: xr.Dataset, planar: Planar) -> RobotRow:
         PREDICTED,
         VERDICTS[rising],
         "from every spring to the next",
+    )
+
+
+def _fluctuation(base: xr.Dataset, planar: Planar) -> RobotRow:
+    several = {spring: row for spring, row in _curved_angles(base).items() if row.size > 1}
+    if len(several) < 2:
+        said, answer = "no two springs at which two trials curve", None
+    else:
+        (stiff, one), *_, (soft, other) = several.items()
+        wider = spread_difference(other, one)
+        spreads = [f"{np.rad2deg(row.std(ddof=1)):.2f} deg at {k:g}" for k, row in ((stiff, one), (soft, other))]
+        said, answer = f"{' and '.join(spreads)} {PAPER_UNIT} (standard deviation): {wider}", wider.higher
+    return RobotRow(
+        "fluctuation among trials over 1/k1, joint 1",
+        "increases",
+        said,
+        planar.get("fluctuation", ""),
+        PREDICTED,
+        VERDICTS[answer],
+        "from the stiffest spring that curves to the softest",
     )
 
 
