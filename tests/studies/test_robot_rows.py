@@ -260,3 +260,39 @@ def test_the_spring_of_the_circle_s_radius(onset, verdict):
     found = walks(base=series(SPRINGS, onset))
     row = row_of(turning_rows(turning(), found, {}), "task A: k1 whose walk")
     assert row.verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("letter", "spring", "label", "verdict"),
+    [
+        ("A", 28.0, "bulged outside", "within"),
+        ("A", 41.0, "turned inside", "outside"),
+        ("A", 15.0, "bulged outside", "outside"),
+        ("A", 21.0, "bulged outside", "outside"),
+        ("B", 26.0, "turned inside", "outside"),
+        ("B", 15.0, "arrived", "outside"),
+        ("B", 41.0, "arrived", "outside"),
+    ],
+)
+def test_what_becomes_of_the_tasks(letter, spring, label, verdict):
+    tasks = turning().tasks
+    criteria = tasks[letter].criteria
+    changed = criteria.assign(outcome=criteria.outcome.where(criteria.spring != spring, label))
+    found = turning(tasks={**tasks, letter: dataclasses.replace(tasks[letter], criteria=changed)})
+    assert row_of(turning_rows(found, None, {}), f"task {letter}: what becomes").verdict == verdict
+
+
+def test_all_repeats_have_to_arrive_at_the_paper_s_spring():
+    tasks = turning().tasks
+    criteria = tasks["A"].criteria
+    late = (criteria.spring == 21.0) & (criteria.repeat == 4)
+    changed = criteria.assign(outcome=criteria.outcome.where(~late, "bulged outside"))
+    found = turning(tasks={**tasks, "A": dataclasses.replace(tasks["A"], criteria=changed)})
+    assert row_of(turning_rows(found, None, {}), "task A: what becomes").verdict == "outside"
+
+
+@pytest.mark.parametrize(("alone", "helped", "verdict"), [(4, 5, "within"), (5, 5, "outside"), (0, 4, "outside")])
+def test_without_leg_yaw_many_fail(alone, helped, verdict):
+    arrived = [[1.0] * alone + [0.0] * (9 - alone), [1.0] * helped + [0.0] * (5 - helped) + [np.nan] * 4]
+    data = turning().without.assign(arrived=(("case", "trial"), arrived))
+    assert row_of(turning_rows(turning(without=data), None, {}), "task A without leg yaw").verdict == verdict
