@@ -1,14 +1,17 @@
 """Figures of the turning tasks: all text is shown, in both layouts, and what they say is what was found."""
 
+import runpy
+from pathlib import Path
+
 import numpy as np
 import pytest
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.text import Text
 
 from chilopod import load_robot
 from chilopod.report import style, tables
 from chilopod.report.turning import panels
 from chilopod.studies.turning_findings import turning
+
+CHECK = runpy.run_path(str(Path(__file__).with_name("texts.py")))["check"]
 
 
 @pytest.fixture(scope="module")
@@ -17,26 +20,10 @@ def drawn():
     return list(panels(found))
 
 
-def painted(figure, monkeypatch) -> list[Text]:
-    """The texts that are really painted: not those of hidden axes or of ticks outside the limits."""
-    found = []
-    draw = Text.draw
-    with monkeypatch.context() as patch:
-        patch.setattr(Text, "draw", lambda self, renderer: (found.append(self), draw(self, renderer)))
-        FigureCanvasAgg(figure).draw()
-    return [text for text in found if text.get_visible() and text.get_text().strip()]
-
-
 @pytest.mark.parametrize("narrow", [False, True])
 def test_no_text_is_cut_or_tiny(drawn, narrow, monkeypatch):
     for panel in drawn:
-        with style.house_style():
-            figure = panel.draw(narrow)
-            for text in painted(figure, monkeypatch):
-                box, extent = figure.bbox, text.get_window_extent()
-                assert extent.x0 > -1 and extent.y0 > -1, (panel.name, text.get_text())  # noqa: PT018
-                assert extent.x1 < box.x1 + 1 and extent.y1 < box.y1 + 1, (panel.name, text.get_text())  # noqa: PT018
-                assert text.get_fontsize() >= style.SMALL, (panel.name, text.get_text())
+        CHECK(panel, narrow, monkeypatch)
 
 
 def test_paths_are_drawn_with_equal_scales(drawn):

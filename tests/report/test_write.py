@@ -13,9 +13,10 @@ import xarray as xr
 from chilopod import load_robot
 from chilopod.errors import OutputError
 from chilopod.report import write_identification, write_report
+from chilopod.report.page import summary
 from chilopod.report.write import panels
-from chilopod.studies import Results
-from chilopod.studies.robot_rows import RobotRow
+from chilopod.studies import Results, Row
+from chilopod.studies.robot_table import RobotRow
 
 VOID = {"meta", "link", "img", "source", "br", "hr", "input"}
 
@@ -196,6 +197,24 @@ def test_unwritable_folder(results, tmp_path):
         write_report(results, tmp_path / "file")
 
 
+def test_what_scatter_leaves_open_has_its_own_mark_and_is_counted(results, tmp_path):
+    def row(kind, verdict):
+        return RobotRow(f"{kind}, {verdict}", "1", "2", "", kind, verdict, "10 %")
+
+    verdicts = ("within", "within", "outside", "undecided")
+    rows = [*(row("predicted", each) for each in verdicts), row("fitted", "undecided"), row("checked", "within")]
+    planar = [Row(each, "1", "2", "here", each) for each in ("agrees", "differs", "undecided", "not printed")]
+    found = Results(results.robot, whole=load_robot("aoi2022"), rows={"mode": planar}, robot_rows={"robot-walks": rows})
+    page = Page(write_report(found, tmp_path).read_text(encoding="utf-8"))
+    text = " ".join(page.text.split())
+    assert "meets 2 of 4 further statements about the robot that it was not fitted to; 1 more is left open" in text
+    assert "Of 3 statements of the paper compared with the planar model, 1 agree, 1 are left open" in text
+    assert text.count("? undecided") == 3
+    assert [tag for tag, attrs in page.tags if attrs.get("class") == "verdict undecided"] == ["span"] * 3
+    alone = summary(Results(results.robot, rows={"mode": planar[2:3]}))
+    assert alone.endswith("planar model, 0 agree and 1 are left open by the scatter of the trials.")
+
+
 def test_the_robot_has_a_table_and_its_numbers(results, tmp_path):
     whole = load_robot("aoi2022")
     row = RobotRow("where <it> bends", "34 N*mm/deg", "33.2 N*mm/deg (-2 %)", "", "predicted", "outside", "10 %")
@@ -203,6 +222,6 @@ def test_the_robot_has_a_table_and_its_numbers(results, tmp_path):
     page = Page(write_report(found, tmp_path).read_text(encoding="utf-8"))
     assert "robot-table" in [attrs.get("id") for tag, attrs in page.tags if tag == "section"]
     assert "33.2 N·mm/deg (−2 %)" in page.text.replace("\u00a0", " ")
-    assert "meets 0 of 1 further statements" in page.text
+    assert "meets 0 of 1 further statements about the robot that it was not fitted to." in page.text
     assert "twin.clearance" in page.text
     assert load_robot(tmp_path / "data" / "robot-3d.toml") == whole

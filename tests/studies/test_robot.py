@@ -11,10 +11,19 @@ from chilopod.report import robot_turning as turning_figures
 from chilopod.report import robot_walks as walk_figures
 from chilopod.report import style
 from chilopod.steering import Target
-from chilopod.studies import robot_rows, robot_walks
+from chilopod.studies import robot_rows, robot_turning_rows, robot_walks
 from chilopod.studies.robot_turning import RobotTurning
-from chilopod.studies.robot_walks import RobotWalks, onset, radius_at, spring_for, undulations, walk_trials
+from chilopod.studies.robot_walks import (
+    RobotWalks,
+    by_duration,
+    lower_steps,
+    undulations,
+    walk_ends,
+    walk_records,
+    walk_trials,
+)
 from chilopod.studies.turning import turning_task, without_leg_yaw
+from chilopod.studies.walk_measures import onset, radius_at, spring_for
 from chilopod.tasks.radius_law import is_curved
 
 ROBOT = load_robot("aoi2022")
@@ -33,19 +42,26 @@ def short():
 
 
 @pytest.fixture(scope="module")
-def base(folder):
-    return walk_trials(ROBOT, robot_walks.SPRINGS, 2, folder=folder)
+def records(folder):
+    return walk_records(ROBOT, robot_walks.SPRINGS, 2, folder=folder)
 
 
 @pytest.fixture(scope="module")
-def walks(base, folder):
+def base(records):
+    return walk_ends(records, ROBOT, robot_walks.SPRINGS)
+
+
+@pytest.fixture(scope="module")
+def walks(base, records, folder):
     uniform = undulations(ROBOT, (8.7, 11.0, 15.0, 30.0), 1, folder=folder)
     examples = xr.Dataset(
         {"joint_angle": (("time", "spring", "joint"), np.linspace(-0.1, 0.3, 30).reshape(3, 2, 5))},
         coords={"time": [0.0, 1.0, 2.0], "spring": [41.0, 15.0], "joint": np.arange(1, 6)},
     )
     names = list(robot_walks.variant_robots(ROBOT))[1:]
-    return RobotWalks(ROBOT, base, dict.fromkeys(names, base), examples, uniform)
+    durations = by_duration(records, ROBOT, robot_walks.SPRINGS)
+    lower = {"stride 1.8 cm": base}
+    return RobotWalks(ROBOT, base, durations, dict.fromkeys(names, base), lower, examples, uniform)
 
 
 @pytest.fixture(scope="module")
@@ -69,8 +85,31 @@ def test_soft_springs_curve_and_stiff_ones_do_not(base):
     assert fit is not None
     assert 26.0 < fit.critical < 45.0
     # The spring for the radius of a spring's own walks is that spring.
-    assert spring_for(base, 5 * 0.225 / float(base.bend.sel(spring=21.0).mean())) == pytest.approx(21.0)
-    assert np.isnan(spring_for(base, 0.05))
+    spring, error = spring_for(base, 5 * 0.225 / float(base.bend.sel(spring=21.0).mean()))
+    assert spring == pytest.approx(21.0)
+    assert 0.0 < error < 2.0
+    assert np.isnan(spring_for(base, 0.05)).all()
+
+
+@pytest.mark.slow
+def test_walks_cut_short_are_those_that_were_asked_shorter(walks, base, folder, monkeypatch):
+    found = walks.durations
+    assert found.duration.values.tolist() == [20.0, 30.0, 40.0]
+    assert float(found.onset[-1]) == onset(base).critical
+    assert found.axis_radius[-1].sel(spring=21.0) == radius_at(base, 21.0)[0]
+    monkeypatch.setattr(robot_walks, "DURATION", 20.0)
+    short = walk_trials(ROBOT, (15.0, 21.0), 2)
+    for spring in (15.0, 21.0):
+        assert float(found.axis_radius.sel(duration=20.0, spring=spring)) == radius_at(short, spring)[0]
+    assert (found.curved + found.straight <= 1.0).all()
+
+
+def test_the_other_reading_of_a_shorter_stride_lifts_the_feet_in_proportion():
+    variant = robot_walks.variant_robots(ROBOT)["stride 1.8 cm"]
+    lower = lower_steps(ROBOT, variant)
+    assert lower.twin.clearance == pytest.approx(0.6 * ROBOT.twin.clearance)
+    assert lower.with_value("twin.clearance", ROBOT.twin.clearance).twin == variant.twin
+    assert lower.gait == variant.gait
 
 
 @pytest.mark.slow
@@ -85,8 +124,8 @@ def test_softer_uniform_springs_undulate_more(walks):
 @pytest.mark.slow
 def test_rows_and_figures_of_the_walks(walks):
     rows = robot_rows.walk_rows(walks, {"onset": "12"})
-    assert {row.verdict for row in rows} <= {"within", "outside"}
-    assert {row.kind for row in rows} == {"fitted", "predicted"}
+    assert {row.verdict for row in rows} <= {"within", "outside", "undecided"}
+    assert {row.kind for row in rows} == {"fitted", "predicted", "checked"}
     assert next(row for row in rows if row.quantity.startswith("where curved walks set in (")).planar == "12"
     with style.house_style():
         for panel in walk_figures.panels(walks):
@@ -100,8 +139,10 @@ def test_rows_and_figures_of_the_tasks(tasks, walks):
     outcome = tasks.tasks["A"].criteria.outcome
     assert (outcome.sel(spring=21.0) == "arrived").all()
     assert (outcome.sel(spring=41.0) == "bulged outside").all()
-    rows = robot_rows.turning_rows(tasks, walks, {})
-    assert all(row.kind == "predicted" for row in rows)
+    rows = robot_turning_rows.turning_rows(tasks, walks, {})
+    assert [row.quantity for row in rows if row.kind != "predicted"] == ["task A: earliest arrival"]
+    # Of a strategy beside itself nothing is lower.
+    assert next(row for row in rows if "against Hopf" in row.quantity).verdict == "undecided"
     assert rows[0].quantity.startswith("task A")
     with style.house_style():
         for panel in turning_figures.panels(tasks, walks):

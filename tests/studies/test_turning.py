@@ -14,7 +14,8 @@ import xarray as xr
 from chilopod.errors import ParameterError
 from chilopod.robot import load_robot
 from chilopod.steering import Outcome, Target
-from chilopod.studies.turning import CRITERIA, minima, springs_by_outcome, turning_task
+from chilopod.studies.minima import minima
+from chilopod.studies.turning import CRITERIA, springs_by_outcome, turning_task
 from chilopod.studies.turning_findings import turning
 from chilopod.studies.turning_rows import rows
 from chilopod.trials import NONE

@@ -18,15 +18,20 @@ from chilopod.report.panel import Panel
 from chilopod.report.words import listing, minus, spring, typeset
 from chilopod.robot import Robot
 from chilopod.studies import CHAPTERS, SECTIONS, Results, Row
-from chilopod.studies.robot_rows import PREDICTED, RobotRow
+from chilopod.studies.robot_table import PREDICTED, RobotRow
 
 _TITLE: Final = "A robot that turns by bifurcation: the paper and the computation"
 _VERDICTS: Final[Mapping[str, tuple[str, str]]] = {
     "agrees": ("agrees", "✓"),
     "differs": ("differs", "≠"),
+    "undecided": ("undecided", "?"),
     "not printed": ("open", "–"),
 }
-_ROBOT_VERDICTS: Final[Mapping[str, tuple[str, str]]] = {"within": ("agrees", "✓"), "outside": ("differs", "≠")}
+_ROBOT_VERDICTS: Final[Mapping[str, tuple[str, str]]] = {
+    "within": _VERDICTS["agrees"],
+    "outside": _VERDICTS["differs"],
+    "undecided": _VERDICTS["undecided"],
+}
 _MOST_LISTED: Final = 4
 _LIBRARIES: Final = ("numpy", "numba", "scipy", "xarray", "matplotlib")
 
@@ -131,20 +136,25 @@ def summary(results: Results) -> str:
         )
     if results.robot_rows:
         predicted = [row for row in results.all_robot_rows if row.kind == PREDICTED]
-        within = sum(row.verdict == "within" for row in predicted)
+        counted = {word: sum(row.verdict == word for row in predicted) for word in _ROBOT_VERDICTS}
+        open_ = counted["undecided"]
+        left = f"; {open_} more {'is' if open_ == 1 else 'are'} left open by the scatter of its trials" if open_ else ""
         parts.append(
-            "The same robot in three dimensions, its unknown constants fitted to the paper's base series of walks "
-            f"alone, meets {within} of {len(predicted)} further statements about the robot that it was not fitted to."
+            "The same robot in three dimensions, its unknown constants fitted to the paper's base series of walks and "
+            f"their speed alone, meets {counted['within']} of {len(predicted)} further statements about the robot that "
+            f"it was not fitted to{left}."
         )
     counted = {word: sum(row.verdict == word for row in results.all_rows) for word in _VERDICTS}
-    compared = counted["agrees"] + counted["differs"]
+    compared = sum(counted.values()) - counted["not printed"]
     if compared:
         differing = [typeset(row.quantity) for row in results.all_rows if row.verdict == "differs"]
-        listed = f": {listing(differing)}" if len(differing) <= _MOST_LISTED else ""
-        parts.append(
-            f"Of {compared} statements of the paper compared with the planar model, {counted['agrees']} agree"
-            + (f" and {len(differing)} differ{listed}. The reasons are given below." if differing else ".")
-        )
+        said = [f"{counted['agrees']} agree"]
+        if counted["undecided"]:
+            said.append(f"{counted['undecided']} are left open by the scatter of the trials")
+        if differing:
+            listed = f": {listing(differing)}" if len(differing) <= _MOST_LISTED else ""
+            said.append(f"{len(differing)} differ{listed}. The reasons are given below")
+        parts.append(f"Of {compared} statements of the paper compared with the planar model, {listing(said)}.")
     return " ".join(parts)
 
 

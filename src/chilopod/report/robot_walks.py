@@ -10,23 +10,24 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from chilopod import units
-from chilopod.report import style
+from chilopod.report import robot_durations, style
 from chilopod.report.curved_trials import INVERSE_UNIT, errorbars, springs_above
 from chilopod.report.panel import Panel
 from chilopod.report.words import SPRING_UNIT, k, listing, number, typeset
-from chilopod.studies.paper import printed
-from chilopod.studies.robot_rows import printed_number
-from chilopod.studies.robot_walks import RobotWalks, onset, radius_at
+from chilopod.studies.equal_distance import onset_of_bend
+from chilopod.studies.robot_rows import printed_radii
+from chilopod.studies.robot_table import ONSET, percent, printed_spring
+from chilopod.studies.robot_walks import RobotWalks
+from chilopod.studies.walk_measures import onset_with_error, radius_at
 from chilopod.tasks.radius_law import is_curved
 
 Array = NDArray[np.float64]
 
 _WALKS = (style.Layout("AB;CD", 7.4), style.Layout("A;B;C;D", 13.6))
 _ONE = (style.Layout("A", 4.0), style.Layout("A", 4.4))
-_TWO = (style.Layout("AB", 4.2), style.Layout("A;B", 8.0))
+_THREE = (style.Layout("AB;CC", 7.6), style.Layout("A;B;C", 12.6))
 _JOINTS = tuple(zip((style.BLACK, *style.CURVES), "os^vD", strict=False))
-_VARIANTS = tuple(zip((style.BLACK, style.BLUE, style.GREEN, style.ORANGE), "os^D", strict=True))
+_VARIANTS = tuple(zip((style.BLACK, style.BLUE, style.GREEN, style.ORANGE, style.GREY), "os^Dv", strict=True))
 _MARKED = (75.0, 41.0, 28.0, 21.0, 17.0, 15.0)
 _DASHED = (0, (4, 2))
 
@@ -36,6 +37,7 @@ def panels(found: RobotWalks) -> Iterator[Panel]:
     yield walks(found)
     yield joints(found)
     yield different(found)
+    yield robot_durations.panel(found.durations)
 
 
 def walks(found: RobotWalks) -> Panel:
@@ -58,10 +60,10 @@ def walks(found: RobotWalks) -> Panel:
             f"at each of {base.sizes['spring']} values of {k(1)}, 90\u00a0s each, angles averaged over the last "
             f"5\u00a0s as in the paper. {int(here.sum())} of {here.size} end in a curve, {lefts} to the left and "
             f"{rights} to the right. The square-root fit puts the onset at {said} {SPRING_UNIT}; the paper's "
-            f"estimate for its robot is {printed_number('pitchfork', 'robot_critical_k1'):g}.",
+            f"estimate for its robot is {printed_spring('pitchfork', 'robot_critical_k1'):g}.",
             "These are the data that the twin's unknown constants were fitted to (the printed onset, the two printed "
-            "radii, which springs walk straight and which do not), so agreement here is no surprise. What follows was "
-            "not fitted."
+            "radii, which springs walk straight and which do not; and the walking speed), so agreement here is no "
+            "surprise. What follows was not fitted."
             + (
                 f" In {unsettled} walks the bend still moved by more than 0.1 rad in the last seconds."
                 if unsettled
@@ -94,21 +96,28 @@ def joints(found: RobotWalks) -> Panel:
 def different(found: RobotWalks) -> Panel:
     """The paper's Fig. "different"."""
     said = []
-    for name, data in found.variants.items():
-        fit, paper = onset(data), printed_variant(name)
-        said.append(f"{name} {number(fit.critical, 3) if fit else 'none'} (robot: {paper:g})")
+    for title, (name, data) in _variants(found).items():
+        point, paper = onset_with_error(data)[0], printed_spring("variants", name, "robot_critical_k1")
+        said.append(f"{typeset(title)} {number(point, 3) if np.isfinite(point) else 'none'} (robot: {paper:g})")
     return Panel(
         name="robot-different",
         letter="",
         title="The robot in three dimensions: other springs, strides and phases",
         draw=lambda narrow: _draw_different(found, narrow),
-        alt=f"A: radius over 1/{k(1)} of the robot as built and of three variants. B: where curved walks set in, twin "
-        "beside robot.",
+        alt=f"A: radius over 1/{k(1)} of the robot as built and of three variants. B: the same over the distance from "
+        "each one's own onset. C: where curved walks set in, twin beside robot.",
         text=(
             "Nothing here was fitted. Where curved walks set in by the paper's method, in "
             f"{SPRING_UNIT}: {listing(said)}. "
-            "Bars in B are what counts as within: 10 % for the base series, 15 % for the variants, 20 % for springs "
-            "all alike, where the body undulates.",
+            f"Bars in C are what counts as within, {percent(ONSET)}; with all springs alike the body undulates. At "
+            "equal springs (A) a variant that sets in at a softer spring turns more widely by that alone; so the table "
+            f"compares radii at equal distance from each one's own onset {k(1)}* (B)."
+            + (
+                " The paper does not say whether the leg tips swing as high with the shorter stride, or lower in "
+                "proportion: both are shown."
+                if found.lower_steps
+                else ""
+            ),
         ),
         data=xr.concat(
             [each.assign_coords(variant=name) for name, each in _all(found).items()],
@@ -119,16 +128,18 @@ def different(found: RobotWalks) -> Panel:
     )
 
 
-def printed_variant(name: str) -> float:
-    """Where the robot's curved walks set in, by the paper, N*mm/deg."""
-    return units.from_si(units.parse(printed()["variants"][name]["robot_critical_k1"], "N*m/rad"), SPRING)
-
-
-SPRING = "N*mm/deg"
+def _variants(found: RobotWalks) -> dict[str, tuple[str, xr.Dataset]]:
+    """Of every variant and reading of it, by what they are called here: the paper's name, and the trials."""
+    named: dict[str, tuple[str, xr.Dataset]] = {}
+    for name, data in found.variants.items():
+        named[name] = (name, data)
+        if name in found.lower_steps:
+            named[f"{name.removeprefix('stride ')}, lower steps"] = (name, found.lower_steps[name])
+    return named
 
 
 def _all(found: RobotWalks) -> dict[str, xr.Dataset]:
-    return {"as built": found.base, **found.variants}
+    return {"as built": found.base, **{title: data for title, (_, data) in _variants(found).items()}}
 
 
 def _draw_walks(found: RobotWalks, narrow: bool) -> Figure:
@@ -170,7 +181,7 @@ def _draw_fork(axes: Axes, found: RobotWalks) -> None:
     here = base.direction.values == "straight"
     mean, error = means(np.where(here, angles, np.nan))
     errorbars(axes, inverse, mean, error, style.GREY, "D", "straight")
-    onset_ = printed_number("pitchfork", "robot_critical_k1")
+    onset_ = printed_spring("pitchfork", "robot_critical_k1")
     axes.axvline(1.0 / onset_, color=style.ORANGE, lw=1.4, label=f"robot's onset, {onset_:g}")
     axes.set_xlim(0.0, 1.06 * inverse.max())
     springs_above(axes, (75.0, 41.0, 28.0, 21.0, 15.0))
@@ -186,7 +197,7 @@ def _draw_radius(axes: Axes, found: RobotWalks) -> None:
     inverse = 1.0 / base.spring.values
     radius, error = means(np.where(is_curved(base), base.axis_radius.values, np.nan))
     errorbars(axes, inverse, radius, error, style.BLUE, "o", "twin")
-    wanted = {float(key): units.parse(text, "m") for key, text in printed()["curved"]["radius"].items()}
+    wanted = printed_radii()
     axes.plot(
         [1.0 / key for key in wanted],
         list(wanted.values()),
@@ -227,44 +238,53 @@ def _draw_joints(found: RobotWalks, narrow: bool) -> Figure:
 
 
 def _draw_different(found: RobotWalks, narrow: bool) -> Figure:
-    figure, axes = style.figure(*_TWO, narrow)
-    for (name, data), (color, marker) in zip(_all(found).items(), _VARIANTS, strict=True):
-        springs = [float(spring) for spring in data.spring.values]
-        radius, error = np.array([radius_at(data, spring) for spring in springs]).T
-        errorbars(axes["A"], 1.0 / np.array(springs), radius, error, color, marker, typeset(name))
-        axes["A"].plot(1.0 / np.array(springs), radius, color=color, lw=1.0)
-    axes["A"].set_ylim(0.0, 3.0)
+    figure, axes = style.figure(*_THREE, narrow)
+    for (name, data), (color, marker) in zip(_all(found).items(), _VARIANTS, strict=False):
+        inverse = 1.0 / data.spring.values
+        radius, error = np.array([radius_at(data, float(spring)) for spring in data.spring.values]).T
+        away = inverse - 1.0 / onset_of_bend(data)
+        for letter, place, shown in (("A", inverse, inverse > 0.0), ("B", away, away > 0.0)):
+            errorbars(axes[letter], place[shown], radius[shown], error[shown], color, marker, typeset(name))
+            axes[letter].plot(place[shown], radius[shown], color=color, lw=1.0)
+    for letter in "AB":
+        axes[letter].set_ylim(0.0, 3.0)
+        axes[letter].set_ylabel("radius of the body axis (m)")
+        style.grid(axes[letter])
     springs_above(axes["A"], (34.0, 28.0, 21.0, 17.0, 15.0, 12.0))
     axes["A"].set_xlabel(f"1/{k(1)} ({INVERSE_UNIT})")
-    axes["A"].set_ylabel("radius of the body axis (m)")
-    axes["A"].set_title("A  Radius")
-    axes["A"].legend(loc="upper right")
-    style.grid(axes["A"])
-
-    fit = found.fit
-    lines = [
-        ("base series (fitted)", printed_number("pitchfork", "robot_critical_k1"), fit.critical if fit else None, 0.10)
-    ]
-    for name, data in found.variants.items():
-        own = onset(data)
-        lines.append((name, printed_variant(name), own.critical if own else None, 0.15))
-    lines.append(
-        ("all springs alike", printed_number("uniform", "robot_critical_k"), found.uniform.attrs["critical_k"], 0.2)
-    )
-    for row, (_, paper, twin, tolerance) in enumerate(lines):
-        axes["B"].plot([paper * (1 - tolerance), paper * (1 + tolerance)], [row, row], color=style.PALE, lw=9, zorder=1)
-        axes["B"].plot(paper, row, "D", color=style.ORANGE, markersize=7, label=None if row else "robot, paper")
-        if twin is not None and np.isfinite(twin):
-            axes["B"].plot(twin, row, "o", color=style.BLUE, markersize=7, label=None if row else "twin")
-    axes["B"].set_yticks(range(len(lines)), [typeset(name) for name, *_ in lines])
-    axes["B"].invert_yaxis()
-    axes["B"].set_xlim(0.0, 45.0)
-    axes["B"].set_ylim(len(lines) - 0.5, -0.7)
-    axes["B"].set_xlabel(f"onset ({SPRING_UNIT})")
-    axes["B"].set_title("B  Where straight walks end")
-    axes["B"].legend(loc="upper left")
-    style.grid(axes["B"], "x")
+    axes["A"].set_title("A  Radius over the spring")
+    axes["B"].set_xlim(left=0.0)
+    axes["B"].set_xlabel(f"1/{k(1)} − 1/{k(1)}* ({INVERSE_UNIT})")
+    axes["B"].set_title("B  Radius, like with like")
+    handles, labels = axes["A"].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=2 if narrow else 5)
+    _draw_onsets(axes["C"], found)
     return figure
+
+
+def _draw_onsets(axes: Axes, found: RobotWalks) -> None:
+    lines = [
+        ("base series (fitted)", printed_spring("pitchfork", "robot_critical_k1"), onset_with_error(found.base)[0]),
+        *(
+            (title, printed_spring("variants", name, "robot_critical_k1"), onset_with_error(data)[0])
+            for title, (name, data) in _variants(found).items()
+        ),
+        ("all springs alike", printed_spring("uniform", "robot_critical_k"), found.uniform.attrs["critical_k"]),
+    ]
+    for row, (_, paper, twin) in enumerate(lines):
+        ends = [paper * (1.0 - ONSET), paper * (1.0 + ONSET)]
+        axes.plot(ends, [row, row], color=style.PALE, lw=9, zorder=1, solid_capstyle="butt")
+        axes.plot(paper, row, "D", color=style.ORANGE, markersize=7, label=None if row else "robot, paper")
+        if np.isfinite(twin):
+            axes.plot(twin, row, "o", color=style.BLUE, markersize=7, label=None if row else "twin")
+    axes.set_yticks(range(len(lines)), [typeset(name) for name, *_ in lines])
+    axes.invert_yaxis()
+    axes.set_xlim(0.0, 45.0)
+    axes.set_ylim(len(lines) - 0.5, -0.7)
+    axes.set_xlabel(f"onset ({SPRING_UNIT})")
+    axes.set_title("C  Onset of curved walks")
+    axes.legend(loc="upper left")
+    style.grid(axes, "x")
 
 
 def means(values: Array) -> tuple[Array, Array]:

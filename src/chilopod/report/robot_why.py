@@ -13,8 +13,9 @@ from chilopod.report import style
 from chilopod.report.panel import Panel
 from chilopod.report.words import SPRING_UNIT, listing, number, typeset
 from chilopod.robot import Robot
+from chilopod.studies.minima import AROUND
 from chilopod.studies.paper import printed
-from chilopod.studies.robot_rows import printed_number
+from chilopod.studies.robot_table import ONSET, printed_spring
 from chilopod.studies.robot_walks import SPRINGS
 from chilopod.tasks.identify.twin_constants import FREE, parts_of
 
@@ -79,7 +80,7 @@ def _draw_why(data: xr.Dataset, narrow: bool) -> Figure:
     for letter in "AB":
         axes[letter].axvline(12.0, color=style.GREY, lw=1.2, linestyle=(0, (4, 2)), label="planar model, 12")
         axes[letter].axvline(
-            printed_number("pitchfork", "robot_critical_k1"),
+            printed_spring("pitchfork", "robot_critical_k1"),
             color=style.VERMILLION,
             lw=1.2,
             linestyle=(0, (4, 2)),
@@ -172,16 +173,18 @@ def _draw_spread(data: xr.Dataset, robot: Robot, narrow: bool) -> Figure:
     axes["A"].invert_yaxis()
     style.grid(axes["A"])
 
-    lines = [("base series (fitted)", printed_number("pitchfork", "robot_critical_k1"), 0.10, data.onset.values[:, 0])]
+    near = (1.0 - ONSET, 1.0 + ONSET)
+    lines = [("base series (fitted)", printed_spring("pitchfork", "robot_critical_k1"), near, data.onset.values[:, 0])]
     for column, name in enumerate(data.variant.values[1:], 1):
-        paper = units.from_si(units.parse(printed()["variants"][str(name)]["robot_critical_k1"], "N*m/rad"), "N*mm/deg")
-        lines.append((str(name), paper, 0.15, data.onset.values[:, column]))
-    lines.append(("all springs alike", printed_number("uniform", "robot_critical_k"), 0.2, data.uniform.values))
+        paper = printed_spring("variants", str(name), "robot_critical_k1")
+        lines.append((str(name), paper, near, data.onset.values[:, column]))
+    lines.append(("all springs alike", printed_spring("uniform", "robot_critical_k"), near, data.uniform.values))
     for task in data.task.values:
         paper = float(printed()["turning"]["tasks"][str(task)]["k_hat"].split()[0])
-        lines.append((f"best spring, task {task}", paper, 0.25, data.best.sel(task=task).values))
-    for row, (_, paper, tolerance, values) in enumerate(lines):
-        axes["B"].plot([paper * (1 - tolerance), paper * (1 + tolerance)], [row, row], color=style.PALE, lw=9, zorder=1)
+        lines.append((f"best spring, task {task}", paper, AROUND, data.best.sel(task=task).values))
+    for row, (_, paper, within, values) in enumerate(lines):
+        ends = [part * paper for part in within]
+        axes["B"].plot(ends, [row, row], color=style.PALE, lw=9, zorder=1, solid_capstyle="butt")
         axes["B"].plot(paper, row, "D", color=style.ORANGE, markersize=8, label=None if row else "robot, paper")
         for index, value in enumerate(values):
             axes["B"].plot(

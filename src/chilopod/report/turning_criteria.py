@@ -10,12 +10,13 @@ from matplotlib.lines import Line2D
 
 from chilopod.report import style
 from chilopod.report.panel import Panel
-from chilopod.report.words import SPRING_UNIT, listing, number, spring
+from chilopod.report.words import SPRING_UNIT, listing, number, spring, typeset
 from chilopod.steering import Outcome
+from chilopod.studies import hopf
+from chilopod.studies.minima import NAMES, SCALES, minima
 from chilopod.studies.paper import printed
-from chilopod.studies.turning import TurningTask, minima, springs_by_outcome
+from chilopod.studies.turning import TurningTask, springs_by_outcome
 from chilopod.studies.turning_findings import Turning
-from chilopod.studies.turning_rows import NAMES, SCALES
 
 _LAYOUTS = (style.Layout("ABC", 3.9), style.Layout("A;B;C", 9.9))
 _AXES = {
@@ -67,8 +68,6 @@ def another(found: Turning) -> Panel:
 def comparison(found: Turning) -> Panel:
     """Fig. "comparison": pitchfork against Hopf."""
     task = found.tasks["A"]
-    ours, theirs = minima(task.criteria), minima(found.hopf.criteria)
-    lower = all(bool(ours["mean"].sel(criterion=name) < theirs["mean"].sel(criterion=name)) for name in NAMES)
     ever = int(np.isfinite(found.hopf.criteria.arrival.values).sum())
     return Panel(
         name="turning-hopf",
@@ -80,20 +79,16 @@ def comparison(found: Turning) -> Panel:
             "The earlier strategy softens all springs together, so that the straight walk gives way to an undulation "
             f"(below {spring(found.hopf_point, 3)} in the planar model, the robot's Hopf point is "
             f"{printed()['turning']['hopf']['point'].split()[0]}). Same task, same time, same disturbances: "
-            + listing(
-                f"{title.partition(',')[0]} at best {number(_shown(ours, name))} against "
-                f"{number(_shown(theirs, name))}\u00a0{SCALES[name][1]}"
-                for name, title in NAMES.items()
-            )
-            + (
-                ". Every minimum of the pitchfork is lower, as in the paper."
-                if lower
-                else ". Not every minimum of the pitchfork is lower, unlike in the paper."
-            ),
+            f"at best, pitchfork against Hopf: {typeset(hopf.words(task, found.hopf))}. "
+            + {
+                True: "Every minimum of the pitchfork is lower, as in the paper.",
+                False: "Not every minimum of the pitchfork is lower, unlike in the paper.",
+                None: "Whether every minimum of the pitchfork is lower, as in the paper, these walks leave open.",
+            }[hopf.all_lower(task, found.hopf)],
             f"With uniform springs {ever} of {found.hopf.criteria.arrival.size} walks arrive. Their ε1 and ε2 are "
             "smallest at the softest springs, in the unstable region as the paper found, but there the walks scatter: "
-            "how the body swings when it passes the target decides. ε3 tells the two apart least: the legs are at "
-            "their limit nearly all the time with both (the axis of ε3 does not start at zero).",
+            "how the body swings when it passes the target decides. ε3 tells the two apart least: "
+            f"{typeset(hopf.saturation(task, found.hopf))} (its axis does not start at zero).",
         ),
         data=xr.concat(
             [each.criteria.assign_coords(strategy=each.criteria.attrs["strategy"]) for each in (task, found.hopf)],

@@ -28,7 +28,7 @@ from chilopod.errors import AnalysisError
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot, Twin
 from chilopod.studies.paper import printed
-from chilopod.studies.robot_rows import CHECKED, RobotRow
+from chilopod.studies.robot_table import CHECKED, VERDICTS, RobotRow
 from chilopod.tasks.radius_law import CURVED
 from chilopod.trials import NONE, Trial
 from chilopod.twin.creep import foot_creep
@@ -329,7 +329,7 @@ def rows(data: xr.Dataset) -> list[RobotRow]:
             f"{data.attrs['vouched']:.2f} N*mm/deg ({100.0 * off:+.1f} %)",
             f"{data.attrs['exact']:.4f} N*mm/deg",
             CHECKED,
-            "within" if abs(off) <= _VOUCHED else "outside",
+            VERDICTS[abs(off) <= _VOUCHED],
             f"{100.0 * _VOUCHED:.0f} % of the planar model",
         )
     ]

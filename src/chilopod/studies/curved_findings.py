@@ -207,7 +207,8 @@ def compared(variants: Mapping[str, xr.Dataset], branches: Mapping[str, xr.Datas
     bootstrap), ``exact_k1``, ``robot_k1`` as printed, ``stiffest_k1``, up to which curved walks exist (above
     ``exact_k1`` where the branch folds back), all in N*mm/deg; ``criticality``; ``radius`` with ``radius_error``, mean
     and standard error over the trials that settled on a curved walk (m; NaN where there are fewer than two);
-    ``equal_ratio``, the radius over that as built at the same ratio, mean over all ratios; ``equal_spring``, over that
+    ``equal_ratio``, the radius over that as built at the same ratio, mean over all ratios, with ``equal_ratio_error``,
+    its standard error from that of the radii; ``equal_spring``, over that
     at the same k1, along the branches, at ``spring``.
     """
     base = branches["as built"]
@@ -217,6 +218,9 @@ def compared(variants: Mapping[str, xr.Dataset], branches: Mapping[str, xr.Datas
     curved = np.isfinite(statistics[:, 0]).all(axis=0)
     ratios = variants["as built"].spring.values / exact[0]
     radius = statistics[:, 0]
+    ratio = (radius / radius[0])[:, curved]
+    # Of independent trials; the base is one with itself, which is not asked.
+    off = np.hypot(*((statistics[each, 1] / radius[each])[..., curved] for each in (slice(None), slice(1))))
     # Every variant walks a curve there: softer than all critical springs, stiffer than where a branch ends.
     spring = float(0.9 * exact.min())
     there = np.array([axis_radius(branch, spring) for branch in branches.values()])
@@ -239,7 +243,8 @@ def compared(variants: Mapping[str, xr.Dataset], branches: Mapping[str, xr.Datas
             ),
             "radius": (("variant", "ratio"), radius, {"units": "m"}),
             "radius_error": (("variant", "ratio"), statistics[:, 1], {"units": "m"}),
-            "equal_ratio": ("variant", (radius / radius[0])[:, curved].mean(axis=1), {"units": "1"}),
+            "equal_ratio": ("variant", ratio.mean(axis=1), {"units": "1"}),
+            "equal_ratio_error": ("variant", np.linalg.norm(ratio * off, axis=1) / off.shape[1], {"units": "1"}),
             "equal_spring": ("variant", there / axis_radius(base, spring), {"units": "1"}),
         },
         coords={"variant": np.array(list(variants), dtype=object), "ratio": ratios},

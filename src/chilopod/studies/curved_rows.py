@@ -6,14 +6,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import xarray as xr
-from numpy.typing import NDArray
 
 from chilopod.studies.curved_findings import CurvedStudy, axis_radius, bent
 from chilopod.studies.paper import printed
+from chilopod.studies.scatter import INCREASES, Difference, between, increases, near, spread_difference
 from chilopod.studies.table import Row, agrees
-
-Array = NDArray[np.float64]
 
 
 def rows(study: CurvedStudy) -> list[Row]:
@@ -26,13 +23,15 @@ def rows(study: CurvedStudy) -> list[Row]:
     unsettled = int((~trials.settled).sum())
     stiff = trials.spring.values > exact
     straight = bool((trials.direction.values[stiff] == "straight").all())
-    angle, spread = _angles(curved)
-    rising = bool((np.diff(angle[:, 0]) < 0.0).all())
+    angles = np.where(bent(curved)[..., None], np.abs(curved.mean_angle.values), np.nan)
+    spread = np.nanstd(angles, axis=1, ddof=1)
+    joint_1 = angles[..., 0]
+    rising, wider = increases(joint_1[::-1]), spread_difference(joint_1[0], joint_1[-1])
     ratios = np.nanmean(np.abs(curved.mean_angle.values)[-1], axis=0)
     # The largest first: joints by how far they bend, and by the size of their share in the mode.
     order, mode = np.argsort(-ratios), np.argsort(-np.array(printed()["pitchfork"]["joint_components"]))
     fit = study.fit
-    near, law = study.fits.isel(softest=0), study.law
+    closest, law = study.fits.isel(softest=0), study.law
     below = law.sel(softest=0.99 * exact, method="nearest")
     where = text["source"]
     springs = ", ".join(f"{value:g}" for value in trials.spring.values)
@@ -56,7 +55,7 @@ def rows(study: CurvedStudy) -> list[Row]:
         Row(
             "angle of joint 1 over 1/k1",
             "increases",
-            "increases" if rising else "not throughout",
+            INCREASES[rising],
             where,
             agrees(rising),
         ),
@@ -64,9 +63,10 @@ def rows(study: CurvedStudy) -> list[Row]:
             "fluctuation among trials over 1/k1",
             "increases",
             f"{np.rad2deg(spread[-1, 0]):.2f} deg at k1 = {curved.spring.values[-1]:g}, "
-            f"{np.rad2deg(spread[0, 0]):.2f} deg at {curved.spring.values[0]:g} N*mm/deg (standard deviation, joint 1)",
+            f"{np.rad2deg(spread[0, 0]):.2f} deg at {curved.spring.values[0]:g} N*mm/deg (standard deviation, joint "
+            f"1): {wider}",
             where,
-            agrees(bool(spread[0, 0] > spread[-1, 0])),
+            agrees(wider.higher),
             "in the model uneven feet move the critical spring of a trial, which shows most beside it, where the angle "
             "rises steeply; a straight walk they leave straight",
         ),
@@ -87,7 +87,7 @@ def rows(study: CurvedStudy) -> list[Row]:
             "differs",
             f"{100 * (fit.critical / exact - 1):+.1f} % off, {(fit.critical - exact) / fit.bootstrap_error:.0f} of its "
             "standard errors: the law holds beside the point only. Over the two stiffest curved springs alone it gives "
-            f"{float(near.critical_k1):.2f} ± {float(near.bootstrap_error):.2f}",
+            f"{float(closest.critical_k1):.2f} ± {float(closest.bootstrap_error):.2f}",
         ),
         Row(
             "how the bend of joint 1 grows from the point",
@@ -131,7 +131,8 @@ def _variant_rows(study: CurvedStudy) -> list[Row]:
     where = table["curved"]["different"]
     for name in data.variant.values[1:]:
         at, base = data.sel(variant=name), data.isel(variant=0)
-        lower = float(at.fitted_k1) < float(base.fitted_k1)
+        apart = Difference(float(at.fitted_k1 - base.fitted_k1), float(np.hypot(at.error, base.error)))
+        robot_lower = float(at.robot_k1) < float(base.robot_k1)
         found.append(
             Row(
                 f"square-root fit to trials, {name}",
@@ -140,7 +141,7 @@ def _variant_rows(study: CurvedStudy) -> list[Row]:
                 f"{100 * float(at.fitted_k1 / base.fitted_k1 - 1):+.0f} %; exact {float(at.exact_k1):.3f}, "
                 f"{100 * float(at.exact_k1 / base.exact_k1 - 1):+.0f} %",
                 where,
-                agrees(lower == (float(at.robot_k1) < float(base.robot_k1))),
+                agrees(apart.lower if robot_lower else apart.higher),
                 f"{at.criticality.item()}"
                 + (
                     f": curved walks last up to {float(at.stiffest_k1):.3f} N*mm/deg, and no square root sets in"
@@ -150,13 +151,13 @@ def _variant_rows(study: CurvedStudy) -> list[Row]:
             )
         )
         says = table["variants"][name]["radius"]
-        ratio = float(at.equal_ratio)
-        fits = ratio < 0.98 if says == "smaller" else abs(ratio - 1.0) < 0.05
+        ratio, error = float(at.equal_ratio), float(at.equal_ratio_error)
+        fits = between(ratio, error, 0.0, 0.98) if says == "smaller" else near(ratio, error, 1.0, 0.05)
         found.append(
             Row(
                 f"radius, {name}",
                 says,
-                f"{100 * (ratio - 1):+.1f} % at the same k1 over its critical value",
+                f"{100 * (ratio - 1):+.1f} ± {100 * error:.1f} % at the same k1 over its critical value",
                 where,
                 agrees(fits),
                 "the paper does not say at which springs it compares; "
@@ -164,9 +165,3 @@ def _variant_rows(study: CurvedStudy) -> list[Row]:
             )
         )
     return found
-
-
-def _angles(trials: xr.Dataset) -> tuple[Array, Array]:
-    """Mean and standard deviation of the angles of the trials that settled on a curved walk, rad, (spring, joint)."""
-    angles = np.where(bent(trials)[..., None], np.abs(trials.mean_angle.values), np.nan)
-    return np.nanmean(angles, axis=1), np.nanstd(angles, axis=1, ddof=1)

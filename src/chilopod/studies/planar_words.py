@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chilopod.steering import Outcome
+from chilopod.studies import hopf
 from chilopod.studies.curved_findings import CurvedStudy, axis_radius, bent
+from chilopod.studies.equal_distance import change, radius_ratio
+from chilopod.studies.minima import NAMES, SCALES, minima
 from chilopod.studies.paper import printed
-from chilopod.studies.turning import minima, springs_by_outcome
+from chilopod.studies.scatter import INCREASES, increases, spread_difference
+from chilopod.studies.turning import springs_by_outcome
 from chilopod.studies.turning_findings import Turning
-from chilopod.studies.turning_rows import NAMES, SCALES
 
 if TYPE_CHECKING:
     from chilopod.studies.reproduce import Results
@@ -33,13 +36,15 @@ def _curved(study: CurvedStudy) -> dict[str, str]:
     trials, here = study.trials, bent(study.trials)
     sides = [int((trials.direction == side).sum()) for side in ("left", "right")]
     curving = [float(k) for k, row in zip(trials.spring.values, here, strict=True) if row.any()]
-    means = np.nanmean(np.where(here[..., None], np.abs(trials.mean_angle.values), np.nan), axis=1)[: len(curving), 0]
+    angles = np.where(here, np.abs(trials.mean_angle.sel(joint=1).values), np.nan)
     words = {
         "straight": f"straight from {min(set(trials.spring.values) - set(curving)):g} N*mm/deg up",
         "curved": f"curved up to {max(curving):g} N*mm/deg",
         "sides": f"{sides[0]} and {sides[1]}",
         "onset": f"{study.fit.critical:.2f} N*mm/deg; the point is at {trials.attrs['critical_k1']:.2f}",
-        "rising": "increases" if (np.diff(means) < 0.0).all() else "not throughout",
+        "rising": INCREASES[increases([row for row in angles if np.isfinite(row).any()][::-1])],
+        "fluctuation": f"{spread_difference(angles[0], angles[len(curving) - 1])} at {curving[0]:g} than at "
+        f"{curving[-1]:g} N*mm/deg",
     }
     ratio = trials.attrs["critical_k1"] / float(printed()["pitchfork"]["robot_critical_k1"].split()[0])
     for spring in printed()["curved"]["radius"]:
@@ -48,7 +53,11 @@ def _curved(study: CurvedStudy) -> dict[str, str]:
     for name in study.comparison.variant.values[1:]:
         at = study.comparison.sel(variant=name)
         words[str(name)] = f"{float(at.fitted_k1):.2f} N*mm/deg; the point is at {float(at.exact_k1):.2f}"
-        words[f"radius {name}"] = f"{100.0 * (float(at.equal_spring) - 1.0):+.0f} % at the same spring"
+        ratio = radius_ratio(study.variants["as built"], study.variants[str(name)])
+        words[f"radius {name}"] = (
+            f"{change(ratio.distance, ratio.distance_error)} at equal distance from its own onset; "
+            f"{change(float(at.equal_spring))} at the same spring"
+        )
     return words
 
 
@@ -67,9 +76,7 @@ def _turning(found: Turning) -> dict[str, str]:
             factor, unit = SCALES[name]
             at = low.sel(criterion=name)
             words[f"{name} {letter}"] = f"{factor * float(at['mean']):.3g} {unit} at k1 = {float(at['at']):.3g}"
-    ours, other = minima(found.tasks["A"].criteria), minima(found.hopf.criteria)
-    lower = [bool(ours["mean"].sel(criterion=name) < other["mean"].sel(criterion=name)) for name in NAMES]
-    words["hopf"] = "all three lower" if all(lower) else f"{sum(lower)} of three lower"
+    words["hopf"] = hopf.counted(found.tasks["A"], found.hopf)
     alone, helped = found.without.isel(case=0), found.without.isel(case=1)
     words["without"] = (
         f"{int(np.nansum(alone.arrived))} of {int(np.isfinite(alone.arrived).sum())} arrive, with it "

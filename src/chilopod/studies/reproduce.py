@@ -14,12 +14,21 @@ from chilopod.analysis.parameters import K1, stiffness
 from chilopod.analysis.undulation import undulating_walks
 from chilopod.errors import ParameterError, nearest_name
 from chilopod.robot import Robot
-from chilopod.studies import ablation, curved_rows, floquet, floquet_rows, robot_rows, turning_rows, twin_numerics
+from chilopod.studies import (
+    ablation,
+    curved_rows,
+    floquet,
+    floquet_rows,
+    robot_rows,
+    robot_turning_rows,
+    turning_rows,
+    twin_numerics,
+)
 from chilopod.studies.curved_findings import CurvedStudy, curved_study
 from chilopod.studies.fit_data import critical_mode_data, variant_settings
 from chilopod.studies.movies import Movie, movies, robot_movies
 from chilopod.studies.planar_words import planar_words
-from chilopod.studies.robot_rows import RobotRow
+from chilopod.studies.robot_table import RobotRow
 from chilopod.studies.robot_turning import RobotTurning, robot_turning
 from chilopod.studies.robot_walks import RobotWalks, robot_walks
 from chilopod.studies.table import Row
@@ -249,7 +258,7 @@ def _robot_section(
         return robot_rows.walk_rows(results.robot_walks, planar_words(results))
     if name == "robot-turning":
         results.robot_turning = robot_turning(whole, folder, quick, report)
-        return robot_rows.turning_rows(results.robot_turning, results.robot_walks, planar_words(results))
+        return robot_turning_rows.turning_rows(results.robot_turning, results.robot_walks, planar_words(results))
     if name == "robot-spread":
         results.datasets[name] = twin_spread(whole, folder, 2 if quick else SPREAD, report)
         return []

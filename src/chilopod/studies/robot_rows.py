@@ -1,342 +1,322 @@
-"""The table quantity | the paper's robot | twin | planar model | within?."""
+"""Lines of the robot's table about its walks."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from chilopod import units
 from chilopod.analysis.parameters import PAPER_UNIT
-from chilopod.steering import Outcome
+from chilopod.studies.equal_distance import change, law_ratio, radius_ratio
+from chilopod.studies.fit_data import walking_speed
 from chilopod.studies.paper import printed
-from chilopod.studies.robot_turning import PAPER_SPRING, RobotTurning
-from chilopod.studies.robot_walks import RobotWalks, onset, radius_at, spring_for
-from chilopod.studies.turning import minima, springs_by_outcome
-from chilopod.studies.turning_rows import AROUND, NAMES, SCALES
+from chilopod.studies.robot_table import (
+    CHECKED,
+    FITTED,
+    ONSET,
+    PREDICTED,
+    RADIUS,
+    SPEED,
+    UNCHANGED,
+    VERDICTS,
+    Planar,
+    RobotRow,
+    percent,
+    printed_spring,
+    spring_row,
+    with_error,
+)
+from chilopod.studies.robot_turning import PAPER_SPRING
+from chilopod.studies.robot_walks import RobotWalks
+from chilopod.studies.scatter import (
+    INCREASES,
+    Answer,
+    between,
+    every,
+    increases,
+    mean_and_error,
+    near,
+    spread_difference,
+)
+from chilopod.studies.walk_measures import onset_with_error, radius_at, shares
 from chilopod.tasks.radius_law import is_curved
 
-FITTED, PREDICTED, CHECKED = "fitted", "predicted", "checked"
-
-_SPRING = "N*mm/deg"
-
-
-@dataclass(frozen=True)
-class RobotRow:
-    """A line of the table.
-
-    Attributes
-    ----------
-    quantity
-        What it is about.
-    robot, twin, planar
-        What the paper prints of its robot, what the twin does, and what the planar model does, empty where it was not
-        asked; in words and numbers with units.
-    kind
-        "fitted" if the twin's constants were fitted to it, else "predicted"; "checked" for what is about the twin.
-    verdict
-        "within" or "outside" of what is asked of the twin, or "not printed".
-    asked
-        What counts as within.
-    """
-
-    quantity: str
-    robot: str
-    twin: str
-    planar: str
-    kind: str
-    verdict: str
-    asked: str
-
-    def as_json(self) -> dict[str, str]:
-        """The row by column."""
-        return asdict(self)
-
-
-Planar = Mapping[str, str]
-"""What the planar model does, in words, by the keys of :func:`planar_words`."""
+STRAIGHT, CURVED = (41.0, 75.0), (15.0, 17.0, 21.0, 28.0)
+"""N*mm/deg: springs at which the paper's robot walks straight, and those at which it curves."""
 
 
 def walk_rows(found: RobotWalks, planar: Planar) -> list[RobotRow]:
-    """Where walks curve, and how tightly."""
-    base, fit = found.base, found.fit
-    at = {float(k): row for k, row in zip(base.spring.values, is_curved(base).mean(axis=1), strict=True)}
-    curving = [k for k, part in at.items() if part > 0.5]
-    wanted = printed_number("pitchfork", "robot_critical_k1")
-    sides = {name: int((base.direction == name).sum()) for name in ("left", "right")}
+    """Where walks curve, how tightly and how fast, and what of it hangs on how long they last."""
+    base = found.base
     rows = [
-        RobotRow(
-            "walks with k1 = 41 and 75 N*mm/deg",
-            "straight",
-            _share({k: 1.0 - at[k] for k in (41.0, 75.0)}, base.sizes["repeat"], "straight"),
-            planar.get("straight", ""),
-            FITTED,
-            _verdict(all(at[k] < 0.5 for k in (41.0, 75.0))),
-            "most trials",
-        ),
-        RobotRow(
-            "walks with k1 = 15, 17, 21 and 28 N*mm/deg",
-            "curved",
-            _share({k: at[k] for k in (15.0, 17.0, 21.0, 28.0)}, base.sizes["repeat"], "curved"),
-            planar.get("curved", ""),
-            FITTED,
-            _verdict(all(k in curving for k in (15.0, 17.0, 21.0, 28.0))),
-            "most trials",
-        ),
-        RobotRow(
-            "curved walks to the left and to the right",
-            "both",
-            f"{sides['left']} and {sides['right']}",
-            planar.get("sides", ""),
-            PREDICTED,
-            _verdict(min(sides.values()) > 0),
-            "both",
-        ),
-        _number(
+        _straight(base, planar),
+        _curved(base, planar),
+        spring_row(
             "where curved walks set in (square-root fit)",
-            wanted,
-            fit.critical if fit else None,
-            0.10,
+            printed_spring("pitchfork", "robot_critical_k1"),
+            onset_with_error(base),
+            ONSET,
             FITTED,
-            planar,
-            "onset",
+            planar.get("onset", ""),
+        ),
+        *(_radius(base, spring, planar) for spring in printed_radii()),
+        _speed(base, planar),
+        _rising(base, planar),
+        _fluctuation(base, planar),
+    ]
+    for name, data in found.variants.items():
+        if name not in found.lower_steps:
+            rows += variant_rows(base, data, name, name, planar)
+            continue
+        rows += variant_rows(base, data, name, f"{name} (steps as high)", planar)
+        rows += variant_rows(base, found.lower_steps[name], name, f"{name} (steps lower in proportion)", planar)
+    uniform = found.uniform.attrs
+    rows.append(
+        spring_row(
+            "where a body with springs all alike undulates",
+            printed_spring("uniform", "robot_critical_k"),
+            (uniform["critical_k"], uniform["critical_k_error"]),
+            ONSET,
+            PREDICTED,
+            planar.get("uniform", ""),
+        )
+    )
+    return rows + duration_rows(found.durations)
+
+
+def printed_radii() -> dict[float, float]:
+    """Radii (m) that the paper prints, by k1 (N*mm/deg)."""
+    return {float(key): units.parse(text, "m") for key, text in printed()["curved"]["radius"].items()}
+
+
+def _straight(base: xr.Dataset, planar: Planar) -> RobotRow:
+    return RobotRow(
+        f"walks with k1 = {_listed(STRAIGHT)} {PAPER_UNIT}",
+        "straight",
+        f"straight: {_counts(base, 'straight', STRAIGHT)}",
+        planar.get("straight", ""),
+        FITTED,
+        VERDICTS[_most(shares(base), "straight", STRAIGHT)],
+        "most trials",
+    )
+
+
+def _curved(base: xr.Dataset, planar: Planar) -> RobotRow:
+    directions = base.direction.sel(spring=list(CURVED)).values
+    left, right = (int((directions == side).sum()) for side in ("left", "right"))
+    both = ", ".join(planar[key] for key in ("curved", "sides") if key in planar)
+    return RobotRow(
+        f"walks with k1 = {_listed(CURVED)} {PAPER_UNIT}",
+        "curved, to both sides",
+        f"curved: {_counts(base, 'curved', CURVED)}; {left} to the left, {right} to the right",
+        both,
+        FITTED,
+        VERDICTS[_most(shares(base), "curved", CURVED) and min(left, right) > 0],
+        "most trials at each; both sides",
+    )
+
+
+def _radius(base: xr.Dataset, spring: float, planar: Planar) -> RobotRow:
+    (mean, error), paper = radius_at(base, spring), printed_radii()[spring]
+    return RobotRow(
+        f"radius at k1 = {spring:g} {PAPER_UNIT}",
+        f"{paper:g} m",
+        "no two trials curve" if np.isnan(mean) else f"{with_error(mean, error, 2)} m",
+        planar.get(f"radius {spring:g}", ""),
+        FITTED,
+        VERDICTS[near(mean, error, paper, RADIUS)],
+        percent(RADIUS),
+    )
+
+
+def _speed(base: xr.Dataset, planar: Planar) -> RobotRow:
+    entry = printed()["turning"]
+    mean, error = mean_and_error(base.speed.sel(spring=PAPER_SPRING).values)
+    return RobotRow(
+        f"speed of module 1 at k1 = {PAPER_SPRING:g} {PAPER_UNIT}",
+        f"{walking_speed():.3f} m/s, from {entry['evaluation_time']} to {entry['tasks']['A']['target']}",
+        f"{with_error(mean, error, 4)} m/s",
+        planar.get("speed", ""),
+        FITTED,
+        VERDICTS[near(mean, error, walking_speed(), SPEED)],
+        percent(SPEED),
+    )
+
+
+def _curved_angles(base: xr.Dataset) -> dict[float, NDArray[np.float64]]:
+    """Of joint 1 in all trials that curve, rad, by spring (N*mm/deg), the stiffest first."""
+    ordered = base.sortby("spring", ascending=False)
+    angles = np.where(is_curved(ordered), np.abs(ordered.mean_angle.sel(joint=1).values), np.nan)
+    pairs = zip(ordered.spring.values, angles, strict=True)
+    return {float(spring): row[np.isfinite(row)] for spring, row in pairs if np.isfinite(row).any()}
+
+
+def _rising(base: xr.Dataset, planar: Planar) -> RobotRow:
+    rising = increases(_curved_angles(base).values())
+    return RobotRow(
+        "angle of joint 1 over 1/k1",
+        "increases",
+        INCREASES[rising],
+        planar.get("rising", ""),
+        PREDICTED,
+        VERDICTS[rising],
+        "from every spring to the next",
+    )
+
+
+def _fluctuation(base: xr.Dataset, planar: Planar) -> RobotRow:
+    several = {spring: row for spring, row in _curved_angles(base).items() if row.size > 1}
+    if len(several) < 2:
+        said, answer = "no two springs at which two trials curve", None
+    else:
+        (stiff, one), *_, (soft, other) = several.items()
+        wider = spread_difference(other, one)
+        spreads = [f"{np.rad2deg(row.std(ddof=1)):.2f} deg at {k:g}" for k, row in ((stiff, one), (soft, other))]
+        said, answer = f"{' and '.join(spreads)} {PAPER_UNIT} (standard deviation): {wider}", wider.higher
+    return RobotRow(
+        "fluctuation among trials over 1/k1, joint 1",
+        "increases",
+        said,
+        planar.get("fluctuation", ""),
+        PREDICTED,
+        VERDICTS[answer],
+        "from the stiffest spring that curves to the softest",
+    )
+
+
+def variant_rows(base: xr.Dataset, data: xr.Dataset, name: str, title: str, planar: Planar) -> list[RobotRow]:
+    """Onset and radius of a variant.
+
+    Parameters
+    ----------
+    base, data
+        Trials of the robot as built and of the variant.
+    name
+        Of the variant, as the paper's.
+    title
+        What the rows call it: its name, and if there are several, which reading of it.
+    planar
+        What the planar model does.
+    """
+    own = printed_spring("variants", name, "robot_critical_k1")
+    says = printed()["variants"][name]["radius"]
+    ratio = radius_ratio(base, data)
+    law = law_ratio(ratio.compared, printed_spring("pitchfork", "robot_critical_k1"), own)
+    if says == "smaller":
+        answer, asked = between(ratio.distance, ratio.distance_error, 0.0, 1.0), "not wider than as built"
+    else:
+        answer, asked = near(ratio.distance, ratio.distance_error, 1.0, UNCHANGED), percent(UNCHANGED)
+    said = [f"{change(ratio.distance, ratio.distance_error)} at equal distance from its own onset, 1/k1 - 1/k1*"]
+    if np.isnan(ratio.distance):
+        said = ["no distance from the onset in common with the robot as built"]
+    if ratio.compared:
+        said.append(
+            f"{change(ratio.springs, ratio.springs_error)} at equal springs, {_listed(ratio.compared)}"
+            + ("" if np.isnan(law) else f" (the robot's onsets alone would make it {change(law)})")
+        )
+    return [
+        spring_row(
+            f"where curved walks set in, {title}",
+            own,
+            onset_with_error(data),
+            ONSET,
+            PREDICTED,
+            planar.get(name, ""),
+        ),
+        RobotRow(
+            f"radius, {title}",
+            says,
+            "; ".join(said),
+            planar.get(f"radius {name}", ""),
+            PREDICTED,
+            VERDICTS[answer],
+            f"{asked}, at equal distance",
         ),
     ]
-    for spring, text in printed()["curved"]["radius"].items():
-        mean, error = radius_at(base, float(spring))
-        paper = units.parse(text, "m")
-        rows.append(
-            RobotRow(
-                f"radius at k1 = {spring} {_SPRING}",
-                text,
-                "no two trials curve" if np.isnan(mean) else f"{mean:.2f} ± {error:.2f} m",
-                planar.get(f"radius {spring}", ""),
-                FITTED,
-                _verdict(abs(mean / paper - 1.0) <= 0.10),
-                "10 %",
-            )
-        )
-    means = np.array(
-        [
-            np.nanmean(np.where(here, np.abs(row), np.nan))
-            for here, row in zip(is_curved(base), base.mean_angle.sel(joint=1).values, strict=True)
-            if here.any()
-        ]
-    )
-    rising = bool((np.diff(means) < 0.0).all())
-    rows.append(
-        RobotRow(
-            "angle of joint 1 over 1/k1",
-            "increases",
-            "increases" if rising else "not throughout",
-            planar.get("rising", ""),
-            PREDICTED,
-            _verdict(rising),
-            "at every spring",
-        )
-    )
-    return rows + _variant_rows(found, planar) + [_uniform(found, planar)]
 
 
-def _variant_rows(found: RobotWalks, planar: Planar) -> list[RobotRow]:
-    rows, base = [], found.base
-    shared = [float(k) for k in base.spring.values if k in found.variants[next(iter(found.variants))].spring.values]
-    for name, data in found.variants.items():
-        fit = onset(data)
-        wanted = units.from_si(units.parse(printed()["variants"][name]["robot_critical_k1"], "N*m/rad"), PAPER_UNIT)
+def duration_rows(data: xr.Dataset) -> list[RobotRow]:
+    """Which quantities of the base series would be judged otherwise if its walks were shorter.
+
+    Parameters
+    ----------
+    data
+        From :func:`chilopod.studies.robot_walks.by_duration`.
+    """
+    paper = printed_spring("pitchfork", "robot_critical_k1")
+    each = [data.isel(duration=index) for index in range(data.sizes["duration"])]
+    rows = [
+        _duration_row(
+            data,
+            "onset",
+            f"{_numbers(data.onset.values, 1)} {PAPER_UNIT}",
+            [near(float(at.onset), float(at.onset_error), paper, ONSET) for at in each],
+        )
+    ]
+    for spring, radius in printed_radii().items():
+        pairs = data[["axis_radius", "axis_radius_error"]].sel(spring=spring).to_array("part").values.T
         rows.append(
-            _number(
-                f"where curved walks set in, {name}",
-                wanted,
-                fit.critical if fit else None,
-                0.15,
-                PREDICTED,
-                planar,
-                name,
+            _duration_row(
+                data,
+                f"radius at {spring:g} {PAPER_UNIT}",
+                f"{_numbers(pairs[:, 0], 2)} m",
+                [near(mean, error, radius, RADIUS) for mean, error in pairs],
             )
         )
-        says = printed()["variants"][name]["radius"]
-        ratios = [radius_at(data, k)[0] / radius_at(base, k)[0] for k in shared]
-        ratios = [ratio for ratio in ratios if np.isfinite(ratio)]
-        ratio = float(np.mean(ratios)) if ratios else float("nan")
-        fits = ratio < 0.97 if says == "smaller" else abs(ratio - 1.0) < 0.15
+    # The springs next to the onset are those that need the longest.
+    for what, spring in (("curved", max(CURVED)), ("straight", min(STRAIGHT))):
         rows.append(
-            RobotRow(
-                f"radius, {name}",
-                says,
-                f"{100.0 * (ratio - 1.0):+.0f} % at the same springs" if np.isfinite(ratio) else "no two trials curve",
-                planar.get(f"radius {name}", ""),
-                PREDICTED,
-                _verdict(fits),
-                "smaller by 3 %" if says == "smaller" else "15 %",
+            _duration_row(
+                data,
+                f"walks {what} at {spring:g} {PAPER_UNIT}",
+                f"{_numbers(100.0 * data[what].sel(spring=spring).values, 0)} %",
+                [_most(at, what, (spring,)) for at in each],
             )
         )
     return rows
 
 
-def _uniform(found: RobotWalks, planar: Planar) -> RobotRow:
-    wanted = printed_number("uniform", "robot_critical_k")
-    return _number(
-        "where a body with springs all alike undulates",
-        wanted,
-        found.uniform.attrs["critical_k"],
-        0.20,
-        PREDICTED,
-        planar,
-        "uniform",
-    )
-
-
-def turning_rows(found: RobotTurning, walks: RobotWalks | None, planar: Planar) -> list[RobotRow]:
-    """The turning tasks."""
-    rows: list[RobotRow] = []
-    for letter, task in found.tasks.items():
-        entry = printed()["turning"]["tasks"][letter]
-        k_hat = float(entry["k_hat"].split()[0])
-        if walks is not None:
-            own = spring_for(walks.base, task.target.radius)
-            rows.append(
-                RobotRow(
-                    f"task {letter}: k1 whose walk has the radius of the circle",
-                    entry["k_hat"],
-                    f"{own:.1f} {_SPRING}",
-                    planar.get(f"k_hat {letter}", ""),
-                    PREDICTED,
-                    _verdict(abs(own / k_hat - 1.0) <= 0.15),
-                    "15 %",
-                )
-            )
-        outcomes = springs_by_outcome(task.criteria)
-        said = "; ".join(
-            f"{label} at {', '.join(f'{k:g}' for k in outcomes[label])}"
-            for label in (Outcome.OUTSIDE.label, Outcome.ARRIVED.label, Outcome.INSIDE.label)
-            if outcomes[label]
-        )
-        rows.append(_outcomes(task.criteria, letter, entry, k_hat, said, planar))
-        low = minima(task.criteria)
-        for name, title in NAMES.items():
-            at, (factor, unit) = low.sel(criterion=name), SCALES[name]
-            spring = float(at["at"])
-            rows.append(
-                RobotRow(
-                    f"task {letter}: smallest {title}",
-                    f"around k1 = {k_hat:g} {_SPRING}",
-                    f"{factor * float(at['mean']):.3g} ± {factor * float(at['error']):.2g} {unit} at k1 = {spring:.3g} "
-                    f"(no worse: {float(at.softest):g} to {float(at.stiffest):g})",
-                    planar.get(f"{name} {letter}", ""),
-                    PREDICTED,
-                    _verdict(AROUND[0] * k_hat <= spring <= AROUND[1] * k_hat),
-                    f"{AROUND[0] * k_hat:.3g} to {AROUND[1] * k_hat:.3g} {_SPRING}",
-                )
-            )
-    return [*rows, _arrival(found, planar), *_without(found, planar), *_hopf(found, planar)]
-
-
-def _outcomes(
-    criteria: xr.Dataset, letter: str, entry: Mapping[str, Any], k_hat: float, said: str, planar: Planar
-) -> RobotRow:
-    """What became of the task: at the paper's own springs, or between two that miss to either side."""
-    outcomes = springs_by_outcome(criteria)
-    if "outcomes" in entry:
-        wanted = {label: float(text.split()[0]) for label, text in entry["outcomes"].items()}
-        met = all(k in outcomes[label] for label, k in wanted.items())
-        every = bool((criteria.outcome.sel(spring=k_hat) == Outcome.ARRIVED.label).all())
-        robot = ", ".join(f"{label} at {k:g}" for label, k in wanted.items()) + f" {_SPRING}, all five at {k_hat:g}"
-        asked = "the same at these springs, and all repeats arrive"
-    else:
-        met = bool(outcomes[Outcome.OUTSIDE.label] and outcomes[Outcome.INSIDE.label])
-        every = k_hat in outcomes[Outcome.ARRIVED.label]
-        robot, asked = f"best around {k_hat:g} {_SPRING}", "arrives there; stiffer miss outside, softer inside"
-    return RobotRow(
-        f"task {letter}: what becomes of it",
-        robot,
-        said,
-        planar.get(f"outcomes {letter}", ""),
-        PREDICTED,
-        _verdict(met and every),
-        asked,
-    )
-
-
-def _arrival(found: RobotTurning, planar: Planar) -> RobotRow:
-    return RobotRow(
-        "task A: earliest arrival",
-        printed()["turning"]["evaluation_time"],
-        f"{found.tasks['A'].time:.1f} s",
-        planar.get("arrival", ""),
-        PREDICTED,
-        _verdict(abs(found.tasks["A"].time / units.parse(printed()["turning"]["evaluation_time"], "s") - 1.0) <= 0.15),
-        "15 %",
-    )
-
-
-def _without(found: RobotTurning, planar: Planar) -> list[RobotRow]:
-    data = found.without
-    alone, helped = (data.isel(case=int(np.flatnonzero(data.leg_yaw.values == which)[0])) for which in (False, True))
-    counts = [(int(np.nansum(case.arrived)), int(np.isfinite(case.arrived).sum())) for case in (alone, helped)]
-    left = int((alone.turned > 0.0).sum())
-    return [
-        RobotRow(
-            f"task A without leg yaw, k1 = {PAPER_SPRING:g} {_SPRING}",
-            "many of 9 fail, with it 5 of 5 arrive",
-            f"{counts[0][0]} of {counts[0][1]} arrive ({left} turn left), with it {counts[1][0]} of {counts[1][1]}",
-            planar.get("without", ""),
-            PREDICTED,
-            _verdict(counts[0][0] <= counts[0][1] // 2 and counts[1][0] == counts[1][1]),
-            "at most 4 arrive without, all with",
-        )
+def _duration_row(data: xr.Dataset, name: str, values: str, answers: Sequence[Answer]) -> RobotRow:
+    """Whether a quantity is judged alike after every duration."""
+    times, last = [f"{each:g}" for each in data.duration.values], answers[-1]
+    by = {word: [t for t, each in zip(times, answers, strict=True) if each is key] for key, word in VERDICTS.items()}
+    judged = [
+        f"{word} after {_joined(those) if len(those) < len(times) else 'each'}" for word, those in by.items() if those
     ]
-
-
-def _hopf(found: RobotTurning, planar: Planar) -> list[RobotRow]:
-    ours, other = minima(found.tasks["A"].criteria), minima(found.hopf.criteria)
-    pairs, lower = [], True
-    for name, title in NAMES.items():
-        factor, unit = SCALES[name]
-        one, two = (factor * float(each["mean"].sel(criterion=name)) for each in (ours, other))
-        pairs.append(f"{title} {one:.3g} against {two:.3g} {unit}")
-        lower &= one < two
-    return [
-        RobotRow(
-            "task A, pitchfork against Hopf: smallest criteria",
-            "lower for the pitchfork, all three",
-            "; ".join(pairs),
-            planar.get("hopf", ""),
-            PREDICTED,
-            _verdict(lower),
-            "all three lower",
-        )
-    ]
-
-
-def printed_number(section: str, key: str) -> float:
-    """A spring that the paper prints, N*mm/deg."""
-    return units.from_si(units.parse(printed()[section][key], "N*m/rad"), PAPER_UNIT)
-
-
-def _number(
-    quantity: str, paper: float, twin: float | None, tolerance: float, kind: str, planar: Planar, key: str
-) -> RobotRow:
-    good = twin is not None and np.isfinite(twin)
     return RobotRow(
-        quantity,
-        f"{paper:g} {_SPRING}",
-        f"{twin:.1f} {_SPRING} ({100.0 * (twin / paper - 1.0):+.0f} %)"
-        if good and twin
-        else "not determined by trials",
-        planar.get(key, ""),
-        kind,
-        _verdict(bool(good and twin and abs(twin / paper - 1.0) <= tolerance)),
-        f"{100.0 * tolerance:.0f} %",
+        f"{name}, by how long the walks last",
+        "not printed how long",
+        f"{values} after {_joined(times)} s: {', '.join(judged)}",
+        "",
+        CHECKED,
+        VERDICTS[every(None if None in (each, last) else each == last for each in answers)],
+        "the same verdict after each",
     )
 
 
-def _share(parts: Mapping[float, float], repeats: int, what: str) -> str:
-    return f"{what}: " + ", ".join(f"{round(part * repeats)} of {repeats} at {k:g}" for k, part in parts.items())
+def _most(shares: xr.Dataset, what: str, springs: tuple[float, ...]) -> bool:
+    """Whether most walks at each of some springs are "curved" or "straight"."""
+    return bool((shares[what].sel(spring=list(springs)) > 0.5).all())
 
 
-def _verdict(yes: bool) -> str:
-    return "within" if yes else "outside"
+def _counts(data: xr.Dataset, what: str, springs: tuple[float, ...]) -> str:
+    counts = data.sizes["repeat"] * shares(data)[what].sel(spring=list(springs)).values
+    return ", ".join(
+        f"{count:.0f} of {data.sizes['repeat']} at {spring:g}" for spring, count in zip(springs, counts, strict=True)
+    )
+
+
+def _numbers(values: NDArray[np.float64], digits: int) -> str:
+    return ", ".join(f"{value:.{digits}f}" if np.isfinite(value) else "none" for value in values)
+
+
+def _listed(springs: tuple[float, ...]) -> str:
+    """15, 17 and 21."""
+    return _joined([f"{spring:g}" for spring in sorted(springs)])
+
+
+def _joined(names: Sequence[str]) -> str:
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)

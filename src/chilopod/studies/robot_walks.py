@@ -22,7 +22,8 @@ from chilopod.errors import AnalysisError
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.studies.curved_trials import variant_robots
-from chilopod.tasks.radius_law import DURATION, end_of_walk, is_curved
+from chilopod.studies.walk_measures import onset, onset_with_error, radius_at, shares
+from chilopod.tasks.radius_law import DURATION, end_of_walk
 from chilopod.trials import AVERAGED, Disturbance, Trial
 
 Array = NDArray[np.float64]
@@ -40,6 +41,9 @@ SWINGING = 15.0
 """N*mm/deg: of the paper's uniform springs, those up to here are on the soft side of its Hopf point."""
 
 REPEATS, VARIANT_REPEATS, UNIFORM_REPEATS = 10, 5, 3
+
+SHORTER = (20.0, 30.0, 40.0, 60.0)
+"""s, after which the base series is judged besides: the paper does not say how long its trials last."""
 
 UNIFORM_DURATION = 60.0
 """s, of walks with all springs alike, which settle sooner."""
@@ -61,8 +65,13 @@ class RobotWalks:
         As built.
     base
         See :func:`walk_trials`.
+    durations
+        See :func:`by_duration`.
     variants
-        The same of the paper's three variants, by name.
+        As ``base``, of the paper's three variants, by name.
+    lower_steps
+        The same of those of them that change the stride, with another reading of what the paper leaves open: that a
+        shorter half ellipse of the leg tips is lower in proportion, see :func:`lower_steps`.
     examples
         Joint angles (rad) over time of one straight and one curved walk, over (time, spring, joint).
     uniform
@@ -71,7 +80,9 @@ class RobotWalks:
 
     robot: Robot
     base: xr.Dataset
+    durations: xr.Dataset
     variants: Mapping[str, xr.Dataset]
+    lower_steps: Mapping[str, xr.Dataset]
     examples: xr.Dataset
     uniform: xr.Dataset
 
@@ -105,14 +116,26 @@ def robot_walks(
     springs, uniform_springs = (
         (VARIANT_SPRINGS[1::2], UNIFORM_SPRINGS[:4]) if quick else (VARIANT_SPRINGS, UNIFORM_SPRINGS)
     )
-    base = walk_trials(robot, SPRINGS, repeats, folder=folder, progress=part(0.0, 0.35, "as built"))
+    records = walk_records(robot, SPRINGS, repeats, folder=folder, progress=part(0.0, 0.31, "as built"))
+    base, durations = walk_ends(records, robot, SPRINGS), by_duration(records, robot, SPRINGS)
     robots = {name: each for name, each in variant_robots(robot).items() if name != "as built"}
-    variants = {}
-    for index, (name, variant) in enumerate(robots.items()):
-        shown = part(0.35 + 0.18 * index, 0.53 + 0.18 * index, name)
-        variants[name] = walk_trials(variant, springs, fewer, folder=folder, progress=shown)
-    uniform = undulations(robot, uniform_springs, fewest, folder=folder, progress=part(0.89, 1.0, "uniform springs"))
-    return RobotWalks(robot, base, variants, _examples(robot, folder), uniform)
+    readings = {
+        name: lower_steps(robot, each) for name, each in robots.items() if each.gait.stride != robot.gait.stride
+    }
+    asked = [(robots, name) for name in robots] + [(readings, name) for name in readings]
+    found: list[xr.Dataset] = []
+    for index, (of, name) in enumerate(asked):
+        shown = part(0.31 + 0.6 * index / len(asked), 0.31 + 0.6 * (index + 1) / len(asked), name)
+        found.append(walk_trials(of[name], springs, fewer, folder=folder, progress=shown))
+    variants, lower = dict(zip(robots, found, strict=False)), dict(zip(readings, found[len(robots) :], strict=True))
+    uniform = undulations(robot, uniform_springs, fewest, folder=folder, progress=part(0.91, 1.0, "uniform springs"))
+    return RobotWalks(robot, base, durations, variants, lower, _examples(robot, folder), uniform)
+
+
+def lower_steps(robot: Robot, variant: Robot) -> Robot:
+    """A variant with another stride whose swing clearance is in proportion to the stride, as the robot has it."""
+    part = variant.gait.stride / robot.gait.stride
+    return variant.with_value("twin.clearance", part * robot.get("twin.clearance"))
 
 
 def walk_trials(
@@ -124,7 +147,21 @@ def walk_trials(
     folder: str | Path | None = None,
     progress: Progress = silent,
 ) -> xr.Dataset:
-    """Walks of the twin from straight on.
+    """Walks of the twin from straight on, see :func:`walk_records` and :func:`walk_ends`."""
+    records = walk_records(robot, springs, repeats, disturbance=disturbance, folder=folder, progress=progress)
+    return walk_ends(records, robot, springs)
+
+
+def walk_records(
+    robot: Robot,
+    springs: Sequence[float] = SPRINGS,
+    repeats: int = REPEATS,
+    *,
+    disturbance: Disturbance | None = None,
+    folder: str | Path | None = None,
+    progress: Progress = silent,
+) -> list[xr.Dataset]:
+    """Records of walks of the twin from straight on, spring by spring.
 
     Parameters
     ----------
@@ -140,10 +177,6 @@ def walk_trials(
         Where trials are kept.
     progress
         Called as trials are done.
-
-    Returns
-    -------
-    Dataset over spring (N*mm/deg), repeat and joint: what :func:`chilopod.tasks.radius_law.end_of_walk` makes of each.
     """
     asked = [
         Trial(
@@ -157,52 +190,68 @@ def walk_trials(
         for spring in springs
         for repeat in range(repeats)
     ]
-    ends = [end_of_walk(record, robot) for record in trials.run(asked, folder, progress)]
+    return trials.run(asked, folder, progress)
+
+
+def walk_ends(
+    records: Sequence[xr.Dataset], robot: Robot, springs: Sequence[float], duration: float | None = None
+) -> xr.Dataset:
+    """What walks come to.
+
+    Parameters
+    ----------
+    records
+        From :func:`walk_records`.
+    robot, springs
+        Those of the records.
+    duration
+        s, after which the walks are cut; by default not at all.
+
+    Returns
+    -------
+    Dataset over spring (N*mm/deg), repeat and joint: what :func:`chilopod.tasks.radius_law.end_of_walk` makes of each.
+    """
+    repeats = len(records) // len(springs)
+    last = DURATION if duration is None else duration
+    ends = [end_of_walk(record.sel(time=record.time <= last + 1e-9), robot) for record in records]
     rows = [xr.concat(ends[i : i + repeats], "repeat") for i in range(0, len(ends), repeats)]
     data = xr.concat(rows, "spring").assign_coords(
         spring=("spring", np.asarray(springs, dtype=np.float64), {"units": PAPER_UNIT}), repeat=np.arange(repeats)
     )
-    data.attrs = {"robot": robot.name, "varied": K1, "averaged_s": AVERAGED, "duration_s": DURATION}
+    data.attrs = {"robot": robot.name, "varied": K1, "averaged_s": AVERAGED, "duration_s": last}
     return data
 
 
-def onset(data: xr.Dataset, joint: int = 1) -> SquareRootFit | None:
-    """Where curved walks set in by the paper's method: the square-root fit to trials at springs at which most curve.
+def by_duration(records: Sequence[xr.Dataset], robot: Robot, springs: Sequence[float]) -> xr.Dataset:
+    """What the same walks would come to if they had ended earlier.
 
-    None if they do not determine a point.
+    Parameters
+    ----------
+    records, robot, springs
+        As for :func:`walk_ends`.
+
+    Returns
+    -------
+    Dataset over duration (s; those of :data:`SHORTER`, and the walks' own last): ``onset`` with ``onset_error`` (of the
+    bootstrap), N*mm/deg; over duration and spring: those of :func:`shares`, and ``axis_radius`` with
+    ``axis_radius_error`` as of :func:`radius_at`, m.
     """
-    here = is_curved(data)
-    here &= here.mean(axis=1)[:, None] > 0.5
-    inverse = np.broadcast_to(1.0 / data.spring.values[:, None], here.shape)
-    try:
-        return square_root_fit(inverse[here], data.mean_angle.sel(joint=joint).values[here])
-    except AnalysisError:
-        return None
-
-
-def radius_at(data: xr.Dataset, spring: float) -> tuple[float, float]:
-    """Mean radius of the trials at a spring that curve, and its standard error, m; NaN if there are fewer than two."""
-    at = data.sel(spring=spring)
-    radii = at.axis_radius.values[is_curved(at)]
-    if len(radii) < 2:
-        return float("nan"), float("nan")
-    return float(radii.mean()), float(radii.std(ddof=1) / np.sqrt(len(radii)))
-
-
-def spring_for(data: xr.Dataset, radius: float) -> float:
-    """The paper's k1-hat: the spring whose walks have a radius, between trials, N*mm/deg; NaN outside of them.
-
-    The squared curvature is interpolated in 1/k1, in which it is linear by the square-root law.
-    """
-    here = is_curved(data)
-    curved = here.mean(axis=1) > 0.5
-    bend = np.where(here, data.bend.values, np.nan)[curved]
-    inverse, squared = 1.0 / data.spring.values[curved], np.nanmean(bend, axis=1) ** 2
-    order = np.argsort(squared)
-    # bend = (N-1) L / radius, and bend * axis_radius is (N-1) L in every trial.
-    wanted = (float(data.bend[0, 0] * data.axis_radius[0, 0]) / radius) ** 2
-    found = np.interp(wanted, squared[order], inverse[order], left=np.nan, right=np.nan)
-    return float(1.0 / found)
+    durations = [*(each for each in SHORTER if each < DURATION), DURATION]
+    series = [walk_ends(records, robot, springs, duration) for duration in durations]
+    onsets = np.array([onset_with_error(each) for each in series])
+    radii = np.array([[radius_at(each, spring) for spring in springs] for each in series])
+    both = ("duration", "spring")
+    return xr.Dataset(
+        {
+            "onset": ("duration", onsets[:, 0], {"units": PAPER_UNIT}),
+            "onset_error": ("duration", onsets[:, 1], {"units": PAPER_UNIT}),
+            **xr.concat([shares(each) for each in series], "duration"),
+            "axis_radius": (both, radii[..., 0], {"units": "m"}),
+            "axis_radius_error": (both, radii[..., 1], {"units": "m"}),
+        },
+        coords={"duration": ("duration", np.array(durations), {"units": "s"}), "spring": series[0].spring},
+        attrs={"robot": robot.name, "repeats": series[0].sizes["repeat"], "averaged_s": AVERAGED},
+    )
 
 
 def undulations(
@@ -219,7 +268,8 @@ def undulations(
     -------
     Dataset over spring (N*mm/deg) and repeat: ``amplitude``, root mean square of the joint angles, averaged over gait
     cycles, about their mean over the last 24 s (rad), and ``status``; attributes ``critical_k``, where by a square-root
-    fit to those at most :data:`SWINGING` the undulation sets in, NaN if they determine no point.
+    fit to those at most :data:`SWINGING` the undulation sets in, and ``critical_k_error``, its standard error by the
+    bootstrap; NaN if they determine no point.
     """
     joints = robot.body.modules - 1
     wave = tuple(np.deg2rad(4.0) * np.cos(np.arange(joints) * np.pi / 2.0))
@@ -253,10 +303,11 @@ def undulations(
     soft = np.asarray(springs) <= SWINGING
     inverse = np.broadcast_to(1.0 / np.asarray(springs)[:, None], shape)
     try:
-        critical = square_root_fit(inverse[soft].ravel(), amplitude[soft].ravel(), resampled=0).critical
+        fit = square_root_fit(inverse[soft].ravel(), amplitude[soft].ravel())
+        critical = {"critical_k": fit.critical, "critical_k_error": fit.bootstrap_error}
     except AnalysisError:
-        critical = float("nan")
-    data.attrs = {"robot": robot.name, "critical_k": critical}
+        critical = dict.fromkeys(("critical_k", "critical_k_error"), float("nan"))
+    data.attrs = {"robot": robot.name, **critical}
     return data
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 
+from chilopod.studies.scatter import Answer
+
 
 @dataclass(frozen=True)
 class Row:
@@ -16,7 +18,7 @@ class Row:
     where
         Of the paper.
     verdict
-        "agrees", "differs", or "not printed".
+        "agrees", "differs", "undecided" if the scatter of trials leaves it open, or "not printed".
     remark
         Why it differs, if it does.
     """
@@ -33,6 +35,6 @@ class Row:
         return asdict(self)
 
 
-def agrees(yes: bool) -> str:
+def agrees(answer: Answer) -> str:
     """The verdict on something the paper prints."""
-    return "agrees" if yes else "differs"
+    return {True: "agrees", False: "differs", None: "undecided"}[answer]

@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from chilopod import units
 from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.steering import Outcome
+from chilopod.studies import hopf
+from chilopod.studies.minima import NAMES, SCALES, around, minima
 from chilopod.studies.paper import printed
-from chilopod.studies.table import Row
-from chilopod.studies.turning import DURATION, minima, springs_by_outcome
+from chilopod.studies.scatter import every
+from chilopod.studies.table import Row, agrees
+from chilopod.studies.turning import DURATION, springs_by_outcome
 from chilopod.studies.turning_findings import ROUGH, Turning
-
-AROUND = (17.0 / 21.0, 28.0 / 21.0)
-"""Between these parts of the law's spring a minimum counts as "around" it: the paper's own neighbours of 21."""
-
-NAMES = {"distance": "ε1, distance", "angle": "ε2, angle", "effort": "ε3, leg yaw"}
-"""The paper's criteria."""
-
-SCALES = {"distance": (1.0, "m"), "angle": (180.0 / math.pi, "deg"), "effort": (1.0, "rad²·s")}
-"""What they are shown in: factor and unit."""
 
 
 def rows(found: Turning) -> list[Row]:
@@ -102,7 +94,7 @@ def _minima(found: Turning, letter: str) -> list[Row]:
                 f"{scale[0] * float(at['mean']):.3g} ± {scale[0] * float(at['error']):.2g} {scale[1]} at k1 = "
                 f"{float(at['at']):.1f} {PAPER_UNIT} (no worse: {float(at.softest):g} to {float(at.stiffest):g})",
                 entry["source"],
-                "agrees" if AROUND[0] <= part <= AROUND[1] and bool(at.between) else "differs",
+                agrees(every((around(at, k_hat), bool(at.between)))),
                 remark,
             )
         )
@@ -156,13 +148,7 @@ def _without(found: Turning) -> list[Row]:
 
 
 def _hopf(found: Turning) -> list[Row]:
-    ours, theirs = minima(found.tasks["A"].criteria), minima(found.hopf.criteria)
-    parts, lower = [], True
-    for name, title in NAMES.items():
-        factor, unit = SCALES[name]
-        here, there = ours.sel(criterion=name), theirs.sel(criterion=name)
-        lower &= bool(here["mean"] < there["mean"])
-        parts.append(f"{title} {factor * float(here['mean']):.3g} against {factor * float(there['mean']):.3g} {unit}")
+    task, theirs = found.tasks["A"], minima(found.hopf.criteria)
     at = [float(theirs.spring.sel(criterion=name)) for name in NAMES]
     unstable = all(spring < found.hopf_point for spring in at)
     ever = int(np.isfinite(found.hopf.criteria.arrival.values).sum())
@@ -170,10 +156,10 @@ def _hopf(found: Turning) -> list[Row]:
         Row(
             "task A, pitchfork against Hopf: smallest criteria",
             "lower for the pitchfork, all three (robot)",
-            "; ".join(parts),
+            hopf.words(task, found.hopf),
             "figure Comparison of evaluation criteria",
-            "agrees" if lower else "differs",
-            "ε3 differs little: the legs are at their limit nearly all the time",
+            agrees(hopf.all_lower(task, found.hopf)),
+            hopf.saturation(task, found.hopf),
         ),
         Row(
             "task A, Hopf: springs of the smallest criteria",

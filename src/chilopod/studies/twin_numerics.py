@@ -10,7 +10,7 @@ from chilopod.errors import AnalysisError
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.studies.fit_data import base_series_data
-from chilopod.studies.robot_rows import CHECKED, RobotRow
+from chilopod.studies.robot_table import CHECKED, VERDICTS, RobotRow
 from chilopod.tasks.identify.twin_series import base_series
 from chilopod.twin.walk import TOLERANCE
 
@@ -87,7 +87,7 @@ def rows(data: xr.Dataset) -> list[RobotRow]:
             f"{100.0 * largest_move(data):.1f} %",
             "",
             CHECKED,
-            "within" if largest_move(data) < ALLOWED else "outside",
+            VERDICTS[largest_move(data) < ALLOWED],
             f"less than {100.0 * ALLOWED:.0f} %",
         )
     ]

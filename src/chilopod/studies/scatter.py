@@ -1,0 +1,140 @@
+"""What trials that scatter say beyond doubt, and what they leave open.
+
+Every answer is yes, no, or undecided: True, False or None.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+Answer = bool | None
+"""True, False, or None where the scatter leaves it open."""
+
+INCREASES: Mapping[Answer, str] = {True: "increases", False: "not throughout", None: "not told apart everywhere"}
+"""What :func:`increases` says, in words."""
+
+SURE = 2.0
+"""Standard errors beyond which two means, or a mean and a bound, are told apart."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One mean less another.
+
+    Attributes
+    ----------
+    value, error
+        The difference and its standard error; the error is NaN where it is not known, as of single trials.
+    """
+
+    value: float
+    error: float
+
+    @property
+    def lower(self) -> Answer:
+        """Whether the first mean is the lower one."""
+        if np.isnan(self.value) or not abs(self.value) > SURE * self.error:
+            return None
+        return bool(self.value < 0.0)
+
+    @property
+    def higher(self) -> Answer:
+        """Whether the first mean is the higher one."""
+        return None if self.lower is None else not self.lower
+
+    def __str__(self) -> str:
+        """Lower, higher or undecided, with the difference in standard errors."""
+        side = "lower" if self.value < 0.0 else "higher"
+        if not self.error > 0.0:
+            return "undecided" if self.lower is None else side
+        by = f"by {abs(self.value) / self.error:.1f} standard errors"
+        return f"undecided ({side} {by})" if self.lower is None else f"{side} {by}"
+
+
+def difference(one: ArrayLike, other: ArrayLike, *, paired: bool = False) -> Difference:
+    """The mean of some trials less that of others.
+
+    Parameters
+    ----------
+    one, other
+        A value of every trial, shapes (n,) and (m,); NaN does not count.
+    paired
+        Whether trials of equal index belong together, as those of one seed do; then the scatter of their differences
+        counts. Else the trials are independent.
+    """
+    x, y = np.asarray(one, dtype=np.float64), np.asarray(other, dtype=np.float64)
+    if paired:
+        return Difference(*mean_and_error(x - y))
+    (first, error), (second, other_error) = mean_and_error(x), mean_and_error(y)
+    return Difference(first - second, float(np.hypot(error, other_error)))
+
+
+def spread_difference(one: ArrayLike, other: ArrayLike) -> Difference:
+    """How much farther trials scatter than others: the difference of the mean distances from the median (the test of
+    Brown and Forsythe)."""
+    distances = [np.abs(each - np.nanmedian(each)) for each in (np.asarray(one), np.asarray(other))]
+    return difference(*distances)
+
+
+def mean_and_error(values: ArrayLike) -> tuple[float, float]:
+    """Mean and standard error of what is not NaN; the error is NaN for fewer than two values, the mean for none."""
+    finite = np.asarray(values, dtype=np.float64)
+    finite = finite[np.isfinite(finite)]
+    mean = float(finite.mean()) if finite.size else float("nan")
+    return mean, float(finite.std(ddof=1) / np.sqrt(finite.size)) if finite.size > 1 else float("nan")
+
+
+def between(value: float, error: float, low: float, high: float) -> Answer:
+    """Whether a mean lies between two bounds: undecided within :data:`SURE` standard errors of the nearer bound.
+
+    What is not finite lies nowhere; a mean whose error is not known (NaN) is undecided.
+    """
+    if not np.isfinite(value):
+        return False
+    margin = min(value - low, high - value)
+    if margin == 0.0 or abs(margin) > SURE * error:
+        return bool(margin >= 0.0)
+    return None
+
+
+def near(value: float, error: float, wanted: float, tolerance: float) -> Answer:
+    """Whether a mean is within a relative tolerance of a positive number, see :func:`between`."""
+    return between(value, error, wanted * (1.0 - tolerance), wanted * (1.0 + tolerance))
+
+
+def every(answers: Iterable[Answer]) -> Answer:
+    """No if any answer is no, undecided if any other is undecided, else yes."""
+    given = list(answers)
+    if any(answer is False for answer in given):
+        return False
+    return None if None in given else True
+
+
+def increases(trials: Iterable[ArrayLike]) -> Answer:
+    """Whether the mean rises from every set of independent trials to the next; undecided for fewer than two sets."""
+    sets = list(trials)
+    if len(sets) < 2:
+        return None
+    return every(difference(after, before).higher for before, after in zip(sets[:-1], sets[1:], strict=True))
+
+
+def drawn_anew(trials: Array, rng: np.random.Generator) -> Array:
+    """Another set of trials for a bootstrap, shape (conditions, trials): in every row its mean and deviations from it.
+
+    Deviations from the mean of n trials are too small by sqrt((n - 1) / n) on average, for which they are widened.
+    NaN stays where it is, single trials as they are.
+    """
+    drawn = trials.copy()
+    for row in drawn:
+        here = np.flatnonzero(np.isfinite(row))
+        if here.size > 1:
+            mean = row[here].mean()
+            apart = np.sqrt(here.size / (here.size - 1.0)) * (row[here] - mean)
+            row[here] = mean + rng.choice(apart, size=here.size)
+    return drawn
