@@ -40,6 +40,7 @@ def series(springs, onset, amplitude=AMPLITUDE, *, repeats=10, scatter=0.01, sat
             "mean_angle": (("spring", "repeat", "joint"), (side * bends)[..., None] * _MODE),
             "bend": (("spring", "repeat"), bends),
             "axis_radius": (("spring", "repeat"), _LENGTH / bends),
+            "settled": (("spring", "repeat"), np.ones(bends.shape, dtype=bool)),
             "direction": (
                 ("spring", "repeat"),
                 np.where(straight, "straight", np.where(side > 0.0, "right", "left")).astype(object),

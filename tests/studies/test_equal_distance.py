@@ -8,18 +8,19 @@ import pytest
 
 from chilopod.studies.equal_distance import change, law_ratio, radius_ratio
 from chilopod.studies.robot_walks import SPRINGS, VARIANT_SPRINGS
+from chilopod.studies.walk_measures import onset, radius_at, shares
 
 MADE_UP = runpy.run_path(str(Path(__file__).with_name("made_up_robot.py")))
 series, AMPLITUDE = MADE_UP["series"], MADE_UP["AMPLITUDE"]
 
 
-@pytest.mark.parametrize("onset", [23.0, 25.0, 31.0, 45.0])
+@pytest.mark.parametrize("point", [23.0, 25.0, 31.0, 45.0])
 @pytest.mark.parametrize("wider", [0.8, 1.0, 1.25])
-def test_a_known_ratio(onset, wider):
+def test_a_known_ratio(point, wider):
     base = series(SPRINGS, 34.0, scatter=0.0)
-    found = radius_ratio(base, series(VARIANT_SPRINGS, onset, AMPLITUDE / wider, scatter=0.0), drawn=5)
+    found = radius_ratio(base, series(VARIANT_SPRINGS, point, AMPLITUDE / wider, scatter=0.0), drawn=5)
     assert found.distance == pytest.approx(wider, rel=2e-3)
-    law = law_ratio(found.compared, 34.0, onset)
+    law = law_ratio(found.compared, 34.0, point)
     assert found.springs == pytest.approx(wider * law, rel=5e-3)
 
 
@@ -72,3 +73,15 @@ def test_words():
     assert change(1.583) == "+58 %"
     assert change(0.999, 0.02) == "+0 ± 2 %"
     assert change(float("nan"), float("nan")) == "not determined"
+
+
+def test_walks_that_have_not_settled_are_no_measure_of_the_radius():
+    base = series(SPRINGS, 34.0, scatter=0.0)
+    growing = base.copy(deep=True)
+    growing["axis_radius"][:, 0] *= 3.0
+    growing["mean_angle"][:, 0] /= 3.0
+    growing["settled"][:, 0] = False
+    assert radius_at(growing, 21.0) == pytest.approx(radius_at(base, 21.0))
+    assert onset(growing).critical == pytest.approx(onset(base).critical)
+    assert radius_at(growing, 21.0, settled=False)[0] > 1.1 * radius_at(base, 21.0)[0]
+    assert shares(growing).curved.sel(spring=21.0) == 1.0

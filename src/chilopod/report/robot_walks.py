@@ -19,7 +19,7 @@ from chilopod.studies.robot_rows import printed_radii
 from chilopod.studies.robot_table import ONSET, percent, printed_spring
 from chilopod.studies.robot_walks import RobotWalks
 from chilopod.studies.walk_measures import onset_with_error, radius_at
-from chilopod.tasks.radius_law import is_curved
+from chilopod.tasks.radius_law import in_settled_curve, is_curved
 
 Array = NDArray[np.float64]
 
@@ -195,7 +195,7 @@ def _draw_fork(axes: Axes, found: RobotWalks) -> None:
 def _draw_radius(axes: Axes, found: RobotWalks) -> None:
     base = found.base
     inverse = 1.0 / base.spring.values
-    radius, error = means(np.where(is_curved(base), base.axis_radius.values, np.nan))
+    radius, error = means(np.where(in_settled_curve(base), base.axis_radius.values, np.nan))
     errorbars(axes, inverse, radius, error, style.BLUE, "o", "twin")
     wanted = printed_radii()
     axes.plot(

@@ -139,8 +139,9 @@ def spread(data: xr.Dataset, robot: Robot) -> Panel:
         draw=lambda narrow: _draw_spread(data, robot, narrow),
         alt="A: the constants of several fits, in parts of their ranges. B: what each predicts, beside the robot.",
         text=(
-            "Three printed numbers and six yes-or-no answers do not determine eight constants. "
-            f"{data.attrs['known']} sets that the search found meet them within 5 %; shown are the preset (filled) and "
+            f"{data.attrs['numbers']} printed numbers and {data.attrs['answers']} yes-or-no answers do not determine "
+            f"{data.sizes['constant']} constants. {data.attrs['known']} sets that the search found meet them within "
+            "5 %; shown are the preset (filled) and "
             f"those that are most unlike it and each other. What the data leave open (A): {listing(ranges)}.",
             f"What they predict (B), with few and undisturbed walks, in {SPRING_UNIT}: {onsets}; all springs alike "
             f"{number(float(np.nanmin(data.uniform)), 3)} to {number(float(np.nanmax(data.uniform)), 3)}. They come "
@@ -176,8 +177,7 @@ def _draw_spread(data: xr.Dataset, robot: Robot, narrow: bool) -> Figure:
     near = (1.0 - ONSET, 1.0 + ONSET)
     lines = [("base series (fitted)", printed_spring("pitchfork", "robot_critical_k1"), near, data.onset.values[:, 0])]
     for column, name in enumerate(data.variant.values[1:], 1):
-        paper = printed_spring("variants", str(name), "robot_critical_k1")
-        lines.append((str(name), paper, near, data.onset.values[:, column]))
+        lines.append((str(name), float(data.paper[column]), near, data.onset.values[:, column]))
     lines.append(("all springs alike", printed_spring("uniform", "robot_critical_k"), near, data.uniform.values))
     for task in data.task.values:
         paper = float(printed()["turning"]["tasks"][str(task)]["k_hat"].split()[0])

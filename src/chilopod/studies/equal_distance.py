@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from chilopod.analysis.square_root import square_root_fit
 from chilopod.errors import AnalysisError
 from chilopod.studies.scatter import drawn_anew, mean_and_error
-from chilopod.tasks.radius_law import is_curved
+from chilopod.studies.walk_measures import counted
 
 Array = NDArray[np.float64]
 
@@ -56,8 +56,9 @@ def radius_ratio(base: xr.Dataset, variant: xr.Dataset, drawn: int = DRAWN, seed
     Parameters
     ----------
     base, variant
-        Over spring and repeat: ``axis_radius`` and ``direction``, as :func:`chilopod.tasks.radius_law.end_of_walk` has
-        them. Springs count at which most trials curve.
+        Over spring and repeat: ``axis_radius``, ``direction`` and ``settled``, as
+        :func:`chilopod.tasks.radius_law.end_of_walk` has them. What counts, see
+        :func:`chilopod.studies.walk_measures.counted`.
     drawn
         How many times trials are drawn anew at every spring for the standard errors, onsets fitted anew each time.
     seed
@@ -102,9 +103,9 @@ def _spread(values: Sequence[float]) -> float:
 
 
 def _bends(data: xr.Dataset) -> tuple[Array, Array]:
-    """1/k1, rising, and the bend of every trial that curves, NaN elsewhere, at springs at which most do."""
-    here = is_curved(data)
-    most = here.mean(axis=1) > 0.5
+    """1/k1, rising, and the bend of every trial that counts, NaN elsewhere, at springs at which some do."""
+    here = counted(data)
+    most = here.any(axis=1)
     bend = np.where(here, 1.0 / data.axis_radius.values, np.nan)[most]  # in proportion: (N-1) L is the same in all
     inverse = 1.0 / data.spring.values[most]
     order = np.argsort(inverse)

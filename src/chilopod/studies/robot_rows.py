@@ -42,7 +42,7 @@ from chilopod.studies.scatter import (
     spread_difference,
 )
 from chilopod.studies.walk_measures import onset_with_error, radius_at, shares
-from chilopod.tasks.radius_law import is_curved
+from chilopod.tasks.radius_law import in_settled_curve
 
 STRAIGHT, CURVED = (41.0, 75.0), (15.0, 17.0, 21.0, 28.0)
 """N*mm/deg: springs at which the paper's robot walks straight, and those at which it curves."""
@@ -149,7 +149,7 @@ def _speed(base: xr.Dataset, planar: Planar) -> RobotRow:
 def _curved_angles(base: xr.Dataset) -> dict[float, NDArray[np.float64]]:
     """Of joint 1 in all trials that curve, rad, by spring (N*mm/deg), the stiffest first."""
     ordered = base.sortby("spring", ascending=False)
-    angles = np.where(is_curved(ordered), np.abs(ordered.mean_angle.sel(joint=1).values), np.nan)
+    angles = np.where(in_settled_curve(ordered), np.abs(ordered.mean_angle.sel(joint=1).values), np.nan)
     pairs = zip(ordered.spring.values, angles, strict=True)
     return {float(spring): row[np.isfinite(row)] for spring, row in pairs if np.isfinite(row).any()}
 

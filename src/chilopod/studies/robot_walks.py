@@ -126,7 +126,9 @@ def robot_walks(
     found: list[xr.Dataset] = []
     for index, (of, name) in enumerate(asked):
         shown = part(0.31 + 0.6 * index / len(asked), 0.31 + 0.6 * (index + 1) / len(asked), name)
-        found.append(walk_trials(of[name], springs, fewer, folder=folder, progress=shown))
+        # Growing and settling go with the way: who makes shorter steps is given the time to walk as far.
+        longer = DURATION * robot.gait.stride / of[name].gait.stride
+        found.append(walk_trials(of[name], springs, fewer, duration=longer, folder=folder, progress=shown))
     variants, lower = dict(zip(robots, found, strict=False)), dict(zip(readings, found[len(robots) :], strict=True))
     uniform = undulations(robot, uniform_springs, fewest, folder=folder, progress=part(0.91, 1.0, "uniform springs"))
     return RobotWalks(robot, base, durations, variants, lower, _examples(robot, folder), uniform)
@@ -143,12 +145,15 @@ def walk_trials(
     springs: Sequence[float] = SPRINGS,
     repeats: int = REPEATS,
     *,
+    duration: float = DURATION,
     disturbance: Disturbance | None = None,
     folder: str | Path | None = None,
     progress: Progress = silent,
 ) -> xr.Dataset:
     """Walks of the twin from straight on, see :func:`walk_records` and :func:`walk_ends`."""
-    records = walk_records(robot, springs, repeats, disturbance=disturbance, folder=folder, progress=progress)
+    records = walk_records(
+        robot, springs, repeats, duration=duration, disturbance=disturbance, folder=folder, progress=progress
+    )
     return walk_ends(records, robot, springs)
 
 
@@ -157,6 +162,7 @@ def walk_records(
     springs: Sequence[float] = SPRINGS,
     repeats: int = REPEATS,
     *,
+    duration: float = DURATION,
     disturbance: Disturbance | None = None,
     folder: str | Path | None = None,
     progress: Progress = silent,
@@ -171,6 +177,8 @@ def walk_records(
         Values of k1, N*mm/deg.
     repeats
         Trials at each of them, all with seeds of their own.
+    duration
+        s.
     disturbance
         By default that of all studies.
     folder
@@ -181,7 +189,7 @@ def walk_records(
     asked = [
         Trial(
             robot.with_value(K1, stiffness(spring)),
-            DURATION,
+            duration,
             int(_SEEDS * spring) + repeat,
             disturbance=disturbance or Disturbance(),
             rate=_RATE,
@@ -212,7 +220,7 @@ def walk_ends(
     Dataset over spring (N*mm/deg), repeat and joint: what :func:`chilopod.tasks.radius_law.end_of_walk` makes of each.
     """
     repeats = len(records) // len(springs)
-    last = DURATION if duration is None else duration
+    last = float(records[0].time[-1]) if duration is None else duration
     ends = [end_of_walk(record.sel(time=record.time <= last + 1e-9), robot) for record in records]
     rows = [xr.concat(ends[i : i + repeats], "repeat") for i in range(0, len(ends), repeats)]
     data = xr.concat(rows, "spring").assign_coords(
@@ -238,8 +246,9 @@ def by_duration(records: Sequence[xr.Dataset], robot: Robot, springs: Sequence[f
     """
     durations = [*(each for each in SHORTER if each < DURATION), DURATION]
     series = [walk_ends(records, robot, springs, duration) for duration in durations]
-    onsets = np.array([onset_with_error(each) for each in series])
-    radii = np.array([[radius_at(each, spring) for spring in springs] for each in series])
+    # Short walks have not settled: what they show is what one would take for the radius.
+    onsets = np.array([onset_with_error(each, settled=False) for each in series])
+    radii = np.array([[radius_at(each, spring, settled=False) for spring in springs] for each in series])
     both = ("duration", "spring")
     return xr.Dataset(
         {
@@ -259,6 +268,7 @@ def undulations(
     springs: Sequence[float] = UNIFORM_SPRINGS,
     repeats: int = UNIFORM_REPEATS,
     *,
+    engine: str = "twin",
     folder: str | Path | None = None,
     progress: Progress = silent,
 ) -> xr.Dataset:
@@ -280,7 +290,7 @@ def undulations(
             UNIFORM_DURATION,
             int(_SEEDS * spring) + repeat,
             wave,
-            engine="twin",
+            engine=engine,
             rate=rate,
         )
         for spring in springs

@@ -27,7 +27,7 @@ from chilopod.trials import Disturbance, Trial
 Array = NDArray[np.float64]
 
 DURATION: float = units.parse(printed()["turning"]["evaluation_time"], "s")
-"""s: when the paper evaluates, and how long these trials are."""
+"""s: when the paper evaluates, and how long trials of the planar model are, which arrives well before."""
 
 REPEATS: int = printed()["turning"]["repeats"]
 
@@ -57,7 +57,8 @@ class TurningTask:
         Where it is.
     criteria
         Over (instant, spring, repeat): ``distance`` (m), ``angle`` (rad) and ``effort`` (rad^2 s), epsilon 1 to 3, at
-        the ``seconds`` of the two instants "earliest arrival" and "paper"; means over repeats and standard errors as
+        the ``seconds`` of the two instants "earliest arrival" and "paper" (:data:`DURATION`); means over repeats and
+        standard errors as
         ``distance_mean``, ``distance_error`` and so on (NaN where a repeat did not walk so long). Over (spring,
         repeat): ``effort_until_arrival`` (or until the end, rad^2 s), ``arrival`` (s, NaN if never), ``nearest`` (m),
         ``outcome`` and ``status``.
@@ -115,7 +116,7 @@ def turning_task(
         When epsilon 1 to 3 are taken, s; by default the earliest arrival of any of these trials, as in the paper, and
         ``duration`` if none arrives.
     duration
-        Of every trial, s; also the second instant of evaluation.
+        Of every trial, s, at least the paper's.
     disturbance
         How much differs from trial to trial; by default what all studies have.
     shown
@@ -144,7 +145,7 @@ def turning_task(
     record = trials.together(trials.run(asked, folder, progress))
     earliest = earliest_arrival(record)
     when = time if time is not None else earliest if np.isfinite(earliest) else duration
-    criteria = _criteria(record, (when, duration), springs, repeats)
+    criteria = _criteria(record, (when, DURATION), springs, repeats)
     criteria.attrs = {
         "robot": robot.name,
         "target": str(target),
@@ -242,6 +243,7 @@ def without_leg_yaw(
     target: Target,
     springs: Mapping[str, float],
     *,
+    duration: float = DURATION,
     engine: str = "planar",
     folder: str | Path | None = None,
     progress: Progress = silent,
@@ -250,7 +252,7 @@ def without_leg_yaw(
 
     Parameters
     ----------
-    robot, target, engine, folder, progress
+    robot, target, duration, engine, folder, progress
         As for :func:`turning_task`.
     springs
         k1 by name, N*mm/deg.
@@ -266,11 +268,11 @@ def without_leg_yaw(
         strategy = "pitchfork" if leg_yaw else "open-loop"
         walker, controller = steered(robot, STRATEGIES[strategy], stiffness(spring))
         asked = [
-            Trial(walker, DURATION, seed, target=target, controller=controller, rate=RATE, engine=engine)
+            Trial(walker, duration, seed, target=target, controller=controller, rate=RATE, engine=engine)
             for seed in range(REPEATS if leg_yaw else most)
         ]
         record = trials.together(trials.run(asked, folder))
-        result = evaluate(record, DURATION)
+        result = evaluate(record, duration)
         some = record.isel(time=slice(None, None, _PATH_STEP))
         over = ("trial", "time")
         case = xr.Dataset(

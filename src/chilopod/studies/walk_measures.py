@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from chilopod.analysis.square_root import RESAMPLED, SquareRootFit, square_root_fit
 from chilopod.errors import AnalysisError
 from chilopod.studies.scatter import drawn_anew, mean_and_error
-from chilopod.tasks.radius_law import is_curved
+from chilopod.tasks.radius_law import in_settled_curve, is_curved
 
 Array = NDArray[np.float64]
 
@@ -25,13 +25,19 @@ def shares(data: xr.Dataset) -> xr.Dataset:
     )
 
 
-def onset(data: xr.Dataset, joint: int = 1) -> SquareRootFit | None:
-    """Where curved walks set in by the paper's method: the square-root fit to trials at springs at which most curve.
+def counted(data: xr.Dataset, settled: bool = True) -> NDArray[np.bool_]:
+    """Which trials have an angle and a radius that count: curved ones that have settled (or not, as they say), at
+    springs at which most curve; shape (springs, repeats)."""
+    most = is_curved(data).mean(axis=1) > 0.5
+    return (in_settled_curve(data) if settled else is_curved(data)) & most[:, None]
+
+
+def onset(data: xr.Dataset, joint: int = 1, settled: bool = True) -> SquareRootFit | None:
+    """Where curved walks set in by the paper's method: the square-root fit to the trials that are :func:`counted`.
 
     None if they do not determine a point.
     """
-    here = is_curved(data)
-    here &= here.mean(axis=1)[:, None] > 0.5
+    here = counted(data, settled)
     inverse = np.broadcast_to(1.0 / data.spring.values[:, None], here.shape)
     try:
         return square_root_fit(inverse[here], data.mean_angle.sel(joint=joint).values[here])
@@ -39,16 +45,17 @@ def onset(data: xr.Dataset, joint: int = 1) -> SquareRootFit | None:
         return None
 
 
-def onset_with_error(data: xr.Dataset) -> tuple[float, float]:
+def onset_with_error(data: xr.Dataset, settled: bool = True) -> tuple[float, float]:
     """:func:`onset` and its standard error by the bootstrap, N*mm/deg; NaN if there is none."""
-    fit = onset(data)
+    fit = onset(data, settled=settled)
     return (fit.critical, fit.bootstrap_error) if fit else (float("nan"), float("nan"))
 
 
-def radius_at(data: xr.Dataset, spring: float) -> tuple[float, float]:
-    """Mean radius of the trials at a spring that curve, and its standard error, m; NaN if there are fewer than two."""
+def radius_at(data: xr.Dataset, spring: float, settled: bool = True) -> tuple[float, float]:
+    """Mean radius of the trials at a spring that curve and have settled (or not, as they say), and its standard error,
+    m; NaN if there are fewer than two."""
     at = data.sel(spring=spring)
-    radii = at.axis_radius.values[is_curved(at)]
+    radii = at.axis_radius.values[in_settled_curve(at) if settled else is_curved(at)]
     return mean_and_error(radii) if len(radii) > 1 else (float("nan"), float("nan"))
 
 
@@ -58,8 +65,8 @@ def spring_for(data: xr.Dataset, radius: float) -> tuple[float, float]:
     The squared curvature is interpolated in 1/k1, in which it is linear by the square-root law. With its standard error
     from drawing trials anew at every spring.
     """
-    here = is_curved(data)
-    curved = here.mean(axis=1) > 0.5
+    here = counted(data)
+    curved = here.any(axis=1)
     curvature = np.where(here, 1.0 / data.axis_radius.values, np.nan)[curved]
     inverse, wanted = 1.0 / data.spring.values[curved], radius**-2
 

@@ -25,6 +25,9 @@ DURATION = 90.0
 CURVED = 0.25
 """rad: a walk is curved if its joints bend by more than this in all, to a radius of 4.5 m or less."""
 
+SETTLED = 0.05
+"""Of its bend: a curve has settled if it changed by less than this in the 10 s before its end."""
+
 _LAW_SPRINGS = (0.2, 0.3, 0.37, 0.44, 0.51, 0.59, 0.68, 0.78, 0.9)  # of the stiffest spring
 _LAW_BEND = 0.8  # rad in all, to start with
 
@@ -72,7 +75,7 @@ def radius_law(
         for spring in springs
     ]
     ends = xr.concat([end_of_walk(each, robot) for each in run(asked, folder, progress)], "spring")
-    curved = is_curved(ends)
+    curved = in_settled_curve(ends)
     if curved.sum() < 3:
         raise AnalysisError("the walks at fewer than three springs curve: there is no radius law", field="springs")
     inverse = 1.0 / np.array(springs)
@@ -90,7 +93,8 @@ def end_of_walk(record: xr.Dataset, robot: Robot) -> xr.Dataset:
     -------
     Dataset over joint: ``mean_angle`` over the last 5 s (rad), ``bend``, the sum of their sizes (rad), ``axis_radius``
     (m), ``direction`` (left, right, straight; empty where the walk failed), ``moved``, by how much the sum differs from
-    that of the 10 s before (rad), ``speed`` of module 1 over the last 12 s (m/s), and ``status``.
+    that of the 10 s before (rad), ``settled``, whether that is less than :data:`SETTLED` of the bend, ``speed`` of
+    module 1 over the last 12 s (m/s), and ``status``.
     """
     walk = record.isel(robot=0)
     angles, times = walk.joint_angle.transpose("time", "joint").values, walk.time.values
@@ -98,6 +102,7 @@ def end_of_walk(record: xr.Dataset, robot: Robot) -> xr.Dataset:
     before = (times > times[-1] - AVERAGED - 10.0) & ~late
     last = angles[late].mean(axis=0)
     bend = float(np.abs(last).sum())
+    moved = abs(bend - float(np.abs(angles[before].mean(axis=0)).sum()))
     failed = walk.status.item() != Status.WALKED.label
     side = "straight" if bend < CURVED else "right" if last.sum() > 0.0 else "left"
     place = walk.position.transpose("time", "axis").values
@@ -111,7 +116,8 @@ def end_of_walk(record: xr.Dataset, robot: Robot) -> xr.Dataset:
             "bend": ((), bend, {"units": "rad"}),
             "axis_radius": ((), (robot.body.modules - 1) * robot.module_length / max(bend, 1e-9), {"units": "m"}),
             "direction": ((), np.array("" if failed else side, dtype=object)),
-            "moved": ((), abs(bend - float(np.abs(angles[before].mean(axis=0)).sum())), {"units": "rad"}),
+            "moved": ((), moved, {"units": "rad"}),
+            "settled": ((), moved <= SETTLED * bend),
             "speed": ((), float(steps.mean()), {"units": "m/s"}),
             "status": ((), np.array(walk.status.item(), dtype=object)),
         },
@@ -122,3 +128,9 @@ def end_of_walk(record: xr.Dataset, robot: Robot) -> xr.Dataset:
 def is_curved(data: xr.Dataset) -> NDArray[np.bool_]:
     """Which walks curve, by :func:`end_of_walk`; of the shape of ``data.direction``."""
     return np.isin(data.direction.values, ("left", "right"))
+
+
+def in_settled_curve(data: xr.Dataset) -> NDArray[np.bool_]:
+    """Which walks curve and have settled: those whose radius and angles are those of the robot, not of the time that
+    they were given."""
+    return is_curved(data) & data.settled.values
