@@ -85,3 +85,9 @@ def test_walks_that_have_not_settled_are_no_measure_of_the_radius():
     assert onset(growing).critical == pytest.approx(onset(base).critical)
     assert radius_at(growing, 21.0, settled=False)[0] > 1.1 * radius_at(base, 21.0)[0]
     assert shares(growing).curved.sel(spring=21.0) == 1.0
+
+
+def test_without_drawing_there_are_no_errors():
+    found = radius_ratio(series(SPRINGS, 34.0), series(VARIANT_SPRINGS, 25.0), drawn=0)
+    assert np.isfinite([found.distance, found.springs]).all()
+    assert np.isnan([found.distance_error, found.springs_error]).all()

@@ -60,7 +60,8 @@ def radius_ratio(base: xr.Dataset, variant: xr.Dataset, drawn: int = DRAWN, seed
         :func:`chilopod.tasks.radius_law.end_of_walk` has them. What counts, see
         :func:`chilopod.studies.walk_measures.counted`.
     drawn
-        How many times trials are drawn anew at every spring for the standard errors, onsets fitted anew each time.
+        How many times trials are drawn anew at every spring for the standard errors, onsets fitted anew each time; 0
+        for none.
     seed
         Of the drawing.
     """
@@ -68,8 +69,9 @@ def radius_ratio(base: xr.Dataset, variant: xr.Dataset, drawn: int = DRAWN, seed
     found = _ratios(inverse, bends)
     rng = np.random.default_rng(seed)
     again = [_ratios(inverse, [drawn_anew(each, rng) for each in bends]) for _ in range(drawn)]
-    single = any((np.isfinite(each).sum(axis=1) < 2).all() for each in bends)  # nobody knows how these scatter
-    errors = [float("nan") if single else _spread(column) for column in zip(*again, strict=True)]
+    if any((np.isfinite(each).sum(axis=1) < 2).all() for each in bends):  # nobody knows how these scatter
+        again = []
+    errors = [_spread([each[i] for each in again]) for i in range(2)]
     compared = tuple(float(1.0 / x) for x in _shared(inverse, bends))
     return RadiusRatio(found[0], errors[0], found[1], errors[1], compared)
 
