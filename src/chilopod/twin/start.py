@@ -27,7 +27,7 @@ traits = Traits(
     poses=True,
     a_core=4,
     a_round=8,
-    haste=1.9,
+    haste=2.8,
     version=f"MuJoCo {mujoco.__version__}",
 )
 
