@@ -47,7 +47,7 @@ _STRAIGHT: Mapping[str, Callable[[Results], Panel]] = {
     "identification": identification.panel,
 }
 _FILM_SIZE = (1280, 320)  # three panels in a row
-_STILLS = {"robot-movie-1": (2.0, 20.0, 40.0, 58.0), "robot-movie-2": (0.5, 6.0, 12.0, 17.0)}  # s, of films in 3-D
+_STILLS = {"robot-movie-1": (2.0, 30.0, 60.0, 88.0), "robot-movie-2": (0.5, 8.0, 16.0, 24.0)}  # s, of films in 3-D
 
 
 def panels(results: Results) -> dict[str, list[Panel]]:

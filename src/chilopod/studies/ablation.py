@@ -102,7 +102,7 @@ FACTORS = (
 _BEND = float(np.deg2rad(1.0))
 _DURATION, _SKIPPED = 18.0, 6.0  # s
 _SAMPLES = 6  # per period
-_BENT, _WALK = 0.5, 40.0  # rad (root of the sum of squares) and s, of the walks that a square root is fitted to
+_BENT, _WALK = 0.5, 60.0  # rad (root of the sum of squares) and s, of the walks that a square root is fitted to
 _AVERAGED, _PER_SECOND = 12.0, 10.0  # s, a cycle of the undulation that the twin has besides; Hz
 _VOUCHED = 0.03
 _BESIDE = (0.75, 0.85, 0.95)  # of a point, springs for a finer one
@@ -205,8 +205,8 @@ def onset(robot: Robot, folder: str | Path | None = None, quick: bool = False) -
     """Where curved walks set in, N*mm/deg, by the paper's method: the square-root fit to the bend of joint 1 of walks
     that begin bent; over the three stiffest springs that curve, then over three beside the point that these give.
 
-    Infinite if walks curve at the stiffest spring tried, NaN if at fewer than two. With ``quick`` without the second
-    fit.
+    Infinite if walks curve at the stiffest spring tried, NaN if at fewer than two, or if their bends point beyond it.
+    With ``quick`` without the second fit.
     """
     springs = SPRINGS[::2] if quick else SPRINGS
     bends = _bends(robot, springs, folder)
@@ -243,9 +243,11 @@ def _fitted(springs: Sequence[float], bends: Array) -> float:
     # Two springs have a point too: a third that is as straight as it gets does not move it.
     inverse = np.array([*(1.0 / springs[i] for i in curved), 1e-3])
     try:
-        return square_root_fit(inverse, [*bends[curved], 0.0], resampled=0).critical
+        point = square_root_fit(inverse, [*bends[curved], 0.0], resampled=0).critical
     except AnalysisError:
         return float("nan")
+    # Beyond a spring at which walks are straight there is no point.
+    return point if point <= max(springs) or bends[-1] > 0.0 else float("nan")
 
 
 def limit_point(

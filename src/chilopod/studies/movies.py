@@ -18,8 +18,8 @@ from chilopod.trials import NONE, Trial, run, together
 TASK_A = Target(float(np.deg2rad(45.0)), 1.3)
 
 _WALK = 45.0  # s
-_ROBOT_WALK = 60.0
-_TASK = 24.0
+_ROBOT_WALK = 90.0
+_TASK, _ROBOT_TASK = 24.0, 32.0
 _BEND = tuple(float(angle) for angle in np.deg2rad([20.0, 10.0, 14.0, 12.0, 4.0]))
 
 
@@ -104,9 +104,9 @@ def robot_movies(
     walks = [
         Trial(robot.with_value(K1, value), _ROBOT_WALK, 1, rate=25.0, engine="twin", poses=True) for value in springs
     ]
-    tasks = [replace(each, engine="twin", poses=True) for each in _tasks(robot, tried)]
+    tasks = [replace(each, duration=_ROBOT_TASK, engine="twin", poses=True) for each in _tasks(robot, tried)]
     records = run([*walks, *tasks], folder, progress)
-    return _movies("robot-", (*springs, *tried), records)
+    return _movies("robot-", (*springs, *tried), records, speed=3.0)
 
 
 def _tasks(robot: Robot, tried: tuple[float, float, float]) -> list[Trial]:
@@ -115,11 +115,11 @@ def _tasks(robot: Robot, tried: tuple[float, float, float]) -> list[Trial]:
     ]
 
 
-def _movies(prefix: str, springs: tuple[float, ...], records: list[xr.Dataset]) -> list[Movie]:
+def _movies(prefix: str, springs: tuple[float, ...], records: list[xr.Dataset], speed: float = 2.0) -> list[Movie]:
     kinds = ("straight", "curved a little", "curved a lot", "too stiff", "best", "too soft")
     names = [units.format(value, "N*mm/deg", digits=3).replace("*", "·") for value in springs]
     titles = tuple(f"k1 = {name}: {kind}" for name, kind in zip(names, kinds, strict=True))
     return [
-        Movie(f"{prefix}movie-1", "One spring decides how the robot walks", titles[:3], together(records[:3]), 2.0),
+        Movie(f"{prefix}movie-1", "One spring decides how the robot walks", titles[:3], together(records[:3]), speed),
         Movie(f"{prefix}movie-2", f"Turning to a target, {TASK_A}", titles[3:], together(records[3:]), 1.0),
     ]

@@ -44,7 +44,7 @@ TOLERANCE = 0.05
 
 _STEP = 0.06  # of a constant's range, for differences: where walks change evenly
 _PRIOR = 0.25  # of its range, how far a constant is moved without cost
-_ROUNDS = 2
+_ROUNDS, _MET = 5, 0.7  # steps at most, and misfit at which that ends
 
 _SPRINGS = {"pitchfork": (17.0, 21.0, 26.0), "hopf": (8.7, 11.0, 15.0)}  # N*mm/deg, where criteria are smallest
 _REPEATS = 3
@@ -275,6 +275,8 @@ def _fitted(robot: Robot, data: BaseSeries, law: Array, engine: str) -> tuple[fl
     given = best = float(np.sqrt(np.mean(off**2)))
     here = place
     for _ in range(_ROUNDS):
+        if best <= _MET:
+            break
         # Damped about the preset: no constant is moved far for little.
         step = -np.linalg.solve(law.T @ law + np.eye(len(FREE)) / _PRIOR**2, law.T @ off + (here - place) / _PRIOR**2)
         step = np.clip(here + step, 0.0, 1.0) - here
