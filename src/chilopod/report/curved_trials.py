@@ -48,7 +48,8 @@ def walks(study: CurvedStudy) -> Panel:
         text=(
             f"{trials.sizes['repeat']} walks from straight on at each of {trials.sizes['spring']} springs, every one "
             "with small errors of its joints and heading at the start and feet that differ by "
-            f"{100.0 * Disturbance().friction:g} %. Stiffer than {spring(exact)} all end straight; softer, all bend, {lefts} to the left and {rights} to the right."
+            f"{100.0 * Disturbance().friction:g} %. Stiffer than {spring(exact)} all end straight; softer, all bend, "
+            f"{lefts} to the left and {rights} to the right."
             + (f" {unsettled} had not settled and are left out." if unsettled else " All had settled."),
             f"Panels A and B are single walks at {k(1)} = {number(straight, 2)} and {spring(curved, 2)}; the body "
             "sways within every gait cycle, hence the thick lines. In C and D dots and bars are means and standard "
