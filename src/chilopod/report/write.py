@@ -17,6 +17,7 @@ from chilopod.report import (
     exponents,
     identification,
     mode,
+    robot_structures,
     robot_turning,
     robot_walks,
     robot_why,
@@ -74,6 +75,8 @@ def panels(results: Results) -> dict[str, list[Panel]]:
         found[whole] += robot_turning.panels(results.robot_turning, results.robot_walks)
     if "robot-spread" in data and results.whole:
         found[whole].append(robot_why.spread(data["robot-spread"], results.whole))
+    if "robot-structures" in data:
+        found[whole].append(robot_structures.panel(data["robot-structures"]))
     if "robot-why" in data:
         found[whole].append(robot_why.why(data["robot-why"]))
     return {chapter: figures for chapter, figures in found.items() if figures}

@@ -31,6 +31,7 @@ from chilopod.studies.planar_words import planar_words
 from chilopod.studies.robot_table import RobotRow
 from chilopod.studies.robot_turning import RobotTurning, robot_turning
 from chilopod.studies.robot_walks import RobotWalks, robot_walks
+from chilopod.studies.structures import structures
 from chilopod.studies.table import Row
 from chilopod.studies.turning_findings import Turning, turning
 from chilopod.studies.twin_spread import COUNT as SPREAD
@@ -56,10 +57,14 @@ SECTIONS: Mapping[str, str] = {
     "robot-turning": "the whole robot in 3-D: turning to targets",
     "robot-spread": "the whole robot in 3-D: other constants that fit as well",
     "robot-numerics": "the whole robot in 3-D: finer steps",
+    "robot-structures": "the whole robot in 3-D: what else it could be made of",
     "robot-why": "why the robot bends earlier than the planar model",
     "robot-movies": "the paper's two movies in 3-D",
 }
 """What can be asked for with ``--only``, and what it is."""
+
+ON_REQUEST = ("robot-structures",)
+"""Sections that are computed only if they are asked for by name."""
 
 CHAPTERS: Mapping[str, tuple[str, ...]] = {
     "The straight walk and where it bends": ("mode", "exponents", "variants", "modules", "uniform", "identification"),
@@ -70,6 +75,7 @@ CHAPTERS: Mapping[str, tuple[str, ...]] = {
         "robot-turning",
         "robot-spread",
         "robot-numerics",
+        "robot-structures",
         "robot-why",
         "robot-movies",
     ),
@@ -140,7 +146,7 @@ def chosen(only: Iterable[str] | None) -> list[str]:
     ParameterError
         If one of them does not exist.
     """
-    names = list(SECTIONS) if only is None else list(only)
+    names = [name for name in SECTIONS if name not in ON_REQUEST] if only is None else list(only)
     for name in names:
         if name not in SECTIONS:
             raise ParameterError(
@@ -169,7 +175,7 @@ def reproduce(
     robot
         The robot; the paper's numbers are those of ``aoi2022-planar``.
     only
-        Names of :data:`SECTIONS`; all by default.
+        Names of :data:`SECTIONS`; by default all that are not :data:`ON_REQUEST`.
     quick
         Coarser sweeps, fewer module counts, springs and repeats, and no other constants of the robot in three
         dimensions unless asked for; what does not depend on chance is as exact as otherwise.
@@ -265,6 +271,9 @@ def _robot_section(
     if name == "robot-numerics":
         results.datasets[name] = twin_numerics.twin_numerics(whole, quick, report)
         return twin_numerics.rows(results.datasets[name])
+    if name == "robot-structures":
+        results.datasets[name] = structures(whole, folder, progress=report)
+        return []
     if name == "robot-why":
         results.datasets[name] = ablation.ablation(whole, results.robot, folder, quick, report)
         return ablation.rows(results.datasets[name])

@@ -1,0 +1,97 @@
+"""What else the robot could be made of, and what each such robot predicts."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from chilopod.report import style
+from chilopod.report.panel import Panel
+from chilopod.report.words import listing, number, typeset
+from chilopod.studies.robot_table import ONSET
+from chilopod.studies.structures import TOLERANCE
+
+_LAYOUTS = (style.Layout("AB", 5.4, widths=(0.7, 1.0)), style.Layout("A;B", 10.0))
+_MET = 1.0  # misfit at which the base series is met
+_FARTHEST = 60.0  # per cent, where predictions are cut off
+_MARKERS = "osD^v"
+
+
+def panel(data: xr.Dataset) -> Panel:
+    """Predictions of other structures."""
+    fitted = data.misfit.sel(fit="fitted").values
+    met = fitted <= _MET
+    squared = data.chi_squared.values
+    better = [
+        f"{name} ({number(float(value), 2)})"
+        for name, value, good in zip(data.structure.values[1:], squared[1:], met[1:], strict=True)
+        if good and value < squared[0]
+    ]
+    missed = [str(name) for name, good in zip(data.structure.values, met, strict=True) if not good]
+    ratio = data.criteria.sel(strategy="pitchfork") / data.criteria.sel(strategy="hopf")
+    lower = [str(name) for name in data.structure.values if (ratio.sel(structure=name) < 1.0).all()]
+    return Panel(
+        name="robot-structures",
+        letter="",
+        title="What else the robot could be made of",
+        draw=lambda narrow: _draw(data, narrow),
+        alt="A: how far each structure's predictions are from the paper's. B: predictions, relative to the paper's.",
+        text=(
+            "Each of these structures was given to the preset, and its nine constants moved until it meets the base "
+            "series again, from few and undisturbed walks: "
+            + "; ".join(
+                f"{name} ({about})" for name, about in zip(data.structure.values, data.about.values, strict=True)
+            )
+            + ".",
+            f"A adds up the squares of how far its predictions are from the paper's, over {100.0 * TOLERANCE:g} %: the "
+            f"preset has {number(float(squared[0]), 2)}, "
+            + (f"less have {listing(better)}." if better else "none has less.")
+            + (f" Pale: {listing(missed)}, which did not meet the base series within its tolerance." if missed else "")
+            + " For the shorter stride the nearer of its two readings counts.",
+            "In task A the smallest criteria of one soft spring are all three below those of springs all alike with "
+            + (listing(lower) if lower else "none of them")
+            + ".",
+        ),
+        data=data,
+    )
+
+
+def _draw(data: xr.Dataset, narrow: bool) -> Figure:
+    figure, axes = style.figure(*_LAYOUTS, narrow)
+    rows = np.arange(data.sizes["structure"])
+    met = data.misfit.sel(fit="fitted").values <= _MET
+    names = [str(name) for name in data.structure.values]
+    values = np.nan_to_num(data.chi_squared.values, nan=0.0)
+    longest = 1.15 * values.max()
+    axes["A"].barh(rows, values, 0.6, color=[style.BLUE if good else style.PALE for good in met])
+    for row, value in zip(rows, data.chi_squared.values, strict=True):
+        text = "none" if np.isnan(value) else number(float(value), 2)
+        axes["A"].annotate(
+            text, (np.nan_to_num(value), row), (4, 0), textcoords="offset points", va="center", fontsize=style.SMALL
+        )
+    axes["A"].set_yticks(rows, names)
+    axes["A"].set_xlim(0.0, longest)
+    axes["A"].set_xlabel("chi squared")
+    axes["A"].set_title("A  From the paper's")
+    off = 100.0 * (data.predicted / data.paper - 1.0)
+    axes["B"].axvspan(-100.0 * ONSET, 100.0 * ONSET, color=style.PALE, zorder=0)
+    for column, name in enumerate(data.prediction.values):
+        axes["B"].plot(
+            np.clip(off.values[:, column], -_FARTHEST, _FARTHEST),
+            rows,
+            _MARKERS[column % len(_MARKERS)],
+            color=style.CURVES[column % len(style.CURVES)],
+            markersize=6,
+            label=typeset(str(name)),
+        )
+    axes["B"].set_yticks(rows, names if narrow else [""] * len(names))
+    axes["B"].set_xlim(-_FARTHEST - 3.0, _FARTHEST + 3.0)
+    axes["B"].set_xlabel("onset relative to the paper's (%)")
+    axes["B"].set_title("B  Predictions")
+    for letter in "AB":
+        axes[letter].invert_yaxis()
+        style.grid(axes[letter], "x")
+    handles, labels = axes["B"].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=1 if narrow else 3)
+    return figure
