@@ -76,6 +76,6 @@ def test_the_panel_says_who_is_nearer():
     found = structures._with_chi_squared(made_up([[30.0, 25.0, 25.0, 18.0], [24.0, 25.0, 25.0, 18.0]]))
     shown = robot_structures.panel(found)
     assert "less have s1" in " ".join(shown.text)
-    assert "below those of springs all alike with none of them" in " ".join(shown.text)
+    assert "below those of springs all alike with none of those that meet it" in " ".join(shown.text)
     shown.draw(False)
     shown.draw(True)

@@ -8,13 +8,14 @@ from matplotlib.figure import Figure
 
 from chilopod.report import style
 from chilopod.report.panel import Panel
-from chilopod.report.words import listing, number, typeset
+from chilopod.report.words import listing, typeset
 from chilopod.studies.robot_table import ONSET
 from chilopod.studies.structures import TOLERANCE
 
 _LAYOUTS = (style.Layout("AB", 5.4, widths=(0.7, 1.0)), style.Layout("A;B", 10.0))
 _MET = 1.0  # misfit at which the base series is met
 _FARTHEST = 60.0  # per cent, where predictions are cut off
+_MOST = 100.0  # chi squared, where bars are cut off
 _MARKERS = "osD^v"
 
 
@@ -24,13 +25,14 @@ def panel(data: xr.Dataset) -> Panel:
     met = fitted <= _MET
     squared = data.chi_squared.values
     better = [
-        f"{name} ({number(float(value), 2)})"
+        f"{name} ({_shown(value)})"
         for name, value, good in zip(data.structure.values[1:], squared[1:], met[1:], strict=True)
         if good and value < squared[0]
     ]
     missed = [str(name) for name, good in zip(data.structure.values, met, strict=True) if not good]
     ratio = data.criteria.sel(strategy="pitchfork") / data.criteria.sel(strategy="hopf")
-    lower = [str(name) for name in data.structure.values if (ratio.sel(structure=name) < 1.0).all()]
+    below = (ratio < 1.0).all("criterion").values
+    lower = [str(name) for name, yes in zip(data.structure.values, below & met, strict=True) if yes]
     return Panel(
         name="robot-structures",
         letter="",
@@ -45,16 +47,20 @@ def panel(data: xr.Dataset) -> Panel:
             )
             + ".",
             f"A adds up the squares of how far its predictions are from the paper's, over {100.0 * TOLERANCE:g} %: the "
-            f"preset has {number(float(squared[0]), 2)}, "
+            f"preset has {_shown(squared[0])}, "
             + (f"less have {listing(better)}." if better else "none has less.")
             + (f" Pale: {listing(missed)}, which did not meet the base series within its tolerance." if missed else "")
             + " For the shorter stride the nearer of its two readings counts.",
             "In task A the smallest criteria of one soft spring are all three below those of springs all alike with "
-            + (listing(lower) if lower else "none of them")
+            + (listing(lower) if lower else "none of those that meet it")
             + ".",
         ),
         data=data,
     )
+
+
+def _shown(value: float) -> str:
+    return f"{value:.0f}" if value >= 10.0 else f"{value:.1f}"
 
 
 def _draw(data: xr.Dataset, narrow: bool) -> Figure:
@@ -62,16 +68,13 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
     rows = np.arange(data.sizes["structure"])
     met = data.misfit.sel(fit="fitted").values <= _MET
     names = [str(name) for name in data.structure.values]
-    values = np.nan_to_num(data.chi_squared.values, nan=0.0)
-    longest = 1.15 * values.max()
+    values = np.clip(np.nan_to_num(data.chi_squared.values, nan=0.0), 0.0, _MOST)
     axes["A"].barh(rows, values, 0.6, color=[style.BLUE if good else style.PALE for good in met])
-    for row, value in zip(rows, data.chi_squared.values, strict=True):
-        text = "none" if np.isnan(value) else number(float(value), 2)
-        axes["A"].annotate(
-            text, (np.nan_to_num(value), row), (4, 0), textcoords="offset points", va="center", fontsize=style.SMALL
-        )
+    for row, value, end in zip(rows, data.chi_squared.values, values, strict=True):
+        text = "a prediction has no point" if np.isnan(value) else _shown(value)
+        axes["A"].annotate(text, (end, row), (4, 0), textcoords="offset points", va="center", fontsize=style.SMALL)
     axes["A"].set_yticks(rows, names)
-    axes["A"].set_xlim(0.0, longest)
+    axes["A"].set_xlim(0.0, 1.2 * _MOST)
     axes["A"].set_xlabel("chi squared")
     axes["A"].set_title("A  From the paper's")
     off = 100.0 * (data.predicted / data.paper - 1.0)
