@@ -15,6 +15,7 @@ import xarray as xr
 from chilopod import load_robot
 from chilopod.cli import main
 from chilopod.tasks.identify import twin
+from chilopod.tasks.identify.twin_series import Series
 from chilopod.trials import Trial, run
 
 ROBOT = "aoi2022"
@@ -95,12 +96,12 @@ def test_a_robot_that_blows_up_says_so(capsys):
 
 
 def test_identify_twin_keeps_what_it_has_tried(capsys, tmp_path, monkeypatch):
-    bends = twin.known()[0].bends
+    best = twin.known()[0]
     asked = []
 
     def series(robot, data):
         asked.append(robot)
-        return np.stack([bends, bends])
+        return Series(best.bends, best.bends, best.speeds)
 
     monkeypatch.setattr(twin, "base_series", series)
     monkeypatch.setattr(twin, "confirmed", lambda robot, springs: True)

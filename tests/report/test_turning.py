@@ -46,5 +46,6 @@ def test_every_figure_has_a_name_of_its_own_words_and_a_table(drawn):
 
 def test_the_shaded_springs_are_those_that_arrive(drawn):
     panel = next(panel for panel in drawn if panel.name == "turning-criteria")
-    arrived = panel.data.spring.values[np.isfinite(panel.data.arrival.values).all(axis=1)]
+    most = np.isfinite(panel.data.arrival.values).mean(axis=1) > 0.5
+    arrived = panel.data.spring.values[most]
     assert f"{arrived.min():g} to {arrived.max():g}" in panel.text[0]

@@ -25,8 +25,12 @@ from chilopod.studies.robot_walks import (
 from chilopod.studies.turning import turning_task, without_leg_yaw
 from chilopod.studies.walk_measures import onset, radius_at, spring_for
 from chilopod.tasks.radius_law import is_curved
+from chilopod.trials import Disturbance
 
 ROBOT = load_robot("aoi2022")
+
+BENT = Disturbance(joint_angle=float(np.deg2rad(5.0)))
+"""Walks that begin well bent settle within a minute."""
 
 
 @pytest.fixture(scope="module")
@@ -37,13 +41,13 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module", autouse=True)
 def short():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(robot_walks, "DURATION", 40.0)
+        patch.setattr(robot_walks, "DURATION", 60.0)
         yield
 
 
 @pytest.fixture(scope="module")
 def records(folder):
-    return walk_records(ROBOT, robot_walks.SPRINGS, 2, folder=folder)
+    return walk_records(ROBOT, robot_walks.SPRINGS, 2, disturbance=BENT, folder=folder)
 
 
 @pytest.fixture(scope="module")
@@ -67,9 +71,9 @@ def walks(base, records, folder):
 @pytest.fixture(scope="module")
 def tasks(folder):
     target, springs = Target.parse("45 deg, 1.3 m"), (15.0, 21.0, 41.0)
-    task = turning_task(ROBOT, target, springs, 2, shown=springs, engine="twin", duration=19.0, folder=folder)
+    task = turning_task(ROBOT, target, springs, 2, shown=springs, engine="twin", duration=27.0, folder=folder)
     hopf = dataclasses.replace(task)
-    without = without_leg_yaw(ROBOT, target, {"paper's spring": 21.0}, engine="twin", folder=folder)
+    without = without_leg_yaw(ROBOT, target, {"paper's spring": 21.0}, duration=27.0, engine="twin", folder=folder)
     return RobotTurning(ROBOT, {"A": task, "B": task}, hopf, without)
 
 
@@ -94,13 +98,13 @@ def test_soft_springs_curve_and_stiff_ones_do_not(base):
 @pytest.mark.slow
 def test_walks_cut_short_are_those_that_were_asked_shorter(walks, base, folder, monkeypatch):
     found = walks.durations
-    assert found.duration.values.tolist() == [20.0, 30.0, 40.0]
-    assert float(found.onset[-1]) == onset(base).critical
-    assert found.axis_radius[-1].sel(spring=21.0) == radius_at(base, 21.0)[0]
+    assert found.duration.values.tolist() == [20.0, 30.0, 40.0, 60.0]
+    assert float(found.onset[-1]) == onset(base, settled=False).critical
+    assert found.axis_radius[-1].sel(spring=21.0) == radius_at(base, 21.0, settled=False)[0]
     monkeypatch.setattr(robot_walks, "DURATION", 20.0)
-    short = walk_trials(ROBOT, (15.0, 21.0), 2)
+    short = walk_trials(ROBOT, (15.0, 21.0), 2, disturbance=BENT)
     for spring in (15.0, 21.0):
-        assert float(found.axis_radius.sel(duration=20.0, spring=spring)) == radius_at(short, spring)[0]
+        assert float(found.axis_radius.sel(duration=20.0, spring=spring)) == radius_at(short, spring, settled=False)[0]
     assert (found.curved + found.straight <= 1.0).all()
 
 
@@ -138,7 +142,8 @@ def test_rows_and_figures_of_the_walks(walks):
 def test_rows_and_figures_of_the_tasks(tasks, walks):
     outcome = tasks.tasks["A"].criteria.outcome
     assert (outcome.sel(spring=21.0) == "arrived").all()
-    assert (outcome.sel(spring=41.0) == "bulged outside").all()
+    assert (outcome.sel(spring=41.0) == "bulged outside").any()
+    assert (outcome.sel(spring=15.0) == "turned inside").all()
     rows = robot_turning_rows.turning_rows(tasks, walks, {})
     assert [row.quantity for row in rows if row.kind != "predicted"] == ["task A: earliest arrival"]
     # Of a strategy beside itself nothing is lower.

@@ -83,14 +83,16 @@ def test_repeats_with_their_mean_and_standard_error():
     task = turning_task(ROBOT, TASK_A, (9.0, 10.0), repeats=3, duration=17.0, shown=(9.0,))
     data = task.criteria
     values = data.distance.values
-    assert data.distance_mean.values == pytest.approx(values.mean(axis=2))
-    assert data.distance_error.values == pytest.approx(values.std(axis=2, ddof=1) / np.sqrt(3))
+    # The walks are over before the paper's 23 s.
+    assert np.isnan(values[1]).all()
+    assert data.distance_mean.values == pytest.approx(values.mean(axis=2), nan_ok=True)
+    assert data.distance_error.values == pytest.approx(values.std(axis=2, ddof=1) / np.sqrt(3), nan_ok=True)
     assert len(np.unique(values[0, 0])) == 3
     one = task.paths.isel(shown=0, repeat=1)
     x, y = TASK_A.position
     assert one.distance.values == pytest.approx(np.hypot(one.x - x, one.y - y), abs=1e-12)
     assert float(one.distance.min()) == pytest.approx(float(data.nearest[0, 1]), abs=2e-3)
-    assert data.to_dataframe().notna().to_numpy()[:, :3].all()
+    assert data.isel(instant=0).to_dataframe().notna().to_numpy()[:, :3].all()
 
 
 def test_undisturbed_repeats_are_the_same_and_strategies_need_a_name():
@@ -144,9 +146,10 @@ def test_springs_where_a_walk_failed_have_no_mean():
 def test_rows_say_what_the_paper_says_and_whether_it_agrees(found):
     table = rows(found)
     by_start = {row.quantity: row for row in table}
-    assert {row.verdict for row in table} == {"agrees", "differs", "not printed"}
+    assert {row.verdict for row in table} == {"agrees", "differs", "not printed", "undecided"}
     assert by_start["task A: what becomes of it"].verdict == "agrees"
-    assert by_start["task A, pitchfork against Hopf: smallest criteria"].verdict == "agrees"
+    # Of two strategies whose legs are at their limit nearly all the time, the effort is the same but for the scatter.
+    assert by_start["task A, pitchfork against Hopf: smallest criteria"].verdict == "undecided"
     assert by_start["task A without leg yaw, best spring"].verdict == "agrees"
     radius = by_start["task A (45 deg, 1.3 m): radius of the circle to the target"]
     assert (radius.paper, radius.computed, radius.verdict) == ("0.88 m", "0.919 m", "differs")

@@ -14,7 +14,7 @@ def nothing(spec, robot):
 
 def rolls(spec, robot):
     for i in range(2, robot.body.modules + 1):
-        spec.body(f"module{i}").add_joint(name=f"roll{i}", axis=[1, 0, 0], stiffness=[100.0, 0, 0], damping=[0.5, 0, 0])
+        spec.body(f"module{i}").add_joint(name=f"roll{i}", axis=[1, 0, 0], stiffness=[400.0, 0, 0], damping=[2.0, 0, 0])
 
 
 SAME, ROLLS = twin.Edited("same", nothing), twin.Edited("rolls", rolls)

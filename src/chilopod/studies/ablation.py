@@ -217,7 +217,7 @@ def onset(robot: Robot, folder: str | Path | None = None, quick: bool = False) -
         return point
     finer = [round(point * part, 2) for part in _BESIDE]
     refined = _fitted(finer, _bends(robot, finer, folder))
-    return point if np.isnan(refined) else refined
+    return refined if refined <= max(springs) else point
 
 
 def _bends(robot: Robot, springs: Sequence[float], folder: str | Path | None) -> Array:

@@ -145,7 +145,7 @@ def walk_trials(
     springs: Sequence[float] = SPRINGS,
     repeats: int = REPEATS,
     *,
-    duration: float = DURATION,
+    duration: float | None = None,
     disturbance: Disturbance | None = None,
     folder: str | Path | None = None,
     progress: Progress = silent,
@@ -162,7 +162,7 @@ def walk_records(
     springs: Sequence[float] = SPRINGS,
     repeats: int = REPEATS,
     *,
-    duration: float = DURATION,
+    duration: float | None = None,
     disturbance: Disturbance | None = None,
     folder: str | Path | None = None,
     progress: Progress = silent,
@@ -178,7 +178,7 @@ def walk_records(
     repeats
         Trials at each of them, all with seeds of their own.
     duration
-        s.
+        s; by default :data:`DURATION`.
     disturbance
         By default that of all studies.
     folder
@@ -189,7 +189,7 @@ def walk_records(
     asked = [
         Trial(
             robot.with_value(K1, stiffness(spring)),
-            duration,
+            DURATION if duration is None else duration,
             int(_SEEDS * spring) + repeat,
             disturbance=disturbance or Disturbance(),
             rate=_RATE,

@@ -75,7 +75,7 @@ def radius_law(
         for spring in springs
     ]
     ends = xr.concat([end_of_walk(each, robot) for each in run(asked, folder, progress)], "spring")
-    curved = in_settled_curve(ends)
+    curved = is_curved(ends)
     if curved.sum() < 3:
         raise AnalysisError("the walks at fewer than three springs curve: there is no radius law", field="springs")
     inverse = 1.0 / np.array(springs)
