@@ -31,6 +31,7 @@ from chilopod.studies.robot_turning import TASK_DURATION
 from chilopod.studies.turning import turning_task
 from chilopod.studies.twin_spread import LOWER, predictions, printed_onset
 from chilopod.tasks.identify.data import BaseSeries
+from chilopod.tasks.identify.twin import corrected, damped_step
 from chilopod.tasks.identify.twin_constants import FREE, constants_of, parts_of, values_at, with_constants
 from chilopod.tasks.identify.twin_series import base_series, residuals
 
@@ -43,7 +44,6 @@ TOLERANCE = 0.05
 """Of a printed onset, relative: half of what the report calls agreeing; what chi squared counts in."""
 
 _STEP = 0.06  # of a constant's range, for differences: where walks change evenly
-_PRIOR = 0.25  # of its range, how far a constant is moved without cost
 _ROUNDS, _MET = 5, 0.7  # steps at most, and misfit at which that ends
 
 _SPRINGS = {"pitchfork": (17.0, 21.0, 26.0), "hopf": (8.7, 11.0, 15.0)}  # N*mm/deg, where criteria are smallest
@@ -270,7 +270,7 @@ def _off(robot: Robot, data: BaseSeries, engine: str = "twin") -> Array:
 
 def _fitted(robot: Robot, data: BaseSeries, law: Array, engine: str) -> tuple[float, float, Robot]:
     """Misfits before and after, and the robot with constants that meet the base series best."""
-    place, law = parts_of(constants_of(robot)), law.copy()
+    place = parts_of(constants_of(robot))
     best_robot, off = robot, _off(robot, data, engine)
     given = best = float(np.sqrt(np.mean(off**2)))
     here = place
@@ -278,11 +278,10 @@ def _fitted(robot: Robot, data: BaseSeries, law: Array, engine: str) -> tuple[fl
         if best <= _MET:
             break
         # Damped about the preset: no constant is moved far for little.
-        step = -np.linalg.solve(law.T @ law + np.eye(len(FREE)) / _PRIOR**2, law.T @ off + (here - place) / _PRIOR**2)
-        step = np.clip(here + step, 0.0, 1.0) - here
+        step = np.clip(here + damped_step(law, off, here - place), 0.0, 1.0) - here
         moved = with_constants(robot, values_at(here + step))
         found = _off(moved, data, engine)
-        law += np.outer(found - off - law @ step, step) / max(float(step @ step), 1e-12)
+        law = corrected(law, step, found - off)
         here, off = here + step, found
         misfit = float(np.sqrt(np.mean(off**2)))
         if misfit < best:

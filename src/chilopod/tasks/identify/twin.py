@@ -255,6 +255,28 @@ def unlike(fits: Sequence[Fit], count: int) -> list[Fit]:
     return [fits[i] for i in chosen]
 
 
+def damped_step(law: Array, off: Array, moved: Array | float = 0.0) -> Array:
+    """The step of damped least squares (Levenberg), in parts of the constants' ranges.
+
+    Parameters
+    ----------
+    law
+        Slopes of the residuals, shape (residuals, constants).
+    off
+        Residuals, (residuals,).
+    moved
+        How far the constants are from where they belong, (constants,).
+    """
+    normal = law.T @ law + np.eye(len(FREE)) / _PRIOR**2
+    return np.asarray(-np.linalg.solve(normal, law.T @ off + moved / _PRIOR**2), dtype=np.float64)
+
+
+def corrected(law: Array, step: Array, change: Array) -> Array:
+    """The law that is right about a step that was made, and else as it was (Broyden)."""
+    better: Array = law + np.outer(change - law @ step, step) / max(float(step @ step), 1e-12)
+    return better
+
+
 def refined(
     robot: Robot, data: BaseSeries, fits: Sequence[Fit], folder: Path | None = None, progress: Progress = silent
 ) -> list[Fit]:
@@ -285,15 +307,15 @@ def refined(
     slopes = np.linalg.lstsq(np.c_[np.ones(len(near)), places], off, rcond=None)[0][1:].T
     found = []
     for number, fit in enumerate(chosen := unlike(near, _REFINED)):
-        law, here = slopes.copy(), fit
+        law: Array = slopes.copy()
+        here = fit
         for _ in range(_STEPS):
             if here.misfit <= _CLOSE:
                 break
             place, rest = parts_of(here.constants), here.residuals[:smooth]
-            step = -np.linalg.solve(law.T @ law + np.eye(len(FREE)) / _PRIOR**2, law.T @ rest)
-            step = np.clip(place + step, 0.0, 1.0) - place
+            step = np.clip(place + damped_step(law, rest), 0.0, 1.0) - place
             here = evaluate(robot, values_at(place + step), data, folder)
-            law += np.outer(here.residuals[:smooth] - rest - law @ step, step) / (step @ step)
+            law = corrected(law, step, here.residuals[:smooth] - rest)
             found.append(here)
         progress((number + 1) / len(chosen), f"refined {number + 1} of {len(chosen)}: misfit {here.misfit:.2f}")
     return found
