@@ -20,7 +20,6 @@ from chilopod.studies.robot_walks import (
     undulations,
     walk_ends,
     walk_records,
-    walk_trials,
 )
 from chilopod.studies.turning import turning_task, without_leg_yaw
 from chilopod.studies.walk_measures import onset, radius_at, spring_for
@@ -102,7 +101,7 @@ def test_walks_cut_short_are_those_that_were_asked_shorter(walks, base, folder, 
     assert float(found.onset[-1]) == onset(base, settled=False).critical
     assert found.axis_radius[-1].sel(spring=21.0) == radius_at(base, 21.0, settled=False)[0]
     monkeypatch.setattr(robot_walks, "DURATION", 20.0)
-    short = walk_trials(ROBOT, (15.0, 21.0), 2, disturbance=BENT)
+    short = walk_ends(walk_records(ROBOT, (15.0, 21.0), 2, disturbance=BENT), ROBOT, (15.0, 21.0))
     for spring in (15.0, 21.0):
         assert float(found.axis_radius.sel(duration=20.0, spring=spring)) == radius_at(short, spring, settled=False)[0]
     assert (found.curved + found.straight <= 1.0).all()

@@ -39,3 +39,17 @@ def test_an_edit_changes_the_walk():
 @pytest.mark.slow
 def test_an_edited_twin_keeps_the_promises_of_an_engine():
     check_engine(ROLLS, PRESET)
+
+
+def test_trials_of_one_edit_are_not_those_of_another():
+    def versions(*edits):
+        return [twin.Edited("own", each).traits.version for each in edits]
+
+    one, same, other, none = versions(
+        lambda spec, robot: setattr(spec.option, "timestep", 1e-3),
+        lambda spec, robot: setattr(spec.option, "timestep", 1e-3),
+        lambda spec, robot: setattr(spec.option, "timestep", 2e-3),
+        nothing,
+    )
+    assert one == same
+    assert len({one, other, none, twin.traits.version}) == 4

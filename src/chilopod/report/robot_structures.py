@@ -11,6 +11,7 @@ from chilopod.report.panel import Panel
 from chilopod.report.words import listing, typeset
 from chilopod.studies.robot_table import ONSET
 from chilopod.studies.structures import TOLERANCE
+from chilopod.tasks.identify.twin_constants import FREE
 
 _LAYOUTS = (style.Layout("AB", 5.4, widths=(0.7, 1.0)), style.Layout("A;B", 10.0))
 _MET = 1.0  # misfit at which the base series is met
@@ -40,8 +41,8 @@ def panel(data: xr.Dataset) -> Panel:
         draw=lambda narrow: _draw(data, narrow),
         alt="A: how far each structure's predictions are from the paper's. B: predictions, relative to the paper's.",
         text=(
-            "Each of these structures was given to the preset, and its nine constants moved until it meets the base "
-            "series again, from few and undisturbed walks: "
+            f"Each of these structures was given to the preset, and its {len(FREE)} constants moved until it meets the "
+            "base series again, from few and undisturbed walks: "
             + "; ".join(
                 f"{name} ({about})" for name, about in zip(data.structure.values, data.about.values, strict=True)
             )

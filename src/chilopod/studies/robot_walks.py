@@ -64,7 +64,7 @@ class RobotWalks:
     robot
         As built.
     base
-        See :func:`walk_trials`.
+        See :func:`walk_ends`.
     durations
         See :func:`by_duration`.
     variants
@@ -128,7 +128,8 @@ def robot_walks(
         shown = part(0.31 + 0.6 * index / len(asked), 0.31 + 0.6 * (index + 1) / len(asked), name)
         # Growing and settling go with the way: who makes shorter steps is given the time to walk as far.
         longer = DURATION * robot.gait.stride / of[name].gait.stride
-        found.append(walk_trials(of[name], springs, fewer, duration=longer, folder=folder, progress=shown))
+        walked = walk_records(of[name], springs, fewer, duration=longer, folder=folder, progress=shown)
+        found.append(walk_ends(walked, of[name], springs))
     variants, lower = dict(zip(robots, found, strict=False)), dict(zip(readings, found[len(robots) :], strict=True))
     uniform = undulations(robot, uniform_springs, fewest, folder=folder, progress=part(0.91, 1.0, "uniform springs"))
     return RobotWalks(robot, base, durations, variants, lower, _examples(robot, folder), uniform)
@@ -138,23 +139,6 @@ def lower_steps(robot: Robot, variant: Robot) -> Robot:
     """A variant with another stride whose swing clearance is in proportion to the stride, as the robot has it."""
     part = variant.gait.stride / robot.gait.stride
     return variant.with_value("twin.clearance", part * robot.get("twin.clearance"))
-
-
-def walk_trials(
-    robot: Robot,
-    springs: Sequence[float] = SPRINGS,
-    repeats: int = REPEATS,
-    *,
-    duration: float | None = None,
-    disturbance: Disturbance | None = None,
-    folder: str | Path | None = None,
-    progress: Progress = silent,
-) -> xr.Dataset:
-    """Walks of the twin from straight on, see :func:`walk_records` and :func:`walk_ends`."""
-    records = walk_records(
-        robot, springs, repeats, duration=duration, disturbance=disturbance, folder=folder, progress=progress
-    )
-    return walk_ends(records, robot, springs)
 
 
 def walk_records(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import replace
+from types import CodeType
 from typing import Any
 
 import numpy as np
@@ -33,12 +35,16 @@ class Edited:
     name
         As it is recorded.
     edit
-        Called with the description (``mujoco.MjSpec``, names as in :class:`TwinModel`) and the robot, before the step
-        is taken into account (:mod:`chilopod.twin.step`).
+        A function, called with the description (``mujoco.MjSpec``, names as in :class:`TwinModel`) and the robot,
+        before the step is taken into account (:mod:`chilopod.twin.step`). Trials are told apart by its code and the
+        numbers of its module that it uses, not by functions that it calls.
     """
 
     def __init__(self, name: str, edit: Edit) -> None:
-        self.traits = replace(traits, name=name, sentence=f"{traits.sentence}, {name}")
+        version = (
+            f"{traits.version}, edit {hashlib.sha256(repr(_content(edit.__code__, edit)).encode()).hexdigest()[:12]}"
+        )
+        self.traits = replace(traits, name=name, sentence=f"{traits.sentence}, {name}", version=version)
         self._edit = edit
 
     def common(self, robot: Robot) -> Robot:
@@ -56,3 +62,11 @@ class Edited:
     def resume(self, saved: bytes, threads: int = 0) -> TwinWalk:
         """As of the twin."""
         return resume(saved, threads, edit=self._edit, traits=self.traits)
+
+
+def _content(code: CodeType, edit: Any) -> tuple[Any, ...]:
+    """What a function does, and the plain values of its module that it uses: trials with another edit are others."""
+    used = {name: edit.__globals__.get(name) for name in code.co_names}
+    plain = {name: value for name, value in used.items() if isinstance(value, int | float | str | tuple)}
+    inner = [_content(each, edit) if isinstance(each, CodeType) else repr(each) for each in code.co_consts]
+    return code.co_code, code.co_names, inner, plain
