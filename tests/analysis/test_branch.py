@@ -13,7 +13,7 @@ from chilopod.planar.along import walk_means
 from chilopod.report import write_branch
 from chilopod.robot import load_robot
 from chilopod.stability.curve import BranchPoint, Curve
-from chilopod.stability.system import whole_period
+from chilopod.stability.returns import whole_period
 
 ROBOT = load_robot("aoi2022-planar")
 
@@ -27,7 +27,7 @@ def radius_at(data, k1):
     """Of the body axis on the orbit at a spring, found from the nearest point of the branch."""
     near = data.isel(point=int(np.abs(data.parameter.values - k1).argmin()))
     model = PlanarModel(ROBOT.with_value(K1, stiffness(k1)), tolerance=1e-11)
-    orbit, _ = stability.find_orbit(whole_period(model), near.orbit.values, with_error=False)
+    orbit = stability.find_orbit(whole_period(model), near.orbit.values, with_error=False).state
     angles = walk_means([model], orbit[None]).mean_angle[0]
     return 5 * ROBOT.module_length / np.abs(angles).sum()
 

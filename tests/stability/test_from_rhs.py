@@ -225,7 +225,7 @@ REFUSED = {
     "jacobian shape": (oscillator, 2, 1.0, {"jacobian": lambda t, x: [[1.0]]}, "jacobian"),
     "symmetry shape": (oscillator, 2, 1.0, {"symmetry": [[1.0]]}, "symmetry"),
     "symmetry vector": (oscillator, 2, 1.0, {"symmetry": [1.0, -1.0]}, "symmetry"),
-    "symmetry no involution": (oscillator, 2, 1.0, {"symmetry": [[0, 1], [-1, 0]]}, "symmetry"),
+    "symmetry of no finite order": (oscillator, 2, 1.0, {"symmetry": [[0, 1], [-1, 1.1]]}, "symmetry"),
     "symmetry nan": (oscillator, 2, 1.0, {"symmetry": [[np.nan, 0], [0, 1]]}, "symmetry"),
     "spatial symmetry shape": (oscillator, 2, 1.0, {"spatial_symmetry": np.eye(3)}, "spatial_symmetry"),
     "spatial symmetry stretched": (oscillator, 2, 1.0, {"spatial_symmetry": 2 * np.eye(2)}, "spatial_symmetry"),

@@ -74,16 +74,17 @@ def test_coefficient_against_the_branch_itself():
     rate = (growth[0] - growth[1]) / (2 * step)
     side = np.sign(-point.coefficient * rate)  # on which side of F* the asymmetric orbits live
     mode = point.mode.real
-    values, left = np.linalg.eig(find_orbit(duffing(point.value), STATE)[1].jacobian.T)
+    values, left = np.linalg.eig(find_orbit(duffing(point.value), STATE).image.jacobian.T)
     left = left[:, np.abs(values + 1).argmin()]
     left = left / (left @ mode)
 
     def estimate(away):
         force = point.value + side * away
-        symmetric = find_orbit(duffing(force), STATE)[0]
+        symmetric = find_orbit(duffing(force), STATE).state
         amplitude = np.sqrt(abs(rate * away / point.coefficient))
         # Two mirrored orbits: half their difference has only odd powers of the amplitude.
-        there, back = (find_orbit(duffing(force, symmetry=None), symmetric + s * amplitude * mode)[0] for s in (1, -1))
+        beside = (find_orbit(duffing(force, symmetry=None), symmetric + s * amplitude * mode) for s in (1, -1))
+        there, back = (orbit.state for orbit in beside)
         assert np.abs(there - back).max() > amplitude
         return -side * rate * away / (0.5 * left @ (there - back)) ** 2
 

@@ -24,7 +24,7 @@ from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import BifurcationPoint, Criticality, Kind
 from chilopod.stability.floquet import spectrum
-from chilopod.stability.system import return_map, whole_period
+from chilopod.stability.returns import return_map, whole_period
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

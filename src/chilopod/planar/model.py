@@ -93,6 +93,11 @@ class PlanarModel(ReadOnlyArrays):
         return read_only(state)
 
     @property
+    def scale(self) -> Array:
+        """Large changes of the states: m/s, rad/s and rad are of the order of one."""
+        return np.ones(self.dimension)
+
+    @property
     def schedule(self) -> Schedule:
         """Contact pattern of one period."""
         return self.robot.gait.schedule(self.modules)

@@ -9,11 +9,14 @@ False
 
 from chilopod.stability.branch import Branch, BranchPoint, Ending, begin, follow, leave_pitchfork, proceed
 from chilopod.stability.capabilities import (
+    Autonomous,
+    CyclicallySymmetric,
     FlowsEach,
     FlowsMany,
     FlowsStates,
     FlowsWithError,
     KnowsOrbit,
+    Scaled,
     SpatiallySymmetric,
     Switches,
     SystemLike,
@@ -21,15 +24,19 @@ from chilopod.stability.capabilities import (
 from chilopod.stability.floquet import Exponents, Multipliers, exponents, multipliers, sweep
 from chilopod.stability.jumps import UndeclaredSwitch
 from chilopod.stability.locate import locate
+from chilopod.stability.orbits import Orbit, find_orbit
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
+from chilopod.stability.returns import ReturnMap
 from chilopod.stability.rhs import NotAnalytic, from_rhs
-from chilopod.stability.system import PeriodicSystem, find_orbit
+from chilopod.stability.system import PeriodicSystem
 
 __all__ = [
+    "Autonomous",
     "BifurcationPoint",
     "Branch",
     "BranchPoint",
     "Criticality",
+    "CyclicallySymmetric",
     "Ending",
     "Exponents",
     "FlowsEach",
@@ -40,7 +47,10 @@ __all__ = [
     "KnowsOrbit",
     "Multipliers",
     "NotAnalytic",
+    "Orbit",
     "PeriodicSystem",
+    "ReturnMap",
+    "Scaled",
     "SpatiallySymmetric",
     "Switches",
     "SystemLike",

@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.stability.curve import BranchPoint, Curve, sorted_multipliers
 from chilopod.stability.points import BifurcationPoint, Kind
+from chilopod.stability.returns import return_map, whole_period
 from chilopod.stability.samples import Family
-from chilopod.stability.system import return_map, whole_period
 
 __all__ = ["Branch", "BranchPoint", "Ending", "begin", "follow", "leave_pitchfork", "proceed"]
 

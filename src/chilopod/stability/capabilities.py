@@ -22,7 +22,10 @@ Array = NDArray[np.float64]
 
 @runtime_checkable
 class SystemLike(Protocol):
-    """A T-periodic system dx/dt = f(t, x), f(t + T, x) = f(t, x), given by its flow: what every analysis needs."""
+    """A T-periodic system dx/dt = f(t, x), f(t + T, x) = f(t, x), given by its flow: what every analysis needs.
+
+    One that does not depend on time has no period of its own: see :class:`Autonomous`.
+    """
 
     @property
     def dimension(self) -> int:
@@ -30,14 +33,14 @@ class SystemLike(Protocol):
         ...
 
     @property
-    def period(self) -> float:
-        """T."""
+    def period(self) -> float | None:
+        """T; None where the system does not depend on time and the period belongs to the orbit."""
         ...
 
     @property
     def symmetry(self) -> Array | None:
-        """A matrix S, shape (n, n), with S f(t, x) = f(t + T/2, S x), so that H = S flow(T/2) is a return map; or
-        None."""
+        """A matrix S, shape (n, n), of finite order k, with S f(t, x) = f(t + T/k, S x), so that H = S flow(T/k) is a
+        return map; or None. The order is 2 unless the system is :class:`CyclicallySymmetric`."""
         ...
 
     def flow(self, x: Array, t0: float, t1: float, /) -> tuple[Array, Array]:
@@ -46,22 +49,57 @@ class SystemLike(Protocol):
 
 
 @runtime_checkable
+class Autonomous(SystemLike, Protocol):
+    """Does not depend on time: the period of an orbit is an unknown, and every instant may be time 0."""
+
+    @property
+    def guess_period(self) -> float:
+        """About how long an orbit takes."""
+        ...
+
+    def velocity(self, x: Array, /) -> Array:
+        """dx/dt in state x, shape (n,)."""
+        ...
+
+
+@runtime_checkable
+class CyclicallySymmetric(Protocol):
+    """Has a symmetry of another order than 2, such as the shift along a ring of oscillators."""
+
+    @property
+    def symmetry_order(self) -> int:
+        """The smallest k > 1 with S^k = 1."""
+        ...
+
+
+@runtime_checkable
+class Scaled(Protocol):
+    """Says what a large change of every state is, in its own unit; of other systems the orbit tells."""
+
+    @property
+    def scale(self) -> Array | None:
+        """Positive, shape (n,); or None."""
+        ...
+
+
+@runtime_checkable
 class KnowsOrbit(Protocol):
-    """Knows its periodic orbit exactly, so that nobody has to guess and search."""
+    """Knows its periodic orbit, so that nobody has to guess and search."""
 
     @property
     def orbit(self) -> Array | None:
-        """State on the orbit at time 0, shape (n,), fixed by the return map to round-off; or None."""
+        """State on the orbit at time 0, shape (n,); or None. It is improved where it does not return to round-off."""
         ...
 
 
 @runtime_checkable
 class SpatiallySymmetric(Protocol):
-    """Has a symmetry that holds at every instant, such as a reflection: a pitchfork is then known as one."""
+    """Has symmetries that hold at every instant, such as a reflection: a pitchfork is then known as one."""
 
     @property
     def spatial_symmetry(self) -> Array | None:
-        """A matrix P, shape (n, n), with P f(t, x) = f(t, P x); or None."""
+        """A matrix P, shape (n, n), with P f(t, x) = f(t, P x), or several that generate a finite group, shape
+        (generators, n, n); or None."""
         ...
 
 
@@ -79,8 +117,9 @@ class Switches(Protocol):
 class FlowsWithError(Protocol):
     """Bounds the error of its flow; of other systems the error is estimated by a second computation."""
 
-    def flow_with_error(self, x: Array, t0: float, t1: float, /) -> tuple[Array, Array, float]:
-        """As :meth:`SystemLike.flow`, and a bound on the absolute error of the largest entry of the derivative."""
+    def flow_with_error(self, x: Array, t0: float, t1: float, /) -> tuple[Array, Array, float | Array]:
+        """As :meth:`SystemLike.flow`, and a bound on the absolute error of the derivative: of every entry, shape
+        (n, n), or one number for all of them, which is wide where states have different units."""
         ...
 
 
@@ -118,6 +157,16 @@ class FlowsMany(KnowsOrbit, Protocol):
         ...
 
 
-def spatial_symmetry(system: SystemLike) -> Array | None:
-    """The spatial symmetry of a system (see :class:`SpatiallySymmetric`), None if it has none."""
-    return system.spatial_symmetry if isinstance(system, SpatiallySymmetric) else None
+def spatial_symmetries(system: SystemLike) -> tuple[Array, ...]:
+    """Generators of the spatial symmetries of a system (see :class:`SpatiallySymmetric`); none if it has none."""
+    given = system.spatial_symmetry if isinstance(system, SpatiallySymmetric) else None
+    if given is None:
+        return ()
+    return (given,) if given.ndim == 2 else tuple(given)
+
+
+def returns_per_period(system: SystemLike) -> int:
+    """How many applications of the return map make one period: the order of the symmetry, 1 without one."""
+    if system.symmetry is None:
+        return 1
+    return system.symmetry_order if isinstance(system, CyclicallySymmetric) else 2

@@ -19,8 +19,8 @@ from chilopod.frozen import ReadOnlyArrays, read_only
 from chilopod.stability.capabilities import FlowsEach, SystemLike
 from chilopod.stability.floquet import counts_outside
 from chilopod.stability.points import Kind
+from chilopod.stability.returns import ReturnMap, return_map, returned_states, whole_period
 from chilopod.stability.samples import Family
-from chilopod.stability.system import ReturnMap, return_map, returned_states, whole_period
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -218,7 +218,7 @@ class Curve:
     def _mapped(self, x: Array, value: float) -> tuple[Array, Array | None]:
         """H at a state, and at a neighbouring value of the parameter if that costs no time."""
         system = self._family(value)
-        if isinstance(system, FlowsEach):
+        if isinstance(system, FlowsEach) and system.period is not None:
             beside = self._family(value + _PARAMETER_STEP * self.scale)
             if isinstance(beside, FlowsEach):
                 mapped, moved = system.flow_each([system, beside], np.array([x, x]), 0.0, system.period)

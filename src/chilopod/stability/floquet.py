@@ -10,9 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.capabilities import SystemLike
+from chilopod.stability.capabilities import Autonomous, SystemLike
+from chilopod.stability.orbits import Orbit, find_orbit, from_known, known_state
+from chilopod.stability.returns import ReturnMap, return_maps
+from chilopod.stability.scales import numerical_balance
 from chilopod.stability.splitting import split_product
-from chilopod.stability.system import ReturnMap, find_orbit, halves, return_maps
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -33,21 +35,25 @@ class Multipliers(ReadOnlyArrays):
     Attributes
     ----------
     values
-        Multipliers of the full period, by falling modulus, shape (n,). Absolute accuracy is ``error_bound``: those
-        smaller than it are only known to be small (:func:`exponents` resolves them).
+        Multipliers of the full period, by falling modulus, shape (n,); n-1 of them where the system does not depend on
+        time: the one along the motion, which is 1, is left out. Absolute accuracy is ``error_bound``: those smaller
+        than it are only known to be small (:func:`exponents` resolves them).
     half_period
-        Multipliers nu of the half-period map, ``values = nu^2`` in the same order; None where the system has no such
-        symmetry.
+        Multipliers nu of the return map of a system with a symmetry in time, of order k: ``values = nu^k`` in the same
+        order (k is 2 unless told, hence the name); None without one.
     error_bound
         Bound on the absolute error of every multiplier of modulus above 1e-6.
     orbit
         State on the orbit at time 0.
+    period
+        Of the orbit.
     """
 
     values: ComplexArray
     half_period: ComplexArray | None
     error_bound: float
     orbit: Array
+    period: float
 
     @property
     def stable(self) -> bool:
@@ -62,12 +68,12 @@ class Exponents(ReadOnlyArrays):
     Attributes
     ----------
     values
-        Exponents (1/s), by falling real part, shape (n,): the principal logarithm of the full-period multiplier over
-        T, imaginary part in (-pi/T, pi/T]. Where the half-period map exists they come from ln(nu^2), which is the same
-        number.
+        Exponents (1/s), by falling real part, shape (n,) or, as of the multipliers, (n-1,): the principal logarithm of
+        the full-period multiplier over T, imaginary part in (-pi/T, pi/T]. Where the system has a symmetry in time of
+        order k they come from ln(nu^k), which is the same number.
     modes
-        Unit eigenvectors of the full-period map at time 0 as columns, shape (n, n), the largest entry real and
-        positive.
+        Unit eigenvectors of the full-period map at time 0 as columns, the largest entry real and positive; of a system
+        that does not depend on time, those of its Poincare map on the section across the motion.
     multipliers
         The multipliers of the same orbit.
     """
@@ -98,8 +104,12 @@ class Spectrum(ReadOnlyArrays):
 
 
 def spectrum(image: ReturnMap) -> Spectrum:
-    """Eigenvalues of a return map with their condition."""
-    values, right = np.linalg.eig(image.jacobian)
+    """Eigenvalues of a return map with their condition; without the zero that stands for the motion itself."""
+    into, out_of = across(image)
+    jacobian = out_of @ image.jacobian @ into
+    # In units in which all entries are alike the errors of the eigenvalue solver are small against every one of them.
+    units = numerical_balance(jacobian)
+    values, right = np.linalg.eig(jacobian * units / units[:, None])
     # Moduli that differ by round-off are equal; the two of a pair stand together, positive frequency first.
     sizes = np.round(np.abs(values) / max(float(np.abs(values).max()), 1e-300), 12)
     order = np.lexsort((-values.imag, -np.round(np.abs(values.imag), 12), -sizes))
@@ -108,11 +118,35 @@ def spectrum(image: ReturnMap) -> Spectrum:
         left = np.linalg.inv(right).conj().T
     except np.linalg.LinAlgError:  # a defective matrix: no bound to be had from conditions
         left = np.full_like(right, np.nan)
-    # d nu = left^H E right: with entries of E that err independently by up to e, |d nu| has the size e |left| |right|;
-    # the factor 4 is for safety. The second part is the backward error of the eigenvalue solver.
-    matrix_error = 4.0 * image.error + 4.0 * np.finfo(float).eps * np.linalg.norm(image.jacobian)
-    condition = np.linalg.norm(left, axis=0)
-    return Spectrum(values, right, left, np.where(np.isfinite(condition), condition, np.inf) * matrix_error)
+    # The backward error of the eigenvalue solver.
+    size = float(np.linalg.norm(jacobian * units / units[:, None]))
+    error = 4.0 * np.finfo(float).eps * size * np.linalg.norm(left, axis=0) * np.linalg.norm(right, axis=0)
+    right = into @ (units[:, None] * right)
+    left = out_of.T @ (left / units[:, None])
+    norms = np.linalg.norm(right, axis=0)
+    right, left = right / norms, left * norms
+    # d nu = left^H E right, of which a bound of every entry of E tells the most; with one number for all of them, that
+    # err independently, |d nu| has the size e |left| |right|, and the factor 4 is for safety.
+    if isinstance(image.error, np.ndarray):
+        error += np.einsum("ik,ij,jk->k", np.abs(left), image.error, np.abs(right))
+    else:
+        error += 4.0 * image.error * np.linalg.norm(left, axis=0)
+    return Spectrum(values, right, left, np.where(np.isfinite(error), error, np.inf))
+
+
+def across(image: ReturnMap) -> tuple[Array, Array]:
+    """Coordinates on the section of a return map: (n, n-1) from them, and (n-1, n) to them along the motion; two unit
+    matrices where there is no section."""
+    n = image.state.size
+    if image.velocity is None or image.normal is None:
+        return np.eye(n), np.eye(n)
+    # Units in which the motion is across the section, so that its basis can be orthonormal.
+    units = numerical_balance(image.jacobian)
+    normal = image.normal * units
+    basis = np.linalg.svd(normal[None])[2][1:].T
+    into = units[:, None] * basis
+    along = np.eye(n) - np.outer(image.velocity, image.normal) / float(image.normal @ image.velocity)
+    return into, (basis.T / units) @ along
 
 
 def counts_outside(values: ComplexArray) -> tuple[int, int, int]:
@@ -126,16 +160,17 @@ def counts_outside(values: ComplexArray) -> tuple[int, int, int]:
     )
 
 
-def _multipliers(image: ReturnMap, orbit: Array) -> Multipliers:
+def _multipliers(orbit: Orbit) -> Multipliers:
+    image = orbit.image
     spec = spectrum(image)
-    nu = spec.values
+    nu, k = spec.values, image.returns
     resolved = np.abs(nu) > RESOLVED
     bound = float(spec.error[resolved].max()) if resolved.any() else float(spec.error.min())
-    if image.halves == 1:
-        return Multipliers(nu, None, bound, orbit)
-    # mu = nu^2, so d mu = 2 |nu| d nu + (d nu)^2.
-    largest = float(np.abs(nu[0]))
-    return Multipliers(nu**2, nu, bound * (2.0 * max(largest, 0.5) + bound), orbit)
+    if k == 1:
+        return Multipliers(nu, None, bound, orbit.state, image.period)
+    # mu = nu^k: by the mean value theorem, d mu is at most k (|nu| + d nu)^(k-1) d nu.
+    largest = max(float(np.abs(nu[0])), 0.5)
+    return Multipliers(nu**k, nu, bound * k * (largest + bound) ** (k - 1), orbit.state, image.period)
 
 
 def multipliers(system: SystemLike, orbit: ArrayLike | None = None) -> Multipliers:
@@ -148,15 +183,21 @@ def multipliers(system: SystemLike, orbit: ArrayLike | None = None) -> Multiplie
     orbit
         A first guess of a state on the orbit at time 0; not needed where the system knows its orbit.
     """
-    x, image = find_orbit(system, orbit)
-    return _multipliers(image, x)
+    return _multipliers(find_orbit(system, orbit))
 
 
 def sweep(systems: Sequence[SystemLike]) -> list[Multipliers]:
     """Multipliers of many systems at their known orbits, on all cores where the systems allow it."""
     if not systems:
         return []
-    return [_multipliers(image, image.state) for image in return_maps(systems)]
+    if any(isinstance(system, Autonomous) for system in systems):
+        return [multipliers(system) for system in systems]
+    states = [known_state(system) for system in systems]
+    images = return_maps(systems, states)
+    return [
+        _multipliers(from_known(system, state, image=image))
+        for system, state, image in zip(systems, states, images, strict=True)
+    ]
 
 
 def exponents(system: SystemLike, orbit: ArrayLike | None = None) -> Exponents:
@@ -166,35 +207,56 @@ def exponents(system: SystemLike, orbit: ArrayLike | None = None) -> Exponents:
     multiplier of 1e-60 is found with the same relative accuracy as one of 0.5; the eigenvalues of the product itself
     would be round-off there.
     """
-    x, image = find_orbit(system, orbit)
-    factors = _factors(system, x)
+    found = find_orbit(system, orbit)
+    image = found.image
+    factors, units = _factors(system, found)
     log_nu, modes = split_product(factors)
-    # Principal logarithm of nu^halves: the imaginary part back into (-pi, pi].
-    angle = np.angle(np.exp(1j * image.halves * log_nu.imag))
+    # Principal logarithm of nu^k: the imaginary part back into (-pi, pi].
+    angle = np.angle(np.exp(1j * image.returns * log_nu.imag))
     angle[np.abs(angle) < _SAME_ANGLE] = 0.0
     angle[np.abs(np.abs(angle) - np.pi) < _SAME_ANGLE] = np.pi
-    values = (image.halves * log_nu.real + 1j * angle) / system.period
+    values = (image.returns * log_nu.real + 1j * angle) / image.period
     # Conjugate pairs: positive frequency first.
-    order = np.lexsort((-values.imag, -np.round(values.real * system.period, 9)))
-    return Exponents(values[order], modes[:, order], _multipliers(image, x))
+    order = np.lexsort((-values.imag, -np.round(values.real * image.period, 9)))
+    modes = units @ modes
+    modes = modes / np.linalg.norm(modes, axis=0)
+    peaks = modes[np.abs(modes).argmax(axis=0), range(modes.shape[1])]
+    return Exponents(values[order], (modes * (np.abs(peaks) / peaks))[:, order], _multipliers(found))
 
 
-def _factors(system: SystemLike, x: Array) -> list[Array]:
-    """Derivatives of the flow over equal parts of the return, each of moderate condition; their product is that of the
-    return."""
-    duration = system.period / halves(system)
+def _factors(system: SystemLike, orbit: Orbit) -> tuple[list[Array], Array]:
+    """Derivatives of the flow over equal parts of the return, each of moderate condition, in units in which the entries
+    of their product are alike; and these units as a matrix.
+
+    Of a system that does not depend on time, the derivatives between sections across the motion.
+    """
+    x, image = orbit.state, orbit.image
+    units = numerical_balance(image.jacobian)
+    duration = image.period / image.returns
     count = 8
     while True:
         times = np.linspace(0.0, duration, count + 1)
-        state, factors = x.copy(), []
+        state, states, factors = x.copy(), [x], []
         for t0, t1 in zip(times, times[1:], strict=False):
             state, factor = system.flow(state, float(t0), float(t1))
-            factors.append(factor)
-        if max(float(np.linalg.cond(factor)) for factor in factors) < _WORST_CONDITION:
-            break
+            states.append(state)
+            factors.append(factor * units / units[:, None])
+        if system.symmetry is not None:
+            factors[-1] = (system.symmetry * units / units[:, None]) @ factors[-1]
+            states[-1] = system.symmetry @ states[-1]
+        basis = np.diag(units)
+        if isinstance(system, Autonomous):
+            sections = [_normal_basis(system.velocity(at) / units) for at in states[:-1]]
+            sections.append(sections[0])
+            factors = [after.T @ f @ before for f, before, after in zip(factors, sections, sections[1:], strict=False)]
+            basis = basis @ sections[0]
+        if max((float(np.linalg.cond(factor)) for factor in factors), default=1.0) < _WORST_CONDITION:
+            return factors, basis
         count *= 2
         if count > _MOST_FACTORS:
             raise AnalysisError("the flow contracts too strongly to be resolved", field="flow")
-    if system.symmetry is not None:
-        factors[-1] = system.symmetry @ factors[-1]
-    return factors
+
+
+def _normal_basis(direction: Array) -> Array:
+    """Orthonormal basis of the plane across a direction, shape (n, n-1)."""
+    return np.linalg.svd(direction[None])[2][1:].T

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.stability.capabilities import SystemLike
-from chilopod.stability.system import ReturnMap, return_map
+from chilopod.stability.returns import ReturnMap, return_map
 
 Array = NDArray[np.float64]
 
@@ -96,5 +96,5 @@ def _described(family: Callable[[float], SystemLike], x: Array, p: float, scale:
     up, down = (return_map(family(p + step), x, with_error=False).state for step in (h, -h))
     slope = abs(float(left @ (up - down) / (2.0 * h)))
     # left . (H(x, p) - x) = 0 fixes p to first order; x itself enters in second order only.
-    residual = float(np.abs(image.state - x).max()) + image.error * max(1.0, float(np.abs(x).max()))
+    residual = float(np.abs(image.state - x).max()) + float(np.max(image.error)) * float(np.abs(x).max())
     return Fold(p, 2.0 * residual / slope if slope > 0.0 else np.inf, image)

@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.stability.capabilities import SystemLike, spatial_symmetry
+from chilopod.stability.capabilities import SystemLike, spatial_symmetries
 from chilopod.stability.floquet import Spectrum, spectrum
 from chilopod.stability.fold import Fold
 from chilopod.stability.normal_form import NormalForm, complex_normal_form, real_normal_form
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
+from chilopod.stability.returns import return_map
 from chilopod.stability.samples import Family, Sample, Samples
-from chilopod.stability.system import return_map
 from chilopod.stability.zeros import brackets
 
 Array = NDArray[np.float64]
@@ -187,27 +187,27 @@ def _describe(samples: Samples, value: float, event: int, width: float, normal_f
     bound = float(bound + 4 * np.finfo(float).eps * abs(value))
     mode, left = _phased(spec.right[:, critical], spec.left[:, critical])
     if event == _PAIR:
-        angle = float(np.angle(np.exp(1j * image.halves * np.angle(nu))))
+        angle = float(np.angle(np.exp(1j * image.returns * np.angle(nu))))
         # Of a conjugate pair, the mode that turns with positive frequency.
         if angle < 0:
             nu, mode, left, angle = nu.conjugate(), mode.conj(), left.conj(), -angle
         form = None
         if normal_form:
             form = _where_it_exists(lambda size: complex_normal_form(system, image, nu / abs(nu), mode, left, size))
-        return _point(Kind.NEIMARK_SACKER, at, bound, mode, nu, angle / system.period, form)
+        return _point(Kind.NEIMARK_SACKER, at, bound, mode, nu, angle / image.period, form)
     form = None
     if normal_form or (event == _PLUS and not _antisymmetric(system, mode)):
         form = _where_it_exists(lambda size: real_normal_form(system, image, float(event), mode.real, left.real, size))
-    kind = _kind(system, image.halves, event, mode.real, form)
+    kind = _kind(system, image.returns, event, mode.real, form)
     if kind in (Kind.FOLD, Kind.TRANSCRITICAL, Kind.BRANCH_POINT):
         form = None
-    frequency = np.pi / system.period if kind is Kind.PERIOD_DOUBLING else 0.0
+    frequency = np.pi / image.period if kind is Kind.PERIOD_DOUBLING else 0.0
     return _point(kind, at, bound, mode, nu, frequency, form)
 
 
-def _kind(system: SystemLike, halves: int, event: int, mode: Array, form: NormalForm | None) -> Kind:
+def _kind(system: SystemLike, returns: int, event: int, mode: Array, form: NormalForm | None) -> Kind:
     if event == _MINUS:
-        return Kind.PITCHFORK if halves == 2 else Kind.PERIOD_DOUBLING
+        return Kind.PITCHFORK if returns == 2 else Kind.PERIOD_DOUBLING
     if _antisymmetric(system, mode):
         return Kind.PITCHFORK
     # The orbit was sampled on both sides, so it does not end in a fold here.
@@ -262,8 +262,7 @@ def _where_it_exists(form: Callable[[float], NormalForm]) -> NormalForm:
 
 
 def _antisymmetric(system: SystemLike, mode: NDArray[np.inexact]) -> bool:
-    reflection = spatial_symmetry(system)
-    return reflection is not None and bool(np.abs(reflection @ mode + mode).max() < 1e-6)
+    return any(bool(np.abs(matrix @ mode + mode).max() < 1e-6) for matrix in spatial_symmetries(system))
 
 
 def _phased(

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.stability.capabilities import SystemLike
-from chilopod.stability.system import ReturnMap, returned_states
+from chilopod.stability.returns import ReturnMap, returned_states
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -136,8 +136,8 @@ def complex_normal_form(
         return np.stack([resonant.real, resonant.imag], axis=1) / s[:, None] ** 3
 
     found, errors = _limit(third_order, ladder)
-    cubic, rotation = (image.halves * found).tolist()
-    cubic_error, rotation_error = (image.halves * errors).tolist()
+    cubic, rotation = (image.returns * found).tolist()
+    cubic_error, rotation_error = (image.returns * errors).tolist()
     return NormalForm(0.0, 0.0, cubic, cubic_error, rotation, rotation_error)
 
 

@@ -14,6 +14,7 @@ from scipy.integrate import solve_ivp
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability.arguments import check_shape, check_symmetry, checked_arguments, finite_array
+from chilopod.stability.capabilities import spatial_symmetries
 from chilopod.stability.jumps import warn_of_jumps
 from chilopod.stability.system import PeriodicSystem
 
@@ -145,12 +146,10 @@ def from_rhs(
             [segments.carry(x, _pieces(edges, period, t0, t1), tolerance) for x in states]
         ),
     )
-    for field, matrix, shift in (
-        ("symmetry", system.symmetry, 0.5 * period),
-        ("spatial_symmetry", system.spatial_symmetry, 0.0),
-    ):
-        if matrix is not None:
-            check_symmetry(field, matrix, shift, rhs, args, times, base, period)
+    if system.symmetry is not None:
+        check_symmetry("symmetry", system.symmetry, period / system.symmetry_order, rhs, args, times, base, period)
+    for matrix in spatial_symmetries(system):
+        check_symmetry("spatial_symmetry", matrix, 0.0, rhs, args, times, base, period)
     return system
 
 

@@ -11,9 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.capabilities import SystemLike
+from chilopod.stability.capabilities import Autonomous, SystemLike
 from chilopod.stability.fold import Fold, find_fold
-from chilopod.stability.system import ReturnMap, find_orbit, return_maps
+from chilopod.stability.orbits import find_orbit, from_known, known_state
+from chilopod.stability.returns import ReturnMap, return_maps, section_at
 
 Array = NDArray[np.float64]
 Family = Callable[[float], SystemLike]
@@ -66,8 +67,13 @@ class Samples:
         wanted = [float(value) for value in values]
         missing = sorted({value for value in wanted if value not in self._by_value})
         if missing and self._known:
-            for value, image in zip(missing, return_maps([self.family(value) for value in missing]), strict=True):
-                self._keep(Sample(value, image.state, image))
+            systems = [self.family(value) for value in missing]
+            states = [known_state(system) for system in systems]
+            autonomous = any(isinstance(system, Autonomous) for system in systems)
+            images = [None] * len(systems) if autonomous else return_maps(systems, states)
+            for value, system, state, image in zip(missing, systems, states, images, strict=True):
+                orbit = from_known(system, state, image=image)
+                self._keep(Sample(value, orbit.state, orbit.image))
         else:
             for value in missing:
                 self._keep(self._between(value))
@@ -77,9 +83,13 @@ class Samples:
         self._by_value[sample.value] = sample
         bisect.insort(self._values, sample.value)
 
-    def _sampled(self, value: float, near: ArrayLike) -> Sample:
-        orbit, image = find_orbit(self.family(value), near, with_error=False)
-        return Sample(value, orbit, image)
+    def _sampled(self, value: float, near: ArrayLike, beside: Sample | None = None) -> Sample:
+        system = self.family(value)
+        section = None
+        if beside is not None:  # which tells how long an orbit takes, where it is the orbit's to say
+            section = section_at(system, np.asarray(near), None, beside.image.period / beside.image.returns)
+        orbit = find_orbit(system, near, with_error=False, section=section)
+        return Sample(value, orbit.state, orbit.image)
 
     def _between(self, value: float) -> Sample:
         """A sample between two that are there, from their orbits."""
@@ -87,7 +97,7 @@ class Samples:
         a, b = (self._by_value[self._values[i]] for i in (right - 1, right))
         t = (value - a.value) / (b.value - a.value)
         try:
-            return self._sampled(value, (1 - t) * a.orbit + t * b.orbit)
+            return self._sampled(value, (1 - t) * a.orbit + t * b.orbit, a)
         except AnalysisError:
             reached = self._follow([a], value)
             if not reached or reached[-1].value != value:
@@ -133,7 +143,7 @@ class Samples:
                 slope = (last.orbit - behind[-2].orbit) / (last.value - behind[-2].value)
                 guess = guess + (target - last.value) * slope
             try:
-                found = self._sampled(target, guess)
+                found = self._sampled(target, guess, last)
             except AnalysisError:
                 found = None
             # A large jump means that Newton's method has found another orbit.

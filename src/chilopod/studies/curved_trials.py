@@ -25,7 +25,7 @@ from chilopod.engine import Status
 from chilopod.planar import PlanarModel
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
-from chilopod.stability.system import whole_period
+from chilopod.stability.returns import whole_period
 from chilopod.studies.paper import printed
 from chilopod.trials import AVERAGED, Disturbance, Trial, run
 
@@ -169,7 +169,7 @@ def off_branch(robot: Robot, trials: xr.Dataset, branch: xr.Dataset) -> xr.DataA
             continue
         model = PlanarModel(robot.with_value(K1, stiffness(float(spring))))
         guess = on_branch(branch, "orbit", float(spring))
-        orbit, _ = stability.find_orbit(whole_period(model), guess, with_error=False)
+        orbit = stability.find_orbit(whole_period(model), guess, with_error=False).state
         mirrored = model.reflection @ model.flow_states(orbit[None], 0.0, 0.5 * model.period)[0]
         for side, expected in (("right", orbit), ("left", mirrored)):
             here = at.direction.values == side

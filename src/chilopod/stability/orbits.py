@@ -1,0 +1,243 @@
+"""Periodic orbits: fixed points of the return map, by Newton's method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chilopod.errors import AnalysisError
+from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.arguments import finite_array
+from chilopod.stability.capabilities import Autonomous, KnowsOrbit, SystemLike, returns_per_period
+from chilopod.stability.returns import ReturnMap, Section, return_map, returned_states, section_at, whole_period
+from chilopod.stability.scales import sizes
+
+Array = NDArray[np.float64]
+
+_ROUNDS = 30
+_ROUND_OFF = 4e-16
+_SETTLED = 1e-10  # residual, of the sizes of the states, below which it may stop falling
+_RETURNED = 1e-12  # of a known orbit: it is exact
+_KNOWN = 1e-4  # of a known orbit: it is one, if not to the last digit
+_LONGEST_SETTLING = 300  # returns
+_BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
+_MARCHED, _MARCHES = 48, 8  # steps a guessed period, and guessed periods, in which a motion is to come back
+_COMES_BACK = 0.1  # of its size
+
+
+@dataclass(frozen=True)
+class Orbit(ReadOnlyArrays):
+    """A periodic orbit.
+
+    Attributes
+    ----------
+    state
+        At time 0, shape (n,).
+    image
+        The return map there.
+    error
+        How far ``state`` may be off, shape (n,); zero where it is known exactly, NaN if it was not asked for.
+    """
+
+    state: Array
+    image: ReturnMap
+    error: Array
+
+    @property
+    def period(self) -> float:
+        """The full period."""
+        return self.image.period
+
+
+def known_state(system: SystemLike) -> Array:
+    """The state on its orbit that a system knows of itself.
+
+    Raises
+    ------
+    AnalysisError
+        If it knows none.
+    """
+    orbit = system.orbit if isinstance(system, KnowsOrbit) else None
+    if orbit is None:
+        raise AnalysisError(
+            "this system does not know its periodic orbit", field="orbit", allowed="a first guess of it"
+        )
+    return np.asarray(orbit, dtype=np.float64)
+
+
+def find_orbit(
+    system: SystemLike, guess: ArrayLike | None = None, with_error: bool = True, section: Section | None = None
+) -> Orbit:
+    """A periodic orbit: a fixed point of the return map, by Newton's method.
+
+    Where it does not converge from the guess, the motion is given time to settle on an orbit that attracts it.
+
+    Parameters
+    ----------
+    system
+        The system; one that knows its orbit needs no guess.
+    guess
+        A state at time 0 near the orbit, shape (n,).
+    with_error
+        Whether to bound errors.
+    section
+        Of a system that does not depend on time: where its orbit is looked for. By default across the motion in the
+        guess; the orbit that is found has the section across its own motion.
+
+    Raises
+    ------
+    AnalysisError
+        If neither helps.
+    """
+    if guess is None:
+        return from_known(system, known_state(system), with_error)
+    x = finite_array(guess, (system.dimension,), "orbit")
+    try:
+        return _newton(system, x, with_error, section)
+    except AnalysisError as failed:
+        if section is not None:
+            raise
+        for settled, after in _settled(system, x):
+            try:
+                return _newton(system, settled, with_error, after)
+            except AnalysisError:
+                continue
+        raise failed
+
+
+def from_known(system: SystemLike, x: Array, with_error: bool = True, image: ReturnMap | None = None) -> Orbit:
+    """The orbit through a state that is on it, by what the system says of itself; improved if not to the last digit.
+
+    Parameters
+    ----------
+    system, x, with_error
+        As for :func:`find_orbit`.
+    image
+        The return map at ``x``, if it was computed already.
+    """
+    if isinstance(system, Autonomous):
+        return find_orbit(system, x, with_error)
+    image = return_map(system, x, with_error) if image is None else image
+    moved = np.abs(image.state - x)
+    # A zero is no size: an orbit that rests at zero has to come back to it to the last bit, or as near as round-off
+    # in the others takes it.
+    size = _largest(system, x, image)
+    off = _relative(moved, size)
+    if off <= _RETURNED * max(1.0, float(np.abs(image.jacobian * size / size[:, None]).max())):
+        return Orbit(x, image, np.zeros(x.size))
+    if off <= _KNOWN:
+        return _newton(system, x, with_error, None)
+    raise AnalysisError(
+        f"is no periodic orbit: one return later the state is {float(moved.max()):.1e} away",
+        field="orbit",
+        allowed="a state on the orbit at time 0, or as a first guess, which is then improved",
+    )
+
+
+def _largest(system: SystemLike, x: Array, image: ReturnMap) -> Array:
+    return sizes(system, np.maximum(np.abs(x), np.abs(image.state)), image.jacobian)
+
+
+def _relative(values: Array, size: Array) -> float:
+    return float((np.abs(values) / size).max())
+
+
+def _newton(system: SystemLike, x: Array, with_error: bool, section: Section | None) -> Orbit:
+    section = section_at(system, x) if section is None else section
+    best = np.inf
+    for rounds in range(_ROUNDS):
+        image = return_map(system, x, with_error=False, section=section)
+        size = _largest(system, x, image)
+        residual = image.state - x
+        off = _relative(residual, size)
+        if off <= _ROUND_OFF or (off <= _SETTLED and off >= 0.5 * best):
+            return _at(system, x, image, with_error, section, size)
+        if rounds > 4 and off > 10.0 * best:
+            break
+        best = min(best, off)
+        x = x - _solved(image.jacobian - np.eye(x.size), residual, size)
+        if not np.isfinite(x).all():
+            break
+        if section is not None:
+            section = replace(section, duration=image.period / image.returns)
+    raise AnalysisError(
+        f"no periodic orbit found near the guess (it misses itself by {best:.1e} of its size)",
+        field="orbit",
+        allowed="a guess closer to the orbit",
+    )
+
+
+def _solved(matrix: Array, right: Array, size: Array) -> Array:
+    """Solution of a linear system in units of the states' sizes; the shortest where orbits come in families."""
+    scaled = matrix * size / size[:, None]
+    return np.asarray(np.linalg.lstsq(scaled, right / size, rcond=1e-13)[0] * size)
+
+
+def _at(
+    system: SystemLike, x: Array, image: ReturnMap, with_error: bool, section: Section | None, size: Array
+) -> Orbit:
+    """The orbit through a state, with the section across its own motion and the errors that were asked for."""
+    if section is not None:
+        section = section_at(system, x, size, image.period / image.returns)
+    if section is not None or with_error:
+        image = return_map(system, x, with_error, section)
+    if not with_error:
+        return Orbit(x, image, np.full(x.size, np.nan))
+    # The state is as uncertain as the flow, of which the derivative's error tells, times what H - 1 makes of it.
+    wrong = np.abs(image.state - x) + (_matrix(image.error, size) @ size)
+    scaled = image.jacobian * size / size[:, None] - np.eye(x.size)
+    error = size * (np.abs(np.linalg.pinv(scaled, rcond=1e-13)) @ (wrong / size))
+    # The derivative is that of a state so far off: along the direction in which the orbit is least sure.
+    weakest = size * np.linalg.svd(scaled)[2][-1]
+    beside = return_map(system, x + _BESIDE * weakest, with_error=False, section=section)
+    bend = np.abs(beside.jacobian - image.jacobian) * (_relative(error, size) / _BESIDE)
+    return Orbit(x, replace(image, error=_matrix(image.error, size) + bend), error)
+
+
+def _matrix(error: float | Array, size: Array) -> Array:
+    """The error of every entry of a derivative."""
+    return error if isinstance(error, np.ndarray) else np.full((size.size, size.size), error)
+
+
+def _settled(system: SystemLike, x: Array) -> list[tuple[Array, Section | None]]:
+    """States on the orbit that attracts the motion from a state, if one does, with sections across it."""
+    if isinstance(system, Autonomous):
+        return _settled_autonomous(system, x)
+    found: list[tuple[Array, Section | None]] = []
+    for count in (_LONGEST_SETTLING // 10, _LONGEST_SETTLING):
+        try:
+            for _ in range(count):
+                x = returned_states(system, x[None])[0]
+        except AnalysisError:
+            break
+        if not np.isfinite(x).all():
+            break
+        found.append((x, None))
+    return found
+
+
+def _settled_autonomous(system: Autonomous, x: Array) -> list[tuple[Array, Section | None]]:
+    """As :func:`_settled`, with a new guess of the period: when the motion first comes close to where it was."""
+    step = system.guess_period / _MARCHED
+    whole = whole_period(system)
+    try:
+        for _ in range(_LONGEST_SETTLING // 4):
+            x = whole.flow(x, 0.0, system.guess_period)[0]
+        path = [x]
+        for _ in range(_MARCHES * _MARCHED):
+            path.append(whole.flow(path[-1], 0.0, step)[0])
+    except AnalysisError:
+        return []
+    states = np.array(path)
+    if not np.isfinite(states).all():
+        return []
+    size = np.ptp(states, axis=0)
+    size = np.where(size > 0.0, size, np.inf)
+    away = (np.abs(states - x) / size).max(axis=1)
+    turned = np.flatnonzero((away[1:-1] <= away[:-2]) & (away[1:-1] <= away[2:]) & (away[1:-1] < _COMES_BACK)) + 1
+    if not turned.size:
+        return []
+    count = 1 if system.symmetry is None else returns_per_period(system)
+    return [(x, section_at(system, x, None, float(turned[0]) * step / count))]

@@ -1,0 +1,350 @@
+"""The return map of a system: what all analyses study, since its fixed points are the periodic orbits.
+
+Where the period T is known it is H = S flow(T/k), S the symmetry of order k if there is one. Where the system does not
+depend on time, H carries a state to where its motion, turned by S, next crosses a section, a hyperplane: a Poincare
+map, kept in the coordinates of the states (Parker & Chua, *Practical Numerical Algorithms for Chaotic Systems*, 1989,
+ch. 2). Its derivative then maps the direction of the motion to zero, exactly, in place of the trivial multiplier 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.capabilities import (
+    Autonomous,
+    FlowsMany,
+    FlowsStates,
+    FlowsWithError,
+    Scaled,
+    SystemLike,
+    returns_per_period,
+    spatial_symmetries,
+)
+from chilopod.stability.scales import balance, numerical_balance
+
+Array = NDArray[np.float64]
+
+_APPROACHES = (1.0 / 16.0, 0.4)  # of a return: from there on, the crossing of the section is solved for
+_FARTHEST = 0.8  # of a return: a crossing that much later is another one
+_CROSSING_ROUNDS = 30
+_CUTS = (0.0, 0.0477, 0.382)  # near the start as well, or the steps up to the cut would be the same, errors included
+
+
+@dataclass(frozen=True)
+class Section(ReadOnlyArrays):
+    """A hyperplane that the orbit of a system without a period of its own crosses once a return.
+
+    Attributes
+    ----------
+    point
+        A state on it, shape (n,).
+    normal
+        normal . (x - point) = 0 on the section, shape (n,).
+    duration
+        About how long a return to it takes.
+    """
+
+    point: Array
+    normal: Array
+    duration: float
+
+
+@dataclass(frozen=True)
+class ReturnMap(ReadOnlyArrays):
+    """One evaluation of the return map H at a state.
+
+    Attributes
+    ----------
+    state
+        H(x), shape (n,).
+    jacobian
+        dH/dx, shape (n, n).
+    error
+        Bound on the error of every entry of ``jacobian``, shape (n, n), or one number for all; NaN if it was not asked
+        for.
+    returns
+        How many times H makes the full period.
+    period
+        The full period.
+    velocity
+        dx/dt at H(x), shape (n,), where the system does not depend on time; else None.
+    normal
+        Of the section, likewise.
+    """
+
+    state: Array
+    jacobian: Array
+    error: float | Array
+    returns: int
+    period: float
+    velocity: Array | None = None
+    normal: Array | None = None
+
+
+class _WholePeriod:
+    """A system as it is, but for its symmetry in time and its known orbit, over some periods."""
+
+    symmetry = None
+
+    def __init__(self, system: SystemLike, periods: int) -> None:
+        self.dimension = system.dimension
+        self.period = None if system.period is None else periods * system.period
+        self.flow = system.flow
+        symmetries = spatial_symmetries(system)
+        self.spatial_symmetry = np.stack(symmetries) if symmetries else None
+        self.scale = system.scale if isinstance(system, Scaled) else None
+        self.flow_with_error = system.flow_with_error if isinstance(system, FlowsWithError) else None
+        self.flow_states = system.flow_states if isinstance(system, FlowsStates) else None
+        self.velocity = None
+        if isinstance(system, Autonomous):
+            self.guess_period = periods * system.guess_period
+            self.velocity = system.velocity
+
+
+def whole_period(system: SystemLike, periods: int = 1) -> SystemLike:
+    """The same system for the analysis of orbits that do not have its symmetry in time, or take several periods."""
+    return _WholePeriod(system, periods)
+
+
+def section_at(
+    system: SystemLike, x: Array, scale: Array | None = None, duration: float | None = None
+) -> Section | None:
+    """The section through a state across its motion; None where the period is known and there is no need of one.
+
+    Parameters
+    ----------
+    system, x
+        The system and a state, shape (n,).
+    scale
+        Sizes of the states, shape (n,): across means at right angles in these units. By default those of the motion.
+    duration
+        Of a return; the system's own guess by default.
+
+    Raises
+    ------
+    AnalysisError
+        If the motion rests in this state.
+    """
+    if not isinstance(system, Autonomous):
+        return None
+    velocity = _velocity(system, x)
+    if scale is None:
+        scale = np.maximum(np.abs(velocity), 1e-3 * balance(system.flow(x, 0.0, 0.01 * system.guess_period)[1]))
+    normal = velocity / scale**2
+    size = float(np.abs(velocity / scale).max())
+    if not size > 0.0:
+        raise AnalysisError("is an equilibrium: the motion rests in it", field="orbit", allowed="a state on an orbit")
+    if duration is None:
+        duration = system.guess_period / returns_per_period(system)
+    return Section(x, normal / float(np.linalg.norm(normal * scale)), duration)
+
+
+def _velocity(system: Autonomous, x: Array) -> Array:
+    velocity = np.asarray(system.velocity(np.array(x)), dtype=np.float64)
+    if not np.isfinite(velocity).all():
+        raise AnalysisError("the right-hand side is not finite", field="rhs")
+    return velocity
+
+
+def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple[Array, Array, float | Array]:
+    """The flow with an error bound; where the system gives none, one is estimated by taking the interval in parts.
+
+    A step-controlled integrator makes independent errors in the two computations, so ten times their difference is a
+    sound bound; a flow of fixed steps that ignores how it is called cannot be seen through this way and should bring
+    its own.
+    """
+    if isinstance(system, FlowsWithError):
+        return system.flow_with_error(x, t0, t1)
+    state, derivative = system.flow(x, t0, t1)
+    _check_shapes(state, derivative, x.size)
+    _check_finite(state, derivative)
+    times = [t0 + part * (t1 - t0) for part in _CUTS] + [t1]
+    passing, product = x, np.eye(x.size)
+    for a, b in zip(times, times[1:], strict=False):
+        passing, factor = system.flow(passing, a, b)
+        product = factor @ product
+    # In units in which all entries are alike: one that agrees by chance is as uncertain as the others.
+    units = numerical_balance(derivative)
+    units = units[:, None] / units
+    off = float((np.abs(product - derivative) / units).max())
+    size = float((np.abs(derivative) / units).max())
+    return state, derivative, (10.0 * off + 1e-15 * size) * units
+
+
+def _check_shapes(state: Array, derivative: Array, n: int) -> None:
+    if np.shape(state) != (n,) or np.shape(derivative) != (n, n):
+        raise AnalysisError(
+            f"gives shapes {np.shape(state)} and {np.shape(derivative)}", field="flow", allowed=f"({n},) and ({n}, {n})"
+        )
+
+
+def return_map(system: SystemLike, x: ArrayLike, with_error: bool = True, section: Section | None = None) -> ReturnMap:
+    """Evaluate the return map H and its derivative at a state.
+
+    Parameters
+    ----------
+    system, x
+        The system and a state at time 0, shape (n,).
+    with_error
+        Whether to bound the error as well, which may cost a second computation; without, ``error`` is NaN.
+    section
+        Where a return ends, if the system does not depend on time; by default across the motion in ``x``.
+
+    Raises
+    ------
+    AnalysisError
+        If the flow gives anything that is not finite, or does not come back to the section.
+    """
+    x = np.array(x, dtype=np.float64)  # a system may write into what it is given
+    n = system.dimension
+    if x.shape != (n,):
+        raise ParameterError("has the wrong shape", field="orbit", value=x.shape, allowed=f"({n},)")
+    count = returns_per_period(system)
+    if isinstance(system, Autonomous):
+        return _return_to_section(system, x, with_error, section or section_at(system, x))
+    duration = _period(system) / count
+    error: float | Array = np.nan
+    if with_error:
+        state, jacobian, error = flow_with_error(system, x, 0.0, duration)
+    else:
+        state, jacobian = system.flow(x, 0.0, duration)
+    _check_shapes(state, jacobian, n)
+    if system.symmetry is not None:
+        state, jacobian = system.symmetry @ state, system.symmetry @ jacobian
+        if isinstance(error, np.ndarray):
+            error = np.abs(system.symmetry) @ error
+    _check_finite(state, jacobian)
+    return ReturnMap(state, jacobian, error, count, count * duration)
+
+
+def _check_finite(state: Array, jacobian: Array) -> None:
+    if not (np.isfinite(state).all() and np.isfinite(jacobian).all()):
+        raise AnalysisError("the flow is not finite over one return", field="flow")
+
+
+def _period(system: SystemLike) -> float:
+    if system.period is None:
+        raise ParameterError(
+            "must be given", field="period", value=None, allowed="a duration, or a velocity and a guess of the period"
+        )
+    return system.period
+
+
+def _return_to_section(system: Autonomous, x: Array, with_error: bool, section: Section | None) -> ReturnMap:
+    assert section is not None
+    count = returns_per_period(system)
+    turn = np.eye(x.size) if system.symmetry is None else system.symmetry
+    start, rest, first = _crossing(system, x, section)
+    error: float | Array = np.nan
+    if with_error:
+        state, jacobian, error = flow_with_error(system, x, 0.0, start + rest)
+    else:
+        state, second = system.flow(first[0], 0.0, rest)
+        jacobian = second @ first[1]
+    state, jacobian = turn @ state, turn @ jacobian
+    velocity = _velocity(system, state)
+    across = np.eye(x.size) - np.outer(velocity, section.normal) / float(section.normal @ velocity)
+    if isinstance(error, np.ndarray):
+        error = np.abs(across) @ np.abs(turn) @ error
+    elif with_error:
+        error = float(error) * float(np.abs(across @ turn).sum(axis=1).max())
+    _check_finite(state, jacobian)
+    period = count * (start + rest)
+    return ReturnMap(state, across @ jacobian, error, count, period, velocity, section.normal)
+
+
+def _crossing(system: Autonomous, x: Array, section: Section) -> tuple[float, float, tuple[Array, Array]]:
+    """When a motion is back at the section: a time shortly before, the rest of it, and the flow up to that time."""
+    for approach in _APPROACHES:
+        start = (1.0 - approach) * section.duration
+        before, derivative = system.flow(x, 0.0, start)
+        _check_shapes(before, derivative, x.size)
+        _check_finite(before, derivative)
+        rest = _time_to_section(system, before, section, approach * section.duration)
+        if rest is not None:
+            return start, rest, (before, derivative)
+    raise AnalysisError(
+        f"the motion does not come back to where it started after about {section.duration:.6g}",
+        field="orbit",
+        allowed="a guess closer to an orbit, and of its period",
+    )
+
+
+def _time_to_section(system: Autonomous, before: Array, section: Section, rest: float) -> float | None:
+    """How long a state that has almost returned still takes to the section, by Newton's method; None if it does not
+    get there, or has passed it."""
+    best = np.inf
+    for _ in range(_CROSSING_ROUNDS):
+        state = _turned(system, _carried(system, before[None], rest))[0]
+        speed = float(section.normal @ _velocity(system, state))
+        off = float(section.normal @ (state - section.point))
+        if speed == 0.0 or not np.isfinite(off):
+            return None
+        move = abs(off / speed)
+        if move <= 4e-16 * section.duration or (move <= 1e-10 * section.duration and move >= 0.5 * best):
+            return rest
+        best = min(best, move)
+        rest -= off / speed
+        if not 0.0 < rest < _FARTHEST * section.duration:
+            return None
+    return None
+
+
+def _carried(system: SystemLike, states: Array, duration: float) -> Array:
+    if isinstance(system, FlowsStates):
+        return np.asarray(system.flow_states(states, 0.0, duration))
+    return np.array([system.flow(np.array(x), 0.0, duration)[0] for x in states])
+
+
+def _turned(system: SystemLike, states: Array) -> Array:
+    turned: Array = states if system.symmetry is None else states @ system.symmetry.T
+    return turned
+
+
+def returned_states(system: SystemLike, states: Array, section: Section | None = None) -> Array:
+    """H of many states at once, shape (states, n).
+
+    Parameters
+    ----------
+    system, states
+        The system, and states at time 0, shape (states, n).
+    section
+        As for :func:`return_map`; must be given for a system that does not depend on time.
+    """
+    states = np.array(states)  # a system may write into what it is given
+    if section is None:
+        return _turned(system, _carried(system, states, _period(system) / returns_per_period(system)))
+    assert isinstance(system, Autonomous)
+    approach = _APPROACHES[0]
+    before = _carried(system, states, (1.0 - approach) * section.duration)
+    rests = [_time_to_section(system, x, section, approach * section.duration) for x in before]
+    result = np.empty_like(states)
+    for i, rest in enumerate(rests):
+        if rest is None:
+            _, rest, (state, _) = _crossing(system, states[i], section)
+        else:
+            state = before[i]
+        result[i] = _turned(system, _carried(system, state[None], rest))[0]
+    return result
+
+
+def return_maps(systems: Sequence[SystemLike], orbits: Sequence[Array]) -> list[ReturnMap]:
+    """The return maps of many systems at states on their orbits, with errors, together where they can."""
+    first = systems[0]
+    if len(systems) > 1 and isinstance(first, FlowsMany):
+        alike = [system for system in systems if isinstance(system, type(first)) and first.can_flow_with(system)]
+        if len(alike) == len(systems):
+            count, period = returns_per_period(first), _period(first)
+            jacobians, errors = first.flow_many(alike, 0.0, period / count)
+            turn = np.eye(first.dimension) if first.symmetry is None else first.symmetry
+            return [
+                ReturnMap(orbit, turn @ jacobian, float(error), count, period)
+                for orbit, jacobian, error in zip(orbits, jacobians, errors, strict=True)
+            ]
+    return [return_map(system, orbit) for system, orbit in zip(systems, orbits, strict=True)]
