@@ -3,6 +3,7 @@ not."""
 
 from __future__ import annotations
 
+import bisect
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -132,13 +133,18 @@ class Accounts:
         outside = int((margins > errors).sum())
         if self._conservative:
             sizes = np.abs(margins) / errors
+            for event in (Event.PLUS, Event.MINUS):
+                # Those that meet there may have left the circle or not.
+                distances, uncertain = self._spectra.distances(place, event)
+                if distances[self._idle[event]] <= _GREY * uncertain[self._idle[event]]:
+                    return None
             return None if ((sizes > 1.0) & (sizes <= _GREY)).any() else outside
         return outside if int((np.abs(margins) <= errors).sum()) <= self._resting else None
 
     def _walk(self, roots: list[Root]) -> tuple[list[Root], list[Point], bool]:
         """Compare counts along all gaps between decided places; the roots after that, the points, and whether to do
         it again."""
-        decided = [(place, count) for place in self._spectra.values if (count := self.count(place)) is not None]
+        decided = self._decided(roots)
         points: list[Point] = []
         kept: list[Root] = []
         again = False
@@ -198,6 +204,15 @@ class Accounts:
                 kept += inside
                 points.append(self._point(inside[0], after - before, x, y))
         return kept, sorted(points, key=lambda point: point.place), again
+
+    def _decided(self, roots: list[Root]) -> list[tuple[float, int]]:
+        """Places with a count, those within the brackets of roots left out."""
+        values = self._spectra.values
+        within: set[float] = set()
+        for root in roots:
+            left, right = (root.place, root.place) if root.touch else (root.left, root.right)
+            within.update(values[bisect.bisect_left(values, left) : bisect.bisect_right(values, right)])
+        return [(v, count) for v in values if v not in within and (count := self.count(v)) is not None]
 
     def _remark(self, remark: str, gap: Interval) -> None:
         self.open = True
@@ -313,6 +328,8 @@ class Accounts:
         if self._spectra.holes(x, y):
             self._remark(f"{after - before:+d} multipliers outside, and no matrices in between", (x, y))
             return []
+        if self._conservative:
+            return self._bisected(x, y, before)
         roots = []
         for rank in range(min(before, after), max(before, after)):
             if self._spectra.left <= 0:
@@ -340,6 +357,15 @@ class Accounts:
         if not roots and not self._settled & set(self._gaps(x, y)):
             self._remark(f"{after - before:+d} multipliers outside, and none found on the circle", (x, y))
         return roots
+
+    def _bisected(self, x: float, y: float, before: int) -> list[Root]:
+        """No root, but a remark: which gap it is where the count of a conservative family changes unexplained."""
+        while x < (middle := 0.5 * x + 0.5 * y) < y and self._spectra.left > 0:
+            if not self._spectra.exists(middle) or (count := self.count(middle)) is None:
+                break
+            x, y = (middle, y) if count == before else (x, middle)
+        self._remark("multipliers leave the circle, or come back, and none were found to meet", (x, y))
+        return []
 
     def _gaps(self, x: float, y: float) -> list[Interval]:
         inside = [v for v in self._spectra.values if x <= v <= y and self.count(v) is not None]
@@ -369,10 +395,12 @@ class Accounts:
                 if self._spectra.exists(middle) and self.count(middle) is not None:
                     roots.append(root)
                     continue
-            best = last if not last.touch else root
-            roots[-1] = Root(
-                best.place, min(last.left, root.left), max(last.right, root.right), best.event, last.touch and root.touch
-            )
+            if last.touch != root.touch:
+                roots[-1] = last if root.touch else root
+            else:
+                roots[-1] = Root(
+                    last.place, min(last.left, root.left), max(last.right, root.right), last.event, last.touch
+                )
         return roots
 
     def _tightened(self, root: Root, x: float, y: float) -> bool:

@@ -20,7 +20,7 @@ from scipy.optimize import brentq
 from chilopod.errors import ParameterError
 from chilopod.stability.counts import Accounts, Root
 from chilopod.stability.spectra import Event, Matrices, Spectra
-from chilopod.stability.zeros import Interval, find_zeros, first_places
+from chilopod.stability.zeros import Interval, Zeros, find_zeros, first_places
 
 Array = NDArray[np.float64]
 
@@ -163,13 +163,9 @@ class _Finder:
         trivial = sum(idle[event] * (idle[event] - 1) // 2 for event in (Event.PLUS, Event.MINUS))
         conservative = idle[Event.PAIR] > trivial
         self._remark_on(idle, conservative)
-        roots: list[Root] = []
-        missing: list[Interval] = []
         events = [e for e in Event if idle[e] < self._factors(e)]
-        reserve = int((1.0 - _SEARCH) * (self.spectra.left + first.size))
-        for number, event in enumerate(events):
-            room = max(self.spectra.left - reserve, 0) // (len(events) - number) + first.size
-            roots += self._zeros(event, idle[event], room, missing)
+        found = self._searched(events, idle)
+        roots = [root for event in events for root in self._roots(event, idle[event], found[event])]
         accounts = Accounts(self.spectra, (self.a, self.b), idle, resting, conservative, self.parameter)
         points = accounts.balance(roots)
         self.remarks += accounts.remarks
@@ -222,26 +218,38 @@ class _Finder:
         if conservative:
             self.remarks.append("multipliers come in pairs with product 1 throughout: the family is conservative")
 
-    def _zeros(self, event: Event, idle: int, room: int, missing: list[Interval]) -> list[Root]:
+    def _searched(self, events: list[Event], idle: dict[Event, int]) -> dict[Event, Zeros]:
+        """Zeros of the functions of some events: each with an even share of the budget, then with what is left."""
+        reserve = int((1.0 - _SEARCH) * self.spectra.left)
+        found: dict[Event, Zeros] = {}
+        for number, event in enumerate(events):
+            share = (self.spectra.left - reserve) // (len(events) - number)
+            found[event] = self._zeros(event, idle[event], self.spectra.left - share)
+        for event in events:
+            if found[event].spent:
+                found[event] = self._zeros(event, idle[event], reserve)
+        return found
+
+    def _zeros(self, event: Event, idle: int, spare: int) -> Zeros:
         spectra = self.spectra
-        found = find_zeros(
+        return find_zeros(
             lambda places: spectra.function(places, event, idle),
             self.a,
             self.b,
             error=lambda places: spectra.function_error(places, event, idle),
-            budget=room,
+            left=lambda: spectra.left - spare,
         )
+
+    def _roots(self, event: Event, idle: int, found: Zeros) -> list[Root]:
         self.spent |= found.spent
         if not found.spent:
             for piece in found.unresolved:
                 self._leave(f"the multipliers do not depend smoothly on the parameter {self._between(piece)}")
         for piece in found.missing:
-            if piece not in missing:
-                missing.append(piece)
-                self._leave(f"there are no matrices {self._between(piece)}, or only in part")
+            self._leave(f"there are no matrices {self._between(piece)}, or only in part")
         roots = []
         for left, right in found.changes:
-            if spectra.left <= 0:
+            if self.spectra.left <= 0:
                 self.spent = True
                 break
             place = left if left == right else self._root(event, idle, left, right)

@@ -22,7 +22,7 @@ _COPIES = 2
 _SAFETY = 16.0
 _ROUNDING = 2.0 * np.finfo(float).eps
 _SPARE = 8  # factors beside the idle ones that take part in the sum over what may be left out
-_FILL = 1e-8  # of the largest entry, in place of zeros, so that a triangular matrix can be balanced
+_FILL = 1e-30  # of the largest entry, in place of zeros, so that a triangular matrix can be balanced
 
 
 class Event(enum.Enum):
@@ -40,14 +40,16 @@ class Event(enum.Enum):
 class Spectra:
     """Eigenvalues of a family of matrices M, each computed once.
 
-    Errors are found by changing every entry of M at random by what it may be wrong by (Kenney & Laub, SIAM J. Sci.
-    Comput. 15, 1994): that is right for simple and for defective eigenvalues alike, and it does not depend on the
-    units of the states.
+    Errors are found by changing M at random by what it may be wrong by (Kenney & Laub, SIAM J. Sci. Comput. 15, 1994):
+    that is right for simple and for defective eigenvalues alike. An entry may be wrong by the relative error times the
+    geometric mean of the largest entries of its row and its column, the states being in units that balance M: that
+    does not depend on the units the states came in, and a small multiplier beside a huge one is not lost where the
+    matrix keeps them apart.
 
     Parameters
     ----------
     matrices
-        ``matrices(values)`` gives M, shape (k, m, m), and bounds on the relative error of its entries, shape (k,); it
+        ``matrices(values)`` gives M, shape (k, m, m), and bounds on its relative error, shape (k,); it
         raises AnalysisError, or gives NaN, where there is none. Asked twice for the same value where errors matter.
     budget
         At how many values M may be asked for.
@@ -60,7 +62,7 @@ class Spectra:
         self._stretch: dict[float, float] = {}
         self._disturbed: dict[float, ComplexArray] = {}
         self._values: list[float] = []
-        self._scale: Array | None = None
+        self._units: Array | None = None
         self._size: int | None = None
 
     @property
@@ -126,17 +128,20 @@ class Spectra:
             self._size = matrices.shape[-1]
         return matrices, np.broadcast_to(np.asarray(errors, dtype=np.float64), values.shape)
 
-    def _stretches(self, matrices: Array) -> Array:
-        """Logarithms of det(1 + M^T M)^(1/2), M balanced: positive, analytic, and larger than what it divides."""
-        if self._scale is None:
+    def _balanced(self, matrices: Array) -> Array:
+        """Matrices with the states in units in which rows and columns are of the same size; the same for all."""
+        if self._units is None:
             size = np.abs(matrices).max(axis=0)
             filled = size + _FILL * size.max() if size.max() > 0.0 else size
             with np.errstate(all="ignore"):
-                scale = matrix_balance(filled, permute=False, separate=True)[1][0]
-            self._scale = scale if np.isfinite(scale).all() and (scale > 0.0).all() else np.ones_like(scale)
-        balanced = matrices * (self._scale[None, None, :] / self._scale[None, :, None])
-        m = matrices.shape[-1]
-        one = np.broadcast_to(np.eye(m), matrices.shape)
+                units = matrix_balance(filled, permute=False, separate=True)[1][0]
+            self._units = units if (np.isfinite(units) & (units > 0.0)).all() else np.ones_like(units)
+        return np.asarray(matrices * (self._units / self._units[:, None]))
+
+    def _stretches(self, matrices: Array) -> Array:
+        """Logarithms of det(1 + M^T M)^(1/2), M balanced: positive, analytic, and larger than what it divides."""
+        balanced = self._balanced(matrices)
+        one = np.broadcast_to(np.eye(matrices.shape[-1]), matrices.shape)
         double = np.block([[one, -np.swapaxes(balanced, 1, 2)], [balanced, one]])
         return np.asarray(0.5 * np.linalg.slogdet(double)[1])
 
@@ -160,9 +165,12 @@ class Spectra:
             self.at(np.array(missing))
             matrices, errors = self._ask(np.array(missing))
             m = matrices.shape[-1]
-            signs = np.random.default_rng(m).choice(np.array([-1.0, 1.0]), size=(_COPIES, m, m))
+            balanced = self._balanced(matrices)
+            rows, columns = np.abs(balanced).max(axis=2), np.abs(balanced).max(axis=1)
             amounts = np.nan_to_num(np.abs(errors), nan=0.0, posinf=1.0) + _ROUNDING
-            changed = matrices[:, None] * (1.0 + amounts[:, None, None, None] * signs)
+            wrong = amounts[:, None, None] * np.sqrt(rows)[:, :, None] * np.sqrt(columns)[:, None, :]
+            signs = np.random.default_rng(m).choice(np.array([-1.0, 1.0]), size=(_COPIES, m, m))
+            changed = balanced[:, None] + wrong[:, None] * signs
             for value, rows in zip(missing, changed, strict=True):
                 finite = np.isfinite(rows).all()
                 self._disturbed[value] = _eigenvalues(rows) if finite else np.full((_COPIES, self.size), np.nan + 0j)

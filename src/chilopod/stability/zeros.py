@@ -41,6 +41,8 @@ _ROUGH = 2.0**-24  # width at which a piece that is no polynomial is given up, r
 _HOLE = 2.0**-8  # width of a piece in which the function exists in part, relative to the interval
 _ULPS = 256.0  # width of the finest piece in units in the last place
 _DEEP = 2.0**-4  # of the interval: on pieces no wider than this the error of the function is asked for
+_APART = 4.0  # times how far two zeros are apart: half the width of the piece made around them
+_EPSILON = float(np.finfo(float).eps)
 _REAL = 1e-10  # imaginary part of a zero that is real
 
 
@@ -92,7 +94,7 @@ def find_zeros(
     high: float,
     *,
     error: Callable[[Array], Array] | None = None,
-    budget: int = BUDGET,
+    left: Callable[[], int] | None = None,
 ) -> Zeros:
     """Find all zeros of an analytic function in an interval.
 
@@ -105,15 +107,16 @@ def find_zeros(
     error
         Logarithm of the error of the function at some values, shape (k,): below it a value is zero within its error,
         and the search stops. Asked for where the search goes deep only.
-    budget
-        How many values of the function may be asked for; when they are spent the widest pieces have been looked at,
-        and the changes of sign met so far are reported.
+    left
+        How many more values of the function may be asked for; when there are none the widest pieces have been looked
+        at, and the changes of sign met so far are reported. If not given, a budget of ``BUDGET``.
     """
     search = _Search(function, error, low, high)
+    room_left = left if left is not None else lambda: BUDGET - search.asked
     pieces = [(low, high)]
     spent = False
     while pieces:
-        room = max(budget - search.asked, 0) // (2 * _POINTS.size)
+        room = max(room_left(), 0) // (2 * _POINTS.size)
         pieces.sort(key=lambda piece: 0.5 * piece[0] - 0.5 * piece[1])  # the widest first
         if room < len(pieces):
             spent = True
@@ -189,7 +192,7 @@ class _Search:
         coefficients = _TRANSFORM @ values[: _NODES.size]
         off = np.abs(chebyshev.chebval(_CHECKS, coefficients) - values[_NODES.size :]).max()
         uncertain = float(max(off, np.abs(coefficients[-2:]).max()))
-        real, close = _roots(coefficients)
+        real, close, spread = _roots(coefficients)
         dense = np.abs(chebyshev.chebval(_DENSE, coefficients))
         unclear = _DENSE[dense <= _CLEAR * uncertain]
         if not unclear.size and not real.size and not close.size:
@@ -213,7 +216,11 @@ class _Search:
         if close.size:
             touching = np.abs(chebyshev.chebval(close, coefficients)) < noise
             if not touching.all() and not self._fine(a, b, _FINEST):
-                return _around(a, b, float(close[~touching][0]))
+                curvature = abs(float(chebyshev.chebval(close[~touching][0], chebyshev.chebder(coefficients, 2))))
+                # Wide enough that the pieces beside it are clear of zeros, and the pair in it for certain.
+                unsure = np.sqrt(_CLEAR * max(uncertain, _EPSILON) / max(curvature, _EPSILON))
+                reach = min(max(_APART * float(spread[~touching][0]), _APART * unsure), _APART * _NEAR)
+                return _around(a, b, float(close[~touching][0]), reach)
             real = self._touches(a, b, real, close, coefficients, max(noise, uncertain))
         slopes = np.abs(chebyshev.chebval(real, chebyshev.chebder(coefficients)))
         reach = _CLEAR * max(uncertain, noise) / np.maximum(slopes, 1e-300)
@@ -313,24 +320,29 @@ def _halves(a: float, b: float) -> list[Interval]:
     return [(a, middle), (middle, b)]
 
 
-def _around(a: float, b: float, center: float) -> list[Interval]:
+def _around(a: float, b: float, center: float, reach: float) -> list[Interval]:
     """A piece cut in three, the middle one narrow about a center; in two where the center is near an end."""
-    places = _places(a, b, np.array([center - 4.0 * _NEAR, center + 4.0 * _NEAR])).tolist()
+    places = _places(a, b, np.array([center - reach, center + reach])).tolist()
     cuts = [a, *(place for place in places if a < place < b), b]
     return list(itertools.pairwise(cuts))
 
 
-def _roots(coefficients: Array) -> tuple[Array, Array]:
-    """Real roots within the piece, and where roots come close to each other, within it or just outside."""
+def _roots(coefficients: Array) -> tuple[Array, Array, Array]:
+    """Real roots within the piece; where two roots come close to each other, within it or just outside, and how far
+    apart they are."""
     kept = np.trim_zeros(coefficients, "b")
     if kept.size < 2:
-        return np.empty(0), np.empty(0)
+        return np.empty(0), np.empty(0), np.empty(0)
     roots = chebyshev.chebroots(kept)
     near = roots[(np.abs(roots.real) <= 1.0 + _NEAR) & (np.abs(roots.imag) < _NEAR)]
     real = np.sort(near.real[np.abs(near.imag) < _REAL])
-    pairs = 0.5 * (real[1:] + real[:-1])[np.diff(real) < _NEAR]
-    close = np.concatenate([near.real[near.imag > _REAL], pairs])
-    return real[np.abs(real) <= 1.0], np.clip(close, -1.0, 1.0)
+    upper = near[near.imag > _REAL]
+    gaps = np.diff(real)
+    close = np.concatenate([upper.real, 0.5 * (real[1:] + real[:-1])[gaps < _NEAR]])
+    spread = np.concatenate([upper.imag, gaps[gaps < _NEAR]])
+    # A pair beyond an end that is farther from it than its members are from each other belongs to another piece.
+    own = np.abs(close) <= 1.0 + spread
+    return real[np.abs(real) <= 1.0], np.clip(close[own], -1.0, 1.0), spread[own]
 
 
 def _joined(pieces: list[Interval]) -> list[Interval]:
