@@ -133,10 +133,11 @@ class Accounts:
         outside = int((margins > errors).sum())
         if self._conservative:
             sizes = np.abs(margins) / errors
-            for event in (Event.PLUS, Event.MINUS):
-                # Those that meet there may have left the circle or not.
+            for event in Event:
+                # Those that meet may have left the circle or not.
                 distances, uncertain = self._spectra.distances(place, event)
-                if distances[self._idle[event]] <= _GREY * uncertain[self._idle[event]]:
+                idle = self._idle[event]
+                if (distances[idle:] <= _GREY * uncertain[idle:]).any():
                     return None
             return None if ((sizes > 1.0) & (sizes <= _GREY)).any() else outside
         return outside if int((np.abs(margins) <= errors).sum()) <= self._resting else None

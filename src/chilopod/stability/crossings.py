@@ -151,6 +151,7 @@ class _Finder:
         self.parameter = parameter
         self.remarks: list[str] = []
         self.spent = False
+        self.conservative = False
         self.open = False  # whether something is not accounted for
 
     def found(self) -> Crossings:
@@ -161,7 +162,7 @@ class _Finder:
         idle = {event: self._idle(first, event) for event in Event}
         resting = idle[Event.PLUS] + idle[Event.MINUS]
         trivial = sum(idle[event] * (idle[event] - 1) // 2 for event in (Event.PLUS, Event.MINUS))
-        conservative = idle[Event.PAIR] > trivial
+        conservative = self.conservative = idle[Event.PAIR] > trivial
         self._remark_on(idle, conservative)
         events = [e for e in Event if idle[e] < self._factors(e)]
         found = self._searched(events, idle)
@@ -238,6 +239,7 @@ class _Finder:
             self.b,
             error=lambda places: spectra.function_error(places, event, idle),
             left=lambda: spectra.left - spare,
+            skip=spectra.without_pair if event is Event.PAIR and not self.conservative else None,
         )
 
     def _roots(self, event: Event, idle: int, found: Zeros) -> list[Root]:
@@ -252,6 +254,8 @@ class _Finder:
             if self.spectra.left <= 0:
                 self.spent = True
                 break
+            if event is Event.PAIR and not self.conservative and self.spectra.without_pair(left, right):
+                continue
             place = left if left == right else self._root(event, idle, left, right)
             reach = 4.0 * _EPSILON * abs(place)
             roots.append(Root(place, max(place - reach, self.a), min(place + reach, self.b), event, False))

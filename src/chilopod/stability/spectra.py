@@ -21,6 +21,7 @@ Matrices = Callable[[Array], tuple[Array, Array]]
 _COPIES = 2
 _SAFETY = 16.0
 _ROUNDING = 2.0 * np.finfo(float).eps
+_TURNING = 1e-6  # imaginary part of a multiplier that is not real, relative to its size
 _SPARE = 8  # factors beside the idle ones that take part in the sum over what may be left out
 _FILL = 1e-30  # of the largest entry, in place of zeros, so that a triangular matrix can be balanced
 
@@ -153,6 +154,23 @@ class Spectra:
     def holes(self, low: float, high: float) -> bool:
         """Whether there was no matrix somewhere between two values."""
         return any(low < value < high and not nu.size for value, nu in self._known.items())
+
+    def without_pair(self, low: float, high: float) -> bool:
+        """Whether all complex multipliers are clear of the circle between two values, as far as those in between that
+        are known say.
+
+        The bialternate product also vanishes where two real multipliers have product 1.
+        """
+        values = self._values[bisect.bisect_left(self._values, low) : bisect.bisect_right(self._values, high)]
+        if len(values) < 2:
+            return False
+        nu = self.at(np.array(values))
+        turning = nu.imag > _TURNING * np.abs(nu)
+        if (turning.sum(axis=1) != turning[0].sum()).any():
+            return False
+        found = margins(nu[turning].reshape(len(values), -1))
+        least, most = found.min(axis=0), found.max(axis=0)
+        return bool(((2.0 * least - most > 0.0) | (2.0 * most - least < 0.0)).all())
 
     def smallest(self, value: float, event: Event) -> float:
         """Size of the smallest factor of the function of an event."""

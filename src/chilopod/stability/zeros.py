@@ -95,6 +95,7 @@ def find_zeros(
     *,
     error: Callable[[Array], Array] | None = None,
     left: Callable[[], int] | None = None,
+    skip: Callable[[float, float], bool] | None = None,
 ) -> Zeros:
     """Find all zeros of an analytic function in an interval.
 
@@ -110,8 +111,11 @@ def find_zeros(
     left
         How many more values of the function may be asked for; when there are none the widest pieces have been looked
         at, and the changes of sign met so far are reported. If not given, a budget of ``BUDGET``.
+    skip
+        Whether zeros between two values are of no interest, the function having been evaluated there; asked for narrow
+        pieces.
     """
-    search = _Search(function, error, low, high)
+    search = _Search(function, error, skip, low, high)
     room_left = left if left is not None else lambda: BUDGET - search.asked
     pieces = [(low, high)]
     spent = False
@@ -142,6 +146,7 @@ class _Piece:
 class _Search:
     function: SignedLog
     error: Callable[[Array], Array] | None
+    skip: Callable[[float, float], bool] | None
     low: float
     high: float
     asked: int = 0
@@ -202,6 +207,8 @@ class _Search:
         vague = bool((np.abs(unclear[:, None] - known).min(axis=1) > _NEAR).any()) if unclear.size else False
         slopes = np.abs(chebyshev.chebval(real, chebyshev.chebder(coefficients)))
         vague |= bool((_CLEAR * uncertain > _NEAR * slopes).any())
+        if self.skip is not None and self._fine(a, b, _DEEP) and self.skip(a, b):
+            return []
         noise = 0.0
         if self.error is not None and (close.size or vague or uncertain > _RESOLVED) and self._fine(a, b, _DEEP):
             noise = _CLEAR * float(np.exp(min(self.error(_places(a, b, _POINTS)).max() - reference, 0.0)))
