@@ -5,13 +5,13 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import jn_zeros, jv
 
-from chilopod.stability.zeros import brackets
+from chilopod.stability.zeros import find_zeros, signed_log
 
 
 def zeros(function, low, high):
     return [
         a if a == b else brentq(lambda v: function(np.array([v]))[0], a, b, xtol=1e-300, rtol=1e-14)
-        for a, b in brackets(function, low, high)
+        for a, b in find_zeros(signed_log(function), low, high).changes
     ]
 
 

@@ -19,7 +19,7 @@ from chilopod.stability.normal_form import NormalForm, complex_normal_form, real
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
 from chilopod.stability.returns import return_map
 from chilopod.stability.samples import Family, Sample, Samples
-from chilopod.stability.zeros import brackets
+from chilopod.stability.zeros import find_zeros, signed_log
 
 Array = NDArray[np.float64]
 
@@ -75,7 +75,7 @@ def locate(
             def test(places: Array, event: int = event) -> Array:
                 return tests.at(np.clip(outward(places), low, samples.end), event)
 
-            for a, b in brackets(test, float(inward(low)), float(inward(samples.end))):
+            for a, b in find_zeros(signed_log(test), float(inward(low)), float(inward(samples.end))).changes:
                 if event == _PAIR and not _pair_near(samples, float(outward(a)), float(outward(b))):
                     continue
                 root = min(max(float(outward(a if a == b else _root(test, a, b))), low), samples.end)
