@@ -78,6 +78,8 @@ class Sampled:
         left^H (H(W(z)) - x).
     noise
         Bounds on the errors of the samples, shape (n + 1,).
+    shrink
+        Factor of the radius at which the series of the projection would fall to the round-off.
     size
         Largest distance from x, on the curve or of its image, of every state: shape (n,).
     radius
@@ -88,6 +90,7 @@ class Sampled:
 
     harmonics: tuple[Series, ...]
     noise: Array
+    shrink: float
     size: Array
     radius: float
     outermost: ComplexArray
@@ -128,9 +131,7 @@ def images(mapped: ReturnedStates, at: CriticalOrbit, displaced: Array) -> Array
     return result if np.isfinite(result).all() else None
 
 
-def sample(
-    mapped: ReturnedStates, at: CriticalOrbit, curve: Curve, radius: float, noise: float
-) -> Sampled | None:
+def sample(mapped: ReturnedStates, at: CriticalOrbit, curve: Curve, radius: float, noise: float) -> Sampled | None:
     """The map on a curve up to a radius; None where it does not exist. ``noise`` is relative, see
     :func:`chilopod.stability.normal_form.normal_form`."""
     directions = turns(at)
@@ -151,7 +152,8 @@ def sample(
     floor = np.append(floor, np.abs(at.left) @ floor)
     # Noise of the samples is spread evenly over the coefficients of a cosine transform, smaller by this factor.
     seen = np.sqrt(RADII / 2.0) * np.max([one.roughness for one in found], axis=0)
-    return Sampled(found, np.maximum(floor, seen), size, radius, harmonics[0, :, -1])
+    shrink = float(min(1.0, floor[-1] / seen[-1]) ** (0.5 / (RADII - 2))) if seen[-1] > 0.0 else 1.0
+    return Sampled(found, np.maximum(floor, seen), shrink, size, radius, harmonics[0, :, -1])
 
 
 def solve_homological(at: CriticalOrbit, powers: Powers, right_sides: ComplexArray, resonant: bool) -> ComplexArray:

@@ -28,20 +28,23 @@ from chilopod.stability.center_manifold import (
     turns,
 )
 from chilopod.stability.extrapolation import radii
-from chilopod.stability.resonances import others_critical, strong_resonance
+from chilopod.stability.resonances import strong_resonance, uncertainties
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 _TRIALS = 40  # times that the map is sampled at an amplitude
-_START = 0.2  # of the orbit, or of whatever the scale of the states is, where the search for the amplitude starts
+_START = 0.2  # of the scale of the states, where the search for the amplitude starts
 _SHARE = 0.03  # of the amplitude by which the map departs from its linear part, to look for
 _TOO_FAR = 0.3  # of the same, beyond which nothing is learnt
 _UP, _FIRST_DOWN = 30.0, 0.1  # longest step of the amplitude upward; step where the map cannot be evaluated
-_DECADES_UP = 14  # how many such steps upward are taken before a map is called linear
+_UPS = 14  # how many such steps upward are taken before a map is called linear
 _CLOSE = 4.0  # ratio of amplitudes between which no more is tried
+_RESOLVED = 0.7  # factor of the amplitude that would be better, above which a series has fallen to the noise
+_DOWNS = 6  # times that one is made smaller for that: a map that is not smooth never has
 _BENDS = 3  # times that the curve is bent at one amplitude
 _ENOUGH = 3e-8  # relative error at which no other amplitude is tried
+_FULL = 8  # highest order to be seen beyond which a larger amplitude would rather lose
 _BETTER = 0.3  # of the error, to go on for
 _DRAWS = 3
 
@@ -114,7 +117,7 @@ def normal_form(
     noise: float = 0.0,
     uncertainty: float = 0.0,
     scale: ArrayLike | None = None,
-    orbit_error: float = 0.0,
+    orbit_error: float | None = None,
 ) -> NormalForm:
     """Normal form on the centre manifold of a critical orbit.
 
@@ -133,25 +136,26 @@ def normal_form(
         Sizes of the states, shape (n,), in their units: where the search for an amplitude starts. Without it, it
         starts from the size of the orbit, if that has one.
     orbit_error
-        How far off ``at.state`` may be along the mode (in the amplitude's unit). What follows from its residual is
-        allowed for anyway.
+        How far off ``at.state`` may be along the mode (in the amplitude's unit); 0 where it is exact. Without it, what
+        its residual and the noise allow: beside a singular H - 1 that is much.
 
     Returns
     -------
     The normal form, with a status that says why where there is none.
     """
-    uncertainty = max(uncertainty, noise, 16.0 * np.finfo(float).eps)
-    if others_critical(at.jacobian, at.multiplier, uncertainty).size:
+    values, errors = uncertainties(at.jacobian, max(uncertainty, noise, 16.0 * np.finfo(float).eps))
+    own = [int(np.abs(values - one).argmin()) for one in (at.multiplier, at.multiplier.conjugate())]
+    others = np.delete(np.arange(values.size), own)
+    if (np.abs(np.abs(values[others]) - 1.0) <= errors[others]).any():
         return NormalForm(Status.SEVERAL_CRITICAL)
-    spread = np.linalg.norm(at.left) * np.linalg.norm(at.jacobian)
-    resonance = None if at.real else strong_resonance(at.multiplier, uncertainty * float(spread))
+    resonance = None if at.real else strong_resonance(at.multiplier, float(errors[own[0]]))
     if resonance in (1, 2):
         return NormalForm(Status.STRONG_RESONANCE, resonance=resonance)
     fit = _Search(mapped, at, noise, resonance).run(_start(at, scale))
     if fit is None:
         return NormalForm(Status.OUT_OF_REACH, resonance=resonance)
     if at.real:
-        return _of_full_period(fit, at, orbit_error)
+        return _of_full_period(fit, mapped, at, noise, orbit_error)
     cubic = at.returns * np.conj(at.multiplier) * fit.cubic
     error = at.returns * fit.cubic_error
     form = NormalForm(
@@ -162,26 +166,44 @@ def normal_form(
 
 def _start(at: CriticalOrbit, scale: ArrayLike | None) -> float:
     """An amplitude to start the search from; what comes out does not depend on it."""
-    sizes = np.abs(at.state) if scale is None else np.abs(np.asarray(scale, dtype=np.float64))
     mode = np.abs(at.right)
-    known = (sizes > 0.0) & (mode > 0.0)
-    return _START * float((sizes[known] / mode[known]).min()) if known.any() else _START
+    if scale is not None:
+        known = mode > 0.0
+        return _START * float((np.abs(np.asarray(scale, dtype=np.float64))[known] / mode[known]).min())
+    orbit = float(np.abs(at.state).max())
+    # Nothing is known of an orbit at the origin: the search has all the way to go then, up or down.
+    return orbit / float(mode.max()) if orbit > 0.0 else _START
 
 
-def _of_full_period(fit: _Fit, at: CriticalOrbit, orbit_error: float) -> NormalForm:
+def _loose_by(mapped: ReturnedStates, at: CriticalOrbit, noise: float, quadratic: float, cubic: float) -> float:
+    """How far along the mode an orbit may be off that returns as nearly as this one does, where H - 1 is singular.
+
+    Off by d, where the multiplier is 1 all the same, it misses itself by quadratic d^2 - cubic d^3, with the
+    coefficients as they are seen there; beside the symmetric orbit of a pitchfork that is 2 cubic d^3.
+    """
+    image = images(mapped, at, np.zeros((1, at.state.size)))
+    if image is None or at.multiplier.real < 0.0:
+        return 0.0
+    rounding = max(noise, 2.0 * np.finfo(float).eps) * np.abs(at.state)
+    missed = float(abs(image[0] @ at.left)) + float(np.abs(at.left) @ rounding)
+    if missed == 0.0:
+        return 0.0
+    by_cubic = float(np.cbrt(missed / (2.0 * cubic))) if cubic > 0.0 else np.inf
+    # A quadratic term that no pitchfork beside this orbit explains holds the orbit closer.
+    return min(by_cubic, 2.0 * float(np.sqrt(missed / quadratic))) if quadratic > 6.0 * cubic * by_cubic else by_cubic
+
+
+def _of_full_period(
+    fit: _Fit, mapped: ReturnedStates, at: CriticalOrbit, noise: float, orbit_error: float | None
+) -> NormalForm:
     """From one return at a real multiplier to the map whose multiplier is +1."""
     quadratic, quadratic_error = fit.term((2, 0))
     cubic, cubic_error = fit.cubic.real, fit.cubic_error
     fourth, fourth_error = fit.term((4, 0))
-    # At a singular H - 1 a residual r leaves the orbit undetermined by (r / 2c)^(1/3): that far from the symmetric
-    # orbit of a pitchfork the multiplier is 1 again to first order.
-    residual, residual_error = fit.term((0, 0))
-    loose = 0.0
-    if at.multiplier.real > 0.0:
-        loose = float(np.cbrt((abs(residual) + fit.rounding) / (2.0 * (abs(cubic) + cubic_error))))
-    off = max(orbit_error, loose)
-    quadratic_error += 3.0 * (abs(cubic) + cubic_error) * off
-    cubic_error += 4.0 * (abs(fourth) + fourth_error) * off if off > 0.0 else 0.0
+    off = orbit_error if orbit_error is not None else _loose_by(mapped, at, noise, abs(quadratic), abs(cubic) + cubic_error)
+    if off > 0.0:
+        quadratic_error += 3.0 * (abs(cubic) + cubic_error) * off
+        cubic_error += 4.0 * (abs(fourth) + fourth_error) * off
     k = at.returns
     if at.multiplier.real < 0.0:
         # a -> -a + c a^3 twice: a -> a - 2 c a^3.
@@ -220,7 +242,6 @@ class _Fit:
     sampled: Sampled
     cubic: complex
     cubic_error: float
-    rounding: float
 
     def term(self, powers: Powers) -> tuple[complex, float]:
         """Coefficient of a monomial in the projection of H, and its error."""
@@ -245,31 +266,34 @@ class _Search:
         low, high = 0.0, np.inf  # amplitudes known to be small, and to be too large
         best: tuple[Sampled, dict[Powers, ComplexArray]] | None = None
         best_error, status = np.inf, Status.LINEAR
-        bends = ups = 0
+        bends = ups = downs = 0
         for _ in range(_TRIALS):
             found = sample(self._mapped, self._at, self._curve, radius, self._noise)
             share, order, seen = (np.inf, 2, True) if found is None else _departure(found, self._at)
             if found is None or share > _TOO_FAR:
                 high, factor = radius, max(_FIRST_DOWN if found is None else 0.0, _toward(share, order))
+            elif downs < _DOWNS and found.shrink < _RESOLVED:
+                high, factor, downs = radius, max(found.shrink, _FIRST_DOWN), downs + 1
             elif bends < _BENDS and self._bend(found):
                 bends += 1
                 continue  # once more, along the better curve
             elif not seen:
                 best, low, factor, ups = (found, dict(self._curve)), radius, _UP, ups + 1
-                if ups > _DECADES_UP:
+                if ups > _UPS:
                     break
             else:
                 value, error = (float(np.abs(one[-1])) for one in found.taylor(self._third))
                 better, enough = error < _BETTER * best_error, error <= _ENOUGH * value
                 if error < best_error:
                     best, best_error, status = (found, dict(self._curve)), error, Status.FOUND
-                if enough or not better:
+                if enough or not better or _highest(found) > _FULL:
                     break
-                low, factor = (low, 0.5) if _unresolved(found) else (radius, max(_toward(share, order), 2.0))
+                low, factor = radius, max(_toward(share, order) ** 0.5, 2.0)
             bends = 0
-            radius = _within(radius * factor, low, high)
-            if radius is None:
+            nearer = _within(radius * factor, low, high)
+            if nearer is None:
                 break
+            radius = nearer
         if best is None:
             return None
         found, self._curve = best
@@ -299,7 +323,7 @@ class _Search:
     def _described(self, found: Sampled, status: Status) -> _Fit:
         at = self._at
         value, error = found.taylor(self._third)
-        return _Fit(status, found, complex(value[-1]), float(error[-1]) + self._bent_wrongly(found), 0.0)
+        return _Fit(status, found, complex(value[-1]), float(error[-1]) + self._bent_wrongly(found))
 
     def _bent_wrongly(self, found: Sampled) -> float:
         """How far the cubic coefficient may be off because the curve is: sampled on curves that are off by that."""
@@ -351,6 +375,14 @@ def _departure(found: Sampled, at: CriticalOrbit) -> tuple[float, int, bool]:
     return share / found.radius, order, seen
 
 
+def _highest(found: Sampled) -> int:
+    """The highest order that stands out of the noise in the projected map."""
+    return max(
+        one.parity + 2 * int(np.flatnonzero(np.abs(one.coefficients[:, -1]) > found.noise[-1]).max(initial=0))
+        for one in found.harmonics
+    )
+
+
 def _toward(share: float, order: int) -> float:
     """The factor of the amplitude at which a term of some order has the share that is looked for."""
     with np.errstate(divide="ignore"):
@@ -363,10 +395,3 @@ def _within(radius: float, low: float, high: float) -> float | None:
         return radius
     between = float(np.sqrt(low) * np.sqrt(high))
     return between if 0.0 < between < np.inf and high > _CLOSE * low else None
-
-
-def _unresolved(found: Sampled) -> bool:
-    """Whether the series still fall at their end, so that a smaller amplitude would show more."""
-    return any(
-        float(np.abs(one.coefficients[-4:-2, -1]).max()) > 8.0 * float(one.roughness[-1]) for one in found.harmonics
-    )
