@@ -78,8 +78,12 @@ class Sampled:
         left^H (H(W(z)) - x).
     noise
         Bounds on the errors of the samples, shape (n + 1,).
+    blur
+        Error of the projection at x itself, from round-off and what is known of the map's.
     shrink
-        Factor of the radius at which the series of the projection would fall to the round-off.
+        Factor of the radius at which the series of the projection would fall to the noise that was to be expected.
+    falling
+        Whether they still fall at their end; noise would not.
     size
         Largest distance from x, on the curve or of its image, of every state: shape (n,).
     radius
@@ -90,7 +94,9 @@ class Sampled:
 
     harmonics: tuple[Series, ...]
     noise: Array
+    blur: float
     shrink: float
+    falling: bool
     size: Array
     radius: float
     outermost: ComplexArray
@@ -147,13 +153,21 @@ def sample(mapped: ReturnedStates, at: CriticalOrbit, curve: Curve, radius: floa
     found = tuple(series(harmonics[:, h], h % 2) for h in range(directions.size))
     size = np.maximum(np.abs(displaced), np.abs(image)).max(axis=(0, 1))
     reached = np.abs(at.state) + size
-    rounding = 2.0 * np.finfo(float).eps * (reached + np.abs(at.jacobian) @ reached)
-    floor = np.maximum(rounding, noise * reached)
-    floor = np.append(floor, np.abs(at.left) @ floor)
+    blur, floor = (_expected_noise(at, reached, noise) for reached in (np.abs(at.state), np.abs(at.state) + size))
     # Noise of the samples is spread evenly over the coefficients of a cosine transform, smaller by this factor.
     seen = np.sqrt(RADII / 2.0) * np.max([one.roughness for one in found], axis=0)
     shrink = float(min(1.0, floor[-1] / seen[-1]) ** (0.5 / (RADII - 2))) if seen[-1] > 0.0 else 1.0
-    return Sampled(found, np.maximum(floor, seen), shrink, size, radius, harmonics[0, :, -1])
+    falling = any(one.falling[-1] for one in found)
+    return Sampled(
+        found, np.maximum(floor, seen), float(blur[-1]), shrink, falling, size, radius, harmonics[0, :, -1]
+    )
+
+
+def _expected_noise(at: CriticalOrbit, reached: Array, noise: float) -> Array:
+    """Errors of images of a size, shape (n,), and of their projection: shape (n + 1,)."""
+    rounding = 2.0 * np.finfo(float).eps * (reached + np.abs(at.jacobian) @ reached)
+    floor: Array = np.maximum(rounding, noise * reached)
+    return np.append(floor, np.abs(at.left) @ floor)
 
 
 def solve_homological(at: CriticalOrbit, powers: Powers, right_sides: ComplexArray, resonant: bool) -> ComplexArray:

@@ -25,6 +25,7 @@ RADII = 8
 """How many radii a function is sampled at."""
 
 _SAFETY = 3.0
+_FALL = 4.0
 _TAIL = 2  # of every parity so many last coefficients are taken for noise
 
 
@@ -54,6 +55,12 @@ class Series(ReadOnlyArrays):
         converged leaves out."""
         tail: Array = np.abs(self.coefficients[-_TAIL:]).max(axis=0)
         return tail
+
+    @property
+    def falling(self) -> NDArray[np.bool_]:
+        """Whether the coefficients still fall at their end, shape (entries,): noise would not."""
+        before: Array = np.abs(self.coefficients[-2 * _TAIL : -_TAIL]).max(axis=0)
+        return np.asarray(before > _FALL * self.roughness)
 
     def taylor(self, order: int, noise: Array) -> tuple[ComplexArray, Array]:
         """Taylor coefficients of one order, and bounds on their errors, shape (entries,).

@@ -38,7 +38,10 @@ _START = 0.2  # of the scale of the states, where the search for the amplitude s
 _SHARE = 0.03  # of the amplitude by which the map departs from its linear part, to look for
 _TOO_FAR = 0.3  # of the same, beyond which nothing is learnt
 _UP, _FIRST_DOWN = 30.0, 0.1  # longest step of the amplitude upward; step where the map cannot be evaluated
-_UPS = 14  # how many such steps upward are taken before a map is called linear
+_FAR_DOWN, _LEAST_DOWN = 1e-3, 0.3  # longest and shortest step downward where the map is far from linear
+_LOST = 1e-6  # relative departure from linearity that is too small to start from
+_BLURRED = 1e-3  # share of the amplitude that errors at the orbit itself may have
+_LONG_UP, _UPS = 1e3, 5  # step of the amplitude while a map seems linear, and how many make it so
 _CLOSE = 4.0  # ratio of amplitudes between which no more is tried
 _RESOLVED = 0.7  # factor of the amplitude that would be better, above which a series has fallen to the noise
 _DOWNS = 6  # times that one is made smaller for that: a map that is not smooth never has
@@ -181,8 +184,8 @@ def _loose_by(mapped: ReturnedStates, at: CriticalOrbit, noise: float, quadratic
     Off by d, where the multiplier is 1 all the same, it misses itself by quadratic d^2 - cubic d^3, with the
     coefficients as they are seen there; beside the symmetric orbit of a pitchfork that is 2 cubic d^3.
     """
-    image = images(mapped, at, np.zeros((1, at.state.size)))
-    if image is None or at.multiplier.real < 0.0:
+    image = None if at.multiplier.real < 0.0 else images(mapped, at, np.zeros((1, at.state.size)))
+    if image is None:
         return 0.0
     rounding = max(noise, 2.0 * np.finfo(float).eps) * np.abs(at.state)
     missed = float(abs(image[0] @ at.left)) + float(np.abs(at.left) @ rounding)
@@ -263,41 +266,69 @@ class _Search:
 
     def run(self, radius: float) -> _Fit | None:
         """Search on from an amplitude; None if there is none that serves."""
-        low, high = 0.0, np.inf  # amplitudes known to be small, and to be too large
+        low, high = 0.0, np.inf  # amplitudes at which nothing is seen, and that are too large
         best: tuple[Sampled, dict[Powers, ComplexArray]] | None = None
         best_error, status = np.inf, Status.LINEAR
-        bends = ups = downs = 0
+        bends = downs = turned = 0
+        growing = 0.0
         for _ in range(_TRIALS):
             found = sample(self._mapped, self._at, self._curve, radius, self._noise)
             share, order, seen = (np.inf, 2, True) if found is None else _departure(found, self._at)
-            if found is None or share > _TOO_FAR:
-                high, factor = radius, max(_FIRST_DOWN if found is None else 0.0, _toward(share, order))
-            elif downs < _DOWNS and found.shrink < _RESOLVED:
+            if found is not None and found.blur > _BLURRED * radius:
+                low, factor = radius, _UP
+            elif found is None or share > _TOO_FAR:
+                high, factor = radius, _FIRST_DOWN if found is None else _toward(share, order)
+            elif status is Status.LINEAR and downs < _DOWNS and found.falling and found.shrink < _RESOLVED:
                 high, factor, downs = radius, max(found.shrink, _FIRST_DOWN), downs + 1
             elif bends < _BENDS and self._bend(found):
                 bends += 1
                 continue  # once more, along the better curve
             elif not seen:
-                best, low, factor, ups = (found, dict(self._curve)), radius, _UP, ups + 1
-                if ups > _UPS:
-                    break
+                best, low, factor = (found, dict(self._curve)), radius, self._linear_up(radius, high)
             else:
                 value, error = (float(np.abs(one[-1])) for one in found.taylor(self._third))
-                better, enough = error < _BETTER * best_error, error <= _ENOUGH * value
+                better = error < _BETTER * best_error
                 if error < best_error:
                     best, best_error, status = (found, dict(self._curve)), error, Status.FOUND
-                if enough or not better or _highest(found) > _FULL:
+                full = _highest(found) > _FULL
+                if error <= _ENOUGH * value or (full and found.shrink > _RESOLVED):
                     break
-                low, factor = radius, max(_toward(share, order) ** 0.5, 2.0)
+                if growing == 0.0:
+                    growing = -1.0 if full else 1.0
+                elif not better:
+                    growing, turned = -growing, turned + 1
+                    radius = best[0].radius if best else radius
+                if turned > 1:
+                    break
+                factor = max(_toward(share, order) ** 0.5, 2.0) if growing > 0.0 else 0.5
             bends = 0
             nearer = _within(radius * factor, low, high)
             if nearer is None:
                 break
             radius = nearer
-        if best is None:
+        if best is None or (status is Status.LINEAR and np.isfinite(high)):
             return None
         found, self._curve = best
         return self._described(found, status)
+
+    def _linear_up(self, radius: float, high: float) -> float:
+        """How many times as large an amplitude may be, at least, before anything nonlinear shows."""
+        at, factor = self._at, 1.0
+        reach = np.abs(at.jacobian)
+        for _ in range(_UPS):
+            factor *= _LONG_UP
+            if factor * radius >= high:
+                break
+            shift = displacements(at, self._curve, factor * radius * turns(at))
+            image = images(self._mapped, at, shift)
+            if image is None:
+                break
+            size = np.abs(at.state) + np.abs(shift) @ reach.T
+            if (np.abs(image - shift @ at.jacobian.T) > _LOST * size).any():
+                break
+        else:
+            return np.inf
+        return factor
 
     def _excess(self, found: Sampled, powers: Powers) -> tuple[ComplexArray, Array]:
         """What H(W) has at second order and W has not, with the error of that, shape (n,)."""
@@ -385,8 +416,10 @@ def _highest(found: Sampled) -> int:
 
 def _toward(share: float, order: int) -> float:
     """The factor of the amplitude at which a term of some order has the share that is looked for."""
-    with np.errstate(divide="ignore"):
-        return float(np.clip(np.power(_SHARE / share, 1.0 / (order - 1)) if share > 0.0 else np.inf, 0.0, _UP))
+    if share == 0.0:
+        return _UP
+    factor = float((_SHARE / share) ** (1.0 / (order - 1)))
+    return min(max(factor, _FAR_DOWN), _LEAST_DOWN) if share > _TOO_FAR else min(factor, _UP)
 
 
 def _within(radius: float, low: float, high: float) -> float | None:
