@@ -53,7 +53,7 @@ def pitchfork(mu: float) -> stability.PeriodicSystem:
 
 def branch() -> stability.Branch:
     (point,) = stability.locate(pitchfork, (-0.3, 0.4))
-    return stability.follow(pitchfork, stability.leave_pitchfork(pitchfork, point), (-0.3, 0.4), points=2)
+    return stability.follow(pitchfork, stability.switch(pitchfork, point)[0], (-0.3, 0.4), points=2)
 
 
 THINGS = {
@@ -71,7 +71,7 @@ THINGS = {
     "located": lambda: stability.locate(pitchfork, (-0.3, 0.4)),
     "fold": lambda: find_fold(system, -0.01, np.array([-0.1]), 1.0),
     "branch": branch,
-    "begun": lambda: stability.begin(system, -0.1, [-0.3162], True, 1.0),
+    "begun": lambda: stability.begin(system, -0.1, [-0.3162]),
     "means": lambda: walk_means([MODEL], MODEL.orbit[None]),
     "straight walk": lambda: straight_walk(PRESET),
     "walk bifurcation": lambda: bifurcations(PRESET, "springs.stiffness[0]", BETWEEN, normal_form=False),
