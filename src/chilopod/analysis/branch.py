@@ -101,6 +101,7 @@ def curved_walks(
     start = along if (side > 0) is bool(angles.sum() >= 0) else against
     branch = follow(
         make, start, between, points=points, longest=longest, closely=False,
+        precision=TOLERANCE,
         progress=_shown(robot, parameter, points, progress),
     )  # fmt: skip
     attributes = {"side": side, **_verdict(robot, parameter, fork, branch)}
@@ -176,6 +177,7 @@ def resumed(
         points=points,
         longest=longest,
         closely=False,
+        precision=TOLERANCE,
         progress=_shown(saved, parameter, points, progress),
     )
     kept = {name: data.attrs[name] for name in _VERDICT}

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.stability.closure import closes
-from chilopod.stability.curve import Anchor, BranchPoint, Curve, OutsideIntervalError, Step
+from chilopod.stability.curve import PRECISION, Anchor, BranchPoint, Curve, OutsideIntervalError, Step
 from chilopod.stability.inspection import Found, inspect
 from chilopod.stability.orbits import Orbit
 from chilopod.stability.points import BifurcationPoint, Kind
@@ -124,6 +124,7 @@ def follow(
     step: float = 0.02,
     longest: float = LONGEST,
     closely: bool = True,
+    precision: float = PRECISION,
     symmetric: bool = False,
     budget: int = BUDGET,
     progress: Progress = _silent,
@@ -147,6 +148,8 @@ def follow(
     closely
         Whether to look at the multipliers at nine places within every step, a flow each; otherwise only where the ends
         of a step tell that something happens.
+    precision
+        How closely orbits are solved for, of the sizes of the states: as good as the flow is at best.
     symmetric
         Whether to stay among the orbits that have the systems' symmetry in time. By default the full period is used
         even where there is such a symmetry, for the orbits of interest have lost it.
@@ -166,7 +169,7 @@ def follow(
     low, high = _checked(between, points, longest)
     if not step > 0:
         raise ParameterError("must be positive", field="step", value=step)
-    curve = Curve(family, high - low, between=between, symmetric=symmetric, budget=budget)
+    curve = Curve(family, high - low, between=between, symmetric=symmetric, precision=precision, budget=budget)
     anchor = _anchored(family, curve, start, low, step)
     return _followed(
         curve, Branch((anchor.last,), Ending.ENOUGH_POINTS, step, curve.periods, symmetric), anchor, points, longest,
@@ -182,6 +185,7 @@ def proceed(
     points: int = 100,
     longest: float = LONGEST,
     closely: bool = True,
+    precision: float = PRECISION,
     budget: int = BUDGET,
     progress: Progress = _silent,
 ) -> Branch:
@@ -189,7 +193,7 @@ def proceed(
 
     Parameters
     ----------
-    family, points, longest, closely, budget, progress
+    family, points, longest, closely, precision, budget, progress
         As for :func:`follow`; ``points`` are those that are added.
     branch
         From :func:`follow` or from here.
@@ -219,6 +223,7 @@ def proceed(
         between=between,
         periods=branch.periods,
         symmetric=branch.symmetric,
+        precision=precision,
         budget=budget,
     )
     first = branch.points[0]

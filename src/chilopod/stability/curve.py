@@ -25,10 +25,13 @@ from chilopod.stability.samples import Family
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-_CLOSE_ENOUGH = 1e-10  # of the fixed point, of the sizes of the states
+PRECISION = 1e-12
+"""How closely orbits are solved for by default, of the sizes of the states; where the flow is not as good, as it is."""
+
+_COUNTED = 1e-10  # residuals above it count as corrections, by which steps grow or shrink
+_SETTLED = 1e-8  # residual below which it may stop falling
+_FALLING = 0.5
 _MOST_CORRECTIONS = 12
-_NEARLY_SINGULAR = 10.0  # what the equations may make of a residual
-_MOST_POLISHED = 2  # times that they are solved once more where they make more of it
 _PARAMETER_STEP = 1e-6  # of the difference, in units of the scale
 _SHARPEST_TURN = 0.5  # cosine between two tangents: beyond it the step may have landed on another curve
 _KEPT = 8  # systems: making one may cost more than a flow
@@ -170,6 +173,8 @@ class Curve:
         How many periods an orbit takes.
     symmetric
         Whether to stay among the orbits that have the systems' symmetry in time.
+    precision
+        How closely orbits are solved for, of the sizes of the states.
     budget
         Flows that may be asked for.
     """
@@ -183,6 +188,7 @@ class Curve:
         between: tuple[float, float] = (-np.inf, np.inf),
         periods: int = 1,
         symmetric: bool = False,
+        precision: float = PRECISION,
         budget: float = np.inf,
     ) -> None:
         self._family = family
@@ -191,6 +197,7 @@ class Curve:
         self.between = between
         self.periods = periods
         self.symmetric = symmetric
+        self.precision = precision
         self.left = budget
         self.relative_error: float | None = None
         self._known: dict[float, tuple[SystemLike, SystemLike]] = {}
@@ -338,7 +345,7 @@ class Curve:
             raise AnalysisError("the curve has no direction here", field="step") from None
         largest = np.inf
         move = residual_before = np.zeros(n + 1)
-        corrections = polished = 0
+        rounds = corrections = 0
         while True:
             x = last.orbit + units[:n] * moved[:n]
             here = last.value + self.scale * float(moved[n]) if value is None else value
@@ -347,23 +354,15 @@ class Curve:
             mapped, beside = self._mapped(x, here, section)
             residual = np.append((mapped - x) / units[:n], row @ moved - target)
             now = float(np.abs(residual).max())
-            if not np.isfinite(now) or now > 10.0 * largest:
+            if not np.isfinite(now) or (now > 10.0 * largest and now > _SETTLED):
                 raise AnalysisError("corrections diverge", field="step")
-            close = _CLOSE_ENOUGH * max(1.0, float(np.abs(x / units[:n]).max()))
-            if now <= close or polished:
-                image = self.image(x, here, section)
-                derivative = self._difference(x, here, section, mapped, beside)
-                bordered = self.matrix(image.jacobian, derivative, row)
-                # Where the equations are nearly singular a small residual is not enough.
-                off = np.linalg.lstsq(bordered, residual)[0]
-                if polished == _MOST_POLISHED or float(np.abs(off).max()) <= _NEARLY_SINGULAR * close:
-                    break
-                polished += 1
-                moved = moved - off
-                continue
-            if corrections == _MOST_CORRECTIONS:
+            size = max(1.0, float(np.abs(x / units[:n]).max()))
+            # A residual that no longer falls is what the flow is good to.
+            if now <= self.precision * size or (now <= _SETTLED * size and now >= _FALLING * largest):
+                break
+            if rounds == _MOST_CORRECTIONS:
                 raise AnalysisError("corrections do not converge", field="step")
-            if corrections:
+            if rounds:
                 # Broyden's update keeps the matrix of the last point good enough for the whole step.
                 change = inverse @ (residual - residual_before)
                 along = float(move @ change)
@@ -373,8 +372,11 @@ class Curve:
             move = -inverse @ residual
             residual_before, largest = residual, now
             moved = moved + move
-            corrections += 1
-        bordered[n] = last.tangent
+            rounds += 1
+            corrections += now > _COUNTED * size
+        image = self.image(x, here, section)
+        derivative = self._difference(x, here, section, mapped, beside)
+        bordered = self.matrix(image.jacobian, derivative, last.tangent)
         tangent = _null_vector(bordered)
         if not tangent @ last.tangent >= _SHARPEST_TURN:
             raise AnalysisError("the curve turns too sharply", field="step")
