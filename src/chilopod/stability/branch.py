@@ -346,7 +346,8 @@ def _take_error(curve: Curve, found: list[BranchPoint]) -> None:
         return
     sizes = curve.units(point.orbit.size)[:-1]
     wrong = image.error * sizes / sizes[:, None] if isinstance(image.error, np.ndarray) else image.error
-    curve.relative_error = float(np.max(wrong)) / float(np.linalg.norm(image.jacobian * sizes / sizes[:, None]))
+    size = float(np.linalg.norm(image.jacobian * sizes / sizes[:, None]))
+    curve.relative_error = float(np.max(wrong)) / size if size > 0.0 else 0.0
 
 
 def _taken(curve: Curve, anchor: Anchor, size: float) -> tuple[Step, bool]:

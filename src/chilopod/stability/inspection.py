@@ -96,7 +96,9 @@ def inspect(curve: Curve, step: Step, closely: bool) -> Found:
     """
     within = Within(curve, step)
     leaving = step.start.leaving
-    turned = not leaving and float(step.start.last.tangent[-1] * step.tangent[-1]) < 0.0
+    rising = float(step.start.last.tangent[-1])
+    # What starts at a fold does not find it again.
+    turned = not leaving and abs(rising) > _CLOSE and rising * float(step.tangent[-1]) < 0.0
     flipped = not leaving and _sign(step.start.matrix) != _sign(step.matrix)
     brackets = _brackets_from_places(within) if closely else _brackets_from_ends(within, turned)
     if brackets == [] and not turned and not flipped:
@@ -120,6 +122,7 @@ def _places(within: Within, brackets: list[Bracket] | None, turned: bool) -> tup
         roots = [(crossing.event, crossing.value) for crossing in found.crossings]
     else:
         roots = [(event, _root(within, event, a, b)) for event, a, b in brackets]
+    roots = [(event, root) for event, root in roots if root > _CLOSE * step.size]
     places = [_placed(within, event, root) for event, root in roots]
     if turned and not any(place.fold for place in places):
         places.append(_fold(within, 0.0, step.size))
@@ -131,7 +134,7 @@ def _placed(within: Within, event: Event, root: float) -> Place:
     if event is not Event.PLUS:
         return Place(root, event)
     before, after = within.sides(root)
-    branching = _branches_meet(within.at(root)) if root > 0.0 else False
+    branching = _branches_meet(within.at(root))
     if float(before.tangent[-1] * after.tangent[-1]) < 0.0 and not branching:
         return _fold(within, before.size, after.size)
     return Place(root, event, branching=branching)

@@ -158,7 +158,7 @@ def _value_error(
     of the parameter; at a fold, where the parameter rests, that of the orbit's equation."""
     low, high = between
     beside = _SIDE * (high - low)
-    left, here, right = (at(min(max(place.place + s * beside, low + beside), high)) for s in (-1.0, 0.0, 1.0))
+    left, here, right = (at(min(max(place.place + s * beside, low), high)) for s in (-1.0, 0.0, 1.0))
     length = right.size - left.size
     turn = abs if place.event is Event.PAIR else np.real
     slope = abs(float(turn(_nearest(right, nu)) - turn(_nearest(left, nu)))) / length

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.capabilities import Autonomous, KnowsOrbit, Scaled
+from chilopod.stability.capabilities import Autonomous, KnowsOrbit, Scaled, SystemLike
 from chilopod.stability.curve import Anchor, BranchPoint, Curve
 from chilopod.stability.orbits import find_orbit, known_state
 from chilopod.stability.points import BifurcationPoint, Kind
@@ -24,6 +24,7 @@ _SINGULAR = 1e-9  # of the largest singular value: below it another curve passes
 _SAME = 0.999  # cosine between directions that are the same
 _BENT = 0.3  # of a change of state: by so much a map departs from its linear part at the size of a state
 _DECADES = 12
+_PARTS = 16  # of a period, at which an orbit is looked at
 
 
 @dataclass(frozen=True)
@@ -160,9 +161,14 @@ def branch_sizes(curve: Curve, x: Array, value: float, section: Section | None) 
     if given is not None:
         return given
     image = curve.image(x, value, section)
-    base = sizes(system, np.maximum(np.abs(x), np.abs(image.state)), image.jacobian)
+    if isinstance(system, Autonomous):  # where on its orbit the state is tells nothing
+        base = sizes(system, *_along_orbit(system, x, image.period))
+    else:
+        base = sizes(system, np.maximum(np.abs(x), np.abs(image.state)), image.jacobian)
     direction = np.cos(1.0 + 3.0 * np.arange(x.size))
     direction = base * direction / np.abs(direction).max()
+    if image.velocity is not None and image.normal is not None:
+        direction -= image.velocity * float(image.normal @ direction) / float(image.normal @ image.velocity)
     linear = image.jacobian @ direction
     reach = max(float(np.abs(linear / base).max()), 1.0)
 
@@ -187,6 +193,17 @@ def branch_sizes(curve: Curve, x: Array, value: float, section: Section | None) 
         middle = float(np.sqrt(low * high))
         low, high = (middle, high) if bent(middle) is not (step > 1.0) else (low, middle)
     return base * float(np.sqrt(low * high))
+
+
+def _along_orbit(system: SystemLike, x: Array, period: float) -> tuple[Array, Array]:
+    """The largest values of the states on an orbit, shape (n,), and of the derivatives from its start, shape (n, n)."""
+    state, derivative = x, np.eye(x.size)
+    reach, coupling = np.abs(x), np.zeros((x.size, x.size))
+    for _ in range(_PARTS):
+        state, factor = system.flow(np.array(state), 0.0, period / _PARTS)
+        derivative = factor @ derivative
+        reach, coupling = np.maximum(reach, np.abs(state)), np.maximum(coupling, np.abs(derivative))
+    return reach, coupling
 
 
 def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
