@@ -16,12 +16,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
+from chilopod.stability.branch_points import Anchor, BranchPoint, Step
+from chilopod.stability.capabilities import Family
 from chilopod.stability.closure import closes
-from chilopod.stability.curve import PRECISION, Anchor, BranchPoint, Curve, OutsideIntervalError, Step
+from chilopod.stability.curve import PRECISION, Curve, OutsideIntervalError
 from chilopod.stability.inspection import Found, inspect
 from chilopod.stability.orbits import Orbit
-from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.samples import Family
+from chilopod.stability.points import BifurcationPoint
 from chilopod.stability.switching import Start, anchored, begin, branch_sizes, switch
 
 __all__ = ["Branch", "BranchPoint", "Ending", "Start", "begin", "follow", "proceed", "switch"]
@@ -292,6 +293,7 @@ def _followed(
     if _outward(found[-1], curve.between):
         return ended(Ending.LEFT_INTERVAL)
     for count in range(1, points + 1):
+        shortened = False
         while True:
             if curve.left <= 0:
                 return ended(Ending.BUDGET)
@@ -305,7 +307,7 @@ def _followed(
                 # A parameter may also step out of what the system can have.
                 if not isinstance(error, AnalysisError | ParameterError):
                     raise
-                size *= 0.5
+                size, shortened = 0.5 * size, True
                 if size < _SHORTEST * longest:
                     return ended(Ending.LOST, str(error))
         if closed is not None:
@@ -314,7 +316,9 @@ def _followed(
         found += [*what.points, step.end.last]
         remarks += what.remarks
         anchor = step.end
-        size = min(longest, size * (1.5 if step.corrections <= _FEW else 1.0 if step.corrections <= _MANY else 0.6))
+        if not shortened:  # or an edge of what the system can have would be met again at once
+            size *= 1.5 if step.corrections <= _FEW else 1.0 if step.corrections <= _MANY else 0.6
+        size = min(longest, size)
         if curve.relative_error is None:
             _take_error(curve, found)
             found[-1] = replace(found[-1], error_bound=curve.multipliers(step.image)[1])

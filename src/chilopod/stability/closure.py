@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import ChilopodError
-from chilopod.stability.curve import BranchPoint, Curve, Step
+from chilopod.stability.branch_points import BranchPoint, Step
+from chilopod.stability.curve import Curve
 
 Array = NDArray[np.float64]
 

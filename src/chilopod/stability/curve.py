@@ -9,18 +9,17 @@ has the section across the motion where it starts.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from typing import TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.frozen import ReadOnlyArrays, read_only
-from chilopod.stability.capabilities import Autonomous, FlowsEach, SystemLike, returns_per_period
+from chilopod.frozen import read_only
+from chilopod.stability.branch_points import Anchor, BranchPoint, Step
+from chilopod.stability.capabilities import Autonomous, Family, FlowsEach, SystemLike, returns_per_period
 from chilopod.stability.floquet import across
-from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import ReturnMap, Section, return_map, returned_states, section_at, whole_period
-from chilopod.stability.samples import Family
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -36,121 +35,6 @@ _PARAMETER_STEP = 1e-6  # of the difference, in units of the scale
 _SHARPEST_TURN = 0.5  # cosine between two tangents: beyond it the step may have landed on another curve
 _KEPT = 8  # systems: making one may cost more than a flow
 _USER_ERRORS = (ArithmeticError, ValueError, np.linalg.LinAlgError)
-
-
-@dataclass(frozen=True)
-class BranchPoint(ReadOnlyArrays):
-    """A periodic orbit on a branch.
-
-    Attributes
-    ----------
-    value
-        Of the parameter.
-    orbit
-        State at time 0, shape (n,).
-    multipliers
-        Of the full period, by falling modulus, shape (n,), or (n-1,) without the trivial one where the system does not
-        depend on time.
-    tangent
-        Unit tangent of the curve, shape (n+1,): state, then parameter, in ``units``.
-    special
-        What happens here, if anything; ordinary points have None.
-    units
-        Sizes of the states and scale of the parameter that the tangent is in, shape (n+1,); None: the states' own.
-    period
-        The full period of the orbit; None where it was not asked for.
-    error_bound
-        On the absolute error of the multipliers that are not small, by the error of the flow at the branch's first
-        point; 0 where that is not known.
-    bifurcation
-        What is known of the special point: bound, mode, multiplier, normal form.
-    """
-
-    value: float
-    orbit: Array
-    multipliers: ComplexArray
-    tangent: Array
-    special: Kind | None = None
-    units: Array | None = None
-    period: float | None = None
-    error_bound: float = 0.0
-    bifurcation: BifurcationPoint | None = None
-
-    @property
-    def stable(self) -> bool:
-        """Whether all multipliers lie inside the unit circle, by more than the error bound."""
-        return bool((np.abs(self.multipliers) < 1.0 - self.error_bound).all())
-
-
-@dataclass(frozen=True)
-class Anchor(ReadOnlyArrays):
-    """Where a step starts.
-
-    Attributes
-    ----------
-    last
-        The point it starts from.
-    matrix
-        Jacobian of [H - x; tangent . step] there with respect to state and parameter in units, shape (n+1, n+1).
-    before
-        The point before it with its matrix, if there is one.
-    section
-        Where returns end during the step, of a system without a period of its own.
-    leaving
-        Whether the point is one where branches meet: the matrix is then one taken ahead.
-    """
-
-    last: BranchPoint
-    matrix: Array
-    before: tuple[BranchPoint, Array] | None = None
-    section: Section | None = None
-    leaving: bool = False
-
-
-@dataclass(frozen=True)
-class Step(ReadOnlyArrays):
-    """A step that was taken.
-
-    Attributes
-    ----------
-    start, end
-        Where it started; where the next one starts.
-    size
-        Its length along the first tangent.
-    moved
-        From start to end, in units, shape (n+1,).
-    tangent, matrix
-        Of the curve at the end, on the section of the start; the matrix has the tangent as its last row.
-    image
-        The return map at the end, on the section of the start.
-    corrections
-        How many were needed.
-    missed
-        Distance from where it was predicted to end, in units.
-    """
-
-    start: Anchor
-    end: Anchor
-    size: float
-    moved: Array
-    tangent: Array
-    matrix: Array
-    image: ReturnMap
-    corrections: int
-    missed: float
-
-    def between(self, place: float) -> tuple[Array, Array]:
-        """Displacement from the start at a place (along the first tangent), by the cubic through both ends along their
-        tangents, and the matrix there by the straight line."""
-        t, size = place / self.size, self.size
-        first = self.start.last.tangent
-        last = self.tangent / float(first @ self.tangent)
-        moved = (
-            size * t * (1.0 - t) ** 2 * first + t * t * (3.0 - 2.0 * t) * self.moved - size * t * t * (1.0 - t) * last
-        )
-        matrix = self.start.matrix + t * (self.matrix - self.start.matrix)
-        matrix[-1] = first
-        return moved, matrix
 
 
 class Curve:
@@ -201,6 +85,7 @@ class Curve:
         self.left = budget
         self.relative_error: float | None = None
         self._known: dict[float, tuple[SystemLike, SystemLike]] = {}
+        self._each: dict[type, bool] = {}
 
     def system(self, value: float) -> SystemLike:
         """What is studied: over the full period, or as many as the orbits take."""
@@ -229,7 +114,7 @@ class Curve:
         system = self.system(value)
         self.left -= 1
         try:
-            if section is None and isinstance(system, Autonomous):
+            if section is None and system.period is None:
                 section = section_at(system, x, self.sizes)
             return return_map(system, x, with_error, section)
         except _USER_ERRORS as error:
@@ -393,7 +278,8 @@ class Curve:
         if anchor.section is not None:
             system = self.system(value)
             section = section_at(system, x, self.sizes, image.period / image.returns)
-            assert section is not None and isinstance(system, Autonomous)
+            assert section is not None
+            assert isinstance(system, Autonomous)
             along = self._projection(np.asarray(system.velocity(x)), section)
             tangent, matrix = np.array(tangent), np.array(matrix)
             tangent[:-1] = along @ tangent[:-1]
@@ -430,17 +316,25 @@ class Curve:
         self.left -= 1
         own, system = self._systems(value)
         try:
-            if section is None and not self.symmetric and self.periods == 1:
-                if isinstance(own, FlowsEach) and own.period is not None:
-                    beside = self._systems(value + self._parameter_step(value))[0]
-                    if isinstance(beside, FlowsEach):
-                        both: Sequence[FlowsEach] = [own, beside]
-                        mapped, moved = own.flow_each(both, np.array([x, x]), 0.0, own.period)
-                        return (mapped, moved) if beside.period == own.period else (mapped, None)
+            period = own.period
+            if section is None and period is not None and not self.symmetric and self.periods == 1:
+                beside = self._systems(value + self._parameter_step(value))[0] if self._flows_each(own) else own
+                same = beside.period == period
+                if self._flows_each(own) and self._flows_each(beside):
+                    both: Sequence[FlowsEach] = [own, beside]
+                    mapped, moved = own.flow_each(both, np.array([x, x]), 0.0, period)
+                    return (mapped, moved) if same else (mapped, None)
             mapped = returned_states(system, x[None], section)[0]
         except _USER_ERRORS as error:
             raise AnalysisError(f"cannot be evaluated ({error})", field="flow", value=value) from error
         return mapped, None
+
+    def _flows_each(self, system: SystemLike) -> TypeGuard[FlowsEach]:
+        """Whether a system flows each; asked once for each class, for the answer takes longer than some flows."""
+        kind = type(system)
+        if kind not in self._each:
+            self._each[kind] = isinstance(system, FlowsEach)
+        return self._each[kind]
 
     def _parameter_step(self, value: float) -> float:
         """A small change of the parameter that stays within the interval, as the numbers are that differ by it."""
@@ -463,11 +357,6 @@ class Curve:
 
 class OutsideIntervalError(AnalysisError):
     """A step asked for a value of the parameter outside the interval."""
-
-
-def with_special(point: BranchPoint, bifurcation: BifurcationPoint) -> BranchPoint:
-    """A point as the special one that it is."""
-    return replace(point, special=bifurcation.kind, bifurcation=bifurcation)
 
 
 def return_multipliers(image: ReturnMap) -> ComplexArray:

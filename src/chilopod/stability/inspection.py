@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from chilopod.errors import AnalysisError
+from chilopod.stability.branch_points import BranchPoint, Step
 from chilopod.stability.crossings import Crossings, Status, find_crossings
-from chilopod.stability.curve import BranchPoint, Curve, Step
+from chilopod.stability.curve import Curve
 from chilopod.stability.floquet import counts_outside
 from chilopod.stability.special_points import Place, described
 from chilopod.stability.spectra import Event
@@ -176,7 +177,7 @@ def _root(within: Within, event: Event, a: float, b: float) -> float:
 
     def test(place: float) -> float:
         jacobian = _start_jacobian(within) if place == 0.0 else within.at(place).image.jacobian
-        return float(_tests(np.linalg.eigvals(jacobian)[None])[0, _EVENTS.index(event)])
+        return float(_tests(np.linalg.eigvals(jacobian).astype(np.complex128)[None])[0, _EVENTS.index(event)])
 
     if test(a) * test(b) > 0.0:
         raise AnalysisError("the curve is not smooth within the step", field="step")
@@ -267,7 +268,7 @@ def _brackets_from_ends(within: Within, turned: bool) -> list[Bracket] | None:
     if not changed:
         return []
     (i,) = changed[:1]
-    tests = _tests(np.array([start, end]))
+    tests = _tests(np.array([start, end], dtype=np.complex128))
     if len(changed) > 1 or step.start.leaving or abs(before[i] - after[i]) > 1 or tests[0, i] * tests[1, i] >= 0.0:
         return None
     return [(_EVENTS[i], 0.0, step.size)]

@@ -13,14 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.stability.capabilities import SystemLike, spatial_symmetries
+from chilopod.stability.capabilities import Family, SystemLike, spatial_symmetries
 from chilopod.stability.floquet import Spectrum, spectrum
 from chilopod.stability.center_manifold import CriticalOrbit
 from chilopod.stability.fold import Fold
 from chilopod.stability.normal_form import NormalForm, normal_form
 from chilopod.stability.points import BifurcationPoint, Kind, criticality, kind_at_plus_one
 from chilopod.stability.returns import return_map, returned_states, section_at
-from chilopod.stability.samples import Family, Sample, Samples
+from chilopod.stability.samples import Sample, Samples
 from chilopod.stability.zeros import find_zeros, signed_log
 
 Array = NDArray[np.float64]

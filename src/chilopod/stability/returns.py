@@ -135,7 +135,8 @@ def section_at(
         return None
     velocity = _velocity(system, x)
     if scale is None:
-        scale = np.maximum(np.abs(velocity), 1e-3 * balance(system.flow(x, 0.0, 0.01 * system.guess_period)[1]))
+        d = balance(system.flow(x, 0.0, 0.01 * system.guess_period)[1])
+        scale = np.maximum(np.abs(velocity), 1e-3 * d * float((np.abs(velocity) / d).max()))
     normal = velocity / scale**2
     size = float(np.abs(velocity / scale).max())
     if not size > 0.0:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import bisect
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,13 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.capabilities import Autonomous, SystemLike
+from chilopod.stability.capabilities import Autonomous, Family
 from chilopod.stability.fold import Fold, find_fold
 from chilopod.stability.orbits import find_orbit, from_known, known_state
 from chilopod.stability.returns import ReturnMap, return_maps, section_at
 
 Array = NDArray[np.float64]
-Family = Callable[[float], SystemLike]
 
 _FIRST_STEPS = 8
 _SHORTEST = 2.0**-10  # step of an orbit that is followed, relative to the first

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
+from chilopod.stability.branch_points import BranchPoint, Step
 from chilopod.stability.capabilities import SystemLike, spatial_symmetries
 from chilopod.stability.center_manifold import CriticalOrbit
-from chilopod.stability.curve import BranchPoint, Curve, Step
+from chilopod.stability.curve import Curve
 from chilopod.stability.floquet import Spectrum, spectrum
 from chilopod.stability.normal_form import NormalForm, normal_form
 from chilopod.stability.orbits import find_orbit
@@ -197,6 +198,8 @@ def _point(
 ) -> BranchPoint:
     nu = complex(spec.values[index])
     mode, left = _phased(spec.right[:, index], spec.left[:, index])
+    if place.event is not Event.PAIR:
+        mode, left = mode.real.astype(np.complex128), left.real.astype(np.complex128)
     frequency = 0.0
     multiplier = {Event.PLUS: 1.0 + 0j, Event.MINUS: -1.0 + 0j}.get(place.event, nu / abs(nu))
     if place.event is Event.PAIR:
@@ -204,15 +207,11 @@ def _point(
         if angle < 0.0:  # of a conjugate pair, the mode that turns with positive frequency
             nu, multiplier, mode, left, angle = nu.conjugate(), multiplier.conjugate(), mode.conj(), left.conj(), -angle
         frequency = angle / image.period
-    else:
-        mode, left = mode.real, left.real
     form = _form(curve, system, section, point, image, multiplier, mode, left)
-    kind = _kind(system, image, place, mode, form)
+    kind = _kind(system, image, place, mode.real, form)
     if kind is Kind.PERIOD_DOUBLING:
         frequency = np.pi / image.period
-    found = BifurcationPoint(
-        kind, point.value, bound, point.orbit, mode.astype(np.complex128), nu, frequency, normal_form=form
-    )
+    found = BifurcationPoint(kind, point.value, bound, point.orbit, mode, nu, frequency, normal_form=form)
     if form is not None and kind not in (Kind.FOLD, Kind.TRANSCRITICAL, Kind.BRANCH_POINT):
         found = replace(
             found, criticality=criticality(form), coefficient=form.cubic, coefficient_error=form.cubic_error
@@ -241,13 +240,11 @@ def _form(
     point: BranchPoint,
     image: ReturnMap,
     multiplier: complex,
-    mode: NDArray[np.inexact],
-    left: NDArray[np.inexact],
+    mode: ComplexArray,
+    left: ComplexArray,
 ) -> NormalForm | None:
     """The normal form; None where the map cannot be evaluated as it would take."""
-    critical = CriticalOrbit(
-        point.orbit, image.jacobian, multiplier, mode.astype(np.complex128), left.astype(np.complex128), image.returns
-    )
+    critical = CriticalOrbit(point.orbit, image.jacobian, multiplier, mode, left, image.returns)
     uncertainty = float(np.max(image.error)) / float(np.linalg.norm(image.jacobian))
     sizes = curve.units(point.orbit.size)[:-1]
 

@@ -9,12 +9,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.capabilities import Autonomous, KnowsOrbit, Scaled, SystemLike
-from chilopod.stability.curve import Anchor, BranchPoint, Curve
+from chilopod.stability.branch_points import Anchor, BranchPoint
+from chilopod.stability.capabilities import Autonomous, Family, KnowsOrbit, Scaled, SystemLike
+from chilopod.stability.curve import Curve
 from chilopod.stability.orbits import find_orbit, known_state
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import Section, returned_states, whole_period
-from chilopod.stability.samples import Family
 from chilopod.stability.scales import sizes
 
 Array = NDArray[np.float64]
@@ -155,7 +155,7 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
 
 def branch_sizes(curve: Curve, x: Array, value: float, section: Section | None) -> Array:
     """Sizes of the states along a branch, shape (n,): the system's own, or how far from the orbit its return map is no
-    longer linear, with ratios that the orbit tells."""
+    longer linear, or what the interval makes of the orbit, with ratios that the orbit tells."""
     system = curve.system(value)
     given = system.scale if isinstance(system, Scaled) else None
     if given is not None:
@@ -187,8 +187,11 @@ def branch_sizes(curve: Curve, x: Array, value: float, section: Section | None) 
         low, high = high, high * step
         if bent(high) is (step > 1.0):
             break
-    else:
-        return base
+    else:  # linear: as far as the interval takes the orbit
+        n = x.size
+        derivative = curve.parameter_derivative(x, value, section)
+        slope = np.linalg.lstsq(np.eye(n) - image.jacobian * base / base[:, None], derivative / base)[0]
+        return base * max(1.0, float(np.abs(slope).max()))
     for _ in range(2):
         middle = float(np.sqrt(low * high))
         low, high = (middle, high) if bent(middle) is not (step > 1.0) else (low, middle)
