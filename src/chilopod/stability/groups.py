@@ -31,6 +31,9 @@ _MOST_ENTRIES = 2**25
 _RETURNED = 1e-9
 """So close to one are the diagonal entries of a power that is the identity; a rotation by 2 pi / 10 000 has 1 - 2e-7."""
 
+_MIXED = 1e-11
+"""Coordinates are mixed by elements, of order one, with larger entries than this between them."""
+
 _ROUND_OFF = 64.0 * float(np.finfo(float).eps)
 
 
@@ -49,6 +52,10 @@ class Group(ReadOnlyArrays):
     scales
         Of the coordinates x, as the elements tell them, shape (n,): entry (i, j) of an element is of the order of
         ``scales[i] / scales[j]`` at most. Between coordinates that no element mixes they say nothing.
+    component
+        Number of the set of coordinates that each one belongs to, shape (n,): elements mix only coordinates of one set,
+        such as one kind of state over all cells of a ring. ``to_orthogonal`` does not mix the sets either, so that
+        their units do not matter to each other.
     """
 
     generators: Array
@@ -56,6 +63,7 @@ class Group(ReadOnlyArrays):
     to_orthogonal: Array
     from_orthogonal: Array
     scales: Array
+    component: NDArray[np.intp]
 
     @property
     def order(self) -> int:
@@ -110,25 +118,7 @@ def finite_group(generators: ArrayLike) -> Group:
     for i, (by, of) in enumerate(zip(*found, strict=True)):
         if i:
             elements[i] = given[by] @ elements[of]
-    # The metric, in scaled coordinates: in those of the user its entries may differ by more than double precision has.
-    scaled = _scaled(elements, scales)
-    stacked = scaled.reshape(-1, n)
-    try:
-        root = np.linalg.cholesky(stacked.T @ stacked / len(elements)).T
-        inverse = np.linalg.inv(root)
-    except np.linalg.LinAlgError:
-        raise AnalysisError(
-            "have no invariant metric in double precision",
-            field="generators",
-            allowed="coordinates less oblique to each other",
-        ) from None
-    group = Group(given, elements, root / scales, scales[:, None] * inverse, scales)
-    q = group.orthogonal
-    if not np.abs(np.swapaxes(q, 1, 2) @ q - np.eye(n)).max() < SAME:
-        raise AnalysisError(
-            "are no exact symmetries, or too oblique", field="generators", allowed="matrices exact to 1e-9 or better"
-        )
-    return group
+    return _with_metric(given, elements, scales)
 
 
 def isotropy(group: Group, x: ArrayLike, error: ArrayLike = 0.0) -> Group:
@@ -197,8 +187,10 @@ def commutes(group: Group, matrix: ArrayLike, error: ArrayLike = 0.0) -> float:
     n = group.dimension
     m = finite_array(matrix, (n, n), "matrix")
     sizes = group.scales[:, None] / group.scales
-    bound = _bound(error, (n, n)) + _ROUND_OFF * n * float(np.abs(m / sizes).max()) * sizes
-    bound = np.maximum(bound, np.finfo(float).tiny)
+    pairs = group.component[:, None], group.component[None, :]
+    largest = np.full((n, n), np.finfo(float).tiny)
+    np.maximum.at(largest, pairs, np.abs(m / sizes))
+    bound = _bound(error, (n, n)) + _ROUND_OFF * n * largest[pairs] * sizes
     p = group.generators
     explained = np.abs(p) @ bound + bound @ np.abs(p)
     return float((np.abs(p @ m - m @ p) / explained).max())
@@ -267,6 +259,40 @@ def _subgroup(group: Group, members: NDArray[np.bool_], field: str) -> Group:
         raise AnalysisError(
             "is kept by elements that form no group: its error is at the edge of what tells them apart", field=field
         )
-    return Group(
-        group.elements[generators], group.elements[chosen], group.to_orthogonal, group.from_orthogonal, group.scales
-    )
+    return _with_metric(group.elements[generators], group.elements[chosen], group.scales)
+
+
+def _with_metric(generators: Array, elements: Array, scales: Array) -> Group:
+    n = elements.shape[1]
+    # In scaled coordinates: in those of the user the entries may differ by more than double precision has.
+    scaled = _scaled(elements, scales)
+    component = _components(np.abs(scaled).max(axis=0) > _MIXED)
+    stacked = scaled.reshape(-1, n)
+    metric = np.where(component[:, None] == component, stacked.T @ stacked / len(elements), 0.0)
+    try:
+        root = np.linalg.cholesky(metric).T
+        inverse = np.linalg.inv(root)
+    except np.linalg.LinAlgError:
+        raise AnalysisError(
+            "have no invariant metric in double precision",
+            field="generators",
+            allowed="coordinates less oblique to each other",
+        ) from None
+    group = Group(generators, elements, root / scales, scales[:, None] * inverse, scales, component)
+    q = group.orthogonal
+    if not np.abs(np.swapaxes(q, 1, 2) @ q - np.eye(n)).max() < SAME:
+        raise AnalysisError(
+            "are no exact symmetries, or too oblique", field="generators", allowed="matrices exact to 1e-9 or better"
+        )
+    return group
+
+
+def _components(linked: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Numbers of the connected sets, shape (n,), of links shape (n, n)."""
+    linked = linked | linked.T
+    number = np.arange(len(linked))
+    while True:  # ends: numbers only fall
+        lowest = np.where(linked, number, len(linked)).min(axis=1)
+        if (lowest == number).all():
+            return np.asarray(np.unique(number, return_inverse=True)[1])
+        number = lowest[lowest]
