@@ -119,7 +119,9 @@ def generating(elements: Array, members: Indices) -> Indices | None:
         if new is None:
             return None
         chosen.append(new)
-        translations.append([images.number(elements[new] @ image) for image in map(images.__getitem__, range(len(images)))])
+        translations.append(
+            [images.number(elements[new] @ image) for image in map(images.__getitem__, range(len(images)))]
+        )
         frontier = list(reached)
         while frontier:
             here = frontier.pop()

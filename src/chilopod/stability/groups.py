@@ -29,7 +29,8 @@ _MOST_ENTRIES = 2**25
 """Numbers in the matrices of all elements: 256 MiB."""
 
 _RETURNED = 1e-9
-"""So close to one are the diagonal entries of a power that is the identity; a rotation by 2 pi / 10 000 has 1 - 2e-7."""
+"""So close to one are the diagonal entries of a power that is the identity; a rotation by 2 pi / 10 000 has 1 - 2e-7
+there."""
 
 _MIXED = 1e-11
 """Coordinates are mixed by elements, of order one, with larger entries than this between them."""
@@ -161,15 +162,15 @@ def centraliser(group: Group, gamma: ArrayLike) -> Group:
     own = _scaled(group.elements, group.scales)
     left, right = matrix @ own, own @ matrix
     size = np.abs(matrix).max()
-    # gamma P_i = P_j gamma for some j, by nearest neighbours over all j at once in the images of the generators.
-    for image in matrix @ _scaled(group.generators, group.scales):
+    if size == 0.0 or np.linalg.matrix_rank(matrix) < n:
+        raise ParameterError("is not invertible", field="gamma")
+    for image in matrix @ _scaled(group.generators, group.scales):  # which is P gamma for some element P
         if not np.abs(right - image).max(axis=(1, 2)).min() <= SAME * size:
             raise ParameterError(
                 "does not normalise the group", field="gamma", allowed="gamma P gamma^-1 in the group for every P of it"
             )
-    if size == 0.0 or np.linalg.matrix_rank(matrix) < n:
-        raise ParameterError("is not invertible", field="gamma")
-    return _subgroup(group, np.abs(left - right).max(axis=(1, 2)) <= SAME * size, "gamma")
+    kept = np.abs(left - right).max(axis=(1, 2)) <= SAME * size
+    return _subgroup(group, np.asarray(kept), "gamma")
 
 
 def commutes(group: Group, matrix: ArrayLike, error: ArrayLike = 0.0) -> float:
@@ -246,7 +247,9 @@ def _bound(error: ArrayLike, shape: tuple[int, ...]) -> Array:
     try:
         bound = np.broadcast_to(np.asarray(error, dtype=np.float64), shape)
     except (TypeError, ValueError):
-        raise ParameterError("must be a number, or one for each", field="error", value=error, allowed=str(shape)) from None
+        raise ParameterError(
+            "must be a number, or one for each", field="error", value=error, allowed=str(shape)
+        ) from None
     if not (bound >= 0.0).all():
         raise ParameterError("must not be negative", field="error", value=error)
     return bound
