@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_LINKED = 1e-6
-"""Two coordinates whose entries have at least this geometric mean (of any units) act on each other."""
+_ROUND_OFF = 1e-12
+"""An entry smaller than this part of what goes from one coordinate to the other over a third one is round-off."""
 
-_NOISE = 1e-12
-"""Below this mean both entries are round-off; between the two, one of them is and the other one is not."""
+_SMALLEST = 1e-11
+"""An entry below this, in the user's units, that has none opposite is round-off too."""
 
 
 def coordinate_scales(envelope: Array) -> Array:
@@ -30,24 +30,22 @@ def coordinate_scales(envelope: Array) -> Array:
 
     Notes
     -----
-    Coordinates that act on each other are scaled along a maximal spanning tree of the geometric means. Groups of them
-    that do not act on each other keep their mean scale in the user's units, and where one group acts on another one
-    but not the other way round (positions relative to a first one), scales rise until that entry is at most one.
+    Coordinates that act on each other are scaled along a maximal spanning tree of the geometric means. Sets of them
+    that do not act on each other keep their mean scale in the user's units. Where one set acts on another one but not
+    the other way round (positions relative to a first one), the largest entry becomes one, unless it is so small in the
+    user's units that it must be taken for round-off.
     """
-    mean = np.sqrt(envelope) * np.sqrt(envelope.T)
-    strength = np.where((mean >= _LINKED) | (mean <= _NOISE), mean, 0.0)
-    logarithms, component = _along_trees(envelope, strength)
+    envelope = np.where(envelope < _ROUND_OFF * (envelope @ envelope), 0.0, envelope)
+    within, sets = _along_trees(envelope, np.sqrt(envelope) * np.sqrt(envelope.T))
     with np.errstate(divide="ignore"):
-        reach = np.log(envelope) + logarithms[None, :] - logarithms[:, None]
-    # Round-off of the entry beside the one that counts is no constraint.
-    reach = np.where(reach >= reach.T, reach, -np.inf)
-    between: Array = np.full((component.max() + 1, component.max() + 1), -np.inf)
-    np.maximum.at(between, (component[:, None], component[None, :]), reach)
-    np.fill_diagonal(between, 0.0)
-    shift = np.zeros(len(between))
-    for _ in range(len(between)):  # the longest chain of groups, one acting on the next
-        shift = np.asarray((between + shift[None, :]).max(axis=1))
-    return np.asarray(np.exp(logarithms + (shift - shift.mean())[component]))
+        reach = np.log(envelope) + within[None, :] - within[:, None]
+    between = np.full((sets.max() + 1, sets.max() + 1), -np.inf)
+    np.maximum.at(between, (sets[:, None], sets[None, :]), reach)
+    # Where two sets have entries both ways, they are not opposite each other: the larger one counts.
+    forward = (between > between.T) & (between > np.log(_SMALLEST))
+    ratio = np.where(forward, between, np.where(forward.T, -between.T, 0.0))
+    strength = np.where(forward | forward.T, np.exp(-np.abs(ratio)), 0.0)
+    return np.asarray(np.exp(within + _along_trees(np.exp(ratio), strength)[0][sets]))
 
 
 def _along_trees(envelope: Array, strength: Array) -> tuple[Array, NDArray[np.intp]]:

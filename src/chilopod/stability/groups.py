@@ -140,7 +140,7 @@ def isotropy(group: Group, x: ArrayLike, error: ArrayLike = 0.0) -> Group:
     bound = _bound(error, (group.dimension,))
     moved = np.abs(group.elements @ state - state)
     allowed = (np.abs(group.elements) + np.eye(group.dimension)) @ (bound + SAME * np.abs(state))
-    return _subgroup(group, (moved <= allowed).all(axis=1), "x")
+    return _subgroup(group, np.all(moved <= allowed, axis=1), "x")
 
 
 def centraliser(group: Group, gamma: ArrayLike) -> Group:
@@ -169,8 +169,7 @@ def centraliser(group: Group, gamma: ArrayLike) -> Group:
             raise ParameterError(
                 "does not normalise the group", field="gamma", allowed="gamma P gamma^-1 in the group for every P of it"
             )
-    kept = np.abs(left - right).max(axis=(1, 2)) <= SAME * size
-    return _subgroup(group, np.asarray(kept), "gamma")
+    return _subgroup(group, np.all(np.abs(left - right) <= SAME * size, axis=(1, 2)), "gamma")
 
 
 def commutes(group: Group, matrix: ArrayLike, error: ArrayLike = 0.0) -> float:

@@ -149,6 +149,27 @@ class Block(ReadOnlyArrays):
             axis=-2,
         )
 
+    def reduced_error(self, matrices: ArrayLike, error: ArrayLike = 0.0) -> Array:
+        """Bound on the absolute error of the entries of the reduced matrices.
+
+        Parameters
+        ----------
+        matrices
+            M, shape (..., n, n).
+        error
+            Bound on the absolute error of the entries of M: one for all, or anything that fits their shape.
+
+        Returns
+        -------
+        Shape of :meth:`reduced`: what ``error`` and the round-off of the reduction amount to.
+        """
+        given = np.asarray(matrices, dtype=np.float64)
+        m, d, n = self.multiplicity, self.dimension, self.basis.shape[0]
+        entries = np.asarray(error, dtype=np.float64) + 2.0 * n * np.finfo(float).eps * np.abs(given)
+        full = (np.abs(self.dual) @ entries @ np.abs(self.basis)).reshape(*given.shape[:-2], m, d, m, d)
+        parts = np.einsum("...iajb,uab->...ij", full, np.abs(self.units)) / d
+        return np.tile(parts, (2, 2)) if self.type is Type.QUATERNIONIC else np.asarray(parts)
+
     def mode(self, eigenvector: ArrayLike, direction: ArrayLike) -> ComplexArray:
         """The eigenvector of a matrix that commutes with the group, to an eigenvector of its reduced matrix.
 
