@@ -283,6 +283,14 @@ def test_positions_relative_to_a_first_cell():
     assert commutes(group, matrix) < 1.0
 
 
+def test_generators_that_are_not_needed():
+    every = finite_group(GROUPS["S4, regular"]).elements
+    group = finite_group(every)
+    assert group.order == 24
+    assert len(group.generators) < 5
+    assert finite_group([np.eye(2), np.eye(2)]).generators.shape == (1, 2, 2)
+
+
 def test_results_are_the_same_every_time():
     one, other = (isotypic(finite_group(GROUPS["S4, regular"])) for _ in range(2))
     for first, second in zip(one, other, strict=True):
@@ -437,6 +445,8 @@ def turn(angle):
         ([[[1, 0, 0], [0, 1, 0]]], "square"),
         ([], "square"),
         ([np.eye(2), np.eye(3)], "one shape"),
+        ([[[1]]] * 501, "too many"),
+        ([np.roll(np.eye(600), 1, axis=0)], "93"),
         ([[[math.nan]]], "finite"),
         ([[[1j]]], "real"),
         ("shift", "real"),

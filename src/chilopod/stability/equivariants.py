@@ -27,11 +27,17 @@ Matrices = NDArray[Any]
 _ALIGNED = 1e-9
 """Below one by less than this, a cosine is one: an angle of 4e-5 (two elements differ by 6e-4 or more)."""
 
-_NULL = 1e-6
-"""A singular value below this is zero; exact ones are of order one, or zero to some 1e-12."""
+_NULL = 1e-8
+"""Phases of elements that differ by less are one; 1 - cos(2 pi / 10 000) is 2e-7."""
 
 _MOST_SPACES = 500
 """Fixed-point spaces looked at, conjugate ones counted once."""
+
+_MOST_ENTRIES = 2**23
+"""Numbers in the projectors to the fixed-point spaces of single elements: 128 MiB."""
+
+_IRRATIONAL = 0.5 * (np.sqrt(5.0) - 1.0)
+"""As far from all fractions as a number can be."""
 
 
 class Critical(enum.Enum):
@@ -132,7 +138,7 @@ class SymmetricCrossing:
         Numbers of linearly independent quadratic and cubic maps that commute with the representation (with its
         negatives too at -1; with phase shifts too at a pair): terms of the normal form.
     branches
-        The axial ones.
+        The axial ones, those that keep most elements first.
     complete
         Whether these are all of them: the search ends after a budget.
     """
@@ -166,11 +172,14 @@ def symmetric_crossing(block: Block, critical: Critical) -> SymmetricCrossing:
         if critical is Critical.MINUS:  # odd by the shift by one period
             quadratic = 0
     lines, complete = _fixed_lines(rho, critical)
-    branches = tuple(_branch(space @ line, block, critical) for line in lines)
+    branches = [_branch(space @ line, block, critical) for line in lines]
+    branches.sort(
+        key=lambda branch: (-branch.isotropy.size, branch.reversed, "" if branch.wave is None else branch.wave.value)
+    )
     multipliers = 2 * block.repeated if critical is Critical.PAIR else block.dimension
     codimension = 1 if critical is Critical.PAIR else _REAL_CODIMENSION[block.type]
     return SymmetricCrossing(
-        _kind(block, critical, quadratic), multipliers, codimension, quadratic, cubic, branches, complete
+        _kind(block, critical, quadratic), multipliers, codimension, quadratic, cubic, tuple(branches), complete
     )
 
 
@@ -218,19 +227,20 @@ def _fixed_lines(rho: Matrices, critical: Critical) -> tuple[list[Matrices], boo
 
     Every fixed-point space is an intersection of those of single elements, with the phases by which they act.
     """
-    rho = _distinct(rho)
+    rho = _once(rho)
     e = rho.shape[1]
-    single = [np.eye(e, dtype=rho.dtype), *(space for matrix in rho for space in _eigenspaces(matrix, critical))]
+    spaces, complete = _eigenspaces(rho, critical)
+    projectors = np.array([space @ space.conj().T for space in spaces])
     seen = Images(2 * e)
     lines: list[Matrices] = []
     waiting: list[Matrices] = []
 
     def take(space: Matrices) -> None:
         """Note a space, unless it or a conjugate one was met before."""
-        if seen.number(_image(space, seen)) is not None:
+        projector = space @ space.conj().T
+        if seen.number(_probed(projector[None], seen)[0]) is not None:
             return
-        for conjugate in rho @ space:
-            image = _image(conjugate, seen)
+        for image in _probed(rho @ projector @ np.swapaxes(rho.conj(), 1, 2), seen):
             if seen.number(image) is None:
                 seen.add(image)
         if space.shape[1] == 1:
@@ -238,58 +248,66 @@ def _fixed_lines(rho: Matrices, critical: Critical) -> tuple[list[Matrices], boo
         else:
             waiting.append(space)
 
-    for space in single:
+    for space in spaces:
         take(space)
-    looked = 0
-    while waiting and looked < _MOST_SPACES:
+    for _ in range(_MOST_SPACES):
+        if not waiting:
+            break
         space = waiting.pop()
-        looked += 1
-        for other in single:
-            common = _intersection(space, other)
-            if 0 < common.shape[1] < space.shape[1]:
-                take(common)
-    return lines, not waiting
+        # Directions of it that a projector leaves as they are.
+        cosines, vectors = np.linalg.eigh(space.conj().T @ projectors @ space)
+        sizes = (cosines > 1.0 - _ALIGNED).sum(axis=1)
+        for size in range(1, space.shape[1]):
+            bases = space @ vectors[sizes == size][:, :, -size:]
+            for common in _once(bases @ np.swapaxes(bases.conj(), 1, 2)):
+                take(np.linalg.eigh(common)[1][:, -size:])
+    return lines, complete and not waiting
 
 
-def _image(space: Matrices, images: Images) -> NDArray[np.float64]:
-    """What tells a space from others, whatever its basis: the image of probes under the projector."""
-    e = len(space)
-    projected = space @ (space.conj().T @ (images.probes[:e] + 1j * images.probes[e:]))
-    return np.concatenate([projected.real, projected.imag])
+def _probed(matrices: Matrices, images: Images) -> NDArray[np.float64]:
+    """What tells matrices from each other: images of probes, real parts above imaginary ones."""
+    e = matrices.shape[1]
+    products = matrices @ (images.probes[:e] + 1j * images.probes[e:])
+    return np.concatenate([products.real, products.imag], axis=1)
 
 
-def _distinct(rho: Matrices) -> Matrices:
-    """The matrices of a representation, each once."""
-    images = Images(2 * rho.shape[1])
-    e = rho.shape[1]
+def _once(matrices: Matrices) -> Matrices:
+    """Matrices of some, shape (k, e, e), each once."""
+    images = Images(2 * matrices.shape[1])
     first = []
-    for number, moved in enumerate(rho @ (images.probes[:e] + 1j * images.probes[e:])):
-        image = np.concatenate([moved.real, moved.imag])
+    for number, image in enumerate(_probed(matrices, images)):
         if images.number(image) is None:
             images.add(image)
             first.append(number)
-    return rho[first]
+    return matrices[first]
 
 
-def _eigenspaces(matrix: Matrices, critical: Critical) -> list[Matrices]:
-    """Orthonormal bases of the spaces on which an element acts as a phase that a shift in time can undo."""
-    if critical is Critical.PAIR:
-        values = np.linalg.eigvals(matrix)
-        phases = [v for i, v in enumerate(values) if (np.abs(values[:i] - v) > _NULL).all()]
-    else:
-        phases = [1.0, -1.0] if critical is Critical.MINUS else [1.0]
-    spaces = []
-    for phase in phases:
-        _, sizes, right = np.linalg.svd(matrix - phase * np.eye(len(matrix)))
-        space = right[sizes < _NULL].conj().T
-        if space.shape[1]:
-            spaces.append(space)
-    return spaces
-
-
-def _intersection(one: Matrices, other: Matrices) -> Matrices:
-    left, cosines, _ = np.linalg.svd(one.conj().T @ other, full_matrices=False)
-    return np.asarray(one @ left[:, cosines > 1.0 - _ALIGNED])
+def _eigenspaces(rho: Matrices, critical: Critical) -> tuple[list[Matrices], bool]:
+    """Orthonormal bases of the spaces on which single elements act as a phase that a shift in time can undo, each once,
+    and whether these are all."""
+    e = rho.shape[1]
+    # Eigenvectors of a unitary matrix g are those of the Hermitian one with the eigenvalues 2 cos(angle + turn).
+    turn = 1.0 if critical is not Critical.PAIR else np.exp(1j * np.pi * _IRRATIONAL)
+    turned = turn * rho
+    vectors = np.linalg.eigh(turned + np.swapaxes(turned.conj(), 1, 2))[1]
+    phases = np.einsum("gai,gab,gbi->gi", vectors.conj(), rho, vectors)
+    spaces: list[Matrices] = [np.eye(e, dtype=rho.dtype)]
+    images = Images(2 * e)
+    images.add(_probed(np.eye(e)[None], images)[0])
+    for columns, values in zip(vectors, phases, strict=True):
+        if critical is Critical.PAIR:
+            wanted = [v for i, v in enumerate(values) if (np.abs(values[:i] - v) > _NULL).all()]
+        else:
+            wanted = [1.0, -1.0] if critical is Critical.MINUS else [1.0]
+        for phase in wanted:
+            space = columns[:, np.abs(values - phase) < _NULL]
+            image = _probed((space @ space.conj().T)[None], images)[0]
+            if space.shape[1] and images.number(image) is None:
+                if len(spaces) * e * e > _MOST_ENTRIES:
+                    return spaces, False
+                images.add(image)
+                spaces.append(space)
+    return spaces, True
 
 
 def _branch(direction: Matrices, block: Block, critical: Critical) -> AxialBranch:

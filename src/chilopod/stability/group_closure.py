@@ -74,19 +74,25 @@ def factors(generators: Array, largest: int) -> tuple[Indices, Indices] | None:
         Their numbers, shape (order,) both, without meaning for the identity; None if there are more than ``largest``
         elements.
     """
-    images = Images(generators.shape[1])
+    images, by, of = Images(generators.shape[1]), [0], [0]
     images.add(images.probes)
-    by, of = [0], [0]
-    done = 0
-    while done < len(images):
-        for number, image in enumerate(generators @ images[done]):
-            if images.number(image) is None:
-                if len(images) == largest:
-                    return None
-                images.add(image)
-                by.append(number)
-                of.append(done)
-        done += 1
+    needed: list[int] = []
+    for new, image in enumerate(generators @ images.probes):
+        if images.number(image) is not None:
+            continue
+        needed.append(new)  # and the order at least doubles
+        images, by, of = Images(generators.shape[1]), [0], [0]
+        images.add(images.probes)
+        done = 0
+        while done < len(images):
+            for number, product in zip(needed, generators[needed] @ images[done], strict=True):
+                if images.number(product) is None:
+                    if len(images) == largest:
+                        return None
+                    images.add(product)
+                    by.append(number)
+                    of.append(done)
+            done += 1
     return np.array(by), np.array(of)
 
 

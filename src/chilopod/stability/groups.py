@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 LARGEST_ORDER = 10_000
 """A group of more elements is refused."""
 
+_MOST_GENERATORS = 500
+
 _MOST_ENTRIES = 2**25
 """Numbers in the matrices of all elements: 256 MiB."""
 
@@ -45,7 +47,7 @@ class Group(ReadOnlyArrays):
     Attributes
     ----------
     generators
-        Elements whose products are the group, shape (generators, n, n).
+        Elements whose products are the group, those given that are needed, shape (generators, n, n).
     elements
         All elements, the identity first, shape (order, n, n).
     to_orthogonal, from_orthogonal
@@ -99,27 +101,30 @@ def finite_group(generators: ArrayLike) -> Group:
     ------
     ParameterError
         The generators are no finite square matrices of one shape, not invertible, or have more products than
-        ``LARGEST_ORDER``.
+        ``LARGEST_ORDER``, or than fit into 256 MiB.
     """
     given = _checked(generators)
     n = given.shape[1]
-    returns = [_powers(matrix) for matrix in given]
+    most = max(1, min(LARGEST_ORDER, _MOST_ENTRIES // n**2))
+    returns = [_powers(matrix, most) for matrix in given]
     scales = coordinate_scales(np.asarray(np.max([envelope for envelope, _ in returns], axis=0)))
     for matrix, (_, residual) in zip(given, returns, strict=True):
         if np.abs(_scaled(residual, scales)).max() > SAME:
-            raise _infinite(matrix)
-    most = min(LARGEST_ORDER, _MOST_ENTRIES // n**2)
+            raise _infinite(matrix, most)
     found = factors(_scaled(given, scales), most)
     if found is None:
         raise ParameterError(
-            "generate an infinite group, or too large a one", field="generators", allowed=f"{most} elements or fewer"
+            "generate an infinite group, or too large a one",
+            field="generators",
+            allowed=f"{most} elements or fewer in dimension {n}",
         )
     elements = np.empty((len(found[0]), n, n))
     elements[0] = np.eye(n)
     for i, (by, of) in enumerate(zip(*found, strict=True)):
         if i:
             elements[i] = given[by] @ elements[of]
-    return _with_metric(given, elements, scales)
+    needed = np.unique(found[0][1:]) if len(elements) > 1 else [0]
+    return _with_metric(given[needed], elements, scales)
 
 
 def isotropy(group: Group, x: ArrayLike, error: ArrayLike = 0.0) -> Group:
@@ -207,16 +212,18 @@ def _checked(generators: ArrayLike) -> Array:
         raise ParameterError(
             "must be square matrices", field="generators", value=raw.shape, allowed="one or more of shape (n, n)"
         )
+    if len(raw) > _MOST_GENERATORS:
+        raise ParameterError("are too many", field="generators", value=len(raw), allowed=f"{_MOST_GENERATORS} or fewer")
     return finite_array(raw, raw.shape, "generators")
 
 
-def _powers(matrix: Array) -> tuple[Array, Array]:
+def _powers(matrix: Array, most: int) -> tuple[Array, Array]:
     """Largest absolute value of each entry over the powers, shape (n, n), and what the last one differs by from the
     identity, which it is but for round-off if the matrix generates a finite group."""
     n = len(matrix)
     power, envelope = matrix, np.maximum(np.abs(matrix), np.eye(n))
     with np.errstate(over="ignore", invalid="ignore"):
-        for _ in range(LARGEST_ORDER):
+        for _ in range(most):
             diagonal = np.diag(power)
             # Whatever the units: the diagonal is free of them.
             if np.abs(diagonal - 1.0).max() < _RETURNED:
@@ -225,16 +232,16 @@ def _powers(matrix: Array) -> tuple[Array, Array]:
                 break
             power = power @ matrix
             envelope = np.maximum(envelope, np.abs(power))
-    raise _infinite(matrix)
+    raise _infinite(matrix, most)
 
 
-def _infinite(matrix: Array) -> ParameterError:
+def _infinite(matrix: Array, most: int) -> ParameterError:
     if np.linalg.slogdet(matrix)[1] < -1.0:  # ±1 in a finite group
         return ParameterError("is not invertible, or shrinks volumes", field="generators", allowed="determinant ±1")
     return ParameterError(
         "generate an infinite group, or too large a one",
         field="generators",
-        allowed=f"matrices of which a power up to {LARGEST_ORDER} is the identity, to 9 digits",
+        allowed=f"matrices of which a power up to {most} is the identity, to 9 digits",
     )
 
 
