@@ -118,12 +118,12 @@ def finite_group(generators: ArrayLike) -> Group:
             field="generators",
             allowed=f"{most} elements or fewer in dimension {n}",
         )
-    elements = np.empty((len(found[0]), n, n))
+    by, of = found
+    elements = np.empty((len(by), n, n))
     elements[0] = np.eye(n)
-    for i, (by, of) in enumerate(zip(*found, strict=True)):
-        if i:
-            elements[i] = given[by] @ elements[of]
-    needed = np.unique(found[0][1:]) if len(elements) > 1 else [0]
+    for i in range(1, len(by)):
+        elements[i] = given[by[i]] @ elements[of[i]]
+    needed = np.unique(by[1:]) if len(by) > 1 else by
     return _with_metric(given[needed], elements, scales)
 
 
