@@ -12,15 +12,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
-from chilopod.errors import AnalysisError, ParameterError
+from chilopod.errors import ParameterError
 from chilopod.stability.capabilities import SystemLike, spatial_symmetry
+from chilopod.stability.center_manifold import CriticalOrbit
 from chilopod.stability.floquet import Spectrum, spectrum
 from chilopod.stability.fold import Fold
-from chilopod.stability.center_manifold import CriticalOrbit
-from chilopod.stability.normal_form import NormalForm, normal_form
+from chilopod.stability.normal_form import NormalForm
+from chilopod.stability.normal_form import normal_form as normal_form_of
 from chilopod.stability.points import BifurcationPoint, Kind, criticality, kind_at_plus_one
 from chilopod.stability.samples import Family, Sample, Samples
-from chilopod.stability.system import return_map, returned_states
+from chilopod.stability.system import ReturnMap, return_map, returned_states
 from chilopod.stability.zeros import brackets
 
 Array = NDArray[np.float64]
@@ -81,7 +82,7 @@ def locate(
                 point = _describe(samples, root, event, high - low, normal_form)
                 points += [point] if point else []
     if samples.fold is not None:
-        points.append(_fold_point(samples.fold))
+        points.append(_fold_point(samples.fold, samples.family(samples.fold.value), normal_form))
     return sorted(points, key=lambda point: point.value)
 
 
@@ -163,7 +164,9 @@ def _pairs(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return first, second
 
 
-def _describe(samples: Samples, value: float, event: int, width: float, with_normal_form: bool) -> BifurcationPoint | None:
+def _describe(
+    samples: Samples, value: float, event: int, width: float, with_normal_form: bool
+) -> BifurcationPoint | None:
     """What happens at a zero of a test function; None if no multiplier is critical there after all."""
     at = samples.at(np.array([value]))[0]
     system = samples.family(value)
@@ -185,25 +188,16 @@ def _describe(samples: Samples, value: float, event: int, width: float, with_nor
     bound = _SAFETY * uncertainty / slope if slope > 0.0 else np.inf
     bound = float(bound + 4 * np.finfo(float).eps * abs(value))
     mode, left = _phased(spec.right[:, critical], spec.left[:, critical])
-
-    def form_at(multiplier: complex) -> NormalForm:
-        real = multiplier.imag == 0.0
-        critical_orbit = CriticalOrbit(
-            at.orbit, image.jacobian, multiplier, mode.real if real else mode, left.real if real else left, image.halves
-        )
-        uncertainty = image.error / float(np.linalg.norm(image.jacobian))
-        return normal_form(lambda states: returned_states(system, states), critical_orbit, uncertainty=uncertainty)
-
     if event == _PAIR:
         angle = float(np.angle(np.exp(1j * image.halves * np.angle(nu))))
         # Of a conjugate pair, the mode that turns with positive frequency.
         if angle < 0:
             nu, mode, left, angle = nu.conjugate(), mode.conj(), left.conj(), -angle
-        form = form_at(nu / abs(nu)) if with_normal_form else None
+        form = _form(system, at.orbit, image, nu / abs(nu), mode, left) if with_normal_form else None
         return _point(Kind.NEIMARK_SACKER, at, bound, mode, nu, angle / system.period, form)
     form = None
     if with_normal_form or (event == _PLUS and not _antisymmetric(system, mode)):
-        form = form_at(complex(event))
+        form = _form(system, at.orbit, image, complex(event), mode, left)
     kind = _kind(system, image.halves, event, mode.real, form)
     frequency = np.pi / system.period if kind is Kind.PERIOD_DOUBLING else 0.0
     return _point(kind, at, bound, mode, nu, frequency, form)
@@ -219,13 +213,36 @@ def _kind(system: SystemLike, halves: int, event: int, mode: Array, form: Normal
     return kind_at_plus_one(form)
 
 
-def _fold_point(fold: Fold) -> BifurcationPoint:
+def _fold_point(fold: Fold, system: SystemLike, with_normal_form: bool) -> BifurcationPoint:
     spec = spectrum(fold.image)
     critical = _critical(spec, _PLUS)
-    mode, _ = _phased(spec.right[:, critical], spec.left[:, critical])
+    mode, left = _phased(spec.right[:, critical], spec.left[:, critical])
+    form = _form(system, fold.image.state, fold.image, 1.0 + 0.0j, mode, left) if with_normal_form else None
     return BifurcationPoint(
-        Kind.FOLD, fold.value, fold.error_bound, fold.image.state, mode, complex(spec.values[critical]), 0.0
+        Kind.FOLD,
+        fold.value,
+        fold.error_bound,
+        fold.image.state,
+        mode,
+        complex(spec.values[critical]),
+        0.0,
+        normal_form=form,
     )
+
+
+def _form(
+    system: SystemLike,
+    orbit: Array,
+    image: ReturnMap,
+    multiplier: complex,
+    mode: NDArray[np.complex128],
+    left: NDArray[np.complex128],
+) -> NormalForm:
+    if multiplier.imag == 0.0:
+        mode, left = mode.real.astype(np.complex128), left.real.astype(np.complex128)
+    critical_orbit = CriticalOrbit(orbit, image.jacobian, multiplier, mode, left, image.halves)
+    uncertainty = image.error / float(np.linalg.norm(image.jacobian))
+    return normal_form_of(lambda states: returned_states(system, states), critical_orbit, uncertainty=uncertainty)
 
 
 def _point(
@@ -240,9 +257,7 @@ def _point(
     point = BifurcationPoint(kind, at.value, bound, at.orbit, mode, nu, frequency, normal_form=form)
     if form is None or kind in (Kind.FOLD, Kind.TRANSCRITICAL, Kind.BRANCH_POINT):
         return point
-    point = replace(
-        point, criticality=criticality(form), coefficient=form.cubic, coefficient_error=form.cubic_error
-    )
+    point = replace(point, criticality=criticality(form), coefficient=form.cubic, coefficient_error=form.cubic_error)
     if kind is Kind.NEIMARK_SACKER:
         point = replace(point, rotation=form.rotation, rotation_error=form.rotation_error)
     return point

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -49,7 +48,8 @@ _BENDS = 3  # times that the curve is bent at one amplitude
 _ENOUGH = 3e-8  # relative error at which no other amplitude is tried
 _FULL = 8  # highest order to be seen beyond which a larger amplitude would rather lose
 _BETTER = 0.3  # of the error, to go on for
-_DRAWS = 3
+_DRAWS = 3  # of curves that are off at random
+_SURE = 2.0  # for the worst of which
 
 
 class Status(enum.Enum):
@@ -58,7 +58,10 @@ class Status(enum.Enum):
     FOUND = "found", "the coefficients hold within their errors"
     LINEAR = "linear", "no nonlinear term was seen along the mode, however large the amplitude"
     OUT_OF_REACH = "out of reach", "at no amplitude does the return map follow a power series"
-    STRONG_RESONANCE = "strong resonance", "the pair is at a root of unity of order 1 to 4, where other terms decide too"
+    STRONG_RESONANCE = (
+        "strong resonance",
+        "the pair is at a root of unity of order 1 to 4, where more terms decide",
+    )
     SEVERAL_CRITICAL = "several critical", "another multiplier is on the unit circle as well"
 
     def __init__(self, label: str, sentence: str) -> None:
@@ -181,8 +184,8 @@ def _start(at: CriticalOrbit, scale: ArrayLike | None) -> float:
 def _loose_by(mapped: ReturnedStates, at: CriticalOrbit, noise: float, quadratic: float, cubic: float) -> float:
     """How far along the mode an orbit may be off that returns as nearly as this one does, where H - 1 is singular.
 
-    Off by d, where the multiplier is 1 all the same, it misses itself by quadratic d^2 - cubic d^3, with the
-    coefficients as they are seen there; beside the symmetric orbit of a pitchfork that is 2 cubic d^3.
+    Off by d from the symmetric orbit of a pitchfork it misses itself by at least cubic d^3, and looks as if there were
+    a quadratic term 3 cubic d; beside a transcritical point it misses by quadratic d^2.
     """
     image = None if at.multiplier.real < 0.0 else images(mapped, at, np.zeros((1, at.state.size)))
     if image is None:
@@ -191,7 +194,7 @@ def _loose_by(mapped: ReturnedStates, at: CriticalOrbit, noise: float, quadratic
     missed = float(abs(image[0] @ at.left)) + float(np.abs(at.left) @ rounding)
     if missed == 0.0:
         return 0.0
-    by_cubic = float(np.cbrt(missed / (2.0 * cubic))) if cubic > 0.0 else np.inf
+    by_cubic = float(1.5 * np.cbrt(missed / cubic)) if cubic > 0.0 else np.inf
     # A quadratic term that no pitchfork beside this orbit explains holds the orbit closer.
     return min(by_cubic, 2.0 * float(np.sqrt(missed / quadratic))) if quadratic > 6.0 * cubic * by_cubic else by_cubic
 
@@ -203,7 +206,11 @@ def _of_full_period(
     quadratic, quadratic_error = fit.term((2, 0))
     cubic, cubic_error = fit.cubic.real, fit.cubic_error
     fourth, fourth_error = fit.term((4, 0))
-    off = orbit_error if orbit_error is not None else _loose_by(mapped, at, noise, abs(quadratic), abs(cubic) + cubic_error)
+    off = (
+        orbit_error
+        if orbit_error is not None
+        else _loose_by(mapped, at, noise, abs(quadratic), abs(cubic) + cubic_error)
+    )
     if off > 0.0:
         quadratic_error += 3.0 * (abs(cubic) + cubic_error) * off
         cubic_error += 4.0 * (abs(fourth) + fourth_error) * off
@@ -269,7 +276,7 @@ class _Search:
         low, high = 0.0, np.inf  # amplitudes at which nothing is seen, and that are too large
         best: tuple[Sampled, dict[Powers, ComplexArray]] | None = None
         best_error, status = np.inf, Status.LINEAR
-        bends = downs = turned = 0
+        bends = ups = downs = turned = 0
         growing = 0.0
         for _ in range(_TRIALS):
             found = sample(self._mapped, self._at, self._curve, radius, self._noise)
@@ -278,13 +285,14 @@ class _Search:
                 low, factor = radius, _UP
             elif found is None or share > _TOO_FAR:
                 high, factor = radius, _FIRST_DOWN if found is None else _toward(share, order)
-            elif status is Status.LINEAR and downs < _DOWNS and found.falling and found.shrink < _RESOLVED:
+            elif seen and status is Status.LINEAR and downs < _DOWNS and found.falling and found.shrink < _RESOLVED:
                 high, factor, downs = radius, max(found.shrink, _FIRST_DOWN), downs + 1
             elif bends < _BENDS and self._bend(found):
                 bends += 1
                 continue  # once more, along the better curve
             elif not seen:
-                best, low, factor = (found, dict(self._curve)), radius, self._linear_up(radius, high)
+                best, low, ups = (found, dict(self._curve)), radius, ups + 1
+                factor = self._linear_up(radius, high) if ups <= _UPS else np.inf
             else:
                 value, error = (float(np.abs(one[-1])) for one in found.taylor(self._third))
                 better = error < _BETTER * best_error
@@ -346,13 +354,10 @@ class _Search:
             excess, error = self._excess(found, powers)
             if (np.abs(excess) > 2.0 * error).any():
                 bent = True
-                self._curve[powers] = (
-                    self._curve[powers] + solve_homological(self._at, powers, excess[:, None], resonant)[:, 0]
-                )
+                self._curve[powers] = self._curve[powers] + solve_homological(self._at, powers, excess, resonant)
         return bent
 
     def _described(self, found: Sampled, status: Status) -> _Fit:
-        at = self._at
         value, error = found.taylor(self._third)
         return _Fit(status, found, complex(value[-1]), float(error[-1]) + self._bent_wrongly(found))
 
@@ -362,7 +367,9 @@ class _Search:
         n = at.state.size
         if n == (1 if at.real else 2):
             return 0.0
-        off = {powers: np.abs(excess) + error for powers in self._second for excess, error in [self._excess(found, powers)]}
+        off = {
+            powers: np.abs(excess) + error for powers in self._second for excess, error in [self._excess(found, powers)]
+        }
         random = np.random.default_rng(0)
         directions = turns(at)
         largest = found.radius * radii()[0]
@@ -372,7 +379,7 @@ class _Search:
             wrong = {}
             for powers, resonant in self._second.items():
                 signs = random.choice([-1.0, 1.0], n) if at.real else np.exp(2j * np.pi * random.random(n))
-                wrong[powers] = solve_homological(at, powers, (signs * off[powers])[:, None], resonant)[:, 0]
+                wrong[powers] = solve_homological(at, powers, signs * off[powers], resonant)
             shift = displacements(at, wrong, z)
             with np.errstate(divide="ignore", invalid="ignore"):
                 ratios = np.abs(shift).max(axis=0) / found.size
@@ -386,7 +393,7 @@ class _Search:
                 return np.inf
             harmonic = np.fft.fft(image @ at.left.conj())[1] / directions.size
             worst = max(worst, float(abs(harmonic - found.outermost[1])) / (times * largest**3))
-        return 2.0 * worst
+        return _SURE * worst
 
 
 def _departure(found: Sampled, at: CriticalOrbit) -> tuple[float, int, bool]:
