@@ -130,9 +130,7 @@ def images(mapped: ReturnedStates, at: CriticalOrbit, displaced: Array) -> Array
     """H - x at x + ``displaced``, of the same shape; None where the map does not exist."""
     flat = at.state + displaced.reshape(-1, at.state.size)
     try:
-        # Far out, where nobody knows what is there, an overflow is an answer.
-        with np.errstate(all="ignore"):
-            result = np.asarray(mapped(flat), dtype=np.float64).reshape(displaced.shape) - at.state
+        result = np.asarray(mapped(flat), dtype=np.float64).reshape(displaced.shape) - at.state
     except (AnalysisError, ArithmeticError):
         return None
     return result if np.isfinite(result).all() else None
@@ -142,9 +140,8 @@ def sample(mapped: ReturnedStates, at: CriticalOrbit, curve: Curve, radius: floa
     """The map on a curve up to a radius; None where it does not exist. ``noise`` is relative, see
     :func:`chilopod.stability.normal_form.normal_form`."""
     directions = turns(at)
-    with np.errstate(all="ignore"):
-        displaced = displacements(at, curve, radius * radii()[:, None] * directions)
-        highest = np.power(radius, _HIGHEST)
+    displaced = displacements(at, curve, radius * radii()[:, None] * directions)
+    highest = np.power(radius, _HIGHEST)
     if not (0.0 < highest < np.inf and np.isfinite(displaced).all()):
         return None
     image = images(mapped, at, displaced)
@@ -152,6 +149,8 @@ def sample(mapped: ReturnedStates, at: CriticalOrbit, curve: Curve, radius: floa
         return None
     columns = np.concatenate([image, (image @ at.left.conj())[..., None]], axis=-1)
     harmonics = np.fft.fft(columns, axis=1) / directions.size
+    if not np.isfinite(harmonics).all():
+        return None
     found = tuple(series(harmonics[:, h], h % 2) for h in range(directions.size))
     size = np.maximum(np.abs(displaced), np.abs(image)).max(axis=(0, 1))
     blur, floor = (_expected_noise(at, reached, noise) for reached in (np.abs(at.state), np.abs(at.state) + size))
