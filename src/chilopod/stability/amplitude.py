@@ -8,6 +8,7 @@ cubic coefficient falls.
 from __future__ import annotations
 
 import enum
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from chilopod.stability.center_manifold import (
     CriticalOrbit,
+    Curve,
     Powers,
     ReturnedStates,
     Sampled,
@@ -46,6 +48,7 @@ _FULL = 8  # highest order to be seen beyond which a larger amplitude would rath
 _BETTER = 0.3  # of the error, to go on for
 _DRAWS = 3  # of curves that are off at random
 _SURE = 2.0  # for the worst of which
+_WRONG = 0.3  # how far off they are, of what the states move
 
 
 class Status(enum.Enum):
@@ -75,12 +78,15 @@ class Fit:
         FOUND or LINEAR.
     sampled
         The map where it shows most.
+    curve
+        What it is sampled on.
     cubic, cubic_error
         Coefficient of the resonant cubic term.
     """
 
     status: Status
     sampled: Sampled
+    curve: Curve
     cubic: complex
     cubic_error: float
 
@@ -190,40 +196,62 @@ class Search:
 
     def _described(self, found: Sampled, status: Status) -> Fit:
         value, error = found.taylor(self._third)
-        return Fit(status, found, complex(value[-1]), float(error[-1]) + self._bent_wrongly(found))
+        off = {}
+        for powers in self._second:
+            excess, uncertain = self._excess(found, powers)
+            off[powers] = np.abs(excess) + uncertain
+        bend = effect_of_bend(self._mapped, self._at, self._curve, found, off, self._second, order=3)
+        return Fit(status, found, self._curve, complex(value[-1]), float(error[-1]) + bend)
 
-    def _bent_wrongly(self, found: Sampled) -> float:
-        """How far the cubic coefficient may be off because the curve is: sampled on curves that are off by that."""
-        at = self._at
-        n = at.state.size
-        if n == (1 if at.real else 2):
-            return 0.0
-        off = {
-            powers: np.abs(excess) + error for powers in self._second for excess, error in [self._excess(found, powers)]
-        }
-        random = np.random.default_rng(0)
-        directions = turns(at)
-        largest = found.radius * radii()[0]
-        z = largest * directions
-        worst = 0.0
-        for _ in range(_DRAWS):
-            wrong = {}
-            for powers, resonant in self._second.items():
-                signs = random.choice([-1.0, 1.0], n) if at.real else np.exp(2j * np.pi * random.random(n))
-                wrong[powers] = solve_homological(at, powers, signs * off[powers], resonant)
-            shift = displacements(at, wrong, z)
-            ratios = np.abs(shift).max(axis=0) / found.size
-            ratios = ratios[np.isfinite(ratios) & (ratios > 0.0)]
-            if not ratios.size:
-                continue
-            times = 0.3 / float(ratios.max())
-            curve = displacements(at, self._curve, z) + times * shift
-            image = images(self._mapped, at, curve)
-            if image is None:
-                return np.inf
-            harmonic = np.fft.fft(image @ at.left.conj())[1] / directions.size
-            worst = max(worst, float(abs(harmonic - found.outermost[1])) / (times * largest**3))
-        return _SURE * worst
+
+def effect_of_bend(
+    mapped: ReturnedStates,
+    at: CriticalOrbit,
+    curve: Curve,
+    found: Sampled,
+    off: Mapping[Powers, Array],
+    resonant: Mapping[Powers, bool],
+    order: int,
+) -> float:
+    """How far a coefficient of odd order may be off because the sampled curve is not quite the centre manifold.
+
+    Parameters
+    ----------
+    curve, found
+        The curve and what was sampled on it.
+    off
+        What H(W) and W differ by at every monomial, shape (n,): curves that are off by as much, with signs drawn at
+        random, are sampled as well.
+    resonant
+        As in :func:`solve_homological`, of every monomial.
+    order
+        Of the coefficient.
+    """
+    n = at.state.size
+    if n == (1 if at.real else 2):
+        return 0.0
+    random = np.random.default_rng(0)
+    directions = turns(at)
+    largest = found.radius * radii()[0]
+    z = largest * directions
+    worst = 0.0
+    for _ in range(_DRAWS):
+        wrong = {}
+        for powers, difference in off.items():
+            signs = random.choice([-1.0, 1.0], n) if at.real else np.exp(2j * np.pi * random.random(n))
+            wrong[powers] = solve_homological(at, powers, signs * difference, resonant[powers])
+        shift = displacements(at, wrong, z)
+        ratios = np.abs(shift).max(axis=0) / found.size
+        ratios = ratios[np.isfinite(ratios) & (ratios > 0.0)]
+        if not ratios.size:
+            continue
+        times = _WRONG / float(ratios.max())
+        image = images(mapped, at, displacements(at, curve, z) + times * shift)
+        if image is None:
+            return np.inf
+        harmonic = np.fft.fft(image @ at.left.conj())[1] / directions.size
+        worst = max(worst, float(abs(harmonic - found.outermost[1])) / (times * largest**order))
+    return _SURE * worst
 
 
 def _departure(found: Sampled, at: CriticalOrbit) -> tuple[float, int, bool]:
