@@ -4,6 +4,7 @@ is."""
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -11,20 +12,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
-from chilopod.errors import AnalysisError, ParameterError
-from chilopod.stability.capabilities import SystemLike, spatial_symmetries
+from chilopod.errors import ParameterError
+from chilopod.stability.capabilities import SystemLike, spatial_symmetry
+from chilopod.stability.center_manifold import CriticalOrbit
 from chilopod.stability.floquet import Spectrum, spectrum
 from chilopod.stability.fold import Fold
-from chilopod.stability.normal_form import NormalForm, complex_normal_form, real_normal_form
-from chilopod.stability.points import BifurcationPoint, Criticality, Kind
-from chilopod.stability.returns import return_map
+from chilopod.stability.normal_form import NormalForm
+from chilopod.stability.normal_form import normal_form as normal_form_of
+from chilopod.stability.points import BifurcationPoint, Kind, criticality, kind_at_plus_one
 from chilopod.stability.samples import Family, Sample, Samples
+from chilopod.stability.system import ReturnMap, return_map, returned_states
 from chilopod.stability.zeros import brackets
 
 Array = NDArray[np.float64]
-
-AMPLITUDE = 0.2
-"""Largest amplitude along the unit critical mode at which the return map is sampled for the normal form."""
 
 _SAFETY = 1.5
 _DECADES = 4.0
@@ -82,7 +82,7 @@ def locate(
                 point = _describe(samples, root, event, high - low, normal_form)
                 points += [point] if point else []
     if samples.fold is not None:
-        points.append(_fold_point(samples.fold))
+        points.append(_fold_point(samples.fold, samples.family(samples.fold.value), normal_form))
     return sorted(points, key=lambda point: point.value)
 
 
@@ -164,7 +164,9 @@ def _pairs(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return first, second
 
 
-def _describe(samples: Samples, value: float, event: int, width: float, normal_form: bool) -> BifurcationPoint | None:
+def _describe(
+    samples: Samples, value: float, event: int, width: float, with_normal_form: bool
+) -> BifurcationPoint | None:
     """What happens at a zero of a test function; None if no multiplier is critical there after all."""
     at = samples.at(np.array([value]))[0]
     system = samples.family(value)
@@ -187,45 +189,60 @@ def _describe(samples: Samples, value: float, event: int, width: float, normal_f
     bound = float(bound + 4 * np.finfo(float).eps * abs(value))
     mode, left = _phased(spec.right[:, critical], spec.left[:, critical])
     if event == _PAIR:
-        angle = float(np.angle(np.exp(1j * image.returns * np.angle(nu))))
+        angle = float(np.angle(np.exp(1j * image.halves * np.angle(nu))))
         # Of a conjugate pair, the mode that turns with positive frequency.
         if angle < 0:
             nu, mode, left, angle = nu.conjugate(), mode.conj(), left.conj(), -angle
-        form = None
-        if normal_form:
-            form = _where_it_exists(lambda size: complex_normal_form(system, image, nu / abs(nu), mode, left, size))
-        return _point(Kind.NEIMARK_SACKER, at, bound, mode, nu, angle / image.period, form)
+        form = _form(system, at.orbit, image, nu / abs(nu), mode, left) if with_normal_form else None
+        return _point(Kind.NEIMARK_SACKER, at, bound, mode, nu, angle / system.period, form)
     form = None
-    if normal_form or (event == _PLUS and not _antisymmetric(system, mode)):
-        form = _where_it_exists(lambda size: real_normal_form(system, image, float(event), mode.real, left.real, size))
-    kind = _kind(system, image.returns, event, mode.real, form)
-    if kind in (Kind.FOLD, Kind.TRANSCRITICAL, Kind.BRANCH_POINT):
-        form = None
-    frequency = np.pi / image.period if kind is Kind.PERIOD_DOUBLING else 0.0
+    if with_normal_form or (event == _PLUS and not _antisymmetric(system, mode)):
+        form = _form(system, at.orbit, image, complex(event), mode, left)
+    kind = _kind(system, image.halves, event, mode.real, form)
+    frequency = np.pi / system.period if kind is Kind.PERIOD_DOUBLING else 0.0
     return _point(kind, at, bound, mode, nu, frequency, form)
 
 
-def _kind(system: SystemLike, returns: int, event: int, mode: Array, form: NormalForm | None) -> Kind:
+def _kind(system: SystemLike, halves: int, event: int, mode: Array, form: NormalForm | None) -> Kind:
     if event == _MINUS:
-        return Kind.PITCHFORK if returns == 2 else Kind.PERIOD_DOUBLING
+        return Kind.PITCHFORK if halves == 2 else Kind.PERIOD_DOUBLING
     if _antisymmetric(system, mode):
         return Kind.PITCHFORK
     # The orbit was sampled on both sides, so it does not end in a fold here.
     assert form is not None
-    if abs(form.quadratic) > 10.0 * form.quadratic_error:
-        return Kind.TRANSCRITICAL
-    if abs(form.cubic) > 10.0 * form.cubic_error:
-        return Kind.PITCHFORK
-    return Kind.BRANCH_POINT
+    return kind_at_plus_one(form)
 
 
-def _fold_point(fold: Fold) -> BifurcationPoint:
+def _fold_point(fold: Fold, system: SystemLike, with_normal_form: bool) -> BifurcationPoint:
     spec = spectrum(fold.image)
     critical = _critical(spec, _PLUS)
-    mode, _ = _phased(spec.right[:, critical], spec.left[:, critical])
+    mode, left = _phased(spec.right[:, critical], spec.left[:, critical])
+    form = _form(system, fold.image.state, fold.image, 1.0 + 0.0j, mode, left) if with_normal_form else None
     return BifurcationPoint(
-        Kind.FOLD, fold.value, fold.error_bound, fold.image.state, mode, complex(spec.values[critical]), 0.0
+        Kind.FOLD,
+        fold.value,
+        fold.error_bound,
+        fold.image.state,
+        mode,
+        complex(spec.values[critical]),
+        0.0,
+        normal_form=form,
     )
+
+
+def _form(
+    system: SystemLike,
+    orbit: Array,
+    image: ReturnMap,
+    multiplier: complex,
+    mode: NDArray[np.complex128],
+    left: NDArray[np.complex128],
+) -> NormalForm:
+    if multiplier.imag == 0.0:
+        mode, left = mode.real.astype(np.complex128), left.real.astype(np.complex128)
+    critical_orbit = CriticalOrbit(orbit, image.jacobian, multiplier, mode, left, image.halves)
+    uncertainty = image.error / float(np.linalg.norm(image.jacobian))
+    return normal_form_of(lambda states: returned_states(system, states), critical_orbit, uncertainty=uncertainty)
 
 
 def _point(
@@ -237,32 +254,18 @@ def _point(
     frequency: float,
     form: NormalForm | None,
 ) -> BifurcationPoint:
-    if form is None:
-        return BifurcationPoint(kind, at.value, bound, at.orbit, mode, nu, frequency)
-    if abs(form.cubic) <= form.cubic_error:
-        verdict = Criticality.UNDECIDED
-    else:
-        verdict = Criticality.SUPERCRITICAL if form.cubic < 0 else Criticality.SUBCRITICAL
-    rotation = form.rotation if kind is Kind.NEIMARK_SACKER else None
-    return BifurcationPoint(
-        kind, at.value, bound, at.orbit, mode, nu, frequency, verdict, form.cubic, form.cubic_error, rotation
-    )
-
-
-def _where_it_exists(form: Callable[[float], NormalForm]) -> NormalForm:
-    """The normal form from samples at the largest amplitude, of a falling sequence, at which the motion does not
-    diverge."""
-    for halving in range(6):
-        try:
-            return form(AMPLITUDE * 0.25**halving)
-        except AnalysisError:
-            if halving == 5:
-                raise
-    raise AssertionError  # unreachable
+    point = BifurcationPoint(kind, at.value, bound, at.orbit, mode, nu, frequency, normal_form=form)
+    if form is None or kind in (Kind.FOLD, Kind.TRANSCRITICAL, Kind.BRANCH_POINT):
+        return point
+    point = replace(point, criticality=criticality(form), coefficient=form.cubic, coefficient_error=form.cubic_error)
+    if kind is Kind.NEIMARK_SACKER:
+        point = replace(point, rotation=form.rotation, rotation_error=form.rotation_error)
+    return point
 
 
 def _antisymmetric(system: SystemLike, mode: NDArray[np.inexact]) -> bool:
-    return any(bool(np.abs(matrix @ mode + mode).max() < 1e-6) for matrix in spatial_symmetries(system))
+    reflection = spatial_symmetry(system)
+    return reflection is not None and bool(np.abs(reflection @ mode + mode).max() < 1e-6)
 
 
 def _phased(
