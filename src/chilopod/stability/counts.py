@@ -158,10 +158,14 @@ class Accounts:
                 points.append(self._at_end(root, decided))
         for place in self._ends:
             outer = place < decided[0][0] or place > decided[-1][0]
-            if outer and place in self._spectra.values and not any(
-                (root.place < decided[0][0]) == (place < decided[0][0])
-                and (root.place > decided[-1][0]) == (place > decided[-1][0])
-                for root in kept
+            if (
+                outer
+                and place in self._spectra.values
+                and not any(
+                    (root.place < decided[0][0]) == (place < decided[0][0])
+                    and (root.place > decided[-1][0]) == (place > decided[-1][0])
+                    for root in kept
+                )
             ):
                 end = Root(place, place, place, None, True)
                 if self._is_critical(end):
@@ -174,7 +178,7 @@ class Accounts:
                 if roots[index].place > x:
                     inside.append(roots[index])
                 index += 1
-            if not inside and before == after or (x, y) in self._settled:
+            if (not inside and before == after) or (x, y) in self._settled:
                 if inside:
                     kept += inside
                     points += [self._point(root, 0, None, None) for root in inside]
@@ -199,6 +203,9 @@ class Accounts:
             elif self._tightened(inside[0], x, y):
                 kept += inside
                 again = True
+            elif self._conservative and before == after:  # a collision whose ends are too near each other
+                kept += inside
+                points.append(self._point(inside[0], 0, x, y))
             else:
                 critical = sum(group.multiplicity for group in self._groups(inside[0]))
                 self._remark(f"{after - before:+d} multipliers outside where {critical} are on the circle", (x, y))
@@ -232,9 +239,9 @@ class Accounts:
         errors = self._spectra.margin_errors(root.place)
         if left == right:
             return errors
-        slopes = np.abs(self._spectra.margins(right) - self._spectra.margins(left)) / (right - left)
+        changes = np.abs(self._spectra.margins(right) - self._spectra.margins(left))
         reach = max(4.0 * float(np.spacing(abs(root.place))), root.right - root.left)
-        return np.asarray(errors + slopes * reach)
+        return np.asarray(errors + changes * min(reach / (right - left), 1.0))
 
     def _is_critical(self, root: Root) -> bool:
         return self._spectra.exists(root.place) and bool(self._groups(root))
@@ -249,7 +256,9 @@ class Accounts:
         for event, target in ((Event.MINUS, -1.0), (Event.PLUS, 1.0)):
             errors = self._spectra.distances(root.place, event)[1]
             distances = np.abs(rest - target)
-            near = (distances <= errors[: max(rest.size, 1)].max() + tolerances.max()) if rest.size else np.empty(0, bool)
+            near = (
+                (distances <= errors[: max(rest.size, 1)].max() + tolerances.max()) if rest.size else np.empty(0, bool)
+            )
             # A real multiplier on the circle is nowhere else.
             near = near | ((rest.imag == 0.0) & (rest.real * target > 0.0))
             number = int(near.sum()) - self._idle[event]
@@ -314,7 +323,7 @@ class Accounts:
     def _at_end(self, root: Root, decided: list[tuple[float, int]]) -> Point:
         """A root beyond the last decided place: as if the multipliers went on as they come."""
         first = root.place < decided[0][0]
-        place, count = decided[0] if first else decided[-1]
+        count = decided[0 if first else -1][1]
         number = sum(group.multiplicity for group in self._groups(root))
         surely = int((self._spectra.margins(root.place) > self._tolerances(root)).sum())
         outside = count - surely
@@ -330,17 +339,20 @@ class Accounts:
             self._remark(f"{after - before:+d} multipliers outside, and no matrices in between", (x, y))
             return []
         if self._conservative:
-            return self._bisected(x, y, before)
-        roots = []
+            return self._bisected(x, y, before, after)
+        roots: list[Root] = []
         for rank in range(min(before, after), max(before, after)):
             if self._spectra.left <= 0:
                 self.spent = True
                 break
 
             def margin(place: float, rank: int = rank) -> float:
-                found = self._spectra.margins(place)[rank]
-                return float(found) if np.isfinite(found) else 0.0
+                # Those that rest on the circle are of any rank in between, and add nothing.
+                found = float(self._spectra.margins(place)[rank : rank + self._resting + 1].sum())
+                return found if np.isfinite(found) else 0.0
 
+            if margin(x) * margin(y) >= 0.0:
+                break  # errors were not what they were said to be
             most = min(200, max(self._spectra.left, 1))
             place = float(brentq(margin, x, y, xtol=5e-324, rtol=4 * _EPSILON, maxiter=most, disp=False))
             reach = 4.0 * _EPSILON * abs(place)
@@ -359,12 +371,17 @@ class Accounts:
             self._remark(f"{after - before:+d} multipliers outside, and none found on the circle", (x, y))
         return roots
 
-    def _bisected(self, x: float, y: float, before: int) -> list[Root]:
-        """No root, but a remark: which gap it is where the count of a conservative family changes unexplained."""
+    def _bisected(self, x: float, y: float, before: int, after: int) -> list[Root]:
+        """The root of a conservative family where the count changes: found by halving, as far as counts are certain."""
+        gap = (x, y)
         while x < (middle := 0.5 * x + 0.5 * y) < y and self._spectra.left > 0:
             if not self._spectra.exists(middle) or (count := self.count(middle)) is None:
                 break
             x, y = (middle, y) if count == before else (x, middle)
+        for event in (Event.MINUS, Event.PLUS, Event.PAIR):
+            root = Root(0.5 * x + 0.5 * y, x, y, event, False)
+            if (x, y) != gap and self._is_critical(root) and self._explains(root, after - before):
+                return [root]
         self._remark("multipliers leave the circle, or come back, and none were found to meet", (x, y))
         return []
 
@@ -392,10 +409,9 @@ class Accounts:
         for root in inside[1:]:
             last = roots[-1]
             middle = 0.5 * last.place + 0.5 * root.place
-            if last.place < middle < root.place:
-                if self._spectra.exists(middle) and self.count(middle) is not None:
-                    roots.append(root)
-                    continue
+            if last.place < middle < root.place and self._spectra.exists(middle) and self.count(middle) is not None:
+                roots.append(root)
+                continue
             if last.touch != root.touch:
                 roots[-1] = last if root.touch else root
             else:
