@@ -221,7 +221,11 @@ class _Search:
                 return []
             return _halves(a, b)
         if close.size:
-            touching = np.abs(chebyshev.chebval(close, coefficients)) < noise
+            # The error may fall with the function: it is the one in the middle of a pair that counts.
+            sure = np.zeros(close.size)
+            if self.error is not None:
+                sure = _CLEAR * np.exp(np.minimum(self.error(_places(a, b, close)) - reference, 0.0))
+            touching = np.abs(chebyshev.chebval(close, coefficients)) + uncertain < sure
             if not touching.all() and not self._fine(a, b, _FINEST):
                 curvature = abs(float(chebyshev.chebval(close[~touching][0], chebyshev.chebder(coefficients, 2))))
                 # Wide enough that the pieces beside it are clear of zeros, and the pair in it for certain.
