@@ -238,7 +238,7 @@ def test_multipliers_sixty_orders_apart():
 @pytest.mark.parametrize(("low", "width"), [(0.0, 1e-300), (-1e300, 2e300), (1e6, 1e-3), (-1e-310, 3e-310)])
 def test_parameters_of_any_scale(low, width):
     middle = low + 0.37 * width
-    found = find_crossings(diagonal(lambda p: (p / width - middle / width)), low, low + width)
+    found = find_crossings(diagonal(lambda p: p / width - middle / width), low, low + width)
     assert (found.status, summary(found)) == (Status.COMPLETE, [(PLUS, 1, 1)])
     assert places(found) == pytest.approx([middle], rel=1e-15)
 

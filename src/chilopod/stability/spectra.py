@@ -94,8 +94,11 @@ class Spectra:
         missing = sorted({value for value in wanted if value not in self._known})
         if missing:
             self._compute(np.array(missing))
-        absent = np.full(self.size, np.nan + 0j)
-        return np.array([self._known[v] if self._known[v].size else absent for v in wanted]).reshape(-1, self.size)
+        found = np.full((values.size, self.size), np.nan + 0j)
+        for row, value in zip(found, wanted, strict=True):
+            if self._known[value].size:
+                row[:] = self._known[value]
+        return found
 
     def _compute(self, values: Array) -> None:
         matrices, _ = self._ask(values)

@@ -205,7 +205,8 @@ class _Search:
         # Where the polynomial says nothing there must be one of its zeros at hand, or the end of the piece.
         known = np.concatenate([real, close, [-1.0, 1.0]])
         vague = bool((np.abs(unclear[:, None] - known).min(axis=1) > _NEAR).any()) if unclear.size else False
-        slopes = np.abs(chebyshev.chebval(real, chebyshev.chebder(coefficients)))
+        single = real[(np.abs(real[:, None] - close) > _NEAR).all(axis=1)]
+        slopes = np.abs(chebyshev.chebval(single, chebyshev.chebder(coefficients)))
         vague |= bool((_CLEAR * uncertain > _NEAR * slopes).any())
         if self.skip is not None and self._fine(a, b, _DEEP) and self.skip(a, b):
             return []
