@@ -24,6 +24,7 @@ _ROUNDS = 200
 _ULPS = 64.0
 _GROWTH = 8.0
 _JUMP = 0.5
+_SHADOW = 1.5  # widths of a touch within which a crossing explains it
 _WIDER = 100.0
 _EPSILON = float(np.finfo(float).eps)
 
@@ -111,7 +112,7 @@ class Accounts:
         self._spectra.at(np.array(self._ends))
         roots = [root for root in roots if self._is_critical(root)]
         for _ in range(_ROUNDS):
-            roots, points, again = self._walk(sorted(roots, key=lambda root: root.place))
+            roots, points, again = self._walk(sorted(_without_shadows(roots), key=lambda root: root.place))
             if not again:
                 break
         else:
@@ -434,3 +435,14 @@ class Accounts:
                     break
                 reach *= _GROWTH
         return found
+
+
+def _without_shadows(roots: list[Root]) -> list[Root]:
+    """Roots without the touches that are but the uncertain surroundings of a crossing."""
+    crossings = [root.place for root in roots if not root.touch]
+    return [
+        root
+        for root in roots
+        if not root.touch
+        or not any(abs(place - root.place) <= _SHADOW * (root.right - root.left) for place in crossings)
+    ]

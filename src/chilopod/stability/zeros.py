@@ -218,7 +218,7 @@ class _Search:
             return []
         if uncertain > noise and (uncertain > _RESOLVED or vague):
             if self._fine(a, b, _ROUGH):
-                self.unresolved.append((a, b))
+                (self.flat if self._fine(a, b, _FINEST) else self.unresolved).append((a, b))
                 return []
             return _halves(a, b)
         if close.size:
@@ -271,7 +271,7 @@ class _Search:
             touched = any(piece.a <= start and end <= piece.b for start, end in self.flat)
             if changes != piece.expected and not touched:
                 if self._fine(piece.a, piece.b, _FINEST):
-                    self.unresolved.append((piece.a, piece.b))
+                    self.flat.append((piece.a, piece.b))  # a pair of zeros that rounding hides
                 else:
                     left += _halves(piece.a, piece.b)
                 continue
