@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from chilopod.errors import ParameterError
-from chilopod.stability.counts import Accounts, Root
+from chilopod.stability.counts import Accounts
+from chilopod.stability.critical import Root
 from chilopod.stability.spectra import Event, Matrices, Spectra, margins
 from chilopod.stability.zeros import Interval, Zeros, find_zeros, first_places
 
