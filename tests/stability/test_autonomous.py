@@ -24,7 +24,6 @@ def ring(mu, twist=0.0, spin=2.0, leak=0.7, units=(1.0, 1.0, 1.0)):
         q0 = x * x + y * y
         e = np.exp(2.0 * mu * t)
         grown = mu + q0 * (e - 1.0)
-        q = mu * q0 * e / grown
         turned = spin * t + twist * (0.5 * np.log(grown / mu) - mu * t)
         share = np.sqrt(mu * e / grown)
         c, s = np.cos(turned) * share, np.sin(turned) * share
