@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.capabilities import Autonomous, SystemLike
+from chilopod.stability.capabilities import SystemLike, is_autonomous
 from chilopod.stability.orbits import Orbit, find_orbit, from_known, known_state
 from chilopod.stability.returns import ReturnMap, return_maps
 from chilopod.stability.scales import numerical_balance
@@ -192,7 +192,7 @@ def sweep(systems: Sequence[SystemLike]) -> list[Multipliers]:
     """Multipliers of many systems at their known orbits, on all cores where the systems allow it."""
     if not systems:
         return []
-    if any(isinstance(system, Autonomous) for system in systems):
+    if any(is_autonomous(system) for system in systems):
         return [multipliers(system) for system in systems]
     states = [known_state(system) for system in systems]
     images = return_maps(systems, states)
@@ -246,7 +246,7 @@ def _factors(system: SystemLike, orbit: Orbit) -> tuple[list[Array], Array]:
         if system.symmetry is not None:
             factors[-1] = (system.symmetry * units / units[:, None]) @ factors[-1]
         basis = np.diag(units)
-        if isinstance(system, Autonomous):
+        if is_autonomous(system):
             sections = [_normal_basis(system.velocity(at) / units) for at in states[:-1]]
             sections.append(sections[0])
             factors = [after.T @ f @ before for f, before, after in zip(factors, sections, sections[1:], strict=False)]
