@@ -18,7 +18,7 @@ from chilopod.planar.flow import advance
 from chilopod.robot import load_robot
 from chilopod.stability.floquet import spectrum
 from chilopod.stability.fold import find_fold
-from chilopod.stability.system import find_orbit
+from chilopod.stability.orbits import find_orbit
 from chilopod.steering.criteria import Criteria, Outcome
 from chilopod.steering.radius_law import RadiusLaw
 
@@ -66,8 +66,8 @@ THINGS = {
     "multipliers at a guess": lambda: stability.multipliers(system(-0.1), np.array([-0.3])),
     "sweep": lambda: stability.sweep([MODEL, MODEL]),
     "exponents": lambda: stability.exponents(MODEL),
-    "return map": lambda: find_orbit(MODEL)[1],
-    "spectrum": lambda: spectrum(find_orbit(MODEL)[1]),
+    "return map": lambda: find_orbit(MODEL).image,
+    "spectrum": lambda: spectrum(find_orbit(MODEL).image),
     "located": lambda: stability.locate(pitchfork, (-0.3, 0.4)),
     "fold": lambda: find_fold(system, -0.01, np.array([-0.1]), 1.0),
     "branch": branch,

@@ -23,7 +23,7 @@ from chilopod.stability.capabilities import (
 )
 from chilopod.stability.floquet import Exponents, Multipliers, exponents, multipliers, sweep
 from chilopod.stability.jumps import UndeclaredSwitch
-from chilopod.stability.locate import locate
+from chilopod.stability.locate import Located, locate
 from chilopod.stability.orbits import Orbit, find_orbit
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
 from chilopod.stability.returns import ReturnMap
@@ -45,6 +45,7 @@ __all__ = [
     "FlowsWithError",
     "Kind",
     "KnowsOrbit",
+    "Located",
     "Multipliers",
     "NotAnalytic",
     "Orbit",

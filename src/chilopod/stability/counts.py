@@ -6,12 +6,12 @@ from __future__ import annotations
 import bisect
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from chilopod.stability.critical import Critical, Group, Point, Root
 from chilopod.stability.spectra import Event, Spectra
 from chilopod.stability.zeros import Interval
 
@@ -21,47 +21,11 @@ _CLEARLY = 1e-5  # a multiplier this far from the circle is decided, if errors e
 _ROOM = 1e3
 _GREY = 32.0  # a multiplier between one and this many errors from the circle may have left it or not
 _ROUNDS = 200
-_ULPS = 64.0
 _GROWTH = 8.0
 _JUMP = 0.5
+_SHADOW = 1.5  # widths of a touch within which a crossing explains it
 _WIDER = 100.0
 _EPSILON = float(np.finfo(float).eps)
-
-
-@dataclass(frozen=True)
-class Root:
-    """A place where a multiplier may be critical.
-
-    ``event`` is that of the function that vanishes there, None where a multiplier was followed by its rank; ``touch``
-    is whether the function does not change sign.
-    """
-
-    place: float
-    left: float
-    right: float
-    event: Event | None
-    touch: bool
-
-
-@dataclass(frozen=True)
-class Group:
-    """Multipliers that are critical at the same place of the circle."""
-
-    event: Event
-    multiplicity: int
-    change: int
-    multiplier: complex
-    collision: bool
-
-
-@dataclass(frozen=True)
-class Point:
-    """A root with the multipliers that are critical there."""
-
-    place: float
-    left: float
-    right: float
-    groups: tuple[Group, ...]
 
 
 class Accounts:
@@ -100,6 +64,7 @@ class Accounts:
         self._idle = idle
         self._resting = resting
         self._conservative = conservative
+        self._critical = Critical(spectra, idle, conservative)
         self._parameter = parameter
         self._counts: dict[float, int | None] = {}
         self._settled: set[Interval] = set()  # gaps about which a remark was made
@@ -111,7 +76,7 @@ class Accounts:
         self._spectra.at(np.array(self._ends))
         roots = [root for root in roots if self._is_critical(root)]
         for _ in range(_ROUNDS):
-            roots, points, again = self._walk(sorted(roots, key=lambda root: root.place))
+            roots, points, again = self._walk(sorted(_without_shadows(roots), key=lambda root: root.place))
             if not again:
                 break
         else:
@@ -158,10 +123,14 @@ class Accounts:
                 points.append(self._at_end(root, decided))
         for place in self._ends:
             outer = place < decided[0][0] or place > decided[-1][0]
-            if outer and place in self._spectra.values and not any(
-                (root.place < decided[0][0]) == (place < decided[0][0])
-                and (root.place > decided[-1][0]) == (place > decided[-1][0])
-                for root in kept
+            if (
+                outer
+                and place in self._spectra.values
+                and not any(
+                    (root.place < decided[0][0]) == (place < decided[0][0])
+                    and (root.place > decided[-1][0]) == (place > decided[-1][0])
+                    for root in kept
+                )
             ):
                 end = Root(place, place, place, None, True)
                 if self._is_critical(end):
@@ -174,7 +143,7 @@ class Accounts:
                 if roots[index].place > x:
                     inside.append(roots[index])
                 index += 1
-            if not inside and before == after or (x, y) in self._settled:
+            if (not inside and before == after) or (x, y) in self._settled:
                 if inside:
                     kept += inside
                     points += [self._point(root, 0, None, None) for root in inside]
@@ -199,8 +168,11 @@ class Accounts:
             elif self._tightened(inside[0], x, y):
                 kept += inside
                 again = True
+            elif self._conservative and before == after:  # a collision whose ends are too near each other
+                kept += inside
+                points.append(self._point(inside[0], 0, x, y))
             else:
-                critical = sum(group.multiplicity for group in self._groups(inside[0]))
+                critical = sum(group.multiplicity for group in self._critical.groups(inside[0]))
                 self._remark(f"{after - before:+d} multipliers outside where {critical} are on the circle", (x, y))
                 kept += inside
                 points.append(self._point(inside[0], after - before, x, y))
@@ -220,63 +192,14 @@ class Accounts:
         self._settled.add(gap)
         self.remarks.append(f"{remark}, between {self._parameter(gap[0]):.9g} and {self._parameter(gap[1]):.9g}")
 
-    # ---- what is critical at a root --------------------------------------------------------------------------------
-
-    def _tolerances(self, root: Root) -> Array:
-        """How far from zero the margins at a root may be if the multiplier is on the circle there."""
-        ulps = _ULPS * max(float(np.spacing(abs(root.place))), 0.5 * (root.right - root.left) / _ULPS)
-        values = self._spectra.values
-        here = int(np.searchsorted(values, root.place))
-        left = next((v for v in reversed(values[:here]) if root.place - v >= ulps), root.place)
-        right = next((v for v in values[here:] if v - root.place >= ulps), root.place)
-        errors = self._spectra.margin_errors(root.place)
-        if left == right:
-            return errors
-        slopes = np.abs(self._spectra.margins(right) - self._spectra.margins(left)) / (right - left)
-        reach = max(4.0 * float(np.spacing(abs(root.place))), root.right - root.left)
-        return np.asarray(errors + slopes * reach)
+    # ---- whether a root explains a change ---------------------------------------------------------------------------
 
     def _is_critical(self, root: Root) -> bool:
-        return self._spectra.exists(root.place) and bool(self._groups(root))
-
-    def _groups(self, root: Root) -> list[Group]:
-        """Multipliers that are critical at a root, without those that are so throughout; changes are not known yet."""
-        nu = self._spectra.at(np.array([root.place]))[0]
-        margins, tolerances = self._spectra.margins(root.place), self._tolerances(root)
-        critical = nu[np.abs(margins) <= tolerances]
-        groups = []
-        rest = critical
-        for event, target in ((Event.MINUS, -1.0), (Event.PLUS, 1.0)):
-            errors = self._spectra.distances(root.place, event)[1]
-            distances = np.abs(rest - target)
-            near = (distances <= errors[: max(rest.size, 1)].max() + tolerances.max()) if rest.size else np.empty(0, bool)
-            # A real multiplier on the circle is nowhere else.
-            near = near | ((rest.imag == 0.0) & (rest.real * target > 0.0))
-            number = int(near.sum()) - self._idle[event]
-            if number > 0 and (not self._conservative or root.event in (event, None)):
-                best = complex(rest[near][np.abs(rest[near] - target).argmin()])
-                groups.append(Group(event, number, 0, best, self._conservative and number % 2 == 0))
-            rest = rest[~near]
-        upper = rest[rest.imag > 0.0]
-        if self._conservative:
-            upper = self._meeting(upper) if root.event is Event.PAIR and not root.touch else upper[:0]
-        if upper.size:
-            best = complex(upper[np.abs(np.abs(upper) - 1.0).argmin()])
-            groups.append(Group(Event.PAIR, 2 * upper.size, 0, best, self._conservative))
-        return groups
-
-    @staticmethod
-    def _meeting(upper: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """The two nearest to each other."""
-        if upper.size < 2:
-            return upper[:0]
-        first, second = np.triu_indices(upper.size, 1)
-        nearest = int(np.abs(upper[first] - upper[second]).argmin())
-        return upper[[first[nearest], second[nearest]]]
+        return self._spectra.exists(root.place) and bool(self._critical.groups(root))
 
     def _explains(self, root: Root, change: int) -> bool:
         """Whether a change of the count is what the critical multipliers at a root may do."""
-        groups = self._groups(root)
+        groups = self._critical.groups(root)
         number = sum(group.multiplicity for group in groups)
         if self._conservative and all(group.collision for group in groups):
             return 2 * abs(change) <= number and (root.touch or change != 0)
@@ -286,9 +209,9 @@ class Accounts:
         return abs(change) == number if alone else abs(change) <= number and (change - number) % 2 == 0
 
     def _point(self, root: Root, change: int, x: float | None, y: float | None) -> Point:
-        groups = self._groups(root)
+        groups = self._critical.groups(root)
         if len(groups) > 1 and x is not None and y is not None:
-            changes = [self._outside_near(g, y) - self._outside_near(g, x) for g in groups]
+            changes = [self._critical.outside_near(g, y) - self._critical.outside_near(g, x) for g in groups]
         else:
             changes = [change] * len(groups)
         return Point(
@@ -301,22 +224,12 @@ class Accounts:
             ),
         )
 
-    def _outside_near(self, group: Group, place: float) -> int:
-        """How many of the multipliers nearest to those of a group are outside the circle at a place beside it."""
-        nu = self._spectra.at(np.array([place]))[0]
-        if group.event is Event.PAIR:
-            nu = nu[nu.imag > 0.0]
-            nearest = np.argsort(np.abs(nu - group.multiplier))[: group.multiplicity // 2]
-            return 2 * int((np.abs(nu[nearest]) > 1.0).sum())
-        nearest = np.argsort(np.abs(nu - group.multiplier))[: group.multiplicity]
-        return int((np.abs(nu[nearest]) > 1.0).sum())
-
     def _at_end(self, root: Root, decided: list[tuple[float, int]]) -> Point:
         """A root beyond the last decided place: as if the multipliers went on as they come."""
         first = root.place < decided[0][0]
-        place, count = decided[0] if first else decided[-1]
-        number = sum(group.multiplicity for group in self._groups(root))
-        surely = int((self._spectra.margins(root.place) > self._tolerances(root)).sum())
+        count = decided[0 if first else -1][1]
+        number = sum(group.multiplicity for group in self._critical.groups(root))
+        surely = int((self._spectra.margins(root.place) > self._critical.tolerances(root)).sum())
         outside = count - surely
         change = (2 * outside - number) * (1 if first else -1)
         return self._point(root, change if 0 <= outside <= number else 0, None, None)
@@ -330,17 +243,20 @@ class Accounts:
             self._remark(f"{after - before:+d} multipliers outside, and no matrices in between", (x, y))
             return []
         if self._conservative:
-            return self._bisected(x, y, before)
-        roots = []
+            return self._bisected(x, y, before, after)
+        roots: list[Root] = []
         for rank in range(min(before, after), max(before, after)):
             if self._spectra.left <= 0:
                 self.spent = True
                 break
 
             def margin(place: float, rank: int = rank) -> float:
-                found = self._spectra.margins(place)[rank]
-                return float(found) if np.isfinite(found) else 0.0
+                # Those that rest on the circle are of any rank in between, and add nothing.
+                found = float(self._spectra.margins(place)[rank : rank + self._resting + 1].sum())
+                return found if np.isfinite(found) else 0.0
 
+            if margin(x) * margin(y) >= 0.0:
+                break  # errors were not what they were said to be
             most = min(200, max(self._spectra.left, 1))
             place = float(brentq(margin, x, y, xtol=5e-324, rtol=4 * _EPSILON, maxiter=most, disp=False))
             reach = 4.0 * _EPSILON * abs(place)
@@ -359,12 +275,17 @@ class Accounts:
             self._remark(f"{after - before:+d} multipliers outside, and none found on the circle", (x, y))
         return roots
 
-    def _bisected(self, x: float, y: float, before: int) -> list[Root]:
-        """No root, but a remark: which gap it is where the count of a conservative family changes unexplained."""
+    def _bisected(self, x: float, y: float, before: int, after: int) -> list[Root]:
+        """The root of a conservative family where the count changes: found by halving, as far as counts are certain."""
+        gap = (x, y)
         while x < (middle := 0.5 * x + 0.5 * y) < y and self._spectra.left > 0:
             if not self._spectra.exists(middle) or (count := self.count(middle)) is None:
                 break
             x, y = (middle, y) if count == before else (x, middle)
+        for event in (Event.MINUS, Event.PLUS, Event.PAIR):
+            root = Root(0.5 * x + 0.5 * y, x, y, event, False)
+            if (x, y) != gap and self._is_critical(root) and self._explains(root, after - before):
+                return [root]
         self._remark("multipliers leave the circle, or come back, and none were found to meet", (x, y))
         return []
 
@@ -392,10 +313,9 @@ class Accounts:
         for root in inside[1:]:
             last = roots[-1]
             middle = 0.5 * last.place + 0.5 * root.place
-            if last.place < middle < root.place:
-                if self._spectra.exists(middle) and self.count(middle) is not None:
-                    roots.append(root)
-                    continue
+            if last.place < middle < root.place and self._spectra.exists(middle) and self.count(middle) is not None:
+                roots.append(root)
+                continue
             if last.touch != root.touch:
                 roots[-1] = last if root.touch else root
             else:
@@ -418,3 +338,14 @@ class Accounts:
                     break
                 reach *= _GROWTH
         return found
+
+
+def _without_shadows(roots: list[Root]) -> list[Root]:
+    """Roots without the touches that are but the uncertain surroundings of a crossing."""
+    crossings = [root.place for root in roots if not root.touch]
+    return [
+        root
+        for root in roots
+        if not root.touch
+        or not any(abs(place - root.place) <= _SHADOW * (root.right - root.left) for place in crossings)
+    ]

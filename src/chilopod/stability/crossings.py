@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from chilopod.errors import ParameterError
-from chilopod.stability.counts import Accounts, Root
-from chilopod.stability.spectra import Event, Matrices, Spectra
+from chilopod.stability.counts import Accounts
+from chilopod.stability.critical import Root
+from chilopod.stability.spectra import Event, Matrices, Spectra, margins
 from chilopod.stability.zeros import Interval, Zeros, find_zeros, first_places
 
 Array = NDArray[np.float64]
@@ -31,6 +32,10 @@ _DECADES = 4.0
 _SEARCH = 0.7  # of the budget for the zeros of the functions; the rest for counting
 _IDLE = 1e-4  # factors larger than this are not looked at closely
 _MOSTLY = 0.25  # of the first places may disagree on what vanishes everywhere: errors are estimates
+_MANY = 800  # pairs of multipliers; beyond that the bialternate product has too many zeros that mean nothing
+_PROBES = 65
+_FINEST_PROBE = 1e-6  # of the interval
+_CLOSE = 0.25  # of the nearer end: so far towards the circle a multiplier must be heading
 _EPSILON = float(np.finfo(float).eps)
 
 
@@ -164,7 +169,9 @@ class _Finder:
         trivial = sum(idle[event] * (idle[event] - 1) // 2 for event in (Event.PLUS, Event.MINUS))
         conservative = self.conservative = idle[Event.PAIR] > trivial
         self._remark_on(idle, conservative)
-        events = [e for e in Event if idle[e] < self._factors(e)]
+        events = [e for e in Event if idle[e] < self._factors(e) <= _MANY]
+        if self._factors(Event.PAIR) > _MANY:
+            self._probe()
         found = self._searched(events, idle)
         roots = [root for event in events for root in self._roots(event, idle[event], found[event])]
         accounts = Accounts(self.spectra, (self.a, self.b), idle, resting, conservative, self.parameter)
@@ -210,6 +217,27 @@ class _Finder:
             if numbers.count(0) > _MOSTLY * places.size:
                 return 0
         return int(sorted(numbers)[int(_MOSTLY * len(numbers))])
+
+    def _probe(self) -> None:
+        """Ask for matrices wherever a multiplier may cross the circle and come back: where it heads for the circle on
+        both sides of a gap."""
+        self.remarks.append("so many multipliers: pairs are found by counting, not by a function that vanishes")
+        places = np.linspace(self.a, self.b, _PROBES)
+        while places.size and self.spectra.left > places.size:
+            self.spectra.at(places)
+            known = np.array(self.spectra.values)
+            found = margins(self.spectra.at(known))
+            gaps = np.diff((0.5 * known - 0.5 * self.a) / (0.5 * self.b - 0.5 * self.a))
+            slopes = np.diff(found, axis=0) / gaps[:, None]
+            start, end, gap = found[1:-2], found[2:-1], gaps[1:-1]
+            into, out = slopes[:-2], -slopes[2:]  # both taken towards the inside of the gap
+            with np.errstate(divide="ignore", invalid="ignore"):
+                reach = np.clip((end - start + out * gap[:, None]) / (into + out), 0.0, gap[:, None])
+            towards = np.sign(start) * (start + into * np.nan_to_num(reach))
+            turning = (start * end > 0.0) & (np.sign(start) * into < 0.0) & (np.sign(start) * out < 0.0)
+            again = (turning & (towards < _CLOSE * np.minimum(np.abs(start), np.abs(end)))).any(axis=1)
+            again &= gap > _FINEST_PROBE
+            places = (0.5 * known[1:-2] + 0.5 * known[2:-1])[again]
 
     def _remark_on(self, idle: dict[Event, int], conservative: bool) -> None:
         for event in (Event.PLUS, Event.MINUS):

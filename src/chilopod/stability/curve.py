@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from chilopod.errors import AnalysisError
 from chilopod.frozen import read_only
 from chilopod.stability.branch_points import Anchor, BranchPoint, Step
-from chilopod.stability.capabilities import Autonomous, Family, FlowsEach, SystemLike, returns_per_period
+from chilopod.stability.capabilities import Family, FlowsEach, SystemLike, is_autonomous, returns_per_period
 from chilopod.stability.floquet import across
 from chilopod.stability.returns import ReturnMap, Section, return_map, returned_states, section_at, whole_period
 
@@ -207,7 +207,7 @@ class Curve:
         """Projection along the motion onto the section of a step, in units, shape (n, n)."""
         assert anchor.section is not None
         system = self.system(anchor.last.value)
-        assert isinstance(system, Autonomous)
+        assert is_autonomous(system)
         return self._projection(np.asarray(system.velocity(anchor.section.point)), anchor.section)
 
     def _projection(self, velocity: Array, section: Section) -> Array:
@@ -279,7 +279,7 @@ class Curve:
             system = self.system(value)
             section = section_at(system, x, self.sizes, image.period / image.returns)
             assert section is not None
-            assert isinstance(system, Autonomous)
+            assert is_autonomous(system)
             along = self._projection(np.asarray(system.velocity(x)), section)
             tangent, matrix = np.array(tangent), np.array(matrix)
             tangent[:-1] = along @ tangent[:-1]

@@ -21,12 +21,13 @@ from chilopod.stability.capabilities import (
     FlowsMany,
     FlowsStates,
     FlowsWithError,
-    Scaled,
     SystemLike,
+    given_scale,
+    is_autonomous,
     returns_per_period,
     spatial_symmetries,
 )
-from chilopod.stability.scales import balance, numerical_balance
+from chilopod.stability.scales import sizes
 
 Array = NDArray[np.float64]
 
@@ -98,11 +99,11 @@ class _WholePeriod:
         self.flow = system.flow
         symmetries = spatial_symmetries(system)
         self.spatial_symmetry = np.stack(symmetries) if symmetries else None
-        self.scale = system.scale if isinstance(system, Scaled) else None
+        self.scale = given_scale(system)
         self.flow_with_error = system.flow_with_error if isinstance(system, FlowsWithError) else None
         self.flow_states = system.flow_states if isinstance(system, FlowsStates) else None
         self.velocity = None
-        if isinstance(system, Autonomous):
+        if is_autonomous(system):
             self.guess_period = periods * system.guess_period
             self.velocity = system.velocity
 
@@ -122,7 +123,8 @@ def section_at(
     system, x
         The system and a state, shape (n,).
     scale
-        Sizes of the states, shape (n,): across means at right angles in these units. By default those of the motion.
+        Sizes of the states, shape (n,): across means at right angles in these units. By default
+        :func:`chilopod.stability.scales.sizes`.
     duration
         Of a return; the system's own guess by default.
 
@@ -131,19 +133,23 @@ def section_at(
     AnalysisError
         If the motion rests in this state.
     """
-    if not isinstance(system, Autonomous):
+    if not is_autonomous(system):
         return None
     velocity = _velocity(system, x)
-    if scale is None:
-        d = balance(system.flow(x, 0.0, 0.01 * system.guess_period)[1])
-        scale = np.maximum(np.abs(velocity), 1e-3 * d * float((np.abs(velocity) / d).max()))
-    normal = velocity / scale**2
-    size = float(np.abs(velocity / scale).max())
-    if not size > 0.0:
-        raise AnalysisError("is an equilibrium: the motion rests in it", field="orbit", allowed="a state on an orbit")
     if duration is None:
-        duration = system.guess_period / returns_per_period(system)
+        duration = return_duration(system)
+    if not velocity.any():
+        raise AnalysisError("is an equilibrium: the motion rests in it", field="orbit", allowed="a state on an orbit")
+    if scale is None:
+        scale = sizes(system, x, duration)
+    normal = velocity / scale**2
     return Section(x, normal / float(np.linalg.norm(normal * scale)), duration)
+
+
+def return_duration(system: SystemLike) -> float:
+    """How long a return takes; about, where the period belongs to the orbit."""
+    whole = system.guess_period if is_autonomous(system) else _period(system)
+    return whole / returns_per_period(system)
 
 
 def _velocity(system: Autonomous, x: Array) -> Array:
@@ -170,12 +176,12 @@ def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple
     for a, b in zip(times, times[1:], strict=False):
         passing, factor = system.flow(passing, a, b)
         product = factor @ product
-    # In units in which all entries are alike: one that agrees by chance is as uncertain as the others.
-    units = numerical_balance(derivative)
-    units = units[:, None] / units
+    # In units of the states' sizes: an entry that agrees by chance is as uncertain as the others.
+    size = sizes(system, x, t1 - t0)
+    units = size[:, None] / size
     off = float((np.abs(product - derivative) / units).max())
-    size = float((np.abs(derivative) / units).max())
-    return state, derivative, (10.0 * off + 1e-15 * size) * units
+    largest = float((np.abs(derivative) / units).max())
+    return state, derivative, (10.0 * off + 1e-15 * largest) * units
 
 
 def _check_shapes(state: Array, derivative: Array, n: int) -> None:
@@ -207,9 +213,9 @@ def return_map(system: SystemLike, x: ArrayLike, with_error: bool = True, sectio
     if x.shape != (n,):
         raise ParameterError("has the wrong shape", field="orbit", value=x.shape, allowed=f"({n},)")
     count = returns_per_period(system)
-    if isinstance(system, Autonomous):
+    if is_autonomous(system):
         return _return_to_section(system, x, with_error, section or section_at(system, x))
-    duration = _period(system) / count
+    duration = return_duration(system)
     error: float | Array = np.nan
     if with_error:
         state, jacobian, error = flow_with_error(system, x, 0.0, duration)
@@ -320,8 +326,8 @@ def returned_states(system: SystemLike, states: Array, section: Section | None =
     """
     states = np.array(states)  # a system may write into what it is given
     if section is None:
-        return _turned(system, _carried(system, states, _period(system) / returns_per_period(system)))
-    assert isinstance(system, Autonomous)
+        return _turned(system, _carried(system, states, return_duration(system)))
+    assert is_autonomous(system)
     approach = _APPROACHES[0]
     before = _carried(system, states, (1.0 - approach) * section.duration)
     rests = [_time_to_section(system, x, section, approach * section.duration) for x in before]

@@ -13,10 +13,10 @@ from chilopod.stability.branch_points import BranchPoint, Step
 from chilopod.stability.capabilities import SystemLike, spatial_symmetries
 from chilopod.stability.center_manifold import CriticalOrbit
 from chilopod.stability.curve import Curve
-from chilopod.stability.floquet import Spectrum, spectrum
+from chilopod.stability.floquet import Spectrum, phased, spectrum
 from chilopod.stability.normal_form import NormalForm, normal_form
 from chilopod.stability.orbits import find_orbit
-from chilopod.stability.points import BifurcationPoint, Kind, criticality, kind_at_plus_one
+from chilopod.stability.points import BifurcationPoint, Kind, kind_at_plus_one, with_coefficients
 from chilopod.stability.returns import ReturnMap, Section, returned_states
 from chilopod.stability.spectra import Event
 
@@ -197,7 +197,7 @@ def _point(
     bound: float,
 ) -> BranchPoint:
     nu = complex(spec.values[index])
-    mode, left = _phased(spec.right[:, index], spec.left[:, index])
+    mode, left = phased(spec.right[:, index], spec.left[:, index])
     if place.event is not Event.PAIR:
         mode, left = mode.real.astype(np.complex128), left.real.astype(np.complex128)
     frequency = 0.0
@@ -211,13 +211,9 @@ def _point(
     kind = _kind(system, image, place, mode.real, form)
     if kind is Kind.PERIOD_DOUBLING:
         frequency = np.pi / image.period
-    found = BifurcationPoint(kind, point.value, bound, point.orbit, mode, nu, frequency, normal_form=form)
-    if form is not None and kind not in (Kind.FOLD, Kind.TRANSCRITICAL, Kind.BRANCH_POINT):
-        found = replace(
-            found, criticality=criticality(form), coefficient=form.cubic, coefficient_error=form.cubic_error
-        )
-        if kind is Kind.NEIMARK_SACKER:
-            found = replace(found, rotation=form.rotation, rotation_error=form.rotation_error)
+    found = BifurcationPoint(kind, point.value, bound, point.orbit, mode, nu, frequency, period=image.period)
+    if form is not None:
+        found = with_coefficients(found, form)
     return replace(point, special=kind, bifurcation=found)
 
 
@@ -258,10 +254,3 @@ def _form(
         return normal_form(mapped, critical, uncertainty=uncertainty, scale=sizes)
     except (AnalysisError, ValueError, np.linalg.LinAlgError):
         return None
-
-
-def _phased(right: ComplexArray, left: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-    """The pair with the largest entry of the right vector real and positive, left^H right = 1 kept."""
-    peak = right[np.abs(right).argmax()]
-    turn = np.abs(peak) / peak
-    return right * turn, left * turn

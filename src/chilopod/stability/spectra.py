@@ -21,6 +21,8 @@ Matrices = Callable[[Array], tuple[Array, Array]]
 _COPIES = 2
 _SAFETY = 16.0
 _ROUNDING = 2.0 * np.finfo(float).eps
+_SMALLEST = -1e300  # logarithm of zero
+_LARGEST = 1e150  # modulus beyond which multipliers are all the same
 _TURNING = 1e-6  # imaginary part of a multiplier that is not real, relative to its size
 _SPARE = 8  # factors beside the idle ones that take part in the sum over what may be left out
 _FILL = 1e-30  # of the largest entry, in place of zeros, so that a triangular matrix can be balanced
@@ -92,8 +94,11 @@ class Spectra:
         missing = sorted({value for value in wanted if value not in self._known})
         if missing:
             self._compute(np.array(missing))
-        absent = np.full(self.size, np.nan + 0j)
-        return np.array([self._known[v] if self._known[v].size else absent for v in wanted]).reshape(-1, self.size)
+        found = np.full((values.size, self.size), np.nan + 0j)
+        for row, value in zip(found, wanted, strict=True):
+            if self._known[value].size:
+                row[:] = self._known[value]
+        return found
 
     def _compute(self, values: Array) -> None:
         matrices, _ = self._ask(values)
@@ -220,24 +225,28 @@ class Spectra:
         28, 1987).
         """
         nu = self.at(values)
-        power = 1.0 if event is not Event.PAIR else self.size - 1.0
+        here = np.isfinite(nu).all(axis=1)
+        signs, logs = np.full((2, values.size), np.nan)
+        if here.any():
+            signs[here], logs[here] = symmetric(factors(nu[here], event), idle)
+        return signs, logs - self._bounds(values, event)
+
+    def _bounds(self, values: Array, event: Event) -> Array:
+        """Logarithms of what the functions of an event are divided by; NaN where there is no matrix."""
         stretch = np.array([self._stretch.get(value, np.nan) for value in values.tolist()])
-        signs, logs = symmetric(factors(nu, event), idle)
-        return signs, logs - power * stretch
+        return np.asarray(stretch * (1.0 if event is not Event.PAIR else self.size - 1.0))
 
     def function_error(self, values: Array, event: Event, idle: int) -> Array:
         """Logarithm of what :meth:`function` may be wrong by, shape (k,)."""
         signs, logs = symmetric(factors(self.at(values), event), idle)
-        power = 1.0 if event is not Event.PAIR else self.size - 1.0
         largest = np.full(values.size, -np.inf)
-        with np.errstate(all="ignore"):
-            for copy in np.moveaxis(self.disturbed(values), 1, 0):
-                other_signs, other_logs = symmetric(factors(copy, event), idle)
-                top = np.maximum(logs, other_logs)
-                moved = np.abs(signs * np.exp(logs - top) - other_signs * np.exp(other_logs - top))
-                largest = np.fmax(largest, np.log(moved) + top)
-        stretch = np.array([self._stretch.get(value, np.nan) for value in values.tolist()])
-        return np.asarray(np.nan_to_num(largest - power * stretch, nan=-np.inf) + np.log(_SAFETY))
+        for copy in np.moveaxis(self.disturbed(values), 1, 0):
+            other_signs, other_logs = symmetric(factors(copy, event), idle)
+            top = np.maximum(np.maximum(logs, other_logs), _SMALLEST)
+            with np.errstate(divide="ignore"):
+                moved = np.log(np.abs(signs * np.exp(logs - top) - other_signs * np.exp(other_logs - top)))
+            largest = np.fmax(largest, moved + top)
+        return np.asarray(largest - self._bounds(values, event) + np.log(_SAFETY))
 
 
 def margins(nu: ComplexArray) -> Array:
@@ -253,6 +262,7 @@ def factors(nu: ComplexArray, event: Event) -> ComplexArray:
     if event is Event.PLUS:
         return nu - 1.0
     first, second = _pairs(nu.shape[-1])
+    nu = nu * (_LARGEST / np.maximum(np.abs(nu), _LARGEST))  # so that no product overflows
     return np.asarray(nu[..., first] * nu[..., second] - 1.0)
 
 

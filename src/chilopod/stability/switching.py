@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.branch_points import Anchor, BranchPoint
-from chilopod.stability.capabilities import Autonomous, Family, KnowsOrbit, Scaled, SystemLike
+from chilopod.stability.capabilities import Family, given_scale, is_autonomous, known_orbit
 from chilopod.stability.curve import Curve
 from chilopod.stability.orbits import find_orbit, known_state
 from chilopod.stability.points import BifurcationPoint, Kind
@@ -24,7 +24,6 @@ _SINGULAR = 1e-9  # of the largest singular value: below it another curve passes
 _SAME = 0.999  # cosine between directions that are the same
 _BENT = 0.3  # of a change of state: by so much a map departs from its linear part at the size of a state
 _DECADES = 12
-_PARTS = 16  # of a period, at which an orbit is looked at
 
 
 @dataclass(frozen=True)
@@ -94,7 +93,7 @@ def begin(
     system = family(value)
     guess = known_state(system) if orbit is None else orbit
     found = find_orbit(system if symmetric else whole_period(system, periods), guess, with_error=False)
-    period = found.period if isinstance(system, Autonomous) else None
+    period = found.period if is_autonomous(system) else None
     return Start(float(value), found.state, rising, periods=periods, period=period)
 
 
@@ -140,7 +139,7 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
     mode = point.mode.real
     system = family(point.value)
     period = None
-    if isinstance(system, Autonomous):
+    if is_autonomous(system):
         whole = whole_period(system, periods)
         period = find_orbit(whole, point.orbit, with_error=False).period
     if kind is Kind.PERIOD_DOUBLING:
@@ -157,14 +156,11 @@ def branch_sizes(curve: Curve, x: Array, value: float, section: Section | None) 
     """Sizes of the states along a branch, shape (n,): the system's own, or how far from the orbit its return map is no
     longer linear, or what the interval makes of the orbit, with ratios that the orbit tells."""
     system = curve.system(value)
-    given = system.scale if isinstance(system, Scaled) else None
+    given = given_scale(system)
     if given is not None:
         return given
     image = curve.image(x, value, section)
-    if isinstance(system, Autonomous):  # where on its orbit the state is tells nothing
-        base = sizes(system, *_along_orbit(system, x, image.period))
-    else:
-        base = sizes(system, np.maximum(np.abs(x), np.abs(image.state)), image.jacobian)
+    base = sizes(system, x, image.period / image.returns)
     direction = np.cos(1.0 + 3.0 * np.arange(x.size))
     direction = base * direction / np.abs(direction).max()
     if image.velocity is not None and image.normal is not None:
@@ -196,17 +192,6 @@ def branch_sizes(curve: Curve, x: Array, value: float, section: Section | None) 
         middle = float(np.sqrt(low * high))
         low, high = (middle, high) if bent(middle) is not (step > 1.0) else (low, middle)
     return base * float(np.sqrt(low * high))
-
-
-def _along_orbit(system: SystemLike, x: Array, period: float) -> tuple[Array, Array]:
-    """The largest values of the states on an orbit, shape (n,), and of the derivatives from its start, shape (n, n)."""
-    state, derivative = x, np.eye(x.size)
-    reach, coupling = np.abs(x), np.zeros((x.size, x.size))
-    for _ in range(_PARTS):
-        state, factor = system.flow(np.array(state), 0.0, period / _PARTS)
-        derivative = factor @ derivative
-        reach, coupling = np.maximum(reach, np.abs(state)), np.maximum(coupling, np.abs(derivative))
-    return reach, coupling
 
 
 def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
@@ -304,7 +289,7 @@ def _old_tangent(curve: Curve, start: Start, units: Array) -> Array | None:
         if not curve.between[0] <= value <= curve.between[1]:
             value = start.value
         system = curve.system(value)
-        if not isinstance(system, KnowsOrbit) or system.orbit is None:
+        if known_orbit(system) is None:
             return None
         states.append(np.append(known_state(system), value) / units)
     old = states[0] - states[1]

@@ -205,7 +205,8 @@ class _Search:
         # Where the polynomial says nothing there must be one of its zeros at hand, or the end of the piece.
         known = np.concatenate([real, close, [-1.0, 1.0]])
         vague = bool((np.abs(unclear[:, None] - known).min(axis=1) > _NEAR).any()) if unclear.size else False
-        slopes = np.abs(chebyshev.chebval(real, chebyshev.chebder(coefficients)))
+        single = real[(np.abs(real[:, None] - close) > _NEAR).all(axis=1)]
+        slopes = np.abs(chebyshev.chebval(single, chebyshev.chebder(coefficients)))
         vague |= bool((_CLEAR * uncertain > _NEAR * slopes).any())
         if self.skip is not None and self._fine(a, b, _DEEP) and self.skip(a, b):
             return []
@@ -217,11 +218,15 @@ class _Search:
             return []
         if uncertain > noise and (uncertain > _RESOLVED or vague):
             if self._fine(a, b, _ROUGH):
-                self.unresolved.append((a, b))
+                (self.flat if self._fine(a, b, _FINEST) else self.unresolved).append((a, b))
                 return []
             return _halves(a, b)
         if close.size:
-            touching = np.abs(chebyshev.chebval(close, coefficients)) < noise
+            # The error may fall with the function: it is the one in the middle of a pair that counts.
+            sure = np.zeros(close.size)
+            if self.error is not None:
+                sure = _CLEAR * np.exp(np.minimum(self.error(_places(a, b, close)) - reference, 0.0))
+            touching = np.abs(chebyshev.chebval(close, coefficients)) + uncertain < sure
             if not touching.all() and not self._fine(a, b, _FINEST):
                 curvature = abs(float(chebyshev.chebval(close[~touching][0], chebyshev.chebder(coefficients, 2))))
                 # Wide enough that the pieces beside it are clear of zeros, and the pair in it for certain.
@@ -266,7 +271,7 @@ class _Search:
             touched = any(piece.a <= start and end <= piece.b for start, end in self.flat)
             if changes != piece.expected and not touched:
                 if self._fine(piece.a, piece.b, _FINEST):
-                    self.unresolved.append((piece.a, piece.b))
+                    self.flat.append((piece.a, piece.b))  # a pair of zeros that rounding hides
                 else:
                     left += _halves(piece.a, piece.b)
                 continue
