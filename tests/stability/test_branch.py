@@ -50,10 +50,10 @@ def test_the_branch_of_a_subcritical_pitchfork_folds_back():
 def test_in_pieces_as_in_one():
     (fork,) = locate(abrupt, (-0.3, 0.2))
     start = switch(abrupt, fork)[0]
-    whole = follow(abrupt, start, (-0.3, 0.2), points=12, step=0.05)
-    piece = follow(abrupt, start, (-0.3, 0.2), points=5, step=0.05)
+    whole = follow(abrupt, start, (-0.3, 0.2), points=12, step=0.05, closely=False)
+    piece = follow(abrupt, start, (-0.3, 0.2), points=5, step=0.05, closely=False)
     assert piece.ending is Ending.ENOUGH_POINTS
-    pieces = proceed(abrupt, piece, (-0.3, 0.2), points=7)
+    pieces = proceed(abrupt, piece, (-0.3, 0.2), points=7, closely=False)
     assert (pieces.ending, pieces.scale, pieces.step) == (whole.ending, whole.scale, whole.step)
     assert [point.value for point in pieces.points] == [point.value for point in whole.points]
     assert [point.orbit.tolist() for point in pieces.points] == [point.orbit.tolist() for point in whole.points]

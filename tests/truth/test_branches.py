@@ -259,7 +259,7 @@ def cycles(mu, omega=2.0):
 def test_a_fold_of_cycles(units):
     family = rescaled(cycles, units)
     branch = follow(
-        family, begin(family, 0.2, np.array([1.1, 0.0]) * units, rising=False), (-0.5, 0.3), points=12, closely=False
+        family, begin(family, 0.2, np.array([1.1, 0.0]) * units, rising=False), (-0.5, 0.3), points=25, closely=False
     )
     (fold,) = branch.special_points
     assert fold.special is Kind.FOLD

@@ -99,7 +99,8 @@ class Curve:
                 own = self._family(value)
             except _USER_ERRORS as error:
                 raise AnalysisError(f"has no system here ({error})", field="family", value=value) from error
-            known = own, own if self.symmetric else whole_period(own, self.periods)
+            whole = self.symmetric or (own.symmetry is None and self.periods == 1)
+            known = own, own if whole else whole_period(own, self.periods)
             if len(self._known) >= _KEPT:
                 self._known.clear()
             self._known[value] = known

@@ -206,7 +206,7 @@ def _brackets_from_places(within: Within) -> list[Bracket] | None:
     low, size = within.low, within.step.size
     places = low + 0.5 * (1.0 + _PLACES) * (size - low)
     places[_DEGREE] = size
-    nu = np.array([_multipliers_at(within, place) for place in places.tolist()])
+    nu = np.linalg.eigvals(np.array([_jacobian_at(within, place) for place in places.tolist()])).astype(np.complex128)
     tests = _tests(nu)
     if not np.isfinite(tests).all():
         return None
@@ -230,13 +230,13 @@ def _brackets_from_places(within: Within) -> list[Bracket] | None:
     return [(_EVENTS[i], float(a), float(b))]
 
 
-def _multipliers_at(within: Within, place: float) -> ComplexArray:
+def _jacobian_at(within: Within, place: float) -> Array:
     """Of the return map at a place within a step, on the cubic through its ends where that is close enough."""
     curve, step = within.curve, within.step
     if place == step.size:
-        return np.linalg.eigvals(step.image.jacobian).astype(np.complex128)
+        return step.image.jacobian
     if place == 0.0:
-        return np.linalg.eigvals(_start_jacobian(within)).astype(np.complex128)
+        return _start_jacobian(within)
     moved, matrix = step.between(place)
     last, n = step.start.last, step.image.state.size
     units = curve.units(n)
@@ -251,7 +251,7 @@ def _multipliers_at(within: Within, place: float) -> ComplexArray:
         if not float(np.linalg.norm(exact.moved - moved)) <= _AWAY * step.size:
             raise AnalysisError("the curve is not smooth within the step", field="step")
         image = exact.image
-    return np.linalg.eigvals(image.jacobian).astype(np.complex128)
+    return image.jacobian
 
 
 def _brackets_from_ends(within: Within, turned: bool) -> list[Bracket] | None:
