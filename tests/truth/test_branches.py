@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.stability import Criticality, Ending, Kind, PeriodicSystem, begin, follow, locate, switch
+from chilopod.stability import Criticality, Ending, Kind, PeriodicSystem, begin, follow, from_rhs, locate, switch
 
 
 def of_map(function, derivative, dimension=1, **more):
@@ -225,18 +225,18 @@ def integrated(velocity, jacobian, dimension, guess_period):
     return PeriodicSystem(dimension, None, flow, velocity=velocity, guess_period=guess_period)
 
 
-def cycles(mu, omega=2.0):
-    """r' = r (mu + r^2 - r^4), theta' = omega: orbits r^2 = (1 +- sqrt(1 + 4 mu)) / 2."""
+def radial(constant, linear, omega=2.0):
+    """r' = r (constant + linear r^2 - r^4), theta' = omega."""
 
     def squared(s, duration, steps=20, order=12):
-        """(r^2)' = 2 r^2 (mu + r^2 - r^4) by Taylor series."""
+        """(r^2)' = 2 r^2 (constant + linear r^2 - r^4) by Taylor series."""
         h = duration / steps
         for _ in range(steps):
             a, b, c = [s], [], []
             for k in range(order):
                 b.append(sum(a[i] * a[k - i] for i in range(k + 1)))
                 c.append(sum(a[i] * b[k - i] for i in range(k + 1)))
-                a.append(2 * (mu * a[k] + b[k] - c[k]) / (k + 1))
+                a.append(2 * (constant * a[k] + linear * b[k] - c[k]) / (k + 1))
             s = sum(term * h**k for k, term in enumerate(a))
         return s
 
@@ -250,9 +250,29 @@ def cycles(mu, omega=2.0):
 
     def velocity(x):
         square = x @ x
-        return (mu + square - square**2) * x + omega * np.array([-x[1], x[0]])
+        return (constant + linear * square - square**2) * x + omega * np.array([-x[1], x[0]])
 
     return PeriodicSystem(2, None, flow, velocity=velocity, guess_period=2 * pi / omega)
+
+
+def cycles(mu):
+    """Orbits r^2 = (1 +- sqrt(1 + 4 mu)) / 2."""
+    return radial(mu, 1.0)
+
+
+def ring_of_cycles(mu, radius=0.5):
+    """Orbits (r^2 - 1)^2 + mu^2 = radius^2."""
+    return radial(radius**2 - mu**2 - 1.0, 2.0)
+
+
+def test_an_isola_of_cycles_closes():
+    branch = follow(ring_of_cycles, begin(ring_of_cycles, 0.0, [1.22, 0.0]), (-1.0, 1.0), closely=False)
+    assert branch.ending is Ending.CLOSED
+    assert [point.special for point in branch.special_points] == [Kind.FOLD, Kind.FOLD]
+    assert [point.value for point in branch.special_points] == pytest.approx([0.5, -0.5], abs=1e-9)
+    squares = np.array([point.orbit @ point.orbit for point in branch.points])
+    angles = np.unwrap(np.arctan2([point.value for point in branch.points], squares - 1))
+    assert abs(angles[-1] - angles[0]) == pytest.approx(2 * pi, abs=1e-6)
 
 
 @pytest.mark.parametrize("units", [[1.0, 1.0], [1e9, 1e9], [1e-9, 1e-9]])
@@ -351,6 +371,28 @@ def test_van_der_pol_by_liouville():
         end = solve_ivp(rates, (0, point.period), [*point.orbit, 0.0], method="DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
         assert end[:2] == pytest.approx(point.orbit, abs=1e-7)
         assert point.multipliers[0].real == pytest.approx(exp(end[2]), rel=1e-6)
+
+
+def square(mu):
+    """x' = mu x - x^3 - x y^2 / 2 and the same of y: orbits y = 0 and x = y branch off at 0, mirrored four times."""
+
+    def rhs(t, x):
+        return [mu * x[0] - x[0] ** 3 - 0.5 * x[0] * x[1] ** 2, mu * x[1] - x[1] ** 3 - 0.5 * x[1] * x[0] ** 2]
+
+    generators = np.array([[[0.0, 1.0], [1.0, 0.0]], [[-1.0, 0.0], [0.0, 1.0]]])
+    return from_rhs(rhs, 2, 1.0, orbit=[0.0, 0.0], spatial_symmetry=generators)
+
+
+def test_every_mode_of_a_symmetric_pitchfork_has_its_branch():
+    (point,) = locate(square, (-0.4, 0.5))
+    starts = switch(square, point)
+    assert len(starts) == 4
+    for start in starts:
+        end = follow(square, start, (-0.4, 0.5), points=4, closely=False).points[-1]
+        diagonal = abs(start.mode).min() > 0.5
+        assert end.orbit == pytest.approx(
+            np.sqrt(end.value / (1.5 if diagonal else 1.0)) * np.sign(start.mode), abs=1e-8
+        )
 
 
 def test_tori_and_folds_are_not_switched_at():

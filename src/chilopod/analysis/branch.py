@@ -162,7 +162,8 @@ def resumed(
         raise ParameterError("the saved branch turns to the other side", field="side")
     between = (data.attrs["lowest_si"], data.attrs["highest_si"]) if between is None else between
     (low, high), end = sorted(between), float(data.parameter_si[-1])
-    if not low <= end <= high:
+    ended = data.attrs["ending"] == Ending.LEFT_INTERVAL.label and end in (low, high)
+    if ended or not low <= end <= high:
         unit = robot.unit_of(parameter)
         raise ParameterError(
             "does not hold the saved branch's last point, beyond which nothing is left to follow",

@@ -55,8 +55,11 @@ def _closes_on_orbit(curve: Curve, first: BranchPoint, step: Step) -> Step | Non
         middle = 0.5 * (low + high)
         past = abs(step.between(middle)[0][-1]) > abs(target)
         low, high = (low, middle) if past else (middle, high)
-    part = _part(curve, step, high)
-    if part is None or float(part.tangent[-1] * first.tangent[-1]) <= 0.0:
+    try:
+        part = curve.to_value(step.start, first.value, *step.between(high))
+    except ChilopodError:
+        return None
+    if float(part.tangent[-1] * first.tangent[-1]) <= 0.0:
         return None
     point = part.end.last
     assert point.period is not None

@@ -112,7 +112,8 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
     Returns
     -------
     Of a pitchfork two: along the critical mode and against it. Of a transcritical point and a branch point two: the two
-    directions of the other branch. Of a period doubling one: the two sides are the same orbits, a period later.
+    directions of the other branch. Of a period doubling one: the two sides are the same orbits, a period later. Where
+    there are several critical modes, as a symmetry makes them, so many for each of ``point.modes``.
 
     Raises
     ------
@@ -136,18 +137,22 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
             field="point",
             value=point.value,
         )
-    mode = point.mode.real
+    modes = point.mode.real[None] if point.modes is None else point.modes.real.T
     system = family(point.value)
     period = None
     if is_autonomous(system):
-        whole = whole_period(system, periods)
-        period = find_orbit(whole, point.orbit, with_error=False).period
+        period = find_orbit(whole_period(system, periods), point.orbit, with_error=False).period
     if kind is Kind.PERIOD_DOUBLING:
         twice = None if period is None else 2.0 * period
-        return (Start(point.value, point.orbit, mode=mode, periods=2 * periods, period=twice, bifurcation=point),)
-    crossing = kind is not Kind.PITCHFORK
+        return tuple(
+            Start(point.value, point.orbit, mode=mode, periods=2 * periods, period=twice, bifurcation=point)
+            for mode in modes
+        )
+    # Of several modes each has a branch of its own, and the equation for where two curves cross does not hold.
+    crossing = kind is not Kind.PITCHFORK and len(modes) == 1
     return tuple(
         Start(point.value, point.orbit, True, sign * mode, crossing, old, periods, period, point)
+        for mode in modes
         for sign in (1.0, -1.0)
     )
 
