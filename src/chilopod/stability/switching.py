@@ -23,7 +23,7 @@ _BESIDE = 1e-3  # in units: where second differences are taken
 _SINGULAR = 1e-9  # of the largest singular value: below it another curve passes
 _SAME = 0.999  # cosine between directions that are the same
 _BENT = 0.3  # of a change of state: by so much a map departs from its linear part at the size of a state
-_DECADES = 12
+_DECADES, _HALVINGS = 12, 12  # of the size, on its logarithm
 
 
 @dataclass(frozen=True)
@@ -193,7 +193,7 @@ def branch_sizes(curve: Curve, x: Array, value: float, section: Section | None) 
         derivative = curve.parameter_derivative(x, value, section)
         slope = np.linalg.lstsq(np.eye(n) - image.jacobian * base / base[:, None], derivative / base)[0]
         return base * max(1.0, float(np.abs(slope).max()))
-    for _ in range(2):
+    for _ in range(_HALVINGS):
         middle = float(np.sqrt(low * high))
         low, high = (middle, high) if bent(middle) is not (step > 1.0) else (low, middle)
     return base * float(np.sqrt(low * high))
