@@ -8,6 +8,7 @@ False
 """
 
 from chilopod.stability.branch import Branch, BranchPoint, Ending, begin, follow, leave_pitchfork, proceed
+from chilopod.stability.called import NotAnalytic
 from chilopod.stability.capabilities import (
     FlowsEach,
     FlowsMany,
@@ -22,7 +23,7 @@ from chilopod.stability.floquet import Exponents, Multipliers, exponents, multip
 from chilopod.stability.jumps import UndeclaredSwitch
 from chilopod.stability.locate import locate
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
-from chilopod.stability.rhs import NotAnalytic, from_rhs
+from chilopod.stability.rhs import from_rhs
 from chilopod.stability.system import PeriodicSystem, find_orbit
 
 __all__ = [
