@@ -88,22 +88,23 @@ def check_symmetry(
     """Test S f(t, x) = f(t + shift, S x) at some times and states of all sizes: a wrong symmetry gives wrong
     multipliers in silence."""
     n = base.size
-    turns = np.arange(1.0, 3.0)
-    for size in _SIZES:
-        x = np.array([base + size * np.cos(3.0 * np.arange(n) + turn) for _ in times for turn in turns]).T
-        t = np.repeat(times, turns.size)
-        here = slopes(t, x)
-        there = slopes((t + shift) % period, matrix @ x)
-        off = np.abs(matrix @ here - there)
-        terms = np.abs(matrix) @ np.abs(here) + np.abs(there)
-        largest = np.max(np.where(np.isfinite(terms), terms, 0.0), axis=1, keepdims=True)
-        wrong = off > _SAME * largest
-        if wrong.any():
-            raise ParameterError(
-                f"is no symmetry of the right-hand side, as at t = {t[wrong.any(axis=0)][0]:g}",
-                field=field,
-                allowed="S with S f(t, x) = f(t + T/2, S x)" if shift else "P with P f(t, x) = f(t, P x)",
-            )
+    turns, sizes = np.arange(1.0, 3.0), np.array(_SIZES)
+    # Axes: state, size, turn and time.
+    shape = (n, sizes.size, turns.size, times.size)
+    wave = np.cos(3.0 * np.arange(n)[:, None, None, None] + turns[:, None])
+    x = np.broadcast_to(base[:, None, None, None] + sizes[:, None, None] * wave, shape).reshape(n, -1)
+    t = np.broadcast_to(times, shape[1:]).ravel()
+    here, there = slopes(t, x), slopes((t + shift) % period, matrix @ x)
+    off = np.abs(matrix @ here - there)
+    terms = np.abs(matrix) @ np.abs(here) + np.abs(there)
+    largest = np.where(np.isfinite(terms), terms, 0.0).reshape(shape).max(axis=(2, 3), keepdims=True)
+    wrong = (off.reshape(shape) > _SAME * largest).reshape(n, -1).any(axis=0)
+    if wrong.any():
+        raise ParameterError(
+            f"is no symmetry of the right-hand side, as at t = {t[wrong][0]:g}",
+            field=field,
+            allowed="S with S f(t, x) = f(t + T/2, S x)" if shift else "P with P f(t, x) = f(t, P x)",
+        )
 
 
 def sampled(rhs: Callable[..., ArrayLike], args: tuple[Any, ...], n: int) -> Slopes:

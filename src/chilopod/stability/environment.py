@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from chilopod.stability.tracing import as_traced, stand_in
+from chilopod.stability.standins import stand_in
+from chilopod.stability.traced import as_traced
 
 _PLAIN = (int, bool, str, bytes, complex, type(None), np.integer, np.bool_)
 _OUTSIDE = ("numpy", "scipy", "math", "builtins", "numba")
@@ -121,11 +122,13 @@ def rebuild(value: Any, source: Iterator[Any] | None, seen: dict[int, Any]) -> A
     if isinstance(value, functools.partial):
         function, args, keywords = (rebuild(part, source, seen) for part in (value.func, value.args, value.keywords))
         return functools.partial(function, *args, **keywords)
-    if isinstance(value, types.MethodType) and _own(value.__func__):
-        return types.MethodType(_rebuilt_function(value.__func__, None, seen), value.__self__)
-    call = getattr(type(value), "__call__", None)
-    if callable(value) and _own(call):  # an object with a __call__ of its own
-        return types.MethodType(_rebuilt_function(call, None, seen), value)  # type: ignore[arg-type]
+    if isinstance(value, types.MethodType):
+        inner = python_function(value.__func__)
+        if isinstance(inner, types.FunctionType) and _own(inner):
+            return types.MethodType(_rebuilt_function(inner, None, seen), value.__self__)
+    call = vars(type(value)).get("__call__")
+    if isinstance(call, types.FunctionType) and _own(call):  # an object that is called like a function
+        return types.MethodType(_rebuilt_function(call, None, seen), value)
     return stand_in(value)
 
 

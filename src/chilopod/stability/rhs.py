@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -17,16 +19,18 @@ from chilopod.stability.arguments import (
     finite_array,
     sampled,
 )
-from chilopod.stability.called import CalledFlow
-from chilopod.stability.jumps import warn_of_jumps
+from chilopod.stability.called import CalledFlow, NotAnalytic, is_analytic
+from chilopod.stability.evaluation import evaluate, evaluate_jacobian
+from chilopod.stability.jumps import fast_parts, warn_of_jumps
 from chilopod.stability.system import PeriodicSystem
 from chilopod.stability.taylor import TaylorFlow
-from chilopod.stability.trace import Trace, evaluate, trace
-from chilopod.stability.tracing import Untraceable
+from chilopod.stability.trace import Trace, trace
+from chilopod.stability.traced import Untraceable
 
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-14
+_SAME = 1e-6
 _FLOOR = 0.01
 """Truncation of a Taylor step relative to the tolerance: it costs next to nothing."""
 
@@ -94,21 +98,30 @@ def from_rhs(
     slopes: Slopes
     try:
         traced = trace(rhs, dimension, args, times=(0.0, period), base=base)
-    except Untraceable:
+    except Untraceable as reason:
         check_shape(rhs, args, times, base, (dimension,), "rhs")
         if jacobian is not None:
             check_shape(jacobian, args, times, base, (dimension, dimension), "jacobian")
-        called = CalledFlow(rhs, args, jacobian, edges, times, tolerance)
+        slopes = sampled(rhs, args, dimension)
+        analytic = jacobian is not None or is_analytic(rhs, args, base, times)
+        if not analytic:
+            warnings.warn(
+                f"the right-hand side cannot be traced ({reason}) nor differentiated by a complex step: its derivative "
+                "is taken by differences, with about nine digits",
+                NotAnalytic,
+                stacklevel=2,
+            )
         warn_of_jumps(rhs, args, dimension, edges, start)
+        called = CalledFlow(rhs, args, jacobian, edges, fast_parts(slopes, base, period), analytic, tolerance)
         flows = {
             "flow": called.flow,
             "flow_with_error": called.flow_with_error,
             "flow_states": called.flow_states,
         }
-        slopes = sampled(rhs, args, dimension)
     else:
         if jacobian is not None and traced.fresh:
             check_shape(jacobian, args, times, base, (dimension, dimension), "jacobian")
+            _check_jacobian(jacobian, args, traced, times, base)
         flows = _taylor_flows(traced, edges, tolerance)
 
         def slopes(t: Array, x: Array) -> Array:
@@ -149,6 +162,26 @@ def _taylor_flows(traced: Trace, edges: Array, tolerance: float) -> dict[str, An
         return taylor.states(states, t0, t1, params)
 
     return {"flow": flow, "flow_with_error": flow_with_error, "flow_states": flow_states}
+
+
+def _check_jacobian(
+    jacobian: Callable[..., ArrayLike], args: tuple[Any, ...], traced: Trace, times: Array, base: Array
+) -> None:
+    """A traced function needs no jacobian, but who hands over one that is wrong wants to know."""
+    n = base.size
+    for t, turn in itertools.product(times.tolist(), (1.0, 2.0)):
+        x = base + (float(np.abs(base).max()) or 1.0) * np.cos(3.0 * np.arange(n) + turn)
+        _, right = evaluate_jacobian(traced.tape, t, x, traced.params)
+        with np.errstate(all="ignore"):
+            given = np.asarray(jacobian(t, x.copy(), *args), dtype=np.float64)
+        off = np.abs(given - right) > _SAME * np.maximum(np.abs(right), np.abs(given))
+        if off.any() and np.isfinite(right).all():
+            i, j = np.argwhere(off)[0]
+            raise ParameterError(
+                f"is not the derivative of rhs: entry ({i}, {j}) at t = {t:g} should be {right[i, j]:g}",
+                field="jacobian",
+                value=float(given[i, j]),
+            )
 
 
 def _edges(switch_times: Sequence[float], period: float) -> Array:

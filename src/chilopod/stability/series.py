@@ -77,7 +77,7 @@ def values_at(program: Any, terms: Any, start: int, stop: int, k: int, values: A
             for j in range(1, k + 1):
                 s -= values[b, j] * values[i, k - j]
             s = s / values[b, 0] if values[b, 0] != 0.0 else math.nan
-        elif code == STEP or code == FLOOR:
+        elif code in (STEP, FLOOR):
             if k == 0:
                 s = branches[b]
         elif code == SELECT:

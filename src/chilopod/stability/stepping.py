@@ -22,17 +22,11 @@ import numpy as np
 from chilopod.compiled import fused_njit, parallel_njit
 from chilopod.stability import tape as ops
 from chilopod.stability.crossings import first_exit
-from chilopod.stability.series import LANES, expand, load, values_at
-
-STEP, FLOOR, GUARD = ops.STEP, ops.FLOOR, ops.GUARD
-
-DONE, NOT_FINITE, BUDGET, STALLED, SLIDES, CHATTERS, GRAZES = range(7)
-"""How an integration ends."""
+from chilopod.stability.series import LANES, expand, load
+from chilopod.stability.switching import BUDGET, CHATTERS, DONE, GRAZES, NOT_FINITE, STALLED, cross, settle, start
 
 _ROUNDING = 2.0**-53
 _BLOCK = 64
-_ZERO = 1e-13
-"""A switching function this small, relative to what it was before, is zero."""
 
 
 @fused_njit
@@ -86,13 +80,13 @@ def _first_crossing(
     found, crossing, direction = h, -1, 0.0
     for s in range(switches.shape[1]):
         g = values[switches[1, s]]
-        ends = 2 if switches[0, s] == FLOOR else 1
+        ends = 2 if switches[0, s] == ops.FLOOR else 1
         for end in range(ends):
             # What stays positive on the branch: g, -g, g - floor or floor + 1 - g.
-            sign = (1.0 - 2.0 * end) if switches[0, s] == FLOOR else branches[s]
+            sign = (1.0 - 2.0 * end) if switches[0, s] == ops.FLOOR else branches[s]
             for k in range(order + 1):
                 work[k] = sign * g[k]
-            if switches[0, s] == FLOOR:
+            if switches[0, s] == ops.FLOOR:
                 work[0] -= sign * (branches[s] + end)
             z = first_exit(work, order, found)
             if z >= 0.0 and (crossing < 0 or z < found):
@@ -129,157 +123,6 @@ def _agrees(clocks: Any, table: Any, period: float, t: float, h: float, unit: fl
 
 
 @fused_njit
-def _settle(
-    program: Any,
-    terms: Any,
-    layout: Any,
-    slopes: Any,
-    switches: Any,
-    unit: float,
-    values: Any,
-    tangents: Any,
-    branches: Any,
-    scales: Any,
-) -> int:
-    """Choose the branch of every switch at a state; where its function is zero, by where that goes."""
-    for i in range(layout[3], layout[4]):
-        if program[0, i] == STEP:
-            branches[program[2, i]] = 1.0 if values[program[1, i], 0] >= 0.0 else -1.0
-        elif program[0, i] == FLOOR:
-            branches[program[2, i]] = math.floor(values[program[1, i], 0])
-        values_at(program, terms, i, i + 1, 0, values, branches)
-    for s in range(switches.shape[1]):
-        if switches[0, s] == GUARD:
-            branches[s] = 1.0 if values[switches[1, s], 0] >= 0.0 else -1.0
-    nothing = tangents[:, :, :0]
-    for _ in range(2):
-        expand(program, terms, layout, slopes, 1, values, nothing, branches, layout[4], unit)
-        settled = True
-        for s in range(switches.shape[1]):
-            g = values[switches[1, s], 0]
-            slope = values[switches[1, s], 1]
-            if switches[0, s] == FLOOR:
-                if g == branches[s] and slope < 0.0:
-                    branches[s] -= 1.0
-                    settled = False
-            elif abs(g) <= _ZERO * scales[s] and slope * branches[s] < 0.0:
-                branches[s] = -branches[s]
-                settled = False
-        if settled:
-            return DONE
-    # Changed twice: f points to the switching surface on both sides.
-    for s in range(switches.shape[1]):
-        g = values[switches[1, s], 0]
-        if switches[0, s] != GUARD and abs(g) <= _ZERO * scales[s]:
-            return SLIDES
-    return DONE
-
-
-@fused_njit
-def _start(layout: Any, x: Any, t: float, values: Any, tangents: Any) -> None:
-    n = layout[0]
-    for i in range(n):
-        values[i, 0] = x[i]
-        for lane in range(tangents.shape[2]):
-            tangents[i, 0, lane] = 1.0 if lane == i else 0.0
-    values[n, 0] = t
-
-
-@fused_njit
-def _cross(
-    program: Any,
-    terms: Any,
-    layout: Any,
-    slopes: Any,
-    switches: Any,
-    resets: Any,
-    directions: Any,
-    s: int,
-    direction: float,
-    unit: float,
-    x: Any,
-    t: float,
-    values: Any,
-    tangents: Any,
-    branches: Any,
-    scales: Any,
-    jump: Any,
-) -> tuple[int, int]:
-    """Go through a switch or an event: the state after it in ``x``, its derivative in ``jump``.
-
-    Returns the status, and the number of the event or -1.
-    """
-    n = layout[0]
-    g = switches[1, s]
-    event = -1
-    if switches[0, s] == GUARD and directions[switches[2, s]] * direction >= 0.0:
-        event = switches[2, s]
-    _start(layout, x, t, values, tangents)
-    expand(
-        program,
-        terms,
-        layout,
-        slopes,
-        1,
-        values,
-        tangents,
-        branches,
-        layout[5] if event >= 0 else layout[4],
-        unit,
-    )
-    slope = values[g, 1]
-    gradient = tangents[g, 0].copy()
-    before = np.empty(n)
-    for i in range(n):
-        before[i] = values[i, 1]
-        for j in range(tangents.shape[2]):
-            if j < n:
-                jump[i, j] = 1.0 if i == j else 0.0
-    if switches[0, s] == FLOOR:
-        branches[s] += direction
-    else:
-        branches[s] = direction
-    moves = False
-    if event >= 0:
-        for i in range(n):
-            node = resets[event, i]
-            if node != i:
-                moves = True
-            x[i] = values[node, 0]
-            before[i] = values[node, 1]
-            if tangents.shape[2] > 0:
-                for j in range(n):
-                    jump[i, j] = tangents[node, 0, j]
-    _start(layout, x, t, values, tangents)
-    if moves:
-        status = _settle(program, terms, layout, slopes, switches, unit, values, tangents, branches, scales)
-        if status != DONE:
-            return status, event
-    if switches[0, s] == GUARD and not moves:
-        return DONE, event  # f does not switch here
-    nothing = tangents[:, :, :0]
-    expand(program, terms, layout, slopes, 1, values, nothing, branches, layout[4], unit)
-    if not moves and values[g, 1] * direction < 0.0:
-        return SLIDES, event
-    steepest = 0.0
-    for j in range(gradient.size):
-        steepest = max(steepest, abs(gradient[j]))
-    if steepest > 0.0:
-        differs = False
-        for i in range(n):
-            if values[i, 1] != before[i]:
-                differs = True
-        if differs and slope * direction <= 0.0:
-            return GRAZES, event
-        if differs:
-            for i in range(n):
-                f = (values[i, 1] - before[i]) / slope
-                for j in range(n):
-                    jump[i, j] += f * gradient[j]
-    return DONE, event
-
-
-@fused_njit
 def _absorb(factors: Any, errors: Any, count: int, total: Any, bound: Any) -> None:
     """Multiply the derivative by the factors of a block of steps, and carry the bound of its error.
 
@@ -310,6 +153,7 @@ def advance(
     epsilon: float,
     order: int,
     most_steps: int,
+    shake: float,
     derivative: Any,
     bound: Any,
     events: Any,
@@ -323,6 +167,8 @@ def advance(
         program, terms, numbers, layout, slopes, switches, resets, clocks of the tape, and the directions of its events.
     clock
         Values of the functions of time on a grid over the period, the last of each the largest modulus, and the period.
+    shake
+        Relative error made in every state after every step, of pseudo-random sign: what round-off does, made larger.
     derivative, bound
         Shape (n, n), multiplied by the derivative and carried along; shape (0, 0) for none.
     events
@@ -356,9 +202,10 @@ def advance(
     passed = 0
     in_place = 0
     last = t0 - (t1 - t0)
+    noise = 1
     if count_switches > 0:
-        _start(layout, x, t, values, tangents)
-        status = _settle(program, terms, layout, slopes, switches, unit, values, tangents, branches, scales)
+        start(layout, x, t, values, tangents)
+        status = settle(program, terms, layout, slopes, switches, unit, values, tangents, branches, scales)
     while t < t1 and status == DONE:
         steps += 1
         if steps > most_steps:
@@ -366,7 +213,7 @@ def advance(
             break
         finite = False
         for _ in range(24):
-            _start(layout, x, t, values, tangents)
+            start(layout, x, t, values, tangents)
             expand(program, terms, layout, slopes, order, values, tangents, branches, layout[4], unit)
             s = 0.0
             for i in range(n):
@@ -417,6 +264,9 @@ def advance(
             s = 0.0
             for k in range(order, -1, -1):
                 s = s * h + values[i, k]
+            if shake > 0.0:
+                noise = (noise * 1103515245 + 12345) % 2147483648
+                s *= 1.0 + (shake if noise >= 1073741824 else -shake)
             x[i] = s
             for j in range(size):
                 s = 0.0
@@ -442,7 +292,7 @@ def advance(
         unit *= min(max(h, 1e-3), 1e3) if h > 0.0 else 1.0
         if crossing >= 0:
             crossings += 1
-            status, event = _cross(
+            status, event = cross(
                 program,
                 terms,
                 layout,
@@ -513,6 +363,7 @@ def advance_many(
             epsilon,
             order,
             most_steps,
+            0.0,
             nothing,
             nothing,
             nothing,

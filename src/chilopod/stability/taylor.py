@@ -31,8 +31,8 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.evaluation import evaluate
 from chilopod.stability.tape import Tape
-from chilopod.stability.trace import evaluate
 
 Array = NDArray[np.float64]
 
@@ -143,9 +143,9 @@ class TaylorFlow(ReadOnlyArrays):
         """Carry one state from t0 to t1 >= t0, with its derivative unless ``derived`` is False.
 
         The bound of the error is round-off and the last terms of each step, carried along by the steps' own
-        derivatives, and the difference to a second computation of another order, with other steps and from a start
-        that is off by round-off: entries err alike relative to the first part of the bound, so that is stretched until
-        it covers several times the largest difference of all.
+        derivatives, and the difference to a second computation of another order, with other steps, at the start
+        and after every step off by several times round-off. Entries err alike relative to the first part, so that is
+        stretched until it covers several times the largest difference of all.
 
         Raises
         ------
@@ -157,12 +157,12 @@ class TaylorFlow(ReadOnlyArrays):
         if not bounded:
             size = n if derived else 0
             derivative = np.eye(size)
-            events, steps = self._run(x, t0, t1, params, derivative, np.empty((0, 0)), self.order)
+            events, steps = self._run(x, t0, t1, params, derivative, np.empty((0, 0)), self.order, 0.0)
             return Passage(x, derivative, np.empty((0, 0)), events, steps)
         other_x = x * (1.0 + _SHAKE * np.sign(np.cos(3.0 * np.arange(n) + 1.0)))
         derivative, bound, other = np.eye(n), np.zeros((n, n)), np.eye(n)
-        events, steps = self._run(x, t0, t1, params, derivative, bound, self.order)
-        self._run(other_x, t0, t1, params, other, np.empty((0, 0)), self.order - _OTHER_ORDER)
+        events, steps = self._run(x, t0, t1, params, derivative, bound, self.order, 0.0)
+        self._run(other_x, t0, t1, params, other, np.empty((0, 0)), self.order - _OTHER_ORDER, _SHAKE)
         difference = np.abs(other - derivative)
         known = bound > 0.0
         worst = float(np.max(difference[known] / bound[known], initial=0.0))
@@ -185,7 +185,7 @@ class TaylorFlow(ReadOnlyArrays):
         return states
 
     def _run(
-        self, x: Array, t0: float, t1: float, params: Array, derivative: Array, bound: Array, order: int
+        self, x: Array, t0: float, t1: float, params: Array, derivative: Array, bound: Array, order: int, shake: float
     ) -> tuple[Array, int]:
         events = np.empty((_MOST_EVENTS if self.directions else 0, 2))
         report = np.zeros(4)
@@ -203,6 +203,7 @@ class TaylorFlow(ReadOnlyArrays):
                 self._epsilon,
                 order,
                 self.most_steps,
+                shake,
                 derivative,
                 bound,
                 events,

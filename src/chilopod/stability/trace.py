@@ -12,10 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.stability import tape as ops
 from chilopod.stability.environment import Opaque, describe, python_function, rebuild
-from chilopod.stability.tape import Graph, Tape
-from chilopod.stability.tracing import Concrete, Traced, Untraceable, as_traced, node_of, states
+from chilopod.stability.evaluation import evaluate
+from chilopod.stability.graph import Graph
+from chilopod.stability.ordering import ordered
+from chilopod.stability.tape import Tape
+from chilopod.stability.traced import Concrete, Traced, Untraceable, as_traced, node_of, states
 
 Array = NDArray[np.float64]
 
@@ -169,7 +171,7 @@ def _record(
     slopes = results(rhs, dimension)
     guards = [results(guard, None)[0] for guard in event_functions[::2]]
     resets = [graph.states if reset is None else results(reset, dimension) for reset in event_functions[1::2]]
-    return graph.tape(slopes, guards, resets)
+    return ordered(graph, slopes, guards, resets)
 
 
 def _verify(
@@ -201,47 +203,3 @@ def _verify(
         np.isfinite(real).all(axis=1) & ~np.isfinite(own).all(axis=1)
     ).any():
         raise Untraceable("it gives other values when called again: it has a memory, or chance in it")
-
-
-_VALUES: dict[int, Callable[..., Any]] = {
-    ops.PRODUCT: np.multiply,
-    ops.SQUARE: np.square,
-    ops.QUOTIENT: np.divide,
-    ops.STEP: lambda a: np.where(a >= 0.0, 1.0, -1.0),
-    ops.FLOOR: np.floor,
-    ops.SELECT: lambda a, b, c: np.where(a > 0.0, b, c),
-    ops.EXP: np.exp,
-    ops.SIN: np.sin,
-    ops.COS: np.cos,
-    ops.TAN: np.tan,
-    ops.SINH: np.sinh,
-    ops.COSH: np.cosh,
-    ops.TANH: np.tanh,
-    ops.LOG: np.log,
-    ops.SQRT: np.sqrt,
-    ops.POWER: np.power,
-    ops.ATAN: np.arctan,
-    ops.ASIN: np.arcsin,
-}
-_OPERANDS = {ops.PRODUCT: 2, ops.QUOTIENT: 2, ops.POWER: 2, ops.SELECT: 3}
-
-
-def evaluate(tape: Tape, t: Any, x: Any, params: Array) -> Array:
-    """The values of all nodes, shape (nodes, ...), at times of shape (...) and states of shape (n, ...)."""
-    n, parameters, first = (int(i) for i in tape.layout[:3])
-    t, x = np.asarray(t, dtype=np.float64), np.asarray(x, dtype=np.float64)
-    values = np.zeros((tape.program.shape[1], *np.broadcast_shapes(t.shape, x.shape[1:])))
-    values[:n] = x if x.ndim == values.ndim else x.reshape(n, *([1] * (values.ndim - 1)))
-    values[n] = t
-    values[n + 1 : n + 1 + parameters] = params.reshape(-1, *([1] * (values.ndim - 1)))
-    values[n + 1 + parameters : first] = tape.numbers.reshape(-1, *([1] * (values.ndim - 1)))
-    program = tape.program
-    with np.errstate(all="ignore"):
-        for i in range(first, program.shape[1]):
-            code = int(program[0, i])
-            if code == ops.LINEAR:
-                for weight, node in tape.terms[:, program[1, i] : program[2, i]].T:
-                    values[i] += values[weight] * values[node]
-            else:
-                values[i] = _VALUES[code](*(values[program[1 + j, i]] for j in range(_OPERANDS.get(code, 1))))
-    return values
