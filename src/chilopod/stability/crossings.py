@@ -11,7 +11,7 @@ from chilopod.compiled import njit
 _DEEPEST = 48
 
 
-@njit
+@njit(error_model="numpy")
 def horner(coefficients: Any, order: int, z: float) -> float:
     """The polynomial at z."""
     s = 0.0
@@ -20,7 +20,7 @@ def horner(coefficients: Any, order: int, z: float) -> float:
     return s
 
 
-@njit
+@njit(error_model="numpy")
 def _bernstein(coefficients: Any, order: int, h: float, out: Any) -> None:
     """Bernstein coefficients on [0, h]: b_i = sum over k of C(i, k) / C(order, k) c_k h^k."""
     for i in range(order + 1):
@@ -32,7 +32,7 @@ def _bernstein(coefficients: Any, order: int, h: float, out: Any) -> None:
         out[i] = s
 
 
-@njit
+@njit(error_model="numpy")
 def _refined(coefficients: Any, order: int, low: float, high: float) -> float:
     """The root between a point where a polynomial is not negative and one where it is, by bisection and Newton."""
     z = 0.5 * (low + high)
@@ -55,7 +55,7 @@ def _refined(coefficients: Any, order: int, low: float, high: float) -> float:
     return z
 
 
-@njit
+@njit(error_model="numpy")
 def first_exit(coefficients: Any, order: int, h: float) -> float:
     """The first z in [0, h] after which a polynomial is negative; -1 if there is none.
 

@@ -25,7 +25,7 @@ EXP, SIN, COS, TAN, SINH, COSH, TANH = ops.EXP, ops.SIN, ops.COS, ops.TAN, ops.S
 LOG, SQRT, POWER, ATAN, ASIN = ops.LOG, ops.SQRT, ops.POWER, ops.ATAN, ops.ASIN
 
 
-@fused_njit
+@fused_njit(error_model="numpy")
 def _function(code: int, a: float, b: float) -> float:
     if code == EXP:
         return math.exp(a) if a < 709.7 else math.inf
@@ -52,7 +52,7 @@ def _function(code: int, a: float, b: float) -> float:
     return math.asin(a) if abs(a) <= 1.0 else math.nan
 
 
-@fused_njit
+@fused_njit(error_model="numpy")
 def values_at(program: Any, terms: Any, start: int, stop: int, k: int, values: Any, branches: Any) -> None:
     """Coefficient k of the operations from ``start`` up to ``stop``."""
     for i in range(start, stop):
@@ -92,7 +92,7 @@ def values_at(program: Any, terms: Any, start: int, stop: int, k: int, values: A
         values[i, k] = s
 
 
-@fused_njit
+@fused_njit(error_model="numpy")
 def _convolve(tangents: Any, values: Any, i: int, w: int, a: int, first: int, k: int, factor: float) -> None:
     """Add factor sum of w[j] da[k - j], j from ``first``, to the tangents of order k of node i."""
     for lane in range(0, tangents.shape[2], LANES):
@@ -112,7 +112,7 @@ def _convolve(tangents: Any, values: Any, i: int, w: int, a: int, first: int, k:
         tangents[i, k, lane + 3] += factor * s3
 
 
-@fused_njit
+@fused_njit(error_model="numpy")
 def tangents_at(program: Any, terms: Any, start: int, stop: int, k: int, values: Any, tangents: Any) -> None:
     """The same for the tangents, where they are needed; the values of order k have to be there."""
     lanes = tangents.shape[2]
@@ -157,7 +157,7 @@ def tangents_at(program: Any, terms: Any, start: int, stop: int, k: int, values:
             _convolve(tangents, values, i, program[3, i], a, 0, k, -1.0 if code == COS else 1.0)
 
 
-@fused_njit
+@fused_njit(error_model="numpy")
 def load(program: Any, terms: Any, numbers: Any, layout: Any, params: Any, values: Any) -> None:
     """Numbers, parameters and what depends on them only; the other coefficients of these nodes have to be zero."""
     n = layout[0]
@@ -169,7 +169,7 @@ def load(program: Any, terms: Any, numbers: Any, layout: Any, params: Any, value
         values_at(program, terms, i, i + 1, 0, values, numbers)
 
 
-@fused_njit
+@fused_njit(error_model="numpy")
 def expand(
     program: Any,
     terms: Any,

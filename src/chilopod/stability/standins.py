@@ -133,6 +133,11 @@ def _norm(value: Any, ord: Any = None, axis: Any = None, **_: Any) -> Any:
     return np.sqrt(np.add.reduce(as_traced(value) ** 2, axis=axis))
 
 
+def _mean(value: Any, axis: Any = None, **_: Any) -> Any:
+    array = as_traced(value)
+    return np.add.reduce(array, axis=axis) / (array.size if axis is None else array.shape[axis])
+
+
 def _extreme(ufunc: np.ufunc) -> Callable[..., Any]:
     return lambda value, axis=None, **_: ufunc.reduce(as_traced(value), axis=axis)
 
@@ -144,6 +149,7 @@ _OWN: dict[Any, Callable[..., Any]] = {
     np.linalg.norm: _norm,
     np.real: lambda value: value,
     np.imag: lambda value: np.zeros(np.shape(value)),
+    np.mean: _mean,
     np.max: _extreme(np.maximum),
     np.amax: _extreme(np.maximum),
     np.min: _extreme(np.minimum),

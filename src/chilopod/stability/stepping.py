@@ -16,10 +16,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numba
 import numpy as np
 
-from chilopod.compiled import fused_njit, parallel_njit
+from chilopod.compiled import fused_njit
 from chilopod.stability import tape as ops
 from chilopod.stability.crossings import first_exit
 from chilopod.stability.series import LANES, expand, load
@@ -29,7 +28,7 @@ _ROUNDING = 2.0**-53
 _BLOCK = 64
 
 
-@fused_njit
+@fused_njit(error_model="numpy")
 def _allowed(coefficients: Any, order: int, h: float, epsilon: float) -> float:
     """The largest step up to h at which the last two terms are below epsilon times the largest of the first half."""
     for q in range(order, order - 2, -1):
@@ -59,7 +58,7 @@ def _allowed(coefficients: Any, order: int, h: float, epsilon: float) -> float:
     return h
 
 
-@fused_njit
+@fused_njit(error_model="numpy")
 def _step_size(layout: Any, switches: Any, order: int, h: float, epsilon: float, values: Any, tangents: Any) -> float:
     for i in range(layout[0]):
         h = _allowed(values[i], order, h, epsilon)
@@ -72,7 +71,7 @@ def _step_size(layout: Any, switches: Any, order: int, h: float, epsilon: float,
     return h
 
 
-@fused_njit
+@fused_njit(error_model="numpy")
 def _first_crossing(
     switches: Any, order: int, h: float, values: Any, branches: Any, work: Any
 ) -> tuple[float, int, float]:
@@ -94,7 +93,7 @@ def _first_crossing(
     return found, crossing, direction
 
 
-@fused_njit
+@fused_njit(error_model="numpy")
 def _agrees(clocks: Any, table: Any, period: float, t: float, h: float, unit: float, order: int, values: Any) -> float:
     """A step within which the series of functions of time agree with their values on a grid over the period."""
     if clocks.size == 0 or table.shape[1] < 2:
@@ -122,7 +121,7 @@ def _agrees(clocks: Any, table: Any, period: float, t: float, h: float, unit: fl
         at += 1
 
 
-@fused_njit
+@fused_njit(error_model="numpy")
 def _absorb(factors: Any, errors: Any, count: int, total: Any, bound: Any) -> None:
     """Multiply the derivative by the factors of a block of steps, and carry the bound of its error.
 
@@ -142,7 +141,7 @@ def _absorb(factors: Any, errors: Any, count: int, total: Any, bound: Any) -> No
     total[:] = before[count] @ total
 
 
-@fused_njit
+@fused_njit(error_model="numpy", nogil=True)
 def advance(
     tape: Any,
     clock: Any,
@@ -168,7 +167,7 @@ def advance(
     clock
         Values of the functions of time on a grid over the period, the last of each the largest modulus, and the period.
     shake
-        Relative error made in every state after every step, of pseudo-random sign: what round-off does, made larger.
+        Relative error made in every state after every step, and in the time before it: round-off, enlarged.
     derivative, bound
         Shape (n, n), multiplied by the derivative and carried along; shape (0, 0) for none.
     events
@@ -214,6 +213,8 @@ def advance(
         finite = False
         for _ in range(24):
             start(layout, x, t, values, tangents)
+            if shake > 0.0:
+                values[n, 0] = t * (1.0 + (0.5 * shake if steps % 3 else -shake))
             expand(program, terms, layout, slopes, order, values, tangents, branches, layout[4], unit)
             s = 0.0
             for i in range(n):
@@ -334,38 +335,3 @@ def advance(
         _absorb(factors, errors, in_block, derivative, bound)
     report[0], report[1], report[2], report[3] = steps, crossings, passed, t
     return status
-
-
-@parallel_njit
-def advance_many(
-    tape: Any,
-    clock: Any,
-    params: Any,
-    states: Any,
-    t0: float,
-    t1: float,
-    epsilon: float,
-    order: int,
-    most_steps: int,
-    statuses: Any,
-) -> None:
-    """Carry states, shape (states, n), without derivatives, in place; ``params`` has one row each."""
-    for i in numba.prange(states.shape[0]):
-        # One thread, one state: the answer does not depend on their number.
-        nothing = np.empty((0, 0))
-        statuses[i] = advance(
-            tape,
-            clock,
-            params[i],
-            states[i],
-            t0,
-            t1,
-            epsilon,
-            order,
-            most_steps,
-            0.0,
-            nothing,
-            nothing,
-            nothing,
-            np.empty(4),
-        )

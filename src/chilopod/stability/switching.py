@@ -20,7 +20,7 @@ _ZERO = 1e-13
 """A switching function this small, relative to what it was before, is zero."""
 
 
-@fused_njit
+@fused_njit(error_model="numpy")
 def settle(
     program: Any,
     terms: Any,
@@ -67,7 +67,7 @@ def settle(
     return DONE
 
 
-@fused_njit
+@fused_njit(error_model="numpy")
 def start(layout: Any, x: Any, t: float, values: Any, tangents: Any) -> None:
     """Set the state and the time from which a series starts; the tangents are those with respect to that state."""
     n = layout[0]
@@ -78,7 +78,36 @@ def start(layout: Any, x: Any, t: float, values: Any, tangents: Any) -> None:
     values[n, 0] = t
 
 
-@fused_njit
+@fused_njit(error_model="numpy")
+def _carry_over(
+    program: Any,
+    terms: Any,
+    layout: Any,
+    switches: Any,
+    switched: int,
+    surfaces: Any,
+    values: Any,
+    branches: Any,
+    scales: Any,
+) -> None:
+    """Choose anew the branches of the switches whose own functions jump where another one switches."""
+    for i in range(layout[3], layout[4]):
+        if program[0, i] == STEP or program[0, i] == FLOOR:
+            s = program[2, i]
+            g = values[program[1, i], 0]
+            if s != switched and abs(g - surfaces[s]) > _ZERO * scales[s]:
+                if program[0, i] == FLOOR:
+                    branches[s] = math.floor(g)
+                else:
+                    branches[s] = 1.0 if g >= 0.0 else -1.0
+        values_at(program, terms, i, i + 1, 0, values, branches)
+    for s in range(switches.shape[1]):
+        g = values[switches[1, s], 0]
+        if switches[0, s] == GUARD and abs(g - surfaces[s]) > _ZERO * scales[s]:
+            branches[s] = 1.0 if g >= 0.0 else -1.0
+
+
+@fused_njit(error_model="numpy")
 def cross(
     program: Any,
     terms: Any,
@@ -122,6 +151,7 @@ def cross(
     )
     slope = values[g, 1]
     gradient = tangents[g, 0].copy()
+    surfaces = values[switches[1], 0]
     before = np.empty(n)
     for i in range(n):
         before[i] = values[i, 1]
@@ -148,8 +178,10 @@ def cross(
         status = settle(program, terms, layout, slopes, switches, unit, values, tangents, branches, scales)
         if status != DONE:
             return status, event
-    if switches[0, s] == GUARD and not moves:
+    elif switches[0, s] == GUARD:
         return DONE, event  # f does not switch here
+    else:
+        _carry_over(program, terms, layout, switches, s, surfaces, values, branches, scales)
     nothing = tangents[:, :, :0]
     expand(program, terms, layout, slopes, 1, values, nothing, branches, layout[4], unit)
     if not moves and values[g, 1] * direction < 0.0:

@@ -23,12 +23,14 @@ from __future__ import annotations
 
 import functools
 import math
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chilopod.cores import cores
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.evaluation import evaluate
@@ -39,9 +41,10 @@ Array = NDArray[np.float64]
 RESOLUTION = 4096
 """A pulse in time has to be seen on a grid of so many points over the period; then it is resolved exactly."""
 
-_MOST_WORK = 3e7
+_MOST_WORK = 1e7
 _FEWEST_STEPS = 5000
 _MOST_EVENTS = 4096
+_FEWEST_PER_THREAD = 16
 _LEAST_TOLERANCE = 1.2e-16
 _OTHER_ORDER = 4
 _OTHER = 5.0  # two independent errors differ by less than a fifth of them rarely enough
@@ -113,7 +116,9 @@ class TaylorFlow(ReadOnlyArrays):
     directions: tuple[float, ...] = ()
     tolerance: float = _LEAST_TOLERANCE
     _arrays: tuple[Any, ...] = field(init=False, repr=False, compare=False)
-    _clocks: dict[str, Any] = field(init=False, repr=False, compare=False, default_factory=dict)
+    _clocks: list[tuple[bytes | None, Array]] = field(
+        init=False, repr=False, compare=False, default_factory=lambda: [(None, _NOTHING)]
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -153,16 +158,17 @@ class TaylorFlow(ReadOnlyArrays):
             If the motion does not reach t1: it diverges, slides, chatters, grazes, or takes too many steps.
         """
         n = self.tape.dimension
-        x = np.array(x, dtype=np.float64)
+        # Copies, because compiled code is compiled anew for arrays that are read-only.
+        x, params = np.array(x, dtype=np.float64), np.array(params, dtype=np.float64)
         if not bounded:
             size = n if derived else 0
             derivative = np.eye(size)
-            events, steps = self._run(x, t0, t1, params, derivative, np.empty((0, 0)), self.order, 0.0)
-            return Passage(x, derivative, np.empty((0, 0)), events, steps)
+            events, steps = self._run(x, t0, t1, params, derivative, _NOTHING, self.order, 0.0)
+            return Passage(x, derivative, _NOTHING, events, steps)
         other_x = x * (1.0 + _SHAKE * np.sign(np.cos(3.0 * np.arange(n) + 1.0)))
         derivative, bound, other = np.eye(n), np.zeros((n, n)), np.eye(n)
         events, steps = self._run(x, t0, t1, params, derivative, bound, self.order, 0.0)
-        self._run(other_x, t0, t1, params, other, np.empty((0, 0)), self.order - _OTHER_ORDER, _SHAKE)
+        self._run(other_x, t0, t1, params, other, _NOTHING, self.order - _OTHER_ORDER, _SHAKE)
         difference = np.abs(other - derivative)
         known = bound > 0.0
         worst = float(np.max(difference[known] / bound[known], initial=0.0))
@@ -172,16 +178,19 @@ class TaylorFlow(ReadOnlyArrays):
     def states(self, states: Array, t0: float, t1: float, params: Array) -> Array:
         """Carry many states, shape (states, n); ``params`` has shape (parameters,) or (states, parameters)."""
         states = np.array(states, dtype=np.float64, order="C")
-        rows = np.atleast_2d(np.asarray(params, dtype=np.float64))
-        rows = np.ascontiguousarray(np.broadcast_to(rows, (states.shape[0], rows.shape[1])))
-        statuses = np.zeros(states.shape[0], dtype=np.int64)
-        clock = self._clock(rows[0])
-        for a, b in self._pieces(t0, t1):
-            _compiled().advance_many(
-                self._arrays, clock, rows, states, a, b, self._epsilon, self.order, self.most_steps, statuses
-            )
-            if statuses.any():
-                raise _failure(int(statuses[statuses != 0][0]), b)
+        params = np.asarray(params, dtype=np.float64)
+        rows = np.array(np.broadcast_to(params, (states.shape[0], params.shape[-1])))
+
+        def carry(numbers: range) -> None:
+            for i in numbers:
+                self._run(states[i], t0, t1, rows[i], _NOTHING, _NOTHING, self.order, 0.0)
+
+        threads = min(cores(), states.shape[0] // _FEWEST_PER_THREAD)
+        if threads > 1:
+            with ThreadPoolExecutor(threads) as pool:
+                list(pool.map(carry, (range(i, states.shape[0], threads) for i in range(threads))))
+        else:
+            carry(range(states.shape[0]))
         return states
 
     def _run(
@@ -219,18 +228,21 @@ class TaylorFlow(ReadOnlyArrays):
     def _clock(self, params: Array) -> tuple[Array, float]:
         if self.tape.clocks.size == 0:
             return _NO_CLOCK
-        key = params.tobytes()
-        if self._clocks.get("key") != key:
-            self._clocks.update(key=key, table=_clock_table(self.tape, self.period, params))
-        return self._clocks["table"], self.period
+        key, (known, table) = params.tobytes(), self._clocks[0]
+        if known != key:
+            table = _clock_table(self.tape, self.period, params)
+            self._clocks[0] = key, table
+        return table, self.period
 
     def _pieces(self, t0: float, t1: float) -> list[tuple[float, float]]:
         """[t0, t1] cut at the edges."""
+        t0, t1 = float(t0), float(t1)
         if len(self.edges) == 0:
             return [(t0, t1)] if t1 > t0 else []
         return pieces(np.asarray(self.edges), self.period, t0, t1)
 
 
+_NOTHING = np.empty((0, 0))
 _NO_CLOCK = (np.zeros((0, 0)), 1.0)
 
 

@@ -45,7 +45,7 @@ class Trace:
     fresh: bool
 
 
-_Kept = dict[Any, tuple[tuple[int, ...], dict[tuple[float, ...], Tape | str]]]
+_Kept = dict[Any, tuple[tuple[int, ...], dict[tuple[float, ...], Tape]]]
 _KEPT: weakref.WeakKeyDictionary[types.CodeType, _Kept] = weakref.WeakKeyDictionary()
 
 
@@ -94,22 +94,16 @@ def trace(
     known = tapes.get(tuple(floats[i] for i in baked))
     fresh = known is None
     if known is None:
-        try:
-            known, baked = _traced(functions, dimension, args, floats, key is not None, baked)
-            _verify(known, _open(values, baked), rhs, args, times, base)
-        except Untraceable as reason:
-            known = str(reason)
+        before = baked
+        known, baked = _traced(functions, dimension, args, floats, key is not None, baked)
+        _verify(known, _open(values, baked), rhs, args, times, base)
         if key is not None:
             if len(kept) >= _MOST_KEPT:
                 kept.clear()
-            if kept.get(key, (None, None))[0] != baked:
+            if baked != before or len(tapes) >= _MOST_KEPT:
                 tapes = {}
-            elif len(tapes) >= _MOST_KEPT:
-                tapes.clear()
             tapes[tuple(floats[i] for i in baked)] = known
             kept[key] = (baked, tapes)
-    if isinstance(known, str):
-        raise Untraceable(known)
     return Trace(known, _open(values, baked), fresh)
 
 

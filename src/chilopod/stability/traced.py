@@ -256,6 +256,10 @@ class TracedArray(np.ndarray[Any, np.dtype[Any]]):
         """The smallest."""
         return np.minimum.reduce(self, axis=axis)
 
+    def mean(self, axis: Any = None, **_: Any) -> Any:  # type: ignore[override]
+        """The arithmetic mean."""
+        return REPLACED[np.mean](self, axis)
+
     def clip(self, low: Any = None, high: Any = None, **_: Any) -> Any:  # type: ignore[override]
         """Between bounds."""
         return REPLACED[np.clip](self, low, high)
