@@ -86,7 +86,7 @@ def ordered(
         slopes=np.array([place[i] for i in slopes], dtype=np.int64),
         switches=np.array(switches, dtype=np.int64).reshape(-1, 3).T.copy(),
         resets=np.array([[place[i] for i in reset] for reset in resets], dtype=np.int64).reshape(-1, len(slopes)),
-        clocks=np.array([place[i] for i in _clocks(graph, every, flat, [*slopes, *guards])], dtype=np.int64),
+        clocks=np.array([place[i] for i in _clocks(graph, every, flat)], dtype=np.int64),
     )
 
 
@@ -150,7 +150,7 @@ def _live(graph: Graph, roots: Sequence[int], every: Sequence[int], flat: Terms)
     return live
 
 
-def _clocks(graph: Graph, every: Sequence[int], flat: Terms, roots: Sequence[int]) -> list[int]:
+def _clocks(graph: Graph, every: Sequence[int], flat: Terms) -> list[int]:
     plain: set[int] = set()  # what a Taylor series sees from everywhere
     for node in every:
         code, operands = graph.nodes[node]
@@ -170,8 +170,6 @@ def _clocks(graph: Graph, every: Sequence[int], flat: Terms, roots: Sequence[int
                 simple = code in (STEP, FLOOR) and operands[0] in plain
             if simple:
                 plain.add(node)
-    used = set(roots)
-    for node in every:
-        if graph.depends[node] == MOVING or graph.nodes[node][0] in (STEP, FLOOR):
-            used.update(_operands(graph, node, flat))
-    return [i for i in every if i in used and graph.depends[i] == TIMED and i not in plain]
+    # Sums and products of these show what they show, but drown a small tail in a large constant.
+    combined = (LINEAR, PRODUCT, SQUARE, SELECT, STEP, FLOOR)
+    return [i for i in every if graph.depends[i] == TIMED and i not in plain and graph.nodes[i][0] not in combined]

@@ -26,6 +26,8 @@ from chilopod.stability.switching import BUDGET, CHATTERS, DONE, GRAZES, NOT_FIN
 
 _ROUNDING = 2.0**-53
 _BLOCK = 64
+_SAME = 3e-13
+"""Round-off in a pulse of a thousandth of the period; a narrower one costs a step at every point of the grid in it."""
 
 
 @fused_njit(error_model="numpy")
@@ -115,7 +117,7 @@ def _agrees(clocks: Any, table: Any, period: float, t: float, h: float, unit: fl
                     size = size * z + abs(values[clocks[c], k])
                 value = table[c, row]
                 # Nothing but this part of the largest value may be passed over.
-                if not abs(s - value) <= 1e-10 * abs(value) + 1e-15 * size + 1e-17 * table[c, table.shape[1] - 1]:
+                if not abs(s - value) <= _SAME * abs(value) + 1e-15 * size + 1e-17 * table[c, table.shape[1] - 1]:
                     before = (u - spacing) / unit
                     return before if before > 0.1 * z else 0.5 * min(h, z)
         at += 1

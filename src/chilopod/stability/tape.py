@@ -61,8 +61,8 @@ class Tape(ReadOnlyArrays):
     resets
         Nodes of the resets, shape (events, n).
     clocks
-        Nodes that depend on time only and are more than a polynomial in t, cos(a t), sin(a t): these may hold pulses
-        that a Taylor series does not see.
+        Functions of time alone that are more than polynomials in t, cos(a t), sin(a t): these may hold pulses that a
+        Taylor series does not see.
     """
 
     program: Integers
