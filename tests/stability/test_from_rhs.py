@@ -94,9 +94,9 @@ def test_no_false_alarm_for_declared_switches():
 
 
 def test_no_alarm_where_a_function_is_not_defined_everywhere():
+    system = from_rhs(lambda t, x: [1 - x[0] ** 0.5 if x[0] > 0 else 1 / 0], 1, 2.0)
     with pytest.warns(NotAnalytic):
-        system = from_rhs(lambda t, x: [1 - x[0] ** 0.5 if x[0] > 0 else 1 / 0], 1, 2.0)
-    found = multipliers(system, [1.1])
+        found = multipliers(system, [1.1])
     assert found.orbit[0] == pytest.approx(1.0, abs=1e-12)
     assert abs(found.values[0] - exp(-1.0)) <= found.error_bound
 
@@ -126,9 +126,9 @@ def test_a_branch_on_the_state_is_differenced_and_warned_of():
     def absolute(v):
         return fabs(v) if v > 0 else -v
 
+    system = from_rhs(lambda t, x: [-x[0] * absolute(2.0 + x[0])], 1, 1.5, orbit=[0.0])
     with pytest.warns(NotAnalytic, match="a branch"):
-        system = from_rhs(lambda t, x: [-x[0] * absolute(2.0 + x[0])], 1, 1.5, orbit=[0.0])
-    found = multipliers(system)
+        found = multipliers(system)
     assert found.values[0] == pytest.approx(exp(-3.0), rel=1e-8)
     assert abs(found.values[0] - exp(-3.0)) <= found.error_bound < 1e-6
 
@@ -143,9 +143,9 @@ def test_not_analytic_in_one_part_of_the_period_only(compiled):
             slope[0] -= abs(x[0] + 1.0) - 1.0
         return slope
 
+    system = from_rhs(numba.njit(rhs) if compiled else rhs, 1, 2.0, switch_times=[1.0], orbit=[0.0])
     with pytest.warns(NotAnalytic):
-        system = from_rhs(numba.njit(rhs) if compiled else rhs, 1, 2.0, switch_times=[1.0], orbit=[0.0])
-    found = multipliers(system)
+        found = multipliers(system)
     assert found.values[0] == pytest.approx(exp(-3.0), rel=1e-8)
     assert abs(found.values[0] - exp(-3.0)) <= found.error_bound
 
@@ -176,6 +176,59 @@ def test_a_wrong_jacobian_is_refused():
     with pytest.raises(ParameterError, match=r"entry \(1, 0\) at .* should be -1") as error:
         from_rhs(oscillator, 2, 2.0, jacobian=lambda t, x: [[0.0, 1.0], [1.0, 0.0]])
     assert error.value.field == "jacobian"
+
+
+# Jumps with the state, and pulses, in functions that can only be called
+
+
+def test_a_jump_with_the_state_in_a_branch_is_noticed():
+    """x' = 1 below x = 1 and 3 above: the derivative 1 that is found should be 3, and the bound says so."""
+    system = from_rhs(lambda t, x: [3.0 + 0 * x[0] if x[0].real > 1.0 else 1.0 + 0 * x[0]], 1, 2.0)
+    with pytest.warns(UndeclaredSwitch, match="jumps somewhere in the state"):
+        _, derivative, error = system.flow_with_error(np.zeros(1), 0.0, 2.0)
+    assert abs(derivative[0, 0] - 3.0) <= error
+
+
+@pytest.mark.parametrize("width", [0.1, 1e-2, 1e-3])
+def test_a_pulse_in_a_branch_is_not_stepped_over(width):
+    def rhs(t, x):
+        if t > 5.0:
+            return x
+        z = (t - 1.1) / width
+        return (-1 + 3 / width * np.exp(-0.5 * z * z) / np.sqrt(2 * pi)) * x
+
+    found = multipliers(from_rhs(rhs, 1, 2.0, orbit=[0.0]))
+    assert found.values[0] == pytest.approx(exp(1.0), rel=1e-10)
+    assert abs(found.values[0] - exp(1.0)) <= found.error_bound
+
+
+def test_a_traced_pulse_and_a_traced_jump_with_the_state():
+    def rhs(t, x):
+        return (-1 + 3e3 * np.exp(-0.5 * ((t - 1.1) / 1e-3) ** 2) / np.sqrt(2 * pi)) * x
+
+    found = multipliers(from_rhs(rhs, 1, 2.0, orbit=[0.0]))
+    assert abs(found.values[0] - exp(1.0)) <= found.error_bound < 1e-11
+    system = from_rhs(lambda t, x: [np.where(x[0] > 1.0, 3.0, 1.0)], 1, 2.0)
+    _, derivative, error = system.flow_with_error(np.zeros(1), 0.0, 2.0)
+    assert abs(derivative[0, 0] - 3.0) <= error < 1e-13
+
+
+@pytest.mark.parametrize("called", [False, True])
+def test_states_in_any_units(called):
+    """The multipliers of a driven pendulum with lengths and speeds in units 10^9 apart."""
+    values = []
+    for units in (np.ones(2), np.array([2.0**-30, 2.0**30])):
+
+        def rhs(t, x, units=units):
+            y = x / units
+            slope = np.array([y[1], -1.7 * np.sin(y[0]) * (1 + 0.3 * np.cos(t)) - 0.1 * y[1]]) * units
+            return slope if not called or t < 99.0 else x
+
+        system = from_rhs(rhs, 2, 2 * pi)
+        state, derivative = system.flow(np.array([0.9, -0.2]) * units, 0.0, 6.0)
+        values.append((state / units, derivative * units / units[:, None]))
+    np.testing.assert_allclose(values[1][0], values[0][0], rtol=1e-13)
+    np.testing.assert_allclose(values[1][1], values[0][1], rtol=1e-12)
 
 
 # Time

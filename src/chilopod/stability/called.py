@@ -43,14 +43,16 @@ class CalledFlow:
     ----------
     rhs, args, jacobian
         As for :func:`chilopod.stability.from_rhs`. Without a jacobian the derivative is taken by a complex step if the
-        function is ``analytic``, else by central differences.
+        function takes it, else by central differences; that is seen at the first state.
     edges
         Times from 0 to the period at which the integration stops and starts anew.
     fast
         Borders of the parts of the period in which the function changes fast, shape (parts, 2): the step is limited
         there.
-    analytic
-        See :func:`is_analytic`.
+    times
+        One inside every interval between edges.
+    reason
+        Why the function cannot be traced.
     tolerance
         Local error per step.
     """
@@ -60,8 +62,10 @@ class CalledFlow:
     jacobian: Callable[..., ArrayLike] | None
     edges: Array
     fast: Array
-    analytic: bool
+    times: Array
+    reason: str
     tolerance: float
+    _analytic: list[bool] = field(default_factory=list, repr=False)
     _warned: list[bool] = field(default_factory=list, repr=False)
 
     def flow(self, x: Array, t0: float, t1: float) -> tuple[Array, Array]:
@@ -82,7 +86,7 @@ class CalledFlow:
         unit = sizes[None, :] / sizes[:, None]
         rough = float(np.abs((coarse - derivative) * unit).max())
         other = _OTHER * float(np.abs((shifted - derivative) * unit).max())
-        floor = _ANALYTIC_FLOOR if self.analytic or self.jacobian is not None else _DIFFERENCE_FLOOR
+        floor = _ANALYTIC_FLOOR if self.jacobian is not None or self._analytic[0] else _DIFFERENCE_FLOOR
         error = max(rough, other) + floor * float(np.abs(derivative * unit).max())
         error = max(error, self._missed(x, parts, derivative * unit, sizes))
         return state, derivative, error * float((1.0 / unit).max())
@@ -118,6 +122,15 @@ class CalledFlow:
         return lambda t, y: self._slope(min(max(t, inner_a), inner_b), y * sizes) / sizes
 
     def _over(self, x: Array, parts: Parts, tolerance: float, sizes: Array) -> tuple[Array, Array]:
+        if self.jacobian is None and not self._analytic:
+            self._analytic.append(_is_analytic(self.rhs, self.args, x, sizes, self.times))
+            if not self._analytic[0]:
+                warnings.warn(
+                    f"the right-hand side cannot be traced ({self.reason}) nor differentiated by a complex step: its "
+                    "derivative is taken by differences, with about nine digits",
+                    NotAnalytic,
+                    stacklevel=3,
+                )
         n = x.size
         y = np.concatenate([x / sizes, np.eye(n).ravel()])
         for a, b in parts:
@@ -167,7 +180,7 @@ class CalledFlow:
             return np.asarray(self.jacobian(t, x, *self.args), dtype=np.float64)
         columns = []
         for j in range(x.size):
-            if self.analytic:
+            if self._analytic[0]:
                 z = x.astype(np.complex128)
                 z[j] += 1j * _COMPLEX_STEP * sizes[j]
                 columns.append(np.asarray(self.rhs(t, z, *self.args)).imag / (_COMPLEX_STEP * sizes[j]))
@@ -227,12 +240,11 @@ def _cut(parts: Parts) -> Parts:
     return [part for times in cuts for part in zip(times, times[1:], strict=False)]
 
 
-def is_analytic(rhs: Callable[..., ArrayLike], args: tuple[Any, ...], x: Array, times: Array) -> bool:
+def _is_analytic(rhs: Callable[..., ArrayLike], args: tuple[Any, ...], x: Array, sizes: Array, times: Array) -> bool:
     """Whether a right-hand side takes complex states, and complex steps agree with differences on both sides of zero,
     at all of some times."""
-    size = float(np.abs(x).max()) or 1.0
-    step = size * np.cos(2.0 * np.arange(x.size) + 0.1)
-    shift = size * np.cos(np.arange(x.size) + 0.3)
+    step = sizes * np.cos(2.0 * np.arange(x.size) + 0.1)
+    shift = sizes * np.cos(np.arange(x.size) + 0.3)
     for t, part in itertools.product(times.tolist(), (0.7, -0.7, 3.1, -3.1)):
         probe = x + part * shift
         try:
@@ -245,7 +257,8 @@ def is_analytic(rhs: Callable[..., ArrayLike], args: tuple[Any, ...], x: Array, 
         if not np.iscomplexobj(tilted):
             return False
         difference = (up - down) / 2e-6
-        largest = float(np.abs(difference).max())
-        if not np.allclose(tilted.imag / _COMPLEX_STEP, difference, rtol=1e-4, atol=1e-4 * largest):
+        # Where terms cancel, the difference has their round-off: relative to f, in units of the state.
+        allowed = 1e-4 * (np.abs(difference) + np.abs(up))
+        if not (np.abs(tilted.imag / _COMPLEX_STEP - difference) <= allowed).all():
             return False
     return True

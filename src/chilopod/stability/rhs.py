@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -18,7 +17,7 @@ from chilopod.stability.arguments import (
     finite_array,
     sampled,
 )
-from chilopod.stability.called import CalledFlow, NotAnalytic, is_analytic
+from chilopod.stability.called import CalledFlow
 from chilopod.stability.evaluation import evaluate, evaluate_jacobian
 from chilopod.stability.jumps import fast_parts, warn_of_jumps
 from chilopod.stability.system import PeriodicSystem
@@ -102,16 +101,8 @@ def from_rhs(
         if jacobian is not None:
             check_shape(jacobian, args, times, base, (dimension, dimension), "jacobian")
         slopes = sampled(rhs, args, dimension)
-        analytic = jacobian is not None or is_analytic(rhs, args, base, times)
-        if not analytic:
-            warnings.warn(
-                f"the right-hand side cannot be traced ({reason}) nor differentiated by a complex step: its derivative "
-                "is taken by differences, with about nine digits",
-                NotAnalytic,
-                stacklevel=2,
-            )
         warn_of_jumps(rhs, args, dimension, edges, start)
-        called = CalledFlow(rhs, args, jacobian, edges, fast_parts(slopes, base, edges), analytic, tolerance)
+        called = CalledFlow(rhs, args, jacobian, edges, fast_parts(slopes, base, edges), times, str(reason), tolerance)
         flows = {
             "flow": called.flow,
             "flow_with_error": called.flow_with_error,
@@ -173,7 +164,7 @@ def _check_jacobian(
         _, right = evaluate_jacobian(traced.tape, t, x, traced.params)
         with np.errstate(all="ignore"):
             given = np.asarray(jacobian(t, x.copy(), *args), dtype=np.float64)
-        off = np.abs(given - right) > _SAME * np.maximum(np.abs(right), np.abs(given))
+        off = np.abs((given - right) * x) > _SAME * (np.abs(right) @ np.abs(x))[:, None]
         if off.any() and np.isfinite(right).all():
             i, j = np.argwhere(off)[0]
             raise ParameterError(

@@ -49,6 +49,7 @@ _LEAST_TOLERANCE = 1.2e-16
 _OTHER_ORDER = 4
 _OTHER = 5.0  # two independent errors differ by less than a fifth of them rarely enough
 _SHAKE = 4.0 * 2.0**-53
+_NOTHING = np.empty((0, 0))
 
 _REASONS = {
     1: ("the motion diverges, or the right-hand side is not finite, at t = {t:g}", None),
@@ -242,7 +243,6 @@ class TaylorFlow(ReadOnlyArrays):
         return pieces(np.asarray(self.edges), self.period, t0, t1)
 
 
-_NOTHING = np.empty((0, 0))
 _NO_CLOCK = (np.zeros((0, 0)), 1.0)
 
 
