@@ -26,6 +26,8 @@ from chilopod.stability.switching import BUDGET, CHATTERS, DONE, GRAZES, NOT_FIN
 
 _ROUNDING = 2.0**-53
 _BLOCK = 64
+_UNDERFLOW = 1e-290
+"""Numbers below have no full precision: their round-off looks like a singularity."""
 _SAME = 3e-13
 """Round-off in a pulse of a thousandth of the period; a narrower one costs a step at every point of the grid in it."""
 
@@ -35,7 +37,7 @@ def _allowed(coefficients: Any, order: int, h: float, epsilon: float) -> float:
     """The largest step up to h at which the last two terms are below epsilon times the largest of the first half."""
     for q in range(order, order - 2, -1):
         last = abs(coefficients[q])
-        if last == 0.0:
+        if last < _UNDERFLOW:
             continue
         power = 1.0
         biggest = 0.0

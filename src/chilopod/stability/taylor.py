@@ -49,6 +49,7 @@ _LEAST_TOLERANCE = 1.2e-16
 _OTHER_ORDER = 4
 _OTHER = 5.0  # two independent errors differ by less than a fifth of them rarely enough
 _SHAKE = 4.0 * 2.0**-53
+_UNDERFLOW = 1e-290  # numbers below have no full precision
 _NOTHING = np.empty((0, 0))
 
 _REASONS = {
@@ -171,9 +172,9 @@ class TaylorFlow(ReadOnlyArrays):
         events, steps = self._run(x, t0, t1, params, derivative, bound, self.order, 0.0)
         self._run(other_x, t0, t1, params, other, _NOTHING, self.order - _OTHER_ORDER, _SHAKE)
         difference = np.abs(other - derivative)
-        known = bound > 0.0
+        known = bound > _UNDERFLOW
         worst = float(np.max(difference[known] / bound[known], initial=0.0))
-        bound = bound * (1.0 + _OTHER * worst) + np.where(known, 0.0, _OTHER * difference)
+        bound = np.where(known, bound * (1.0 + _OTHER * worst), bound + _OTHER * difference)
         return Passage(x, derivative, bound, events, steps)
 
     def states(self, states: Array, t0: float, t1: float, params: Array) -> Array:
