@@ -245,7 +245,7 @@ def _factors(system: SystemLike, orbit: Orbit) -> tuple[list[Array], Array]:
             factors.append(factor * units / units[:, None])
         if system.symmetry is not None:
             factors[-1] = (system.symmetry * units / units[:, None]) @ factors[-1]
-        basis = np.diag(units)
+        basis, worst = np.diag(units), max(float(np.linalg.cond(factor)) for factor in factors)
         if is_autonomous(system):
             sections = [_normal_basis(system.velocity(at) / units) for at in states[:-1]]
             sections.append(sections[0])
@@ -255,7 +255,7 @@ def _factors(system: SystemLike, orbit: Orbit) -> tuple[list[Array], Array]:
             whole = image.jacobian * units / units[:, None]
             if np.abs(functools.reduce(lambda m, f: f @ m, factors) - whole).max() > _COMPOSED * np.abs(whole).max():
                 return [whole], basis  # a map, which has no parts
-        if max((float(np.linalg.cond(factor)) for factor in factors), default=1.0) < _WORST_CONDITION:
+        if worst < _WORST_CONDITION:
             return factors, basis
         count *= 2
         if count > _MOST_FACTORS:
