@@ -17,13 +17,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.stability.branch_points import Anchor, BranchPoint, Step
+from chilopod.stability.branch_starts import Start, anchored, begin, branch_sizes, switch
 from chilopod.stability.capabilities import Family
 from chilopod.stability.closure import closes
 from chilopod.stability.curve import PRECISION, Curve, OutsideIntervalError
 from chilopod.stability.inspection import Found, inspect
 from chilopod.stability.orbits import Orbit
 from chilopod.stability.points import BifurcationPoint
-from chilopod.stability.switching import Start, anchored, begin, branch_sizes, switch
 
 __all__ = ["Branch", "BranchPoint", "Ending", "Start", "begin", "follow", "proceed", "switch"]
 

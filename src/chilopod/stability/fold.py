@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from chilopod.errors import ChilopodError
 from chilopod.stability.branch import Branch, Ending, follow, proceed
 from chilopod.stability.branch_points import BranchPoint
+from chilopod.stability.branch_starts import begin
 from chilopod.stability.capabilities import Family, returns_per_period
 from chilopod.stability.points import Kind
 from chilopod.stability.returns import ReturnMap, return_map, section_at
-from chilopod.stability.switching import begin
 
 Array = NDArray[np.float64]
 
