@@ -7,7 +7,7 @@
 False
 """
 
-from chilopod.stability.branch import Branch, BranchPoint, Ending, begin, follow, leave_pitchfork, proceed
+from chilopod.stability.branch import Branch, BranchPoint, Ending, Start, begin, follow, proceed, switch
 from chilopod.stability.called import NotAnalytic
 from chilopod.stability.capabilities import (
     Autonomous,
@@ -56,6 +56,7 @@ __all__ = [
     "ReturnMap",
     "Scaled",
     "SpatiallySymmetric",
+    "Start",
     "Switches",
     "SystemLike",
     "UndeclaredSwitch",
@@ -64,9 +65,9 @@ __all__ = [
     "find_orbit",
     "follow",
     "from_rhs",
-    "leave_pitchfork",
     "locate",
     "multipliers",
     "proceed",
     "sweep",
+    "switch",
 ]
