@@ -4,6 +4,7 @@ is."""
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -11,20 +12,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
-from chilopod.errors import AnalysisError, ParameterError
+from chilopod.errors import ParameterError
 from chilopod.stability.capabilities import SystemLike, spatial_symmetries
+from chilopod.stability.center_manifold import CriticalOrbit
 from chilopod.stability.floquet import Spectrum, spectrum
 from chilopod.stability.fold import Fold
-from chilopod.stability.normal_form import NormalForm, complex_normal_form, real_normal_form
-from chilopod.stability.points import BifurcationPoint, Criticality, Kind
-from chilopod.stability.returns import return_map
+from chilopod.stability.normal_form import NormalForm, normal_form
+from chilopod.stability.points import BifurcationPoint, Kind, criticality, kind_at_plus_one
+from chilopod.stability.returns import Section, return_map, returned_states
 from chilopod.stability.samples import Family, Sample, Samples
 from chilopod.stability.zeros import brackets
 
 Array = NDArray[np.float64]
-
-AMPLITUDE = 0.2
-"""Largest amplitude along the unit critical mode at which the return map is sampled for the normal form."""
 
 _SAFETY = 1.5
 _DECADES = 4.0
@@ -164,7 +163,9 @@ def _pairs(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return first, second
 
 
-def _describe(samples: Samples, value: float, event: int, width: float, normal_form: bool) -> BifurcationPoint | None:
+def _describe(
+    samples: Samples, value: float, event: int, width: float, with_normal_form: bool
+) -> BifurcationPoint | None:
     """What happens at a zero of a test function; None if no multiplier is critical there after all."""
     at = samples.at(np.array([value]))[0]
     system = samples.family(value)
@@ -186,21 +187,36 @@ def _describe(samples: Samples, value: float, event: int, width: float, normal_f
     bound = _SAFETY * uncertainty / slope if slope > 0.0 else np.inf
     bound = float(bound + 4 * np.finfo(float).eps * abs(value))
     mode, left = _phased(spec.right[:, critical], spec.left[:, critical])
+
+    def form_at(multiplier: complex) -> NormalForm:
+        real = multiplier.imag == 0.0
+        critical_orbit = CriticalOrbit(
+            at.orbit,
+            image.jacobian,
+            multiplier,
+            mode.real if real else mode,
+            left.real if real else left,
+            image.returns,
+        )
+        uncertainty = float(np.max(image.error)) / float(np.linalg.norm(image.jacobian))
+        section = None
+        if image.normal is not None:
+            section = Section(at.orbit, image.normal, image.period / image.returns)
+        return normal_form(
+            lambda states: returned_states(system, states, section), critical_orbit, uncertainty=uncertainty
+        )
+
     if event == _PAIR:
         angle = float(np.angle(np.exp(1j * image.returns * np.angle(nu))))
         # Of a conjugate pair, the mode that turns with positive frequency.
         if angle < 0:
             nu, mode, left, angle = nu.conjugate(), mode.conj(), left.conj(), -angle
-        form = None
-        if normal_form:
-            form = _where_it_exists(lambda size: complex_normal_form(system, image, nu / abs(nu), mode, left, size))
+        form = form_at(nu / abs(nu)) if with_normal_form else None
         return _point(Kind.NEIMARK_SACKER, at, bound, mode, nu, angle / image.period, form)
     form = None
-    if normal_form or (event == _PLUS and not _antisymmetric(system, mode)):
-        form = _where_it_exists(lambda size: real_normal_form(system, image, float(event), mode.real, left.real, size))
+    if with_normal_form or (event == _PLUS and not _antisymmetric(system, mode)):
+        form = form_at(complex(event))
     kind = _kind(system, image.returns, event, mode.real, form)
-    if kind in (Kind.FOLD, Kind.TRANSCRITICAL, Kind.BRANCH_POINT):
-        form = None
     frequency = np.pi / image.period if kind is Kind.PERIOD_DOUBLING else 0.0
     return _point(kind, at, bound, mode, nu, frequency, form)
 
@@ -212,11 +228,7 @@ def _kind(system: SystemLike, returns: int, event: int, mode: Array, form: Norma
         return Kind.PITCHFORK
     # The orbit was sampled on both sides, so it does not end in a fold here.
     assert form is not None
-    if abs(form.quadratic) > 10.0 * form.quadratic_error:
-        return Kind.TRANSCRITICAL
-    if abs(form.cubic) > 10.0 * form.cubic_error:
-        return Kind.PITCHFORK
-    return Kind.BRANCH_POINT
+    return kind_at_plus_one(form)
 
 
 def _fold_point(fold: Fold) -> BifurcationPoint:
@@ -237,28 +249,13 @@ def _point(
     frequency: float,
     form: NormalForm | None,
 ) -> BifurcationPoint:
-    if form is None:
-        return BifurcationPoint(kind, at.value, bound, at.orbit, mode, nu, frequency)
-    if abs(form.cubic) <= form.cubic_error:
-        verdict = Criticality.UNDECIDED
-    else:
-        verdict = Criticality.SUPERCRITICAL if form.cubic < 0 else Criticality.SUBCRITICAL
-    rotation = form.rotation if kind is Kind.NEIMARK_SACKER else None
-    return BifurcationPoint(
-        kind, at.value, bound, at.orbit, mode, nu, frequency, verdict, form.cubic, form.cubic_error, rotation
-    )
-
-
-def _where_it_exists(form: Callable[[float], NormalForm]) -> NormalForm:
-    """The normal form from samples at the largest amplitude, of a falling sequence, at which the motion does not
-    diverge."""
-    for halving in range(6):
-        try:
-            return form(AMPLITUDE * 0.25**halving)
-        except AnalysisError:
-            if halving == 5:
-                raise
-    raise AssertionError  # unreachable
+    point = BifurcationPoint(kind, at.value, bound, at.orbit, mode, nu, frequency, normal_form=form)
+    if form is None or kind in (Kind.FOLD, Kind.TRANSCRITICAL, Kind.BRANCH_POINT):
+        return point
+    point = replace(point, criticality=criticality(form), coefficient=form.cubic, coefficient_error=form.cubic_error)
+    if kind is Kind.NEIMARK_SACKER:
+        point = replace(point, rotation=form.rotation, rotation_error=form.rotation_error)
+    return point
 
 
 def _antisymmetric(system: SystemLike, mode: NDArray[np.inexact]) -> bool:

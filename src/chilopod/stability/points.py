@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.normal_form import NormalForm, Status
 
 Array = NDArray[np.float64]
 
@@ -46,6 +47,32 @@ class Criticality(enum.Enum):
         self.sentence = sentence
 
 
+_CLEAR = 3.0  # of its error, for a quadratic coefficient that makes a crossing of two orbits
+_NEGLIGIBLE = 0.3  # of the cubic term at the sampled amplitude: what the error of the quadratic one may leave open
+
+
+def kind_at_plus_one(form: NormalForm) -> Kind:
+    """What happens at a real multiplier +1 where the orbit goes on: transcritical with a quadratic term that is clearly
+    there, pitchfork without one but with a cubic one, a branch point where the errors leave that open."""
+    if form.status is not Status.FOUND:
+        return Kind.BRANCH_POINT
+    if abs(form.quadratic) > _CLEAR * form.quadratic_error:
+        return Kind.TRANSCRITICAL
+    cubic = abs(form.cubic) * form.amplitude
+    if abs(form.cubic) > form.cubic_error and form.quadratic_error <= _NEGLIGIBLE * cubic:
+        return Kind.PITCHFORK
+    return Kind.BRANCH_POINT
+
+
+def criticality(form: NormalForm) -> Criticality | None:
+    """The verdict of a cubic coefficient; None where there is no normal form, or where other terms decide too."""
+    if form.status not in (Status.FOUND, Status.LINEAR):
+        return None
+    if abs(form.cubic) <= form.cubic_error:
+        return Criticality.UNDECIDED
+    return Criticality.SUPERCRITICAL if form.cubic < 0 else Criticality.SUBCRITICAL
+
+
 @dataclass(frozen=True)
 class BifurcationPoint(ReadOnlyArrays):
     """A located bifurcation.
@@ -70,9 +97,12 @@ class BifurcationPoint(ReadOnlyArrays):
     criticality, coefficient, coefficient_error
         Verdict and cubic coefficient a -> a + coefficient a^3 of the full-period map, a the amplitude along the unit
         ``mode`` (Neimark-Sacker: state = 2 Re(a mode)); None where it has no meaning (fold, transcritical, branch
-        point).
-    rotation
+        point) or where there is no normal form.
+    rotation, rotation_error
         Where the mode turns (Neimark-Sacker), the phase per period that an amplitude adds, rad per amplitude^2.
+    normal_form
+        All that is known of the normal form, with a status that says why where it has no numbers; None where it was
+        not asked for, and at folds.
     """
 
     kind: Kind
@@ -86,3 +116,5 @@ class BifurcationPoint(ReadOnlyArrays):
     coefficient: float | None = None
     coefficient_error: float | None = None
     rotation: float | None = None
+    rotation_error: float | None = None
+    normal_form: NormalForm | None = None

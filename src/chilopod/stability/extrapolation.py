@@ -1,0 +1,113 @@
+"""Taylor coefficients of a sampled function, with errors that hold.
+
+A function of the radius r is sampled at Chebyshev points of (0, s]; being even or odd, it is then known at those of
+[-s, s]. Its Chebyshev coefficients t_k fall geometrically down to the noise of the samples, so that the series itself
+shows how large that noise is, how much a truncation leaves out, and whether s was well chosen (Trefethen,
+*Approximation Theory and Approximation Practice*, chapters 3, 4 and 8). A Taylor coefficient is a sum over the t_k up
+to the degree at which noise and truncation together are least.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
+
+from chilopod.frozen import ReadOnlyArrays
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+RADII = 8
+"""How many radii a function is sampled at."""
+
+_SAFETY = 3.0
+_FALL = 4.0
+_TAIL = 2  # of every parity so many last coefficients are taken for noise
+
+
+def radii() -> Array:
+    """Positive Chebyshev points of the first kind of [-1, 1], falling, shape (RADII,)."""
+    return np.cos((2 * np.arange(RADII) + 1) * np.pi / (4 * RADII))
+
+
+@dataclass(frozen=True)
+class Series(ReadOnlyArrays):
+    """Chebyshev coefficients over [-1, 1] of functions that are even or odd.
+
+    Attributes
+    ----------
+    coefficients
+        Of T_parity, T_(parity + 2), ..., shape (RADII, entries).
+    parity
+        0 for even functions, 1 for odd ones.
+    """
+
+    coefficients: ComplexArray
+    parity: int
+
+    @property
+    def roughness(self) -> Array:
+        """Size of the last coefficients, shape (entries,): the noise of the samples, or what a series that has not
+        converged leaves out."""
+        tail: Array = np.abs(self.coefficients[-_TAIL:]).max(axis=0)
+        return tail
+
+    @property
+    def falling(self) -> NDArray[np.bool_]:
+        """Whether the coefficients still fall at their end, shape (entries,): noise would not."""
+        before: Array = np.abs(self.coefficients[-2 * _TAIL : -_TAIL]).max(axis=0)
+        return np.asarray(before > _FALL * self.roughness)
+
+    def taylor(self, order: int, noise: Array) -> tuple[ComplexArray, Array]:
+        """Taylor coefficients of one order, and bounds on their errors, shape (entries,).
+
+        Parameters
+        ----------
+        order
+            Of the parity of the functions, at most RADII.
+        noise
+            Bounds on the errors of the samples, shape (entries,).
+        """
+        weights, gains = _weights(order, self.parity)
+        terms = weights[:, None] * self.coefficients
+        sizes = np.abs(terms)
+        # What is beyond the next two coefficients only counts as far as it stands out of the noise.
+        standing_out = np.maximum(sizes - 2.0 * np.abs(weights[:, None]) * self.roughness, 0.0)
+        beyond = np.cumsum(standing_out[::-1], axis=0)[::-1]
+        first = (order - self.parity) // 2
+        value = np.cumsum(terms, axis=0)
+        best, error = value[first], np.full(value.shape[1:], np.inf)
+        for last in range(first, RADII - _TAIL):
+            after = beyond[last + 3] if last + 3 < RADII else 0.0
+            estimate = _SAFETY * (gains[last] * noise + sizes[last + 1] + sizes[last + 2] + after)
+            better = estimate < error
+            best, error = np.where(better, value[last], best), np.where(better, estimate, error)
+        return best, error
+
+
+def series(values: ComplexArray, parity: int) -> Series:
+    """The series of functions sampled at the :func:`radii`, shape (RADII, entries)."""
+    return Series(_transform(parity) @ values, parity)
+
+
+@cache
+def _transform(parity: int) -> Array:
+    """Discrete cosine transform of a function of one parity, from its values at positive points."""
+    orders = np.arange(parity, 2 * RADII, 2)
+    matrix = 2.0 / RADII * np.cos(np.outer(orders, np.arccos(radii())))
+    if parity == 0:
+        matrix[0] *= 0.5
+    return matrix
+
+
+@cache
+def _weights(order: int, parity: int) -> tuple[Array, Array]:
+    """Coefficient of r^order in every T_k, and how much the sum up to each k enlarges an error of the samples."""
+    orders = np.arange(parity, 2 * RADII, 2)
+    weights = np.array([chebyshev.cheb2poly(np.eye(2 * RADII)[k])[order] if k >= order else 0.0 for k in orders])
+    gains = np.abs(np.cumsum(weights[:, None] * _transform(parity), axis=0)).sum(axis=1)
+    return weights, gains
