@@ -30,6 +30,7 @@ ComplexArray = NDArray[np.complex128]
 _SAFETY = 1.5
 _BESIDE = 1e-3  # of a step: how far apart a test function is differentiated
 _POLE = 0.1  # of its values at the ends of a step: where a test function changes sign and is larger, it has a pole
+_RESOLVED = 3.0  # times the error of a test function that it has to reach within a step to mean anything
 _COMPLEX = 1e-6  # imaginary part from which a pair counts as one
 _MIRRORED = 1e-6  # relative to a mode: how well a symmetry reverses it
 
@@ -318,10 +319,10 @@ class Detector:
             spot = equations.spot(at(root).place, frame, before.tangent)
             own = critical(equations.target, spot.at, spot.frame)
             value, error = self._measure(signal, own, spot.at, spot.frame, spot.shift)
-            if np.isnan(value):  # exactly at a point where there is no coefficient
-                value, error = test(root * (1.0 + 1e-9)), np.nan
         except AnalysisError:
             return None
+        if not max(map(abs, ends)) > _RESOLVED * error:
+            return None  # no change of sign but noise: what vanishes all along a curve
         if abs(value) > _POLE * max(map(abs, ends)):
             return None
         kind = self._named(signal, spot, own)
