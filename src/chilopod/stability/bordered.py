@@ -36,6 +36,7 @@ Family2 = Callable[[float, float], SystemLike]
 """``family2(p, q)`` is the system at values of two parameters."""
 
 _STEP = 1e-6  # of differences, in units of the frame: it sets how fast Newton's method converges, not where to
+_LOOKS = 8  # times a return that the states are looked at for their sizes
 _ROUNDS = 14
 _ROUND_OFF = 4e-15  # of a correction, in units of the frame
 _SETTLED = 1e-8  # of the same, below which it may stop falling
@@ -286,7 +287,7 @@ class Equations:
         return place, return_map(system, place.state, with_error, section)
 
     def _size(self, system: SystemLike, place: Place, image: ReturnMap, section: Section | None) -> Array:
-        size = sizes(system, place.state, image.jacobian)
+        size = _sizes_along(system, place.state, image)
         if self.known or place.state.any() or (isinstance(system, Scaled) and system.scale is not None):
             return size
         # An orbit that rests at zero is as large as the parameters make it.
@@ -371,6 +372,17 @@ class Equations:
         power = 1 if self.target else 2
         critical = critical + rounding * float(norms * np.linalg.norm(at.jacobian) ** power)
         return np.abs(at.residual) + np.concatenate([np.abs(frame.basis.T) @ returned, critical])
+
+
+def _sizes_along(system: SystemLike, state: Array, image: ReturnMap) -> Array:
+    """Sizes of the states over a whole return: just here one may pass through zero, or two may seem not to be coupled."""
+    times = np.linspace(0.0, image.period / image.returns, _LOOKS + 1).tolist()
+    total, product, largest = np.abs(image.jacobian), np.eye(state.size), np.abs(state)
+    for a, b in zip(times, times[1:], strict=False):
+        state, factor = system.flow(np.array(state), a, b)
+        product = factor @ product
+        total, largest = total + np.abs(product), np.maximum(largest, np.abs(state))
+    return sizes(system, largest, total)
 
 
 def _bordered(matrix: Array, column: Array, row: Array) -> tuple[Array, Array, Array]:

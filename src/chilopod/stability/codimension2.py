@@ -241,7 +241,7 @@ class Detector:
 
     def coefficient(self, form: NormalForm) -> tuple[float, float]:
         """The coefficient that decides what happens on a curve of this kind, and its error; NaN where there is none."""
-        if form.status is not Status.FOUND:
+        if form.status not in (Status.FOUND, Status.LINEAR):
             return np.nan, np.nan
         if self._kind in (Kind.FOLD, Kind.TRANSCRITICAL, Kind.BRANCH_POINT):
             return form.quadratic, form.quadratic_error
