@@ -304,12 +304,16 @@ class Detector:
             guess = frame.moved(before.place, whole * (place / length))
             return equations.corrected(before, guess, before.tangent, place)[0]
 
+        seen: dict[float, tuple[float, float]] = {}
+
         def test(place: float) -> float:
-            there = at(place)
-            value = self._measure(signal, critical(equations.target, there, frame), there, frame, None)[0]
+            if place not in seen:
+                there = at(place)
+                seen[place] = self._measure(signal, critical(equations.target, there, frame), there, frame, None)
+            value, error = seen[place]
             if np.isnan(value):
                 raise AnalysisError("the test function does not exist", field="special")
-            return value
+            return 0.0 if abs(value) <= error else value
 
         try:
             ends = test(0.0), test(length)
@@ -321,6 +325,8 @@ class Detector:
             value, error = self._measure(signal, own, spot.at, spot.frame, spot.shift)
         except AnalysisError:
             return None
+        if np.isnan(value):  # a coefficient that is zero may be harder to find than those beside it
+            value, error = 0.0, max(seen[place][1] for place in (0.0, length))
         if not max(map(abs, ends)) > _RESOLVED * error:
             return None  # no change of sign but noise: what vanishes all along a curve
         if abs(value) > _POLE * max(map(abs, ends)):
@@ -328,7 +334,7 @@ class Detector:
         kind = self._named(signal, spot, own)
         if kind is None:
             return None
-        along = _along(test, at, root, length, abs(value) + error)
+        along = _along(lambda place: (test(place), seen[place][0])[1], at, root, length, abs(value) + error)
         off = _SAFETY * spot.frame.widths * spot.shift[spot.frame.parameters]
         bound = off + along + 4.0 * np.finfo(float).eps * np.abs(spot.place.values)
         found = Codimension2(kind, spot.place.values, bound, spot.place.state, own.spectrum.values)
