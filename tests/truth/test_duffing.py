@@ -19,6 +19,11 @@ def compiled(t, x, force):
     return np.array([x[1], -0.2 * x[1] - x[0] * x[0] * x[0] + force * np.cos(t)])
 
 
+@numba.njit
+def in_units(t, x, force, size):
+    return np.array([x[1], -0.2 * x[1] - x[0] * (x[0] / size) * (x[0] / size) + force * size * np.cos(t)])
+
+
 def plain(t, x, force):
     return [x[1], -0.2 * x[1] - x[0] ** 3 + force * cos(t)]
 
@@ -64,6 +69,29 @@ def test_compiled_and_plain_agree():
     (one,), (other,) = located(compiled), located(plain)
     assert abs(one.coefficient - other.coefficient) <= one.coefficient_error + other.coefficient_error
     np.testing.assert_allclose(one.mode, other.mode, atol=1e-11)
+
+
+def test_the_symmetry_need_not_be_known():
+    """Over the full period H - 1 is singular at the point and the orbit inexact; it is a pitchfork all the same."""
+    (half,) = located(compiled)
+    (point,) = locate(lambda force: duffing(force, symmetry=None), (2.1, 2.77), orbit=[1.88, 0.64])
+    assert point.kind is Kind.PITCHFORK
+    assert abs(point.normal_form.quadratic) <= point.normal_form.quadratic_error < 1e-3
+    assert abs(point.coefficient - half.coefficient) <= point.coefficient_error < 0.05 * abs(half.coefficient)
+
+
+@pytest.mark.parametrize("size", [1e-4, 1e4])
+def test_other_units(size):
+    """The same for X = size x, with its symmetry."""
+    (expected,) = located(compiled)
+    (point,) = locate(
+        lambda force: from_rhs(in_units, 2, 2 * pi, args=(force, size), symmetry=((-1, 0), (0, -1))),
+        (2.2, 2.6),
+        orbit=[1.88 * size, 0.64 * size],
+    )
+    error = point.coefficient_error * size**2 + expected.coefficient_error
+    assert abs(point.coefficient * size**2 - expected.coefficient) <= error < 1e-4 * abs(expected.coefficient)
+    assert point.criticality is Criticality.SUPERCRITICAL
 
 
 def test_coefficient_against_the_branch_itself():

@@ -34,6 +34,7 @@ Curve = Mapping[Powers, ComplexArray]
 """Coefficient of every monomial, shape (n,); of two that are conjugate only the one with i >= j."""
 
 _ANGLES = 8
+_HIGHEST = 5.0  # power of a radius that has to be a number
 
 
 @dataclass(frozen=True)
@@ -129,9 +130,7 @@ def images(mapped: ReturnedStates, at: CriticalOrbit, displaced: Array) -> Array
     """H - x at x + ``displaced``, of the same shape; None where the map does not exist."""
     flat = at.state + displaced.reshape(-1, at.state.size)
     try:
-        # Far out, where nobody knows what is there, an overflow is an answer.
-        with np.errstate(all="ignore"):
-            result = np.asarray(mapped(flat), dtype=np.float64).reshape(displaced.shape) - at.state
+        result = np.asarray(mapped(flat), dtype=np.float64).reshape(displaced.shape) - at.state
     except (AnalysisError, ArithmeticError):
         return None
     return result if np.isfinite(result).all() else None
@@ -141,26 +140,25 @@ def sample(mapped: ReturnedStates, at: CriticalOrbit, curve: Curve, radius: floa
     """The map on a curve up to a radius; None where it does not exist. ``noise`` is relative, see
     :func:`chilopod.stability.normal_form.normal_form`."""
     directions = turns(at)
-    with np.errstate(all="ignore"):
-        displaced = displacements(at, curve, radius * radii()[:, None] * directions)
-    if not np.isfinite(displaced).all():
+    displaced = displacements(at, curve, radius * radii()[:, None] * directions)
+    highest = np.power(radius, _HIGHEST)
+    if not (0.0 < highest < np.inf and np.isfinite(displaced).all()):
         return None
     image = images(mapped, at, displaced)
     if image is None:
         return None
     columns = np.concatenate([image, (image @ at.left.conj())[..., None]], axis=-1)
     harmonics = np.fft.fft(columns, axis=1) / directions.size
+    if not np.isfinite(harmonics).all():
+        return None
     found = tuple(series(harmonics[:, h], h % 2) for h in range(directions.size))
     size = np.maximum(np.abs(displaced), np.abs(image)).max(axis=(0, 1))
-    reached = np.abs(at.state) + size
     blur, floor = (_expected_noise(at, reached, noise) for reached in (np.abs(at.state), np.abs(at.state) + size))
     # Noise of the samples is spread evenly over the coefficients of a cosine transform, smaller by this factor.
     seen = np.sqrt(RADII / 2.0) * np.max([one.roughness for one in found], axis=0)
     shrink = float(min(1.0, floor[-1] / seen[-1]) ** (0.5 / (RADII - 2))) if seen[-1] > 0.0 else 1.0
     falling = any(one.falling[-1] for one in found)
-    return Sampled(
-        found, np.maximum(floor, seen), float(blur[-1]), shrink, falling, size, radius, harmonics[0, :, -1]
-    )
+    return Sampled(found, np.maximum(floor, seen), float(blur[-1]), shrink, falling, size, radius, harmonics[0, :, -1])
 
 
 def _expected_noise(at: CriticalOrbit, reached: Array, noise: float) -> Array:
@@ -170,8 +168,10 @@ def _expected_noise(at: CriticalOrbit, reached: Array, noise: float) -> Array:
     return np.append(floor, np.abs(at.left) @ floor)
 
 
-def solve_homological(at: CriticalOrbit, powers: Powers, right_sides: ComplexArray, resonant: bool) -> ComplexArray:
-    """Solutions w of (nu^i conj(nu)^j - A) w = r, shape (n, columns) both.
+def solve_homological(
+    at: CriticalOrbit, powers: Powers, right_side: NDArray[np.inexact], resonant: bool
+) -> ComplexArray:
+    """The solution w of (nu^i conj(nu)^j - A) w = r, shape (n,) both.
 
     Where nu^i conj(nu)^j is critical itself (``resonant``: nu, or its conjugate at the resonance 1:3) the part along
     that critical direction is left out.
@@ -181,11 +181,8 @@ def solve_homological(at: CriticalOrbit, powers: Powers, right_sides: ComplexArr
     factor = at.multiplier**i * at.multiplier.conjugate() ** j
     matrix = factor * np.eye(n) - at.jacobian
     if not resonant:
-        plain: ComplexArray = np.linalg.solve(matrix, right_sides).astype(np.complex128)
-        return plain
+        return np.asarray(np.linalg.solve(matrix, right_side), dtype=np.complex128)
     q, p = (at.right, at.left) if abs(factor - at.multiplier) < 0.5 else (at.right.conj(), at.left.conj())
     bordered = np.block([[matrix, q[:, None]], [p.conj()[None], np.zeros((1, 1))]])
-    along = q[:, None] * (p.conj() @ right_sides)
-    padded = np.vstack([right_sides - along, np.zeros((1, right_sides.shape[1]))])
-    result: ComplexArray = np.linalg.solve(bordered, padded)[:n].astype(np.complex128)
-    return result
+    padded = np.append(right_side - q * (p.conj() @ right_side), 0.0)
+    return np.asarray(np.linalg.solve(bordered, padded)[:n], dtype=np.complex128)

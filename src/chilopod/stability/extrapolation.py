@@ -24,7 +24,7 @@ ComplexArray = NDArray[np.complex128]
 RADII = 8
 """How many radii a function is sampled at."""
 
-_SAFETY = 3.0
+_SAFETY = 5.0  # the noise is judged from few samples, the truncation from the next two terms
 _FALL = 4.0
 _TAIL = 2  # of every parity so many last coefficients are taken for noise
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -24,7 +25,8 @@ RESOLVED = 1e-6
 anything."""
 
 _WORST_CONDITION = 1e6
-_MOST_FACTORS = 4096
+_FEWEST_FACTORS, _MOST_FACTORS = 8, 4096
+_COMPOSED = 1e-6  # by so much the parts of a flow may miss the whole
 _SAME_ANGLE = 1e-12
 
 
@@ -233,23 +235,26 @@ def _factors(system: SystemLike, orbit: Orbit) -> tuple[list[Array], Array]:
     x, image = orbit.state, orbit.image
     units = numerical_balance(image.jacobian)
     duration = image.period / image.returns
-    count = 8
+    count = _FEWEST_FACTORS
     while True:
         times = np.linspace(0.0, duration, count + 1)
-        state, states, factors = x.copy(), [x], []
+        states, factors = [x], []
         for t0, t1 in zip(times, times[1:], strict=False):
-            state, factor = system.flow(state, float(t0), float(t1))
+            state, factor = system.flow(states[-1], float(t0), float(t1))
             states.append(state)
             factors.append(factor * units / units[:, None])
         if system.symmetry is not None:
             factors[-1] = (system.symmetry * units / units[:, None]) @ factors[-1]
-            states[-1] = system.symmetry @ states[-1]
         basis = np.diag(units)
         if isinstance(system, Autonomous):
             sections = [_normal_basis(system.velocity(at) / units) for at in states[:-1]]
             sections.append(sections[0])
             factors = [after.T @ f @ before for f, before, after in zip(factors, sections, sections[1:], strict=False)]
             basis = basis @ sections[0]
+        elif count == _FEWEST_FACTORS:
+            whole = image.jacobian * units / units[:, None]
+            if np.abs(functools.reduce(lambda m, f: f @ m, factors) - whole).max() > _COMPOSED * np.abs(whole).max():
+                return [whole], basis  # a map, which has no parts
         if max((float(np.linalg.cond(factor)) for factor in factors), default=1.0) < _WORST_CONDITION:
             return factors, basis
         count *= 2

@@ -11,7 +11,15 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.arguments import finite_array
 from chilopod.stability.capabilities import Autonomous, KnowsOrbit, SystemLike, returns_per_period
-from chilopod.stability.returns import ReturnMap, Section, return_map, returned_states, section_at, whole_period
+from chilopod.stability.returns import (
+    ReturnMap,
+    Section,
+    return_duration,
+    return_map,
+    returned_states,
+    section_at,
+    whole_period,
+)
 from chilopod.stability.scales import sizes
 
 Array = NDArray[np.float64]
@@ -20,11 +28,13 @@ _ROUNDS = 30
 _ROUND_OFF = 4e-16
 _SETTLED = 1e-10  # residual, of the sizes of the states, below which it may stop falling
 _RETURNED = 1e-12  # of a known orbit: it is exact
+_SINGULAR, _FAMILY = 1e-13, 1e-8  # singular values of H - 1 that count as zero, the largest being one
 _KNOWN = 1e-4  # of a known orbit: it is one, if not to the last digit
 _LONGEST_SETTLING = 300  # returns
 _BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
 _MARCHED, _MARCHES = 48, 8  # steps a guessed period, and guessed periods, in which a motion is to come back
 _COMES_BACK = 0.1  # of its size
+_STILL = 1e-3  # of how much the others move
 
 
 @dataclass(frozen=True)
@@ -121,9 +131,9 @@ def from_known(system: SystemLike, x: Array, with_error: bool = True, image: Ret
         return find_orbit(system, x, with_error)
     image = return_map(system, x, with_error) if image is None else image
     moved = np.abs(image.state - x)
-    # A zero is no size: an orbit that rests at zero has to come back to it to the last bit, or as near as round-off
-    # in the others takes it.
-    size = _largest(system, x, image)
+    if not moved.any():
+        return Orbit(x, image, np.zeros(x.size))
+    size = sizes(system, x, image.period / image.returns)
     off = _relative(moved, size)
     if off <= _RETURNED * max(1.0, float(np.abs(image.jacobian * size / size[:, None]).max())):
         return Orbit(x, image, np.zeros(x.size))
@@ -136,28 +146,29 @@ def from_known(system: SystemLike, x: Array, with_error: bool = True, image: Ret
     )
 
 
-def _largest(system: SystemLike, x: Array, image: ReturnMap) -> Array:
-    return sizes(system, np.maximum(np.abs(x), np.abs(image.state)), image.jacobian)
-
-
 def _relative(values: Array, size: Array) -> float:
     return float((np.abs(values) / size).max())
 
 
 def _newton(system: SystemLike, x: Array, with_error: bool, section: Section | None) -> Orbit:
-    section = section_at(system, x) if section is None else section
-    best = np.inf
+    size = sizes(system, x, return_duration(system) if section is None else section.duration)
+    section = section_at(system, x, size) if section is None else section
+    best, before, cutoff = np.inf, x, _SINGULAR
     for rounds in range(_ROUNDS):
         image = return_map(system, x, with_error=False, section=section)
-        size = _largest(system, x, image)
+        size = np.maximum(size, np.maximum(np.abs(x), np.abs(image.state)) if x.any() else 0.0)
         residual = image.state - x
         off = _relative(residual, size)
         if off <= _ROUND_OFF or (off <= _SETTLED and off >= 0.5 * best):
-            return _at(system, x, image, with_error, section, size)
+            return _at(system, x, image, with_error, section)
         if rounds > 4 and off > 10.0 * best:
             break
-        best = min(best, off)
-        x = x - _solved(image.jacobian - np.eye(x.size), residual, size)
+        if off > best and best < _SETTLED and cutoff == _SINGULAR:
+            # The last move followed round-off, along a family of orbits: without that direction it converges.
+            x, cutoff, best = before, _FAMILY, np.inf
+            continue
+        best, before = min(best, off), x
+        x = x - _solved(image.jacobian - np.eye(x.size), residual, size, cutoff)
         if not np.isfinite(x).all():
             break
         if section is not None:
@@ -169,26 +180,26 @@ def _newton(system: SystemLike, x: Array, with_error: bool, section: Section | N
     )
 
 
-def _solved(matrix: Array, right: Array, size: Array) -> Array:
+def _solved(matrix: Array, right: Array, size: Array, cutoff: float) -> Array:
     """Solution of a linear system in units of the states' sizes; the shortest where orbits come in families."""
     scaled = matrix * size / size[:, None]
-    return np.asarray(np.linalg.lstsq(scaled, right / size, rcond=1e-13)[0] * size)
+    return np.asarray(np.linalg.lstsq(scaled, right / size, rcond=cutoff)[0] * size)
 
 
-def _at(
-    system: SystemLike, x: Array, image: ReturnMap, with_error: bool, section: Section | None, size: Array
-) -> Orbit:
+def _at(system: SystemLike, x: Array, image: ReturnMap, with_error: bool, section: Section | None) -> Orbit:
     """The orbit through a state, with the section across its own motion and the errors that were asked for."""
+    if section is None and not with_error:
+        return Orbit(x, image, np.full(x.size, np.nan))
+    size = sizes(system, x, image.period / image.returns)  # those on the way here were of a guess
     if section is not None:
         section = section_at(system, x, size, image.period / image.returns)
-    if section is not None or with_error:
-        image = return_map(system, x, with_error, section)
+    image = return_map(system, x, with_error, section)
     if not with_error:
         return Orbit(x, image, np.full(x.size, np.nan))
     # The state is as uncertain as the flow, of which the derivative's error tells, times what H - 1 makes of it.
     wrong = np.abs(image.state - x) + (_matrix(image.error, size) @ size)
     scaled = image.jacobian * size / size[:, None] - np.eye(x.size)
-    error = size * (np.abs(np.linalg.pinv(scaled, rcond=1e-13)) @ (wrong / size))
+    error = size * (np.abs(np.linalg.pinv(scaled, rcond=_SINGULAR)) @ (wrong / size))
     # The derivative is that of a state so far off: along the direction in which the orbit is least sure.
     weakest = size * np.linalg.svd(scaled)[2][-1]
     beside = return_map(system, x + _BESIDE * weakest, with_error=False, section=section)
@@ -233,8 +244,12 @@ def _settled_autonomous(system: Autonomous, x: Array) -> list[tuple[Array, Secti
     states = np.array(path)
     if not np.isfinite(states).all():
         return []
-    size = np.ptp(states, axis=0)
-    size = np.where(size > 0.0, size, np.inf)
+    # A state that hardly moves, for its size, tells nothing.
+    size = sizes(system, x, system.guess_period)
+    moves = np.ptp(states, axis=0) / size
+    size = size * np.maximum(moves, _STILL * moves.max())
+    if not size.all():
+        return []
     away = (np.abs(states - x) / size).max(axis=1)
     turned = np.flatnonzero((away[1:-1] <= away[:-2]) & (away[1:-1] <= away[2:]) & (away[1:-1] < _COMES_BACK)) + 1
     if not turned.size:

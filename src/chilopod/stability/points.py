@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.normal_form import NormalForm, Status
+from chilopod.stability.amplitude import Status
+from chilopod.stability.normal_form import NormalForm
 
 Array = NDArray[np.float64]
 

@@ -26,7 +26,7 @@ from chilopod.stability.capabilities import (
     returns_per_period,
     spatial_symmetries,
 )
-from chilopod.stability.scales import balance, numerical_balance
+from chilopod.stability.scales import sizes
 
 Array = NDArray[np.float64]
 
@@ -122,7 +122,8 @@ def section_at(
     system, x
         The system and a state, shape (n,).
     scale
-        Sizes of the states, shape (n,): across means at right angles in these units. By default those of the motion.
+        Sizes of the states, shape (n,): across means at right angles in these units. By default
+        :func:`chilopod.stability.scales.sizes`.
     duration
         Of a return; the system's own guess by default.
 
@@ -134,15 +135,20 @@ def section_at(
     if not isinstance(system, Autonomous):
         return None
     velocity = _velocity(system, x)
-    if scale is None:
-        scale = np.maximum(np.abs(velocity), 1e-3 * balance(system.flow(x, 0.0, 0.01 * system.guess_period)[1]))
-    normal = velocity / scale**2
-    size = float(np.abs(velocity / scale).max())
-    if not size > 0.0:
-        raise AnalysisError("is an equilibrium: the motion rests in it", field="orbit", allowed="a state on an orbit")
     if duration is None:
-        duration = system.guess_period / returns_per_period(system)
+        duration = return_duration(system)
+    if not velocity.any():
+        raise AnalysisError("is an equilibrium: the motion rests in it", field="orbit", allowed="a state on an orbit")
+    if scale is None:
+        scale = sizes(system, x, duration)
+    normal = velocity / scale**2
     return Section(x, normal / float(np.linalg.norm(normal * scale)), duration)
+
+
+def return_duration(system: SystemLike) -> float:
+    """How long a return takes; about, where the period belongs to the orbit."""
+    whole = system.guess_period if isinstance(system, Autonomous) else _period(system)
+    return whole / returns_per_period(system)
 
 
 def _velocity(system: Autonomous, x: Array) -> Array:
@@ -169,12 +175,12 @@ def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple
     for a, b in zip(times, times[1:], strict=False):
         passing, factor = system.flow(passing, a, b)
         product = factor @ product
-    # In units in which all entries are alike: one that agrees by chance is as uncertain as the others.
-    units = numerical_balance(derivative)
-    units = units[:, None] / units
+    # In units of the states' sizes: an entry that agrees by chance is as uncertain as the others.
+    size = sizes(system, x, t1 - t0)
+    units = size[:, None] / size
     off = float((np.abs(product - derivative) / units).max())
-    size = float((np.abs(derivative) / units).max())
-    return state, derivative, (10.0 * off + 1e-15 * size) * units
+    largest = float((np.abs(derivative) / units).max())
+    return state, derivative, (10.0 * off + 1e-15 * largest) * units
 
 
 def _check_shapes(state: Array, derivative: Array, n: int) -> None:
@@ -208,7 +214,7 @@ def return_map(system: SystemLike, x: ArrayLike, with_error: bool = True, sectio
     count = returns_per_period(system)
     if isinstance(system, Autonomous):
         return _return_to_section(system, x, with_error, section or section_at(system, x))
-    duration = _period(system) / count
+    duration = return_duration(system)
     error: float | Array = np.nan
     if with_error:
         state, jacobian, error = flow_with_error(system, x, 0.0, duration)
@@ -319,7 +325,7 @@ def returned_states(system: SystemLike, states: Array, section: Section | None =
     """
     states = np.array(states)  # a system may write into what it is given
     if section is None:
-        return _turned(system, _carried(system, states, _period(system) / returns_per_period(system)))
+        return _turned(system, _carried(system, states, return_duration(system)))
     assert isinstance(system, Autonomous)
     approach = _APPROACHES[0]
     before = _carried(system, states, (1.0 - approach) * section.duration)

@@ -10,59 +10,42 @@ from chilopod.stability.capabilities import Scaled, SystemLike
 
 Array = NDArray[np.float64]
 
-_LEAST_WEIGHT = 1e-6  # of a coupling one way only, against one that goes both ways
+_PART = 1.0 / 16.0  # of a return
+_SWEEPS = 3
 
 
-def balance(matrix: Array) -> Array:
-    """Sizes d of the states, shape (n,), for which the entries of ``matrix[i, j] * d[j] / d[i]`` are most alike.
+def sizes(system: SystemLike, x: Array, duration: float) -> Array:
+    """What is large for every state, shape (n,): from the system, or from a state on the orbit and the flow there.
 
-    The logarithms of d solve a least-squares problem over all couplings, with the mean of each set of states that are
-    coupled at all fixed at zero. States in other units, d_i -> c_i d_i, are followed exactly but for that mean: unlike
-    the balancing of LAPACK (Osborne, J. ACM 7, 1960), this does not stop at powers of two.
-    """
-    n = len(matrix)
-    size = np.abs(matrix)
-    coupled = (size > 0.0) & ~np.eye(n, dtype=bool) & np.isfinite(size)
-    if not coupled.any():
-        return np.ones(n)
-    logs = np.zeros((n, n))
-    logs[coupled] = np.log(size[coupled])
-    # The weight is of the couplings there and back, so that it has no unit.
-    back = coupled & coupled.T
-    both = np.where(back, 0.5 * (logs + logs.T), -np.inf)
-    strongest = both.max() if back.any() else 0.0
-    weight = np.where(coupled, np.exp(np.minimum(both - strongest, 0.0)) + _LEAST_WEIGHT, 0.0)
-    weight = weight / weight.max()
-    # minimise sum weight (log |m_ij| + log d_j - log d_i)^2
-    total = weight + weight.T
-    laplacian = np.diag(total.sum(axis=1)) - total
-    right = (weight * logs).sum(axis=1) - (weight * logs).sum(axis=0)
-    d: Array = np.exp(np.linalg.lstsq(laplacian, right)[0])
-    return d
+    A state has the size of its value, or of what the others, disturbed by their own sizes, make of it within a part of
+    the return, whichever is larger: one that passes through zero just here, or rests there, is as large as its
+    coupling makes it. (At the end of the return what is strongly damped would have forgotten the others.) So states in
+    other units have sizes in these units. Of an orbit that is zero throughout, only the ratios mean anything.
 
-
-def numerical_balance(matrix: Array) -> Array:
-    """As :func:`balance` for bounds on round-off, by LAPACK: states that act one way only keep their units.
-
-    What acts one way only may be as small as it likes; units in which it is as large as the rest would blow up the
-    round-off of the rest.
-    """
-    d: Array = matrix_balance(matrix, permute=False, separate=True)[1][0]
-    return d
-
-
-def sizes(system: SystemLike, x: Array, jacobian: Array) -> Array:
-    """What is large for every state, shape (n,): from the system, or from a state and the derivative of the return.
-
-    A state that passes through zero just here has the size that its coupling to the others gives it. Of an orbit that
-    rests at zero only the ratios mean anything.
+    Parameters
+    ----------
+    system, x
+        The system and a state at time 0, shape (n,).
+    duration
+        Of a return.
     """
     given = system.scale if isinstance(system, Scaled) else None
     if given is not None:
         return given
-    d = balance(jacobian)
-    own = np.abs(x) / d
-    reach = float(own.max())
-    if reach == 0.0 or not np.isfinite(reach):
-        return d
-    return np.maximum(np.abs(x), d * float(np.median(own[own > 0.0])))
+    later, derivative = system.flow(np.array(x), 0.0, _PART * duration)
+    size = np.maximum(np.abs(x), np.abs(later))
+    if not size.any():
+        return numerical_balance(derivative)
+    coupling = np.abs(derivative)
+    np.fill_diagonal(coupling, 0.0)
+    for _ in range(_SWEEPS):
+        size = np.maximum(size, (coupling * size).max(axis=1))
+    return np.where(size > 0.0, size, size[size > 0.0].min())
+
+
+def numerical_balance(matrix: Array) -> Array:
+    """Sizes d of the states for which the rows and columns of ``matrix[i, j] * d[j] / d[i]`` are about alike, by
+    LAPACK: for bounds on round-off."""
+    with np.errstate(invalid="ignore"):  # scipy takes large factors for indices, which are not asked for
+        d: Array = matrix_balance(matrix, permute=False, separate=True)[1][0]
+    return d

@@ -1,0 +1,129 @@
+"""Orbits of systems that do not depend on time: unknown period, one multiplier that is always 1."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.stability import Kind, PeriodicSystem, exponents, find_orbit, locate, multipliers
+
+STEP = 1e-30
+
+
+def ring(mu, twist=0.0, spin=2.0, leak=0.7, units=(1.0, 1.0, 1.0)):
+    """r' = r (mu - r^2), phi' = spin + twist (r^2 - mu), z' = -leak z + r^2 - mu, in x = r cos phi, y = r sin phi, z.
+
+    The orbit r^2 = mu takes 2 pi / spin, whatever mu; its multipliers are exp(-2 mu T) and exp(-leak T). All in closed
+    form: with q = r^2, q(t) = mu q0 e / (mu + q0 (e - 1)), e = exp(2 mu t).
+    """
+    units = np.array(units)
+
+    def moved(x, t):
+        x, y, z = x / units
+        q0 = x * x + y * y
+        e = np.exp(2.0 * mu * t)
+        grown = mu + q0 * (e - 1.0)
+        q = mu * q0 * e / grown
+        turned = spin * t + twist * (0.5 * np.log(grown / mu) - mu * t)
+        share = np.sqrt(mu * e / grown)
+        c, s = np.cos(turned) * share, np.sin(turned) * share
+        # z' is driven by q - mu, which is a rational function of e: a Gauss rule is exact to round-off here.
+        u, w = np.polynomial.legendre.leggauss(40)
+        u, w = 0.5 * t * (u + 1.0), 0.5 * t * w
+        grow = np.exp(2.0 * mu * u)
+        drive = mu * q0 * grow / (mu + q0 * (grow - 1.0)) - mu
+        z = z * np.exp(-leak * t) + (w * np.exp(-leak * (t - u)) * drive).sum()
+        return np.array([c * x - s * y, s * x + c * y, z]) * units
+
+    def flow(x, t0, t1):
+        columns = [
+            moved(x + 1j * STEP * step, t1 - t0).imag / STEP / unit
+            for step, unit in zip(np.eye(3) * units, units, strict=True)
+        ]
+        return moved(x, t1 - t0).real, np.array(columns).T
+
+    def velocity(x):
+        x, y, z = x / units
+        q = x * x + y * y
+        turning = spin + twist * (q - mu)
+        return np.array([(mu - q) * x - turning * y, (mu - q) * y + turning * x, -leak * z + q - mu]) * units
+
+    return PeriodicSystem(3, None, flow, velocity=velocity, guess_period=2.0 * np.pi / spin)
+
+
+def known(mu, leak, spin):
+    period = 2.0 * np.pi / spin
+    return period, np.exp(-np.sort([2.0 * mu, leak]) * period)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.floats(0.2, 2.0),
+    st.floats(-3.0, 3.0),
+    st.floats(0.5, 5.0),
+    st.sampled_from([-0.3, -0.02, 0.05, 0.4, 1.0]),
+    st.floats(0.0, 6.2),
+    st.floats(0.93, 1.06),
+    st.lists(st.sampled_from([1e-9, 1e-4, 1.0, 1e5, 1e9]), min_size=3, max_size=3),
+)
+def test_known_orbits_in_any_units(mu, twist, spin, leak, angle, off, units):
+    period, values = known(mu, leak, spin)
+    guess = np.sqrt(mu) * np.array([np.cos(angle), np.sin(angle), 0.0]) * off * units
+    found = multipliers(ring(mu, twist, spin, leak, units), guess)
+    assert found.period == pytest.approx(period, rel=1e-13)
+    assert np.abs(found.values - values).max() <= found.error_bound < 1e-8
+    assert found.stable == bool(leak > 0)
+
+
+def test_exponents_leave_out_the_motion_itself():
+    found = exponents(ring(1.3, 0.4, 2.0, 40.0), [1.1, 0.3, 0.0])
+    np.testing.assert_allclose(found.values, [-2.6, -40.0], rtol=1e-11)
+    assert found.modes.shape == (3, 2)
+    assert found.multipliers.period == pytest.approx(np.pi, rel=1e-14)
+
+
+def test_a_bad_guess_settles_on_the_orbit_that_attracts():
+    found = find_orbit(ring(1.0, 0.8), [9.0, -7.0, 3.0])
+    assert found.period == pytest.approx(np.pi, rel=1e-12)
+    assert np.hypot(*found.state[:2]) == pytest.approx(1.0, rel=1e-12)
+
+
+def test_a_bad_guess_of_the_period():
+    system = ring(1.0, 0.3)
+    for guess in (2.0, 4.7):
+        far = PeriodicSystem(3, None, system.flow, velocity=system.velocity, guess_period=guess)
+        assert find_orbit(far, [1.0, 0.2, 0.1]).period == pytest.approx(np.pi, rel=1e-12)
+
+
+def test_where_the_orbit_loses_stability():
+    """leak passes through zero: a multiplier +1 besides the one of the motion."""
+    (point,) = locate(lambda leak: ring(1.0, 0.5, leak=leak), (-0.2, 0.3), orbit=[1.0, 0.1, 0.0], normal_form=False)
+    assert abs(point.value) <= point.error_bound < 1e-9
+    assert point.kind in (Kind.TRANSCRITICAL, Kind.BRANCH_POINT)
+
+
+def test_orbits_in_a_family():
+    """Nothing brings z back: the nearest orbit is found, and its multiplier 1 is not called stable."""
+    found = multipliers(ring(0.5, leak=0.0), [0.7, 0.02, 0.3])
+    np.testing.assert_allclose(found.values, [1.0, np.exp(-np.pi)], rtol=1e-10)
+    assert not found.stable
+
+
+def test_a_flow_without_parts_is_a_map():
+    """x -> -0.8 x, as a flow that ignores from when to when: the exponent has half a turn."""
+    system = PeriodicSystem(1, 1.0, lambda x, t0, t1: (-0.8 * x, np.array([[-0.8]])), orbit=[0.0])
+    assert exponents(system).values[0] == pytest.approx(np.log(0.8) + 1j * np.pi)
+
+
+def test_what_is_no_orbit_is_one_line():
+    with pytest.raises(AnalysisError, match="equilibrium"):
+        multipliers(ring(1.0, leak=0.5), [0.0, 0.0, -2.0])
+    with pytest.raises(ParameterError, match="guess_period"):
+        PeriodicSystem(3, None, ring(1.0).flow, velocity=ring(1.0).velocity)
+    with pytest.raises(ParameterError, match="period"):
+        PeriodicSystem(3, None, ring(1.0).flow)
+    drift = PeriodicSystem(1, None, lambda x, t0, t1: (x + t1 - t0, np.eye(1)), velocity=np.ones_like, guess_period=1.0)
+    with pytest.raises(AnalysisError) as error:
+        multipliers(drift, [0.0])
+    assert "\n" not in str(error.value)

@@ -1,0 +1,483 @@
+"""Groups whose representations are in every book, in any units."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.stability.equivariants import Critical, SymmetricKind, Wave, symmetric_crossing
+from chilopod.stability.groups import centraliser, commutes, finite_group, isotropy
+from chilopod.stability.isotypic import Type, isotypic, reduced_matrices
+
+
+def permutation(*images):
+    return np.eye(len(images))[list(images)]
+
+
+def shift(cells, states=1):
+    return np.kron(np.roll(np.eye(cells), 1, axis=0), np.eye(states))
+
+
+def reversal(cells, states=1):
+    return np.kron(np.eye(cells)[[-i % cells for i in range(cells)]], np.eye(states))
+
+
+def dihedral(cells, states=1):
+    return np.array([shift(cells, states), reversal(cells, states)])
+
+
+def cyclic(cells, states=1):
+    return shift(cells, states)[None]
+
+
+def quaternions(copies=1):
+    i = np.array([[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 0, -1], [0, 0, 1, 0]])
+    j = np.array([[0, 0, -1, 0], [0, 0, 0, 1], [1, 0, 0, 0], [0, -1, 0, 0]])
+    return np.kron(np.eye(copies), np.array([i, j]))
+
+
+def regular(degree):
+    """The symmetric group acting on itself: each irreducible representation as often as its dimension says."""
+    every = list(itertools.permutations(range(degree)))
+    number = {element: k for k, element in enumerate(every)}
+    return np.array(
+        [
+            np.eye(len(every))[:, [number[tuple(g[i] for i in h)] for h in every]]
+            for g in ((1, 0, *range(2, degree)), (*range(1, degree), 0))
+        ]
+    )
+
+
+QUARTER_TURN = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])
+THIRD_TURN = permutation(1, 2, 0)
+HALF_TURN = np.diag([1.0, -1.0, -1.0])
+
+GROUPS = {
+    "identity": np.eye(3)[None],
+    "sign": -np.eye(2)[None],
+    "C5, 2 states": cyclic(5, 2),
+    "C12": cyclic(12),
+    "D5, 2 states": dihedral(5, 2),
+    "D6, 3 states": dihedral(6, 3),
+    "T": np.array([THIRD_TURN, HALF_TURN]),
+    "Td": np.array([THIRD_TURN, HALF_TURN, permutation(1, 0, 2)]),
+    "O": np.array([THIRD_TURN, QUARTER_TURN]),
+    "Oh": np.array([THIRD_TURN, QUARTER_TURN, -np.eye(3)]),
+    "S4": np.array([permutation(1, 0, 2, 3), permutation(1, 2, 3, 0)]),
+    "S4, regular": regular(4),
+    "Q8": quaternions(),
+    "Q8, 3 copies": quaternions(3),
+}
+ORDERS = dict(zip(GROUPS, (1, 2, 5, 12, 10, 12, 12, 24, 24, 48, 24, 24, 8, 8), strict=True))
+
+
+def in_units(matrices, scales):
+    """Matrices as they are with the states in other units."""
+    return scales[:, None] * np.asarray(matrices) / scales
+
+
+def random_scales(random, size):
+    return 10.0 ** random.uniform(-9.0, 9.0, size)
+
+
+def commuting(elements, random):
+    """A random matrix that commutes with some elements: P M P^-1 averaged over them."""
+    n = elements.shape[1]
+    return np.mean(elements @ random.standard_normal((n, n)) @ np.linalg.inv(elements), axis=0)
+
+
+def farthest(found, known):
+    """Largest distance between two lists of numbers, each of one paired with the nearest that is left of the other."""
+    left = list(known)
+    assert len(found) == len(left)
+    worst = 0.0
+    for value in found:
+        nearest = int(np.argmin(np.abs(np.array(left) - value)))
+        worst = max(worst, abs(left.pop(nearest) - value))
+    return worst
+
+
+def spectrum_of(blocks, matrix):
+    """Eigenvalues from the blocks, each as often as it should be there."""
+    values = []
+    for block in blocks:
+        own = np.linalg.eigvals(block.reduced(matrix)).astype(complex)
+        values += list(np.repeat(own, block.repeated))
+        if block.type is Type.COMPLEX:
+            values += list(np.repeat(own.conj(), block.repeated))
+    return values
+
+
+def shapes(generators):
+    """(d, type, copies, order of the kernel) of each block."""
+    return [
+        (block.dimension, block.type.label, block.multiplicity, int(block.kernel.sum()))
+        for block in isotypic(finite_group(generators))
+    ]
+
+
+@pytest.mark.parametrize("name", GROUPS)
+def test_closure_metric_and_inverses_in_any_units(name):
+    scales = random_scales(np.random.default_rng(1), GROUPS[name].shape[1])
+    group = finite_group(in_units(GROUPS[name], scales))
+    assert group.order == ORDERS[name]
+    np.testing.assert_array_equal(group.elements[0], np.eye(group.dimension))
+    natural = in_units(group.elements, 1.0 / scales)
+    distances = np.abs(natural[:, None] - natural).max(axis=(2, 3))
+    assert distances[~np.eye(group.order, dtype=bool)].min(initial=1.0) > 0.1
+    product = natural[-1] @ natural
+    assert np.abs(product[:, None] - natural).max(axis=(2, 3)).min(axis=1).max() < 1e-12
+    size = np.outer(group.scales, group.scales)
+    moved = np.swapaxes(group.elements, 1, 2) @ group.invariant_metric @ group.elements
+    np.testing.assert_allclose(moved * size, np.tile(group.invariant_metric * size, (group.order, 1, 1)), atol=1e-12)
+    np.testing.assert_allclose(
+        np.swapaxes(group.orthogonal, 1, 2) @ group.orthogonal,
+        np.tile(np.eye(group.dimension), (group.order, 1, 1)),
+        atol=1e-13,
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "known"),
+    [
+        ("identity", [(1, "real", 3, 1)]),
+        ("sign", [(1, "real", 2, 1)]),
+        ("C5, 2 states", [(1, "real", 2, 5), *[(2, "complex", 2, 1)] * 2]),
+        ("D6, 3 states", [(1, "real", 3, 12), (1, "real", 3, 6), (2, "real", 3, 2), (2, "real", 3, 1)]),
+        ("T", [(3, "real", 1, 1)]),
+        ("Oh", [(3, "real", 1, 1)]),
+        ("S4", [(1, "real", 1, 24), (3, "real", 1, 1)]),
+        (
+            "S4, regular",
+            [(1, "real", 1, 24), (1, "real", 1, 12), (2, "real", 2, 4), (3, "real", 3, 1), (3, "real", 3, 1)],
+        ),
+        ("Q8", [(4, "quaternionic", 1, 1)]),
+        ("Q8, 3 copies", [(4, "quaternionic", 3, 1)]),
+    ],
+)
+def test_irreducible_representations(name, known):
+    assert shapes(GROUPS[name]) == known
+
+
+def test_all_types_in_one_group():
+    # Q8 x C3 acting on itself has 1-dimensional real, 2-dimensional complex, and 4-dimensional ones of both types.
+    i, j = np.kron(quaternions(), np.eye(3))
+    third = np.kron(np.eye(4), shift(3))
+    found = shapes([i, j, third])
+    assert found == [(4, "quaternionic", 1, 3), (4, "complex", 2, 1)]
+
+
+@pytest.mark.parametrize("name", GROUPS)
+def test_what_commutes_becomes_copies_of_its_reduced_matrix(name):
+    random = np.random.default_rng(2)
+    group = finite_group(GROUPS[name])
+    blocks = isotypic(group)
+    matrix = commuting(group.elements, random)
+    basis = np.hstack([block.basis for block in blocks])
+    dual = np.vstack([block.dual for block in blocks])
+    np.testing.assert_allclose(dual @ basis, np.eye(group.dimension), atol=1e-13)
+    for block in blocks:
+        reduced = block.reduced(matrix)
+        if block.type is Type.REAL:
+            whole = np.kron(reduced, np.eye(block.dimension))
+        elif block.type is Type.COMPLEX:
+            whole = np.kron(reduced.real, block.units[0]) + np.kron(reduced.imag, block.units[1])
+        else:
+            m = block.multiplicity
+            first, second = reduced[:m, :m], reduced[m:, :m].conj()
+            parts = (first.real, first.imag, second.real, second.imag)
+            whole = sum(np.kron(part, unit) for part, unit in zip(parts, block.units, strict=True))
+        np.testing.assert_allclose(block.dual @ matrix @ block.basis, whole, atol=1e-13)
+        for element, rho in zip(group.elements, block.representation, strict=True):
+            np.testing.assert_allclose(
+                element @ block.basis, block.basis @ np.kron(np.eye(block.multiplicity), rho), atol=1e-13
+            )
+
+
+@pytest.mark.parametrize("name", ["C5, 2 states", "D6, 3 states", "S4, regular", "Q8, 3 copies"])
+def test_reduction_keeps_products(name):
+    random = np.random.default_rng(3)
+    group = finite_group(GROUPS[name])
+    one, other = (commuting(group.elements, random) for _ in range(2))
+    for block in isotypic(group):
+        np.testing.assert_allclose(block.reduced(one @ other), block.reduced(one) @ block.reduced(other), atol=1e-12)
+
+
+def eigenvalue_error(matrix):
+    """Bound on what round-off does to the eigenvalues of a matrix."""
+    vectors = np.linalg.eig(matrix)[1]
+    conditions = np.linalg.norm(np.linalg.inv(vectors), axis=1)
+    return 20.0 * len(matrix) * np.finfo(float).eps * np.linalg.norm(matrix) * conditions.max()
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_eigenvalues_of_random_matrices_in_random_units(seed):
+    random = np.random.default_rng(seed)
+    name = list(GROUPS)[seed % len(GROUPS)]
+    n = GROUPS[name].shape[1]
+    # A turn of the space keeps the matrices orthogonal, and leaves none of their entries zero.
+    turn = np.linalg.qr(random.standard_normal((n, n)))[0] if seed % 3 else np.eye(n)
+    elements = turn @ finite_group(GROUPS[name]).elements @ turn.T
+    matrix = commuting(elements, random)
+    scales = random_scales(random, n)
+    group = finite_group(in_units(turn @ GROUPS[name] @ turn.T, scales))
+    blocks = isotypic(group)
+    here = in_units(matrix, scales)
+    assert farthest(spectrum_of(blocks, here), np.linalg.eigvals(matrix)) < eigenvalue_error(matrix)
+    assert commutes(group, here) < 1.0
+
+
+@pytest.mark.parametrize("name", ["D5, 2 states", "C5, 2 states", "S4", "Q8, 3 copies"])
+def test_modes_are_eigenvectors(name):
+    random = np.random.default_rng(4)
+    n = GROUPS[name].shape[1]
+    scales = random_scales(random, n)
+    group = finite_group(in_units(GROUPS[name], scales))
+    matrix = commuting(finite_group(GROUPS[name]).elements, random)
+    for block in isotypic(group):
+        space = block.half_space
+        values, vectors = np.linalg.eig(block.reduced(in_units(matrix, scales)))
+        for value, vector in zip(values, vectors.T, strict=True):
+            mode = block.mode(vector, space @ random.standard_normal(space.shape[1])) / scales
+            np.testing.assert_allclose(matrix @ mode, value * mode, atol=1e-11 * np.abs(mode).max())
+
+
+def test_a_block_does_not_see_what_does_not_commute_and_bounds_its_error():
+    random = np.random.default_rng(5)
+    group = finite_group(GROUPS["D5, 2 states"])
+    matrix = commuting(group.elements, random)
+    disturbance = 1e-3 * random.uniform(-1.0, 1.0, matrix.shape)
+    mean = np.mean(group.elements @ disturbance @ np.linalg.inv(group.elements), axis=0)
+    for block in isotypic(group):
+        disturbed = block.reduced(matrix + disturbance)
+        np.testing.assert_allclose(disturbed, block.reduced(matrix + mean), atol=1e-14)
+        moved = np.abs(disturbed - block.reduced(matrix))
+        assert (moved <= block.reduced_error(matrix, 1e-3)).all()
+        assert (block.reduced_error(matrix, 1e-3) <= 1e-2).all()
+    assert commutes(group, matrix + disturbance) > 1.0
+    assert commutes(group, matrix + disturbance, error=1e-3) <= 1.0
+
+
+def test_many_matrices_at_once():
+    random = np.random.default_rng(6)
+    group = finite_group(GROUPS["Q8, 3 copies"])
+    blocks = isotypic(group)
+    matrices = np.array([commuting(group.elements, random) for _ in range(4)])
+    (many,) = reduced_matrices(blocks, matrices)
+    assert many.shape == (4, 6, 6)
+    np.testing.assert_array_equal(many[2], blocks[0].reduced(matrices[2]))
+
+
+def test_positions_relative_to_a_first_cell():
+    # The first one, and the others minus it: triangular matrices, not orthogonal in any units.
+    relative = np.eye(5) - np.outer([0, 1, 1, 1, 1], [1, 0, 0, 0, 0])
+    scales = np.array([1e4, 1e-4, 1e-2, 1.0, 1e3])
+    generators = in_units(relative @ dihedral(5) @ np.linalg.inv(relative), scales)
+    group = finite_group(generators)
+    ring = np.roll(np.eye(5), 1, axis=0)
+    matrix = in_units(relative @ (0.3 * ring + 0.3 * ring.T + 0.1 * np.eye(5)) @ np.linalg.inv(relative), scales)
+    known = [0.1 + 0.6 * math.cos(2.0 * math.pi * k / 5) for k in range(5)]
+    assert farthest(spectrum_of(isotypic(group), matrix), known) < 1e-14
+    assert commutes(group, matrix) < 1.0
+
+
+def test_generators_that_are_not_needed():
+    every = finite_group(GROUPS["S4, regular"]).elements
+    group = finite_group(every)
+    assert group.order == 24
+    assert len(group.generators) < 5
+    assert finite_group([np.eye(2), np.eye(2)]).generators.shape == (1, 2, 2)
+
+
+def test_results_are_the_same_every_time():
+    one, other = (isotypic(finite_group(GROUPS["S4, regular"])) for _ in range(2))
+    for first, second in zip(one, other, strict=True):
+        np.testing.assert_array_equal(first.basis, second.basis)
+
+
+def test_labels():
+    labels = [block.label for block in isotypic(finite_group(dihedral(6)))]
+    assert labels == [
+        "trivial",
+        "sign change, kernel of order 6",
+        "2-dimensional, real, kernel of order 2",
+        "2-dimensional, real, kernel of order 1",
+    ]
+
+
+def test_isotropy_of_states_in_any_units():
+    scales = random_scales(np.random.default_rng(7), 10)
+    group = finite_group(in_units(dihedral(5, 2), scales))
+    everywhere = scales * np.tile([0.3, -1.2], 5)
+    mirrored = scales * np.kron([1.0, 2.0, 3.0, 3.0, 2.0], [1.0, 0.5])
+    assert isotropy(group, everywhere).order == 10
+    assert isotropy(group, mirrored).order == 2
+    assert isotropy(group, scales * np.arange(10.0)).order == 1
+    two = isotropy(group, mirrored)
+    assert shapes(two.generators) == [(1, "real", 6, 2), (1, "real", 4, 1)]
+    # A state at rest, up to the error of its computation.
+    tiny = 1e-14 * scales * np.arange(10.0)
+    assert isotropy(group, tiny).order == 1
+    assert isotropy(group, tiny, error=2e-13 * scales).order == 10
+
+
+def test_centraliser_of_the_spatial_part_of_a_symmetry_in_time():
+    group = finite_group(dihedral(6))
+    assert centraliser(group, shift(6)).order == 6
+    assert centraliser(group, reversal(6)).order == 4
+    assert centraliser(group, -np.eye(6)).order == 12
+    # Twisted: M = gamma Phi, Phi commuting with the group, commutes with the centraliser and not with the rest.
+    random = np.random.default_rng(8)
+    matrix = shift(6) @ commuting(group.elements, random)
+    assert commutes(centraliser(group, shift(6)), matrix) < 1.0
+    assert commutes(group, matrix) > 1e6
+
+
+def crossing(generators, critical, number=-1):
+    return symmetric_crossing(isotypic(finite_group(generators))[number], critical)
+
+
+@pytest.mark.parametrize(
+    ("generators", "kind", "quadratic", "axial"),
+    [
+        (np.eye(2)[None], SymmetricKind.FOLD_OR_TRANSCRITICAL, 1, {(1, False)}),
+        (-np.eye(1)[None], SymmetricKind.PITCHFORK, 0, {(1, True)}),
+        (dihedral(3), SymmetricKind.EQUIVARIANT_TRANSCRITICAL, 1, {(2, False)}),
+        (dihedral(4), SymmetricKind.EQUIVARIANT_PITCHFORK, 0, {(2, True)}),
+        (dihedral(5), SymmetricKind.EQUIVARIANT_PITCHFORK, 0, {(2, False)}),
+        (dihedral(6), SymmetricKind.EQUIVARIANT_PITCHFORK, 0, {(2, True)}),
+        # Cube: axes through faces, corners and edges. Tetrahedron: without edges, and with the term (yz, zx, xy).
+        (GROUPS["O"], SymmetricKind.EQUIVARIANT_PITCHFORK, 0, {(4, True), (3, True), (2, True)}),
+        (GROUPS["Oh"], SymmetricKind.EQUIVARIANT_PITCHFORK, 0, {(8, True), (6, True), (4, True)}),
+        (GROUPS["T"], SymmetricKind.EQUIVARIANT_TRANSCRITICAL, 1, {(3, False), (2, True)}),
+        (GROUPS["Td"], SymmetricKind.EQUIVARIANT_TRANSCRITICAL, 1, {(6, False), (4, True)}),
+        # Clusters of 1 and 3, and of 2 and 2 (Golubitsky & Stewart, The Symmetry Perspective, Birkhäuser 2002).
+        (GROUPS["S4"], SymmetricKind.EQUIVARIANT_TRANSCRITICAL, 1, {(6, False), (4, True)}),
+    ],
+)
+def test_crossing_at_plus_one(generators, kind, quadratic, axial):
+    found = crossing(generators, Critical.PLUS)
+    assert found.kind is kind
+    assert found.quadratic == quadratic
+    assert found.codimension == 1
+    assert found.complete
+    assert {(branch.isotropy.size, branch.reversed) for branch in found.branches} == axial
+
+
+@pytest.mark.parametrize("cells", range(3, 13))
+def test_dihedral_axes_and_waves(cells):
+    faithful = [block for block in isotypic(finite_group(dihedral(cells))) if block.kernel.sum() == 1][-1]
+    steady = symmetric_crossing(faithful, Critical.PLUS)
+    assert steady.critical == 2
+    assert len(steady.branches) == (1 if cells % 2 else 2)
+    # Rotating waves and two kinds of standing ones (Golubitsky, Stewart & Schaeffer 1988, chapter XVIII).
+    waves = symmetric_crossing(faithful, Critical.PAIR)
+    assert waves.critical == 4
+    assert sorted(branch.wave.value for branch in waves.branches) == ["rotating", "standing", "standing"]
+    (rotating,) = (branch for branch in waves.branches if branch.wave is Wave.ROTATING)
+    assert rotating.isotropy.size == cells
+    np.testing.assert_allclose(
+        np.sort(np.mod(rotating.phases + 1e-9, 2.0 * math.pi)), 2.0 * math.pi * np.arange(cells) / cells, atol=1e-8
+    )
+    assert waves.cubic == (3 if cells == 4 else 2)
+
+
+@pytest.mark.parametrize("name", ["O", "Td", "Oh"])
+def test_waves_of_cube_and_tetrahedron(name):
+    # Together with phase shifts the three are one group of matrices: Labouriau & Murza, arXiv:1407.2866.
+    waves = crossing(GROUPS[name], Critical.PAIR)
+    assert sorted(branch.wave.value for branch in waves.branches) == ["rotating"] * 2 + ["standing"] * 3
+
+
+def test_isotropy_of_axial_branches_is_what_the_modes_keep():
+    group = finite_group(GROUPS["S4"])
+    block = isotypic(group)[-1]
+    for branch in symmetric_crossing(block, Critical.PLUS).branches:
+        mode = block.mode([1.0], branch.direction)
+        assert np.abs(mode.imag).max() == 0.0
+        kept = np.abs(group.elements @ mode - mode).max(axis=1) < 1e-12
+        np.testing.assert_array_equal(np.flatnonzero(kept), branch.isotropy)
+        assert isotropy(group, mode.real, error=1e-13).order == branch.isotropy.size
+    for branch in symmetric_crossing(block, Critical.PAIR).branches:
+        mode = block.mode([1.0], branch.direction)
+        for number, phase in zip(branch.isotropy, branch.phases, strict=True):
+            np.testing.assert_allclose(group.elements[number] @ mode, np.exp(1j * phase) * mode, atol=1e-12)
+
+
+def test_one_way_rings_rotate():
+    found = crossing(cyclic(5), Critical.PAIR)
+    assert found.kind is SymmetricKind.SYMMETRIC_NEIMARK_SACKER
+    assert found.critical == 2
+    (branch,) = found.branches
+    assert branch.wave is Wave.ROTATING
+    assert branch.isotropy.size == 5
+    assert crossing(cyclic(5), Critical.PLUS).codimension == 2
+    assert crossing(GROUPS["Q8"], Critical.PLUS).codimension == 4
+
+
+def test_period_doubling_has_no_quadratic_terms_and_keeps_shifts_by_the_old_period():
+    assert crossing(np.eye(1)[None], Critical.MINUS).kind is SymmetricKind.PERIOD_DOUBLING
+    found = crossing(dihedral(3), Critical.MINUS)
+    assert found.kind is SymmetricKind.SYMMETRIC_PERIOD_DOUBLING
+    assert found.quadratic == 0
+    assert sorted(tuple(branch.phases) for branch in found.branches) == [(0.0, 0.0), (0.0, math.pi)]
+
+
+def turn(angle):
+    return [[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]]
+
+
+@pytest.mark.parametrize(
+    ("generators", "words"),
+    [
+        ([[[1, 1], [0, 1]]], "infinite"),
+        ([turn(1.0)], "infinite"),
+        ([turn(2.0 * math.pi / 10_001)], "infinite"),
+        ([[[1, 0], [0, -1]], [[math.cos(2), math.sin(2)], [math.sin(2), -math.cos(2)]]], "infinite"),
+        (np.stack([permutation(1, 0, *range(2, 8)), permutation(*range(1, 8), 0)]), "10000"),
+        ([[[2, 0], [0, 2]]], "infinite"),
+        ([[[1e200, 0], [0, 1e-200]]], "infinite"),
+        ([[[0, 0], [0, 0]]], "invertible"),
+        ([[[1, 1], [1, 1]]], "invertible"),
+        ([[1, 0], [0, 1]], "square"),
+        ([[[1, 0, 0], [0, 1, 0]]], "square"),
+        ([], "square"),
+        ([np.eye(2), np.eye(3)], "one shape"),
+        ([[[1]]] * 501, "too many"),
+        ([np.roll(np.eye(600), 1, axis=0)], "93"),
+        ([[[math.nan]]], "finite"),
+        ([[[1j]]], "real"),
+        ("shift", "real"),
+        (None, "real"),
+    ],
+)
+def test_what_generates_no_finite_group_is_refused_in_one_line(generators, words):
+    with pytest.raises(ParameterError) as error:
+        finite_group(generators)
+    assert words in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_other_bad_input_is_refused_in_one_line():
+    group = finite_group(dihedral(4))
+    for call, words in [
+        (lambda: isotropy(group, [1.0]), "shape"),
+        (lambda: isotropy(group, [0.0] * 4, error=-1.0), "negative"),
+        (lambda: isotropy(group, [0.0] * 4, error=[1.0, 2.0]), "error"),
+        (lambda: commutes(group, np.eye(3)), "shape"),
+        (lambda: centraliser(group, np.zeros((4, 4))), "invertible"),
+        (lambda: centraliser(group, np.diag([1.0, 2.0, 3.0, 4.0])), "normalise"),
+        (lambda: reduced_matrices(isotypic(group), np.eye(4)), "shape"),
+        (lambda: reduced_matrices((), np.eye(4)), "blocks"),
+    ]:
+        with pytest.raises(ParameterError, match=words) as error:
+            call()
+        assert "\n" not in str(error.value)
+
+
+def test_a_state_at_the_edge_of_what_is_told_apart():
+    # Two shifts by one cell stay within the error, three do not: no group.
+    with pytest.raises(AnalysisError, match="edge"):
+        isotropy(finite_group(cyclic(12)), np.sin(2.0 * math.pi * np.arange(12) / 12), error=0.4)

@@ -1,0 +1,229 @@
+"""The normal form from a map alone: errors that hold, any units, and a reason where there is none."""
+
+import numpy as np
+import pytest
+
+from chilopod.errors import AnalysisError
+from chilopod.stability import Kind
+from chilopod.stability.amplitude import Status
+from chilopod.stability.center_manifold import CriticalOrbit
+from chilopod.stability.normal_form import normal_form
+from chilopod.stability.points import criticality, kind_at_plus_one
+
+
+def at_origin(jacobian, multiplier, right=None, left=None, returns=1):
+    n = len(jacobian)
+    first = np.eye(n)[0]
+    return CriticalOrbit(
+        np.zeros(n),
+        np.array(jacobian, dtype=float),
+        complex(multiplier),
+        np.asarray(first if right is None else right, dtype=complex),
+        np.asarray(first if left is None else left, dtype=complex),
+        returns,
+    )
+
+
+def pair(angle):
+    """A turn by an angle, its multiplier and vectors; z = x + iy is twice the amplitude over sqrt 2."""
+    c, s = np.cos(angle), np.sin(angle)
+    mode = np.array([1.0, -1j]) / np.sqrt(2)
+    return at_origin([[c, -s], [s, c]], np.exp(1j * angle), mode, mode)
+
+
+def in_plane(image_of):
+    """A map of the plane from one of complex numbers."""
+
+    def mapped(states):
+        z = image_of(states[:, 0] + 1j * states[:, 1])
+        return np.stack([z.real, z.imag], axis=1)
+
+    return mapped
+
+
+def assert_holds(found, error, expected, within):
+    assert abs(found - expected) <= error <= within * abs(expected)
+
+
+@pytest.mark.parametrize("size", [1e-12, 1e-3, 1.0, 1e9])
+def test_the_amplitude_is_found_on_every_scale(size):
+    form = normal_form(lambda x: x / np.sqrt(1.0 + 2.0 * (x / size) ** 2), at_origin([[1.0]], 1.0))
+    assert form.status is Status.FOUND
+    assert_holds(form.cubic, form.cubic_error, -1.0 / size**2, 1e-7)
+    assert kind_at_plus_one(form) is Kind.PITCHFORK
+
+
+def test_the_scale_may_be_given():
+    form = normal_form(lambda x: x - (x / 1e-7) ** 3, at_origin([[1.0]], 1.0), scale=[1e-7])
+    assert_holds(form.cubic, form.cubic_error, -1e21, 1e-9)
+
+
+def test_units_of_the_states_do_not_matter():
+    """A coupling that leaves the mode and comes back, in states whose units differ by up to 1e18."""
+    random = np.random.default_rng(3)
+    jacobian = np.array([[1.0, 0.0, 0.0], [0.0, 0.4, 0.3], [0.0, -0.2, 0.5]])
+
+    def mapped(x):
+        a, b, c = x.T
+        return np.stack([a + a * b - a**3, 0.4 * b + 0.3 * c + a**2, -0.2 * b + 0.5 * c - 0.7 * a**2], axis=1)
+
+    stretch = np.linalg.solve(np.eye(2) - jacobian[1:, 1:], [1.0, -0.7])
+    for units in [np.ones(3), *10.0 ** random.uniform(-9, 9, (6, 3))]:
+        at = at_origin(units[:, None] * jacobian / units, 1.0)
+        form = normal_form(lambda x, units=units: mapped(x / units) * units, at)
+        assert_holds(form.cubic, form.cubic_error, (stretch[0] - 1.0) / units[0] ** 2, 1e-7)
+
+
+def test_a_term_that_only_the_bent_curve_sees():
+    def mapped(x):
+        return np.stack([x[:, 0] + x[:, 0] * x[:, 1], 0.5 * x[:, 1] + x[:, 0] ** 2], axis=1)
+
+    form = normal_form(mapped, at_origin(np.diag([1.0, 0.5]), 1.0))
+    assert_holds(form.cubic, form.cubic_error, 2.0, 1e-9)
+
+
+@pytest.mark.parametrize(("returns", "times"), [(1, 2), (2, 2), (3, 6), (4, 4)])
+def test_returns_at_minus_one(returns, times):
+    """An even number of returns is the period; after an odd one two periods are needed for a multiplier +1."""
+    form = normal_form(lambda x: -x + 0.7 * x**3, at_origin([[-1.0]], -1.0, returns=returns))
+    assert_holds(form.cubic, form.cubic_error, -times * 0.7, 1e-7)
+
+
+@pytest.mark.parametrize("returns", [1, 2, 3])
+def test_returns_at_plus_one(returns):
+    def mapped(x):
+        return x + 0.3 * x**2 - 0.5 * x**3
+
+    form = normal_form(mapped, at_origin([[1.0]], 1.0, returns=returns), orbit_error=0.0)
+    over_a_period = np.polynomial.Polynomial([0.0, 1.0])
+    for _ in range(returns):
+        over_a_period = mapped(over_a_period)
+    assert_holds(form.quadratic, form.quadratic_error, over_a_period.coef[2], 1e-7)
+    assert_holds(form.cubic, form.cubic_error, over_a_period.coef[3], 1e-7)
+    assert kind_at_plus_one(form) is Kind.TRANSCRITICAL
+
+
+def test_an_orbit_off_by_a_little_beside_a_pitchfork_is_not_transcritical():
+    """x - x^3 around a point beside its fixed point has a quadratic term, and returns to round-off all the same."""
+    off = 1e-6
+    at = CriticalOrbit(np.array([off]), np.array([[1.0 - 3.0 * off**2]]), 1.0 + 0j, np.ones(1), np.ones(1))
+    form = normal_form(lambda x: x - x**3, at)
+    assert abs(form.quadratic) <= form.quadratic_error < 1e-3
+    assert kind_at_plus_one(form) is Kind.PITCHFORK
+
+
+def test_a_map_that_cannot_be_evaluated_far_out():
+    def mapped(x):
+        if (np.abs(x) > 1e-5).any():
+            raise AnalysisError("diverges")
+        return x - x**3 / 1e-8
+
+    form = normal_form(mapped, at_origin([[1.0]], 1.0))
+    assert_holds(form.cubic, form.cubic_error, -1e8, 1e-4)
+
+
+def nowhere(x):
+    raise AnalysisError("diverges")
+
+
+def kinked(x):
+    return x - x * np.abs(x) ** 0.5
+
+
+def noisy(x):
+    return x * (1.0 + 1e-2 * np.sin(1e5 * x / np.abs(x).max(initial=1e-300)))
+
+
+def test_a_map_without_values_has_no_normal_form():
+    form = normal_form(nowhere, at_origin([[1.0]], 1.0))
+    assert form.status is Status.OUT_OF_REACH
+    assert np.isnan(form.cubic)
+    assert criticality(form) is None
+    assert kind_at_plus_one(form) is Kind.BRANCH_POINT
+
+
+@pytest.mark.parametrize("mapped", [kinked, noisy])
+def test_of_a_map_that_is_no_power_series_nothing_is_claimed(mapped):
+    form = normal_form(mapped, at_origin([[1.0]], 1.0))
+    assert not abs(form.cubic) > form.cubic_error
+    assert kind_at_plus_one(form) is Kind.BRANCH_POINT
+
+
+def test_a_linear_map_is_called_so():
+    calls = []
+
+    def mapped(x):
+        calls.append(len(x))
+        return -x
+
+    form = normal_form(mapped, at_origin([[-1.0]], -1.0))
+    assert form.status is Status.LINEAR
+    assert abs(form.cubic) <= form.cubic_error
+    assert sum(calls) <= 32
+
+
+@pytest.mark.parametrize("other", [-1.0, 1.0])
+def test_a_second_critical_multiplier(other):
+    jacobian = np.diag([1.0, other, 0.3])
+    form = normal_form(lambda x: x @ jacobian - x**3, at_origin(jacobian, 1.0))
+    assert form.status is Status.SEVERAL_CRITICAL
+    assert criticality(form) is None
+
+
+@pytest.mark.parametrize("k", [3, 4])
+def test_strong_resonances_claim_no_verdict(k):
+    """z' = nu (z + c z |z|^2) + d conj(z)^(k-1): Kuznetsov, sections 9.5.3 and 9.5.4."""
+    c, d = -0.3 + 0.2j, 0.4 - 0.7j
+    nu = np.exp(2j * np.pi / k)
+    form = normal_form(
+        in_plane(lambda z: nu * (z + c * z * np.abs(z) ** 2) + d * z.conj() ** (k - 1)), pair(2 * np.pi / k)
+    )
+    assert (form.status, form.resonance) == (Status.STRONG_RESONANCE, k)
+    assert criticality(form) is None
+    assert abs(form.resonant - d * np.sqrt(2) ** (k - 2)) <= form.resonant_error < 1e-6
+    assert abs(form.cubic - 2 * c.real) <= form.cubic_error < 1e-6
+    if k == 4:
+        assert form.ratio == pytest.approx(-1j * nu * c / abs(d), rel=1e-6)
+
+
+@pytest.mark.parametrize(("k", "sign"), [(1, 1.0), (2, -1.0)])
+def test_at_one_to_one_and_one_to_two_there_is_no_cubic_coefficient(k, sign):
+    """A Jordan block but for round-off: its eigenvalues are 1e-8 apart, and not known any better."""
+    jacobian = sign * np.array([[1.0, 1.0], [-1e-16, 1.0]])
+    values, right = np.linalg.eig(jacobian)
+    left = np.linalg.inv(right).conj().T
+    at = at_origin(jacobian, values[0] / abs(values[0]), right[:, 0], left[:, 0])
+    form = normal_form(lambda x: x @ jacobian.T - x**3, at)
+    assert (form.status, form.resonance) == (Status.STRONG_RESONANCE, k)
+    assert np.isnan(form.cubic)
+    assert criticality(form) is None
+
+
+@pytest.mark.parametrize("distance", [1e-1, 1e-2, 1e-3, 1e-4, 1e-6])
+def test_beside_one_to_three_the_errors_grow(distance):
+    """z' = nu z + d conj(z)^2 + ...: the cubic term that d makes has the distance to 1:3 in its denominator."""
+    angle, c, d = 2 * np.pi / 3 + distance, -0.3 + 0.2j, 0.4 - 0.7j
+    nu = np.exp(1j * angle)
+    form = normal_form(in_plane(lambda z: nu * (z + c * z * np.abs(z) ** 2) + d * z.conj() ** 2), pair(angle))
+    # z = u + h conj(u)^2 with h (conj(nu)^2 - nu) = d; on returning, 2 d conj(u) conj(h) u^2.
+    h = d / (nu.conj() ** 2 - nu)
+    expected = 2 * (c + nu.conj() * 2 * d * h.conj())
+    assert abs(form.cubic - expected.real) <= form.cubic_error
+    assert abs(form.rotation - expected.imag) <= form.rotation_error < 0.01 * abs(expected)
+
+
+@pytest.mark.parametrize(("sign", "returns"), [(1.0, 1), (1.0, 3), (-1.0, 1), (-1.0, 2), (-1.0, 4)])
+def test_where_the_cubic_coefficient_vanishes_the_fifth_order_decides(sign, returns):
+    """On b = 2 a^2 + ... no a^3 is left of a' = sign a + a b - 2 a^3 + 0.4 a^5."""
+    jacobian = np.diag([sign, 0.5])
+
+    def mapped(x):
+        a, b = x.T
+        return np.stack([sign * a + a * b - 2.0 * a**3 + 0.4 * a**5, 0.5 * b + a**2 - 0.6 * a**4], axis=1)
+
+    form = normal_form(mapped, at_origin(jacobian, sign, returns=returns), fifth=True)
+    # b = h2 a^2 + h4 a^4 with b(a') = b': (1 - 1/2) h2 = 1, and a'^2 = a^2 + O(a^6), so that (1 - 1/2) h4 = -0.6.
+    once = -1.2 + 0.4
+    passes = returns if sign > 0 or returns % 2 == 0 else 2 * returns
+    assert abs(form.cubic) <= form.cubic_error < 1e-9
+    assert_holds(form.quintic, form.quintic_error, sign * passes * once, 1e-3)
