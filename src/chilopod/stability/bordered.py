@@ -36,7 +36,6 @@ Family2 = Callable[[float, float], SystemLike]
 """``family2(p, q)`` is the system at values of two parameters."""
 
 _STEP = 1e-6  # of differences, in units of the frame: it sets how fast Newton's method converges, not where to
-_LOOKS = 8  # times a return that the states are looked at for their sizes
 _ROUNDS = 14
 _ROUND_OFF = 4e-15  # of a correction, in units of the frame
 _SETTLED = 1e-8  # of the same, below which it may stop falling
@@ -214,7 +213,7 @@ class Equations:
         for _ in range(_ROUNDS):
             at = self.evaluated(place, frame)
             matrix = self._derivative(at, frame)
-            move = -np.linalg.lstsq(matrix, at.residual)[0]
+            move = np.asarray(-np.linalg.lstsq(matrix, at.residual)[0], dtype=np.float64)
             off = float(np.abs(move).max())
             if off <= _ROUND_OFF or (off <= _SETTLED and off >= 0.5 * best):
                 return self.spot(place, frame, None)
@@ -287,7 +286,7 @@ class Equations:
         return place, return_map(system, place.state, with_error, section)
 
     def _size(self, system: SystemLike, place: Place, image: ReturnMap, section: Section | None) -> Array:
-        size = _sizes_along(system, place.state, image)
+        size = sizes(system, place.state, image.period / image.returns)
         if self.known or place.state.any() or (isinstance(system, Scaled) and system.scale is not None):
             return size
         # An orbit that rests at zero is as large as the parameters make it.
@@ -326,7 +325,7 @@ class Equations:
             return frame
         right, left, _ = _bordered(critical, column, row)
         shapes = np.stack([-(left.T @ jacobian @ right).ravel(), -(left.T @ right).ravel()], axis=1)
-        return replace(frame, mixture=np.linalg.pinv(shapes))
+        return replace(frame, mixture=np.asarray(np.linalg.pinv(shapes), dtype=np.float64))
 
     def _critical(self, jacobian: Array, cosine: float) -> Array:
         one = np.eye(len(jacobian))
@@ -372,17 +371,6 @@ class Equations:
         power = 1 if self.target else 2
         critical = critical + rounding * float(norms * np.linalg.norm(at.jacobian) ** power)
         return np.abs(at.residual) + np.concatenate([np.abs(frame.basis.T) @ returned, critical])
-
-
-def _sizes_along(system: SystemLike, state: Array, image: ReturnMap) -> Array:
-    """Sizes of the states over a whole return: just here one may pass through zero, or two may seem not to be coupled."""
-    times = np.linspace(0.0, image.period / image.returns, _LOOKS + 1).tolist()
-    total, product, largest = np.abs(image.jacobian), np.eye(state.size), np.abs(state)
-    for a, b in zip(times, times[1:], strict=False):
-        state, factor = system.flow(np.array(state), a, b)
-        product = factor @ product
-        total, largest = total + np.abs(product), np.maximum(largest, np.abs(state))
-    return sizes(system, largest, total)
 
 
 def _bordered(matrix: Array, column: Array, row: Array) -> tuple[Array, Array, Array]:

@@ -16,11 +16,12 @@ from scipy.optimize import brentq
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.amplitude import Status
 from chilopod.stability.bordered import Equations, Evaluated, Frame, Spot
 from chilopod.stability.capabilities import spatial_symmetries
 from chilopod.stability.center_manifold import CriticalOrbit
 from chilopod.stability.floquet import Spectrum, spectrum
-from chilopod.stability.normal_form import NormalForm, Status, normal_form
+from chilopod.stability.normal_form import NormalForm, normal_form
 from chilopod.stability.points import Kind
 from chilopod.stability.returns import returned_states
 
@@ -182,12 +183,12 @@ def critical(target: int, at: Evaluated, frame: Frame) -> Critical:
         own = [int(np.abs(spec.values - target).argmin())]
         v, w = at.right[:, 0], at.left[:, 0]
         overlap = float(w @ v / (np.linalg.norm(w) * np.linalg.norm(v)))
-        mode = frame.size * v
-        mode = mode / np.linalg.norm(mode)
-        left = w / frame.size
+        mode = (frame.size * v).astype(np.complex128)
+        mode /= np.linalg.norm(mode)
+        left = (w / frame.size).astype(np.complex128)
         with np.errstate(divide="ignore", invalid="ignore"):
-            left = left / float(left @ mode)
-        return Critical(spec, _without(spec, own), complex(target), mode + 0j, left + 0j, overlap)
+            left /= left @ mode
+        return Critical(spec, _without(spec, own), complex(target), mode, left, overlap)
     cosine = at.place.cosine
     nu = cosine + 1j * np.sqrt(complex(1.0 - cosine * cosine))
     first = int(np.abs(spec.values - nu).argmin())
@@ -224,16 +225,14 @@ class Detector:
     def form(self, own: Critical, at: Evaluated, frame: Frame, shift: Array | None) -> NormalForm:
         """The normal form at a place; ``shift`` is how far its coordinates may be off, if that is to count."""
         image = at.image
-        real = self._equations.target != 0
-        mode, left = (own.mode.real, own.left.real) if real else (own.mode, own.left)
         orbit_error = 0.0
         if shift is not None:
-            orbit_error = float(np.abs(left) @ (frame.size * (np.abs(frame.basis) @ shift[: frame.basis.shape[1]])))
+            orbit_error = float(np.abs(own.left) @ (frame.size * (np.abs(frame.basis) @ shift[: frame.basis.shape[1]])))
         error = 0.0 if shift is None else float(np.max(image.error * frame.size / frame.size[:, None]))
         system = self._equations.system(at.place.values)
         return normal_form(
             lambda states: returned_states(system, states, frame.section),
-            CriticalOrbit(at.place.state, image.jacobian, own.multiplier, mode, left, image.returns),
+            CriticalOrbit(at.place.state, image.jacobian, own.multiplier, own.mode, own.left, image.returns),
             uncertainty=error / float(np.linalg.norm(at.jacobian)),
             scale=frame.size,
             orbit_error=orbit_error,
@@ -278,8 +277,8 @@ class Detector:
         if signal in _COSINES:
             return at.place.cosine - _COSINES[signal], 0.0 if shift is None else float(shift[-1])
         if signal is Signal.DOUBLE:
-            error = np.asarray(at.image.error * frame.size / frame.size[:, None])
-            return own.overlap, 2.0 * at.reach * float(np.linalg.norm(np.broadcast_to(error, at.jacobian.shape)))
+            wrong = np.asarray(at.image.error * frame.size / frame.size[:, None])
+            return own.overlap, 2.0 * at.reach * float(np.linalg.norm(np.broadcast_to(wrong, at.jacobian.shape)))
         if signal is Signal.COEFFICIENT:
             if not self._equations.target and abs(at.place.cosine) >= 1.0:
                 return np.nan, np.nan  # past the end of the curve: two real multipliers with product 1
@@ -291,8 +290,8 @@ class Detector:
         nu, errors = own.spectrum.values[own.others], own.spectrum.error[own.others]
         if signal is Signal.PAIR:
             first, second = np.triu_indices(nu.size, 1)
-            sizes, wrong = np.abs(nu), errors[first] * np.abs(nu[second]) + errors[second] * np.abs(nu[first])
-            return _product(nu[first] * nu[second] - 1.0, 1.0 + sizes[first] * sizes[second], wrong)
+            sizes, off = np.abs(nu), errors[first] * np.abs(nu[second]) + errors[second] * np.abs(nu[first])
+            return _product(nu[first] * nu[second] - 1.0, 1.0 + sizes[first] * sizes[second], off)
         return _product(nu - (1.0 if signal is Signal.PLUS else -1.0), 1.0 + np.abs(nu), errors)
 
     def _located(self, signal: Signal, before: Spot, after: Spot) -> tuple[float, Spot, Codimension2] | None:
@@ -313,7 +312,7 @@ class Detector:
             value, error = seen[place]
             if np.isnan(value):
                 raise AnalysisError("the test function does not exist", field="special")
-            return 0.0 if abs(value) <= error else value
+            return 0.0 if abs(value) <= error < np.inf else value  # of an image without bounds the error is not
 
         try:
             ends = test(0.0), test(length)

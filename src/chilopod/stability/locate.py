@@ -13,15 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
 from chilopod.errors import ParameterError
-from chilopod.stability.capabilities import SystemLike, spatial_symmetry
+from chilopod.stability.capabilities import SystemLike, spatial_symmetries
 from chilopod.stability.center_manifold import CriticalOrbit
 from chilopod.stability.floquet import Spectrum, spectrum
 from chilopod.stability.fold import Fold
 from chilopod.stability.normal_form import NormalForm
 from chilopod.stability.normal_form import normal_form as normal_form_of
 from chilopod.stability.points import BifurcationPoint, Kind, criticality, kind_at_plus_one
+from chilopod.stability.returns import ReturnMap, Section, return_map, returned_states
 from chilopod.stability.samples import Family, Sample, Samples
-from chilopod.stability.system import ReturnMap, return_map, returned_states
 from chilopod.stability.zeros import brackets
 
 Array = NDArray[np.float64]
@@ -189,23 +189,23 @@ def _describe(
     bound = float(bound + 4 * np.finfo(float).eps * abs(value))
     mode, left = _phased(spec.right[:, critical], spec.left[:, critical])
     if event == _PAIR:
-        angle = float(np.angle(np.exp(1j * image.halves * np.angle(nu))))
+        angle = float(np.angle(np.exp(1j * image.returns * np.angle(nu))))
         # Of a conjugate pair, the mode that turns with positive frequency.
         if angle < 0:
             nu, mode, left, angle = nu.conjugate(), mode.conj(), left.conj(), -angle
         form = _form(system, at.orbit, image, nu / abs(nu), mode, left) if with_normal_form else None
-        return _point(Kind.NEIMARK_SACKER, at, bound, mode, nu, angle / system.period, form)
+        return _point(Kind.NEIMARK_SACKER, at, bound, mode, nu, angle / image.period, form)
     form = None
     if with_normal_form or (event == _PLUS and not _antisymmetric(system, mode)):
         form = _form(system, at.orbit, image, complex(event), mode, left)
-    kind = _kind(system, image.halves, event, mode.real, form)
-    frequency = np.pi / system.period if kind is Kind.PERIOD_DOUBLING else 0.0
+    kind = _kind(system, image.returns, event, mode.real, form)
+    frequency = np.pi / image.period if kind is Kind.PERIOD_DOUBLING else 0.0
     return _point(kind, at, bound, mode, nu, frequency, form)
 
 
-def _kind(system: SystemLike, halves: int, event: int, mode: Array, form: NormalForm | None) -> Kind:
+def _kind(system: SystemLike, returns: int, event: int, mode: Array, form: NormalForm | None) -> Kind:
     if event == _MINUS:
-        return Kind.PITCHFORK if halves == 2 else Kind.PERIOD_DOUBLING
+        return Kind.PITCHFORK if returns == 2 else Kind.PERIOD_DOUBLING
     if _antisymmetric(system, mode):
         return Kind.PITCHFORK
     # The orbit was sampled on both sides, so it does not end in a fold here.
@@ -240,9 +240,12 @@ def _form(
 ) -> NormalForm:
     if multiplier.imag == 0.0:
         mode, left = mode.real.astype(np.complex128), left.real.astype(np.complex128)
-    critical_orbit = CriticalOrbit(orbit, image.jacobian, multiplier, mode, left, image.halves)
-    uncertainty = image.error / float(np.linalg.norm(image.jacobian))
-    return normal_form_of(lambda states: returned_states(system, states), critical_orbit, uncertainty=uncertainty)
+    critical_orbit = CriticalOrbit(orbit, image.jacobian, multiplier, mode, left, image.returns)
+    uncertainty = float(np.max(image.error)) / float(np.linalg.norm(image.jacobian))
+    section = None if image.normal is None else Section(orbit, image.normal, image.period / image.returns)
+    return normal_form_of(
+        lambda states: returned_states(system, states, section), critical_orbit, uncertainty=uncertainty
+    )
 
 
 def _point(
@@ -264,8 +267,7 @@ def _point(
 
 
 def _antisymmetric(system: SystemLike, mode: NDArray[np.inexact]) -> bool:
-    reflection = spatial_symmetry(system)
-    return reflection is not None and bool(np.abs(reflection @ mode + mode).max() < 1e-6)
+    return any(bool(np.abs(matrix @ mode + mode).max() < 1e-6) for matrix in spatial_symmetries(system))
 
 
 def _phased(
