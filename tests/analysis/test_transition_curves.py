@@ -37,7 +37,12 @@ def test_pitchfork_turns_along_its_curve():
 
 def test_oscillation_of_all_springs_together():
     found = transition_curve(
-        ROBOT, (ALL, OFFSET), ((stiffness(4.0), stiffness(9.0)), (0.04, 0.05)), Kind.NEIMARK_SACKER, second=0.048, points=3
+        ROBOT,
+        (ALL, OFFSET),
+        ((stiffness(4.0), stiffness(9.0)), (0.04, 0.05)),
+        Kind.NEIMARK_SACKER,
+        second=0.048,
+        points=3,
     )
     for point in found.curve.points[::3]:
         (alone,) = bifurcations(
@@ -56,4 +61,6 @@ def test_what_is_no_plane_of_parameters():
     with pytest.raises(ParameterError, match="whole number"):
         family2(ROBOT, (K1, "body.modules"))
     with pytest.raises(AnalysisError, match="no fold"):
-        transition_curve(ROBOT, (K1, OFFSET), ((stiffness(11.5), stiffness(12.5)), (0.04, 0.05)), Kind.FOLD, second=0.048)
+        transition_curve(
+            ROBOT, (K1, OFFSET), ((stiffness(11.5), stiffness(12.5)), (0.04, 0.05)), Kind.FOLD, second=0.048
+        )

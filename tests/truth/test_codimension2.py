@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import mathieu_b
 
-from chilopod.stability import BifurcationPoint, Kind, PeriodicSystem, find_orbit, from_rhs, locate
+from chilopod.stability import BifurcationPoint, Kind, PeriodicSystem, from_rhs, locate
 from chilopod.stability.codimension2 import CodimensionTwo
 from chilopod.stability.two_parameters import CurveEnd, follow2
 
@@ -24,6 +24,29 @@ def mapped(dimension, image, **known):
         flow_states=lambda states, t0, t1: np.array([image(x)[0] for x in states]),
         **known,
     )
+
+
+def with_parameters(rhs, dimension, period, **known):
+    """``family2`` of a right-hand side that has both parameters as its last two states, at rest: built but once."""
+    extended = from_rhs(rhs, dimension + 2, period)
+    n = dimension
+
+    def family2(p, q):
+        def flow(x, t0, t1):
+            state, derivative = extended.flow(np.append(x, [p, q]), t0, t1)
+            return state[:n], derivative[:n, :n]
+
+        def flow_with_error(x, t0, t1):
+            state, derivative, error = extended.flow_with_error(np.append(x, [p, q]), t0, t1)
+            return state[:n], derivative[:n, :n], error
+
+        def flow_states(states, t0, t1):
+            padded = np.hstack([states, np.tile([p, q], (len(states), 1))])
+            return extended.flow_states(padded, t0, t1)[:, :n]
+
+        return PeriodicSystem(n, period, flow, flow_with_error=flow_with_error, flow_states=flow_states, **known)
+
+    return family2, extended
 
 
 def kinds(curve):
@@ -42,7 +65,8 @@ def check_curve(curve, across):
     """``across(values)``, a function that is zero on the curve, is so within the bounds of all points."""
     for point in curve.points:
         slopes = [
-            (across(point.values + h) - across(point.values - h)) / 2e-6 for h in (np.array([1e-6, 0]), np.array([0, 1e-6]))
+            (across(point.values + h) - across(point.values - h)) / 2e-6
+            for h in (np.array([1e-6, 0]), np.array([0, 1e-6]))
         ]
         assert abs(across(point.values)) <= np.abs(slopes) @ point.error_bound
         assert (point.error_bound < 1e-11 * (1.0 + np.abs(point.values))).all()
@@ -89,7 +113,9 @@ def parameters_at(x, b, c=0.2):
 @cache
 def torus_curve():
     (start,) = locate(lambda b: area_changing(0.2, b), (0.2, 1.5), orbit=[0.1, 0.1], normal_form=False)
-    return follow2(lambda b, a: area_changing(a, b), start, ((0.2, 1.9), (-2.0, 5.0)), second=0.2, points=150, longest=0.1)
+    return follow2(
+        lambda b, a: area_changing(a, b), start, ((0.2, 1.9), (-2.0, 5.0)), second=0.2, points=150, longest=0.1
+    )
 
 
 def test_resonances_on_a_curve_of_neimark_sacker():
@@ -237,17 +263,10 @@ def test_two_at_once(first, second, expected):
 
 def test_first_tongue_of_the_mathieu_equation():
     """x'' + (a - 2 q cos 2t) x = 0 doubles its period at a = b_1(q); nothing is damped, so -1 is double all along."""
-
-    def family2(a, q):
-        return from_rhs(mathieu, 2, np.pi, args=(a, q), orbit=[0.0, 0.0])
-
+    family2, _ = with_parameters(mathieu, 2, np.pi, orbit=[0.0, 0.0])
     value = float(mathieu_b(1, 0.5))
-    start = BifurcationPoint(
-        Kind.PERIOD_DOUBLING, value, 0.0, np.zeros(2), np.array([0.0, 1.0 + 0j]), -1.0 + 0j, 1.0
-    )
-    curve = follow2(
-        family2, start, ((-1.0, 1.0), (0.1, 2.0)), second=0.5, points=12, longest=0.15, coefficients=False
-    )
+    start = BifurcationPoint(Kind.PERIOD_DOUBLING, value, 0.0, np.zeros(2), np.array([0.0, 1.0 + 0j]), -1.0 + 0j, 1.0)
+    curve = follow2(family2, start, ((0.0, 1.0), (0.3, 0.8)), second=0.5, step=0.3, longest=0.5, coefficients=False)
     assert curve.endings == (CurveEnd.LEFT_BOX, CurveEnd.LEFT_BOX)
     assert not curve.special
     for point in curve.points:
@@ -256,75 +275,63 @@ def test_first_tongue_of_the_mathieu_equation():
 
 
 @numba.njit
-def mathieu(t, x, a, q):
-    return np.array([x[1], -(a - 2.0 * q * np.cos(2.0 * t)) * x[0]])
+def mathieu(t, x):
+    return np.array([x[1], -(x[2] - 2.0 * x[3] * np.cos(2.0 * t)) * x[0], 0.0 * x[2], 0.0 * x[3]])
 
 
 @numba.njit
-def duffing(t, x, force, frequency):
-    """x'' + 0.3 x' + x + x^3 = F cos(w t), in units of w t."""
-    slope = -0.3 * x[1] - x[0] - x[0] * x[0] * x[0] + force * np.cos(t)
-    return np.array([x[1] / frequency, slope / frequency])
+def duffing(t, x):
+    """x'' + 0.3 x' + x + x^3 = F cos(w t), in units of w t, with F and w behind."""
+    slope = -0.3 * x[1] - x[0] - x[0] * x[0] * x[0] + x[2] * np.cos(t)
+    return np.array([x[1] / x[3], slope / x[3], 0.0 * x[2], 0.0 * x[3]])
 
 
 def test_cusp_of_the_forced_duffing_oscillator():
     """Where the resonance begins to fold over, against F(x(0)) at fixed w: F' and F'' vanish together."""
-
-    def family2(force, frequency):
-        return from_rhs(duffing, 2, 2.0 * np.pi, args=(force, frequency))
-
+    family2, extended = with_parameters(duffing, 2, 2.0 * np.pi)
     located = locate(lambda force: family2(force, 1.7), (0.2, 1.6), orbit=[-0.1, 0.05], normal_form=False)
     start = next(point for point in located if point.kind is Kind.FOLD)
-    curve = follow2(family2, start, ((0.05, 2.0), (1.1, 1.8)), second=1.7, rising=False, points=60, longest=0.2)
+    curve = follow2(family2, start, ((0.05, 2.0), (1.1, 1.8)), second=1.7, rising=False, points=30, longest=0.2)
     cusp = curve.special[0]
     assert cusp.kind is CodimensionTwo.CUSP
     assert (cusp.error_bound < 1e-8).all()
 
-    nodes = np.cos(np.pi * (np.arange(14) + 0.5) / 14)
-    center, reach = cusp.orbit[1], 0.05
+    nodes = np.cos(np.pi * (np.arange(12) + 0.5) / 12)
+    x, speed = cusp.orbit
 
     def forces(frequency):
-        """F on a grid of speeds x'(0): unknown are x(0) and F."""
-        found, x, force = [], *map(float, (cusp.orbit[0], cusp.values[0]))
-        for node in nodes[np.argsort(np.abs(nodes))]:
-            speed = center + reach * node
+        """F of the orbits with given speeds x'(0), as a series; unknown are x(0) and F."""
+        found = []
+        for node in nodes:
+            state = np.array([x, speed + 0.05 * node, cusp.values[0], frequency])
             for _ in range(6):
-                system = family2(force, frequency)
-                state = np.array([x, speed])
-                image, slope = system.flow(state, 0.0, 2.0 * np.pi)
-                beside = family2(force + 1e-6, frequency).flow(state, 0.0, 2.0 * np.pi)[0]
-                matrix = np.column_stack([slope[:, 0] - [1.0, 0.0], (beside - image) / 1e-6])
-                move = np.linalg.solve(matrix, state - image)
-                x, force = x + move[0], force + move[1]
-            found.append((node, force))
-        return np.polynomial.chebyshev.Chebyshev.fit(*zip(*sorted(found), strict=True), 13, domain=[-1, 1])
+                image, slope = extended.flow(state, 0.0, 2.0 * np.pi)
+                matrix = slope[:2, [0, 2]] - np.array([[1.0, 0.0], [0.0, 0.0]])
+                state[[0, 2]] += np.linalg.solve(matrix, (state - image)[:2])
+            found.append(state[2])
+        return np.polynomial.chebyshev.Chebyshev.fit(nodes, found, 11, domain=[-1, 1])
+
+    def flattest(series):
+        roots = series.deriv(2).roots()
+        return roots[np.abs(roots).argmin()].real
 
     def least_slope(frequency):
-        bend = forces(frequency).deriv(2)
-        inside = bend.roots()
-        turning_point = inside[np.abs(inside).argmin()].real
-        return float(forces(frequency).deriv(1)(turning_point))
+        series = forces(frequency)
+        return float(series.deriv(1)(flattest(series)))
 
-    near = cusp.values[1]
-    frequency = brentq(least_slope, near - 0.01, near + 0.01, xtol=1e-10)
-    assert frequency == pytest.approx(near, abs=1e-7)
+    frequency = brentq(least_slope, cusp.values[1] - 0.01, cusp.values[1] + 0.01, xtol=1e-9)
+    assert frequency == pytest.approx(cusp.values[1], abs=1e-7)
     series = forces(frequency)
-    assert series(series.deriv(2).roots()[np.abs(series.deriv(2).roots()).argmin()].real) == pytest.approx(
-        cusp.values[0], abs=1e-7
-    )
-    assert find_orbit(family2(*cusp.values), cusp.orbit, with_error=False).state == pytest.approx(cusp.orbit, abs=1e-4)
+    assert series(flattest(series)) == pytest.approx(cusp.values[0], abs=1e-7)
 
 
 def test_folds_of_cycles_of_an_autonomous_system():
     """r' = p + q (r - 1) - (r - 1)^3 with the angle going round once in 2 pi."""
+    plain, _ = with_parameters(polar, 2, 1.0)
 
     def family2(p, q):
-        plain = from_rhs(polar, 2, 1.0, args=(p, q))
         return replace(
-            plain,
-            period=None,
-            velocity=lambda x: polar(0.0, x, p, q),
-            guess_period=2.0 * np.pi,
+            plain(p, q), period=None, velocity=lambda x: polar(0.0, np.append(x, [p, q]))[:2], guess_period=2.0 * np.pi
         )
 
     x = -np.sqrt(0.3 / 3.0)
@@ -342,7 +349,7 @@ def test_folds_of_cycles_of_an_autonomous_system():
 
 
 @numba.njit
-def polar(t, x, p, q):
+def polar(t, x):
     r = np.sqrt(x[0] * x[0] + x[1] * x[1])
-    grown = (p + q * (r - 1.0) - (r - 1.0) * (r - 1.0) * (r - 1.0)) / r
-    return np.array([grown * x[0] - x[1], grown * x[1] + x[0]])
+    grown = (x[2] + x[3] * (r - 1.0) - (r - 1.0) * (r - 1.0) * (r - 1.0)) / r
+    return np.array([grown * x[0] - x[1], grown * x[1] + x[0], 0.0 * x[2], 0.0 * x[3]])

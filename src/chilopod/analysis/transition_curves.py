@@ -138,7 +138,9 @@ def transition_curve(
     starts = [point for point in found if point.kind is kind]
     if not starts:
         raise AnalysisError(
-            f"no {kind.label} in the interval", field=parameters[0], allowed=", ".join(point.kind.label for point in found)
+            f"no {kind.label} in the interval",
+            field=parameters[0],
+            allowed=", ".join(point.kind.label for point in found),
         )
     curve = follow2(
         family,

@@ -115,6 +115,9 @@ class Signal(enum.Enum):
     AT_QUARTER = enum.auto()
 
 
+Signals = dict[Signal, tuple[float, float]]
+"""Test functions and their errors."""
+
 _COSINES = {Signal.AT_PLUS: 1.0, Signal.AT_MINUS: -1.0, Signal.AT_THIRD: -0.5, Signal.AT_QUARTER: 0.0}
 
 _RESONANCES = {
@@ -246,18 +249,21 @@ class Detector:
             return form.quadratic, form.quadratic_error
         return form.cubic, form.cubic_error
 
-    def measured(self, spot: Spot, own: Critical, form: NormalForm | None) -> dict[Signal, float]:
-        """The test functions at a point of the curve."""
-        return {signal: self._measure(signal, own, spot.at, spot.frame, None, form)[0] for signal in self._signals}
+    def measured(self, spot: Spot, own: Critical, form: NormalForm | None) -> Signals:
+        """The test functions at a point of the curve, with their errors."""
+        return {signal: self._measure(signal, own, spot.at, spot.frame, spot.shift, form) for signal in self._signals}
 
     def between(
-        self, before: Spot, there: dict[Signal, float], after: Spot, here: dict[Signal, float]
+        self, before: Spot, there: Signals, after: Spot, here: Signals
     ) -> list[tuple[float, Spot, Codimension2]]:
         """Points of codimension two within a step, in order, with how far along it they are."""
         found = []
         for signal in self._signals:
-            one, other = there[signal], here[signal]
+            one, other = there[signal][0], here[signal][0]
             if not (one * other < 0.0 or (other == 0.0 and one != 0.0)):
+                continue
+            # What vanishes all along a curve changes its sign as well.
+            if not any(abs(value) > _RESOLVED * error for value, error in (there[signal], here[signal])):
                 continue
             located = self._located(signal, before, after)
             if located is not None:
@@ -326,8 +332,6 @@ class Detector:
             return None
         if np.isnan(value):  # a coefficient that is zero may be harder to find than those beside it
             value, error = 0.0, max(seen[place][1] for place in (0.0, length))
-        if not max(map(abs, ends)) > _RESOLVED * error:
-            return None  # no change of sign but noise: what vanishes all along a curve
         if abs(value) > _POLE * max(map(abs, ends)):
             return None
         kind = self._named(signal, spot, own)

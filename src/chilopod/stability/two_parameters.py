@@ -23,7 +23,7 @@ from chilopod.stability.codimension2 import (
     Codimension2,
     CodimensionTwo,
     Detector,
-    Signal,
+    Signals,
     across,
     critical,
 )
@@ -180,6 +180,8 @@ def follow2(
         If no point of a curve is found at the start.
     """
     box = _checked(between, points, step, longest, budget)
+    if not isinstance(start, BifurcationPoint):
+        raise ParameterError("is no located point", field="start", value=start, allowed="one that `locate` gives")
     values = np.array([start.value, second], dtype=np.float64)
     if not ((box[:, 0] <= values) & (values <= box[:, 1])).all():
         raise ParameterError("does not hold the start", field="between", value=between, allowed=f"{values} within")
@@ -218,8 +220,6 @@ def _checked(between: object, points: int, step: float, longest: float, budget: 
 
 def _what(family2: Family2, start: BifurcationPoint, second: float) -> tuple[int, bool]:
     """The critical multiplier, 0 for a pair, and whether the orbit is no unknown."""
-    if not isinstance(start, BifurcationPoint):
-        raise ParameterError("is no located point", field="start", value=start, allowed="one that `locate` gives")
     system = family2(start.value, second)
     if start.orbit.shape != (system.dimension,):
         raise ParameterError("is of another system", field="start", value=start.orbit.shape)
@@ -245,7 +245,7 @@ class _Station:
 
     spot: Spot
     point: Point2
-    signals: dict[Signal, float]
+    signals: Signals
 
 
 @dataclass(frozen=True)
