@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-from chilopod.analysis import bifurcations
+from chilopod.analysis import bifurcations, transition_curve
 from chilopod.analysis.parameters import ALL, K1, stiffness
-from chilopod.analysis.transition_curves import family2, transition_curve
+from chilopod.analysis.transition_curves import family2
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.robot import load_robot
-from chilopod.stability import Kind
-from chilopod.stability.codimension2 import CodimensionTwo
+from chilopod.stability import CodimensionTwo, Kind
 
 ROBOT = load_robot("aoi2022-planar")
 OFFSET = "legs.forward_offset"

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from chilopod.errors import ParameterError
-from chilopod.stability import BifurcationPoint, Kind, PeriodicSystem
-from chilopod.stability.two_parameters import CurveEnd, follow2
+from chilopod.stability import BifurcationPoint, CurveEnd, Kind, PeriodicSystem, follow2
 
 BOX = ((-2.0, 2.0), (-2.0, 2.0))
 

@@ -9,9 +9,16 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import mathieu_b
 
-from chilopod.stability import BifurcationPoint, Kind, PeriodicSystem, from_rhs, locate
-from chilopod.stability.codimension2 import CodimensionTwo
-from chilopod.stability.two_parameters import CurveEnd, follow2
+from chilopod.stability import (
+    BifurcationPoint,
+    CodimensionTwo,
+    CurveEnd,
+    Kind,
+    PeriodicSystem,
+    follow2,
+    from_rhs,
+    locate,
+)
 
 
 def mapped(dimension, image, **known):
@@ -338,7 +345,7 @@ def test_folds_of_cycles_of_an_autonomous_system():
     start = BifurcationPoint(
         Kind.FOLD, x**3 - 0.3 * x, 0.0, np.array([1.0 + x, 0.0]), np.array([1.0 + 0j, 0.0]), 1.0 + 0j, 0.0
     )
-    curve = follow2(family2, start, ((-0.2, 0.2), (-0.5, 0.5)), second=0.3, points=30, longest=0.15, rising=False)
+    curve = follow2(family2, start, ((-0.2, 0.2), (-0.5, 0.5)), second=0.3, points=10, longest=0.4, rising=False)
     for point in curve.points:
         p, q = point.values
         assert 27.0 * p**2 == pytest.approx(4.0 * q**3, abs=1e-11)

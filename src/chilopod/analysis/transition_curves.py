@@ -15,8 +15,7 @@ from chilopod.errors import AnalysisError, ParameterError
 from chilopod.planar import PlanarModel
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
-from chilopod.stability.points import Kind
-from chilopod.stability.two_parameters import Curve2, follow2
+from chilopod.stability import Curve2, Kind, follow2
 
 Array = NDArray[np.float64]
 
@@ -30,7 +29,7 @@ class TransitionCurve:
     Attributes
     ----------
     curve
-        In SI units, see :class:`chilopod.stability.two_parameters.Curve2`.
+        In SI units, see :class:`chilopod.stability.Curve2`.
     parameters, units
         Dotted paths of the two parameters, and the units they are shown in.
     """

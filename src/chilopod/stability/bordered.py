@@ -400,6 +400,14 @@ def _symmetric(system: SystemLike, state: Array, size: Array) -> Array:
     return np.asarray(right[rank:].T)
 
 
+def reverses(system: SystemLike, mode: NDArray[np.complex128], size: Array) -> bool:
+    """Whether a spatial symmetry of a system turns a mode, shape (n,), into its negative; ``size`` is of the states."""
+    own = np.abs(mode / size).max()
+    return any(
+        bool((np.abs(matrix @ mode + mode) / size).max() <= _LOOSE * own) for matrix in spatial_symmetries(system)
+    )
+
+
 def knows_orbit(system: SystemLike) -> bool:
     """Whether a system knows its orbit."""
     return isinstance(system, KnowsOrbit) and system.orbit is not None

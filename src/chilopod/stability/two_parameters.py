@@ -2,12 +2,11 @@
 
 A curve is followed by its arclength (see :mod:`chilopod.stability.branch` for that of orbits in one parameter) with the
 equations of :mod:`chilopod.stability.bordered`, and on the way the points of codimension two are located (see
-:mod:`chilopod.stability.codimension2`).
+:mod:`chilopod.stability.detection`).
 """
 
 from __future__ import annotations
 
-import enum
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -16,18 +15,13 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
-from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.bordered import Equations, Family2, OutOfBudget, Place, Spot, knows_orbit
-from chilopod.stability.capabilities import spatial_symmetries
-from chilopod.stability.codimension2 import (
-    Codimension2,
-    CodimensionTwo,
-    Detector,
-    Signals,
-    across,
-    critical,
-)
+from chilopod.stability.bordered import Equations, Family2, OutOfBudget, Place, Spot, knows_orbit, reverses
+from chilopod.stability.codimension2 import Codimension2, CodimensionTwo
+from chilopod.stability.curve2 import Curve2, CurveEnd, Point2
+from chilopod.stability.detection import Detector, Signals, across, critical
 from chilopod.stability.points import BifurcationPoint, Kind
+from chilopod.stability.returns import return_duration
+from chilopod.stability.scales import sizes
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -40,90 +34,6 @@ _FEW, _MANY = 5, 8  # corrections after which steps grow, and shrink
 _SHARPEST_TURN = 0.9  # cosine between tangents at both ends of a step
 _FARTHEST = 0.3  # of a step, from where it was predicted to end
 _SAME = 1e-6  # of a step: how near a curve comes to its start to be closed
-_MIRRORED = 1e-6
-
-
-class CurveEnd(enum.Enum):
-    """Why a curve ends where it does; each member's ``sentence`` says it in words."""
-
-    START = "start", "the curve was followed from here, the other way only"
-    LEFT_BOX = "left the box", "a parameter reached an end of its interval"
-    CLOSED = "closed", "the curve came back to where it started"
-    RESONANCE = "resonance", "the two multipliers of the pair meet: here the curve ends indeed"
-    ENOUGH_POINTS = "enough points", "as many points as were asked for"
-    OUT_OF_BUDGET = "out of budget", "as many return maps as were allowed have been evaluated"
-    LOST = "lost", "the step became too small: the curve could not be followed further"
-
-    def __init__(self, label: str, sentence: str) -> None:
-        self.label = label
-        self.sentence = sentence
-
-
-@dataclass(frozen=True)
-class Point2(ReadOnlyArrays):
-    """A bifurcation point on a curve.
-
-    Attributes
-    ----------
-    values
-        Of both parameters, shape (2,).
-    error_bound
-        How far both may be off, shape (2,), at right angles to the curve (in units of the box).
-    orbit
-        State on the critical orbit at time 0, shape (n,).
-    mode
-        Unit critical eigenvector, shape (n,), complex for Neimark-Sacker.
-    multiplier
-        Critical multiplier of the return map.
-    multipliers
-        All of them, by falling modulus.
-    frequency
-        Angular frequency (1/s) of the critical mode over the full period, as of a :class:`BifurcationPoint`.
-    coefficient, coefficient_error
-        Of the normal form of the full period, with the amplitude along ``mode``: the quadratic one of a fold or a
-        transcritical point, the cubic one of all others; None where there is none or it was not asked for.
-    """
-
-    values: Array
-    error_bound: Array
-    orbit: Array
-    mode: ComplexArray
-    multiplier: complex
-    multipliers: ComplexArray
-    frequency: float
-    coefficient: float | None = None
-    coefficient_error: float | None = None
-
-
-@dataclass(frozen=True)
-class Curve2:
-    """A curve of bifurcation points.
-
-    Attributes
-    ----------
-    kind
-        What happens along it.
-    points
-        In order.
-    special
-        Points of codimension two, in order.
-    endings
-        Why it ends, at its first point and at its last.
-    reasons
-        What was the matter where it was lost, else empty: one for each end.
-    """
-
-    kind: Kind
-    points: tuple[Point2, ...]
-    special: tuple[Codimension2, ...]
-    endings: tuple[CurveEnd, CurveEnd]
-    reasons: tuple[str, str] = ("", "")
-
-    @property
-    def values(self) -> Array:
-        """Of both parameters at all points, shape (points, 2)."""
-        return np.array([point.values for point in self.points])
-
 
 Progress2 = Callable[[int, Point2], None]
 
@@ -229,8 +139,7 @@ def _what(family2: Family2, start: BifurcationPoint, second: float) -> tuple[int
     target = 1 if start.multiplier.real > 0.0 else -1
     if target < 0 or start.kind is Kind.FOLD or known:
         return target, known
-    mode = start.mode
-    if not any(np.abs(matrix @ mode + mode).max() < _MIRRORED for matrix in spatial_symmetries(system)):
+    if not reverses(system, start.mode, sizes(system, start.orbit, return_duration(system))):
         raise ParameterError(
             f"is a {start.kind.label} that two parameters would unfold",
             field="start",
