@@ -345,7 +345,9 @@ def test_folds_of_cycles_of_an_autonomous_system():
     start = BifurcationPoint(
         Kind.FOLD, x**3 - 0.3 * x, 0.0, np.array([1.0 + x, 0.0]), np.array([1.0 + 0j, 0.0]), 1.0 + 0j, 0.0
     )
-    curve = follow2(family2, start, ((-0.2, 0.2), (-0.5, 0.5)), second=0.3, points=10, longest=0.4, rising=False)
+    curve = follow2(
+        family2, start, ((-0.2, 0.2), (-0.5, 0.5)), second=0.3, points=8, step=0.2, longest=0.4, rising=False
+    )
     for point in curve.points:
         p, q = point.values
         assert 27.0 * p**2 == pytest.approx(4.0 * q**3, abs=1e-11)
@@ -360,3 +362,60 @@ def polar(t, x):
     r = np.sqrt(x[0] * x[0] + x[1] * x[1])
     grown = (x[2] + x[3] * (r - 1.0) - (r - 1.0) * (r - 1.0) * (r - 1.0)) / r
     return np.array([grown * x[0] - x[1], grown * x[1] + x[0], 0.0 * x[2], 0.0 * x[3]])
+
+
+@numba.njit
+def damped_duffing(t, x):
+    """x'' + d x' + x^3 = F cos t, with F and d behind."""
+    return np.array([x[1], -x[3] * x[1] - x[0] * x[0] * x[0] + x[2] * np.cos(t), 0.0 * x[2], 0.0 * x[3]])
+
+
+def test_pitchfork_of_the_half_period_map_to_a_known_one():
+    """The pitchfork at d = 0.2, known to twenty digits, reached along the curve from another damping."""
+    family2, _ = with_parameters(damped_duffing, 2, 2.0 * np.pi, symmetry=-np.eye(2))
+    (start,) = locate(lambda force: family2(force, 0.22), (2.3, 2.7), orbit=[1.88, 0.64], normal_form=False)
+    curve = follow2(family2, start, ((2.0, 3.0), (0.2, 0.3)), second=0.22, rising=False, longest=0.2)
+    assert curve.kind is Kind.PITCHFORK
+    end = curve.points[-1]
+    assert end.values[1] == 0.2
+    assert abs(end.values[0] - 2.40337711605714358988) <= end.error_bound.sum() < 1e-10
+    np.testing.assert_allclose(end.orbit, [1.87793925257730701435, 0.63506905472679528861], atol=1e-11)
+    assert end.frequency == 0.0
+    assert end.coefficient < -end.coefficient_error
+
+
+def test_units_of_states_and_parameters_change_nothing():
+    """The same curve of folds with states in units of 1e-7 and 1e5, and a parameter in units of 1e6."""
+    units, thousand = np.array([1e-7, 1e5]), 1e6
+
+    def family2(a, b):
+        plain = area_changing(a / thousand, b)
+
+        def image(x):
+            state, jacobian = plain.flow(x / units, 0.0, 1.0)
+            return state * units, jacobian * units[:, None] / units
+
+        def flow_with_error(x, t0, t1):
+            return (*image(x), 1e-15 * np.outer(units, 1.0 / units))
+
+        return PeriodicSystem(
+            2,
+            1.0,
+            lambda x, t0, t1: image(x),
+            flow_with_error=flow_with_error,
+            flow_states=lambda states, t0, t1: np.array([image(x)[0] for x in states]),
+        )
+
+    x = np.full(2, -1.5 / 1.6)
+    start = BifurcationPoint(
+        Kind.FOLD, -(1.5**2) / 3.2 * thousand, 0.0, x * units, units.astype(complex), 1.0 + 0j, 0.0
+    )
+    curve = follow2(family2, start, ((-2.0 * thousand, thousand), (-2.0, 1.5)), second=0.5, longest=0.1)
+    a, b = curve.values.T
+    np.testing.assert_allclose(a / thousand, -((1.0 + b) ** 2) / 3.2, atol=1e-13)
+    assert kinds(curve) == [CodimensionTwo.FOLD_FLIP, CodimensionTwo.RESONANCE_1_1]
+    for point, values in zip(curve.special, [(0.0, -1.0), (-((16.0 / 9.0) ** 2) / 3.2, 7.0 / 9.0)], strict=True):
+        off = np.abs(point.values / [thousand, 1.0] - values)
+        bound = point.error_bound / [thousand, 1.0]
+        assert (off <= bound).all()
+        assert (bound < 1e-11).all()
