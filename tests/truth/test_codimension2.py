@@ -33,23 +33,25 @@ def mapped(dimension, image, **known):
     )
 
 
-def with_parameters(rhs, dimension, period, **known):
-    """``family2`` of a right-hand side that has both parameters as its last two states, at rest: built but once."""
-    extended = from_rhs(rhs, dimension + 2, period)
+def with_parameters(rhs, dimension, period, constants=(), **known):
+    """``family2`` of a right-hand side that has both parameters, and constants, as its last states, at rest: built but
+    once."""
     n = dimension
+    extended = from_rhs(rhs, n + 2 + len(constants), period)
 
     def family2(p, q):
+        behind = [p, q, *constants]
+
         def flow(x, t0, t1):
-            state, derivative = extended.flow(np.append(x, [p, q]), t0, t1)
+            state, derivative = extended.flow(np.append(x, behind), t0, t1)
             return state[:n], derivative[:n, :n]
 
         def flow_with_error(x, t0, t1):
-            state, derivative, error = extended.flow_with_error(np.append(x, [p, q]), t0, t1)
+            state, derivative, error = extended.flow_with_error(np.append(x, behind), t0, t1)
             return state[:n], derivative[:n, :n], error
 
         def flow_states(states, t0, t1):
-            padded = np.hstack([states, np.tile([p, q], (len(states), 1))])
-            return extended.flow_states(padded, t0, t1)[:, :n]
+            return extended.flow_states(np.hstack([states, np.tile(behind, (len(states), 1))]), t0, t1)[:, :n]
 
         return PeriodicSystem(n, period, flow, flow_with_error=flow_with_error, flow_states=flow_states, **known)
 
@@ -288,17 +290,20 @@ def mathieu(t, x):
 
 @numba.njit
 def duffing(t, x):
-    """x'' + 0.3 x' + x + x^3 = F cos(w t), in units of w t, with F and w behind."""
-    slope = -0.3 * x[1] - x[0] - x[0] * x[0] * x[0] + x[2] * np.cos(t)
-    return np.array([x[1] / x[3], slope / x[3], 0.0 * x[2], 0.0 * x[3]])
+    """x'' + d x' + c x + x^3 = F cos(w t), in units of w t, with F, d, w and c behind."""
+    slope = -x[3] * x[1] - x[5] * x[0] - x[0] * x[0] * x[0] + x[2] * np.cos(t)
+    return np.array([x[1] / x[4], slope / x[4], 0.0 * x[2], 0.0 * x[3], 0.0 * x[4], 0.0 * x[5]])
 
 
 def test_cusp_of_the_forced_duffing_oscillator():
-    """Where the resonance begins to fold over, against F(x(0)) at fixed w: F' and F'' vanish together."""
-    family2, extended = with_parameters(duffing, 2, 2.0 * np.pi)
-    located = locate(lambda force: family2(force, 1.7), (0.2, 1.6), orbit=[-0.1, 0.05], normal_form=False)
+    """Where the resonance of a hardening spring begins to fold over as its damping falls, w = 1.7.
+
+    Along the orbits at a damping, in the order of their speeds at time 0, F' and F'' vanish together there.
+    """
+    family2, extended = with_parameters(duffing, 2, 2.0 * np.pi, (1.7, 1.0))
+    located = locate(lambda force: family2(force, 0.6), (0.2, 1.8), orbit=[-0.1, 0.05], normal_form=False)
     start = next(point for point in located if point.kind is Kind.FOLD)
-    curve = follow2(family2, start, ((0.05, 2.0), (1.1, 1.8)), second=1.7, rising=False, points=30, longest=0.2)
+    curve = follow2(family2, start, ((0.05, 2.0), (0.1, 1.0)), second=0.6, rising=True, points=14, longest=0.2)
     cusp = curve.special[0]
     assert cusp.kind is CodimensionTwo.CUSP
     assert (cusp.error_bound < 1e-8).all()
@@ -306,11 +311,11 @@ def test_cusp_of_the_forced_duffing_oscillator():
     nodes = np.cos(np.pi * (np.arange(12) + 0.5) / 12)
     x, speed = cusp.orbit
 
-    def forces(frequency):
+    def forces(damping):
         """F of the orbits with given speeds x'(0), as a series; unknown are x(0) and F."""
         found = []
         for node in nodes:
-            state = np.array([x, speed + 0.05 * node, cusp.values[0], frequency])
+            state = np.array([x, speed + 0.05 * node, cusp.values[0], damping, 1.7, 1.0])
             for _ in range(6):
                 image, slope = extended.flow(state, 0.0, 2.0 * np.pi)
                 matrix = slope[:2, [0, 2]] - np.array([[1.0, 0.0], [0.0, 0.0]])
@@ -322,13 +327,13 @@ def test_cusp_of_the_forced_duffing_oscillator():
         roots = series.deriv(2).roots()
         return roots[np.abs(roots).argmin()].real
 
-    def least_slope(frequency):
-        series = forces(frequency)
+    def least_slope(damping):
+        series = forces(damping)
         return float(series.deriv(1)(flattest(series)))
 
-    frequency = brentq(least_slope, cusp.values[1] - 0.01, cusp.values[1] + 0.01, xtol=1e-9)
-    assert frequency == pytest.approx(cusp.values[1], abs=1e-7)
-    series = forces(frequency)
+    damping = brentq(least_slope, cusp.values[1] - 0.01, cusp.values[1] + 0.01, xtol=1e-9)
+    assert damping == pytest.approx(cusp.values[1], abs=1e-7)
+    series = forces(damping)
     assert series(flattest(series)) == pytest.approx(cusp.values[0], abs=1e-7)
 
 
@@ -341,9 +346,9 @@ def test_folds_of_cycles_of_an_autonomous_system():
             plain(p, q), period=None, velocity=lambda x: polar(0.0, np.append(x, [p, q]))[:2], guess_period=2.0 * np.pi
         )
 
-    x = -np.sqrt(0.3 / 3.0)
+    x = -np.sqrt(0.1 / 3.0)
     start = BifurcationPoint(
-        Kind.FOLD, x**3 - 0.3 * x, 0.0, np.array([1.0 + x, 0.0]), np.array([1.0 + 0j, 0.0]), 1.0 + 0j, 0.0
+        Kind.FOLD, x**3 - 0.1 * x, 0.0, np.array([1.0 + x, 0.0]), np.array([1.0 + 0j, 0.0]), 1.0 + 0j, 0.0
     )
     curve = follow2(
         family2, start, ((-0.2, 0.2), (-0.5, 0.5)), second=0.3, points=8, step=0.2, longest=0.4, rising=False
@@ -364,15 +369,9 @@ def polar(t, x):
     return np.array([grown * x[0] - x[1], grown * x[1] + x[0], 0.0 * x[2], 0.0 * x[3]])
 
 
-@numba.njit
-def damped_duffing(t, x):
-    """x'' + d x' + x^3 = F cos t, with F and d behind."""
-    return np.array([x[1], -x[3] * x[1] - x[0] * x[0] * x[0] + x[2] * np.cos(t), 0.0 * x[2], 0.0 * x[3]])
-
-
 def test_pitchfork_of_the_half_period_map_to_a_known_one():
     """The pitchfork at d = 0.2, known to twenty digits, reached along the curve from another damping."""
-    family2, _ = with_parameters(damped_duffing, 2, 2.0 * np.pi, symmetry=-np.eye(2))
+    family2, _ = with_parameters(duffing, 2, 2.0 * np.pi, (1.0, 0.0), symmetry=-np.eye(2))
     (start,) = locate(lambda force: family2(force, 0.22), (2.3, 2.7), orbit=[1.88, 0.64], normal_form=False)
     curve = follow2(family2, start, ((2.0, 3.0), (0.2, 0.3)), second=0.22, rising=False, longest=0.2)
     assert curve.kind is Kind.PITCHFORK

@@ -30,7 +30,7 @@ BUDGET = 20_000
 """Return maps, with derivatives, that a curve may take by default."""
 
 _SHORTEST = 1e-6  # step at which a curve is lost, relative to the longest
-_FEW, _MANY = 5, 8  # corrections after which steps grow, and shrink
+_FEW, _MANY = 7, 10  # corrections after which steps grow, and shrink
 _SHARPEST_TURN = 0.9  # cosine between tangents at both ends of a step
 _FARTHEST = 0.3  # of a step, from where it was predicted to end
 _SAME = 1e-6  # of a step: how near a curve comes to its start to be closed
