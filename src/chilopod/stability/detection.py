@@ -50,6 +50,10 @@ class Signal(enum.Enum):
     AT_QUARTER = enum.auto()
 
 
+class _NoValue(AnalysisError):
+    """A test function has no value at a place."""
+
+
 Signals = dict[Signal, tuple[float, float]]
 """Test functions and their errors."""
 
@@ -231,29 +235,41 @@ class Detector:
             if place not in seen:
                 there = at(place)
                 seen[place] = self._measure(signal, critical(equations.target, there, frame), there, frame, None)
-            value, error = seen[place]
-            if np.isnan(value):
-                raise AnalysisError("the test function does not exist", field="special")
-            return 0.0 if abs(value) <= error < np.inf else value  # of an image without bounds the error is not
+            if np.isnan(seen[place][0]):
+                raise _NoValue("the test function does not exist", field="special")
+            return seen[place][0]
 
+        def resolved(place: float) -> float:
+            value = test(place)
+            # Of an image without bounds the error is none.
+            return 0.0 if abs(value) <= seen[place][1] < np.inf else value
+
+        beside, unsure = _BESIDE * length, 0.0
         try:
             ends = test(0.0), test(length)
             if ends[0] * ends[1] > 0.0:
                 return None
-            root = float(brentq(test, 0.0, length, xtol=1e-15 * length, rtol=8.9e-16, maxiter=60, disp=False))
-            spot = equations.spot(at(root).place, frame, before.tangent)
-            own = critical(equations.target, spot.at, spot.frame)
-            value, error = self._measure(signal, own, spot.at, spot.frame, spot.shift)
-        except AnalysisError:
-            return None
-        if np.isnan(value):  # a coefficient that is zero may be harder to find than those beside it
-            value, error = 0.0, max(seen[place][1] for place in (0.0, length))
-        if abs(value) > _POLE * max(map(abs, ends)):
+            root = float(brentq(resolved, 0.0, length, xtol=1e-15 * length, rtol=8.9e-16, maxiter=60, disp=False))
+        except _NoValue:
+            # A coefficient that is zero may be harder to find than those beside it.
+            known = {place: value for place, (value, _) in seen.items() if not np.isnan(value)}
+            if not known.keys() >= {0.0, length}:
+                return None
+            low = max(place for place, value in known.items() if value * known[0.0] > 0.0)
+            high = min(place for place in known if place > low)
+            root, beside = 0.5 * (low + high), 0.5 * (high - low)
+            unsure = max(abs(known[low]), abs(known[high]))
+        spot = equations.spot(at(root).place, frame, before.tangent)
+        own = critical(equations.target, spot.at, spot.frame)
+        value, error = self._measure(signal, own, spot.at, spot.frame, spot.shift)
+        if np.isnan(value):
+            value, error = 0.0, max(error for _, error in seen.values() if not np.isnan(error))
+        if not unsure and abs(value) > _POLE * max(map(abs, ends)):
             return None
         kind = self._named(signal, spot, own)
         if kind is None:
             return None
-        along = _along(lambda place: (test(place), seen[place][0])[1], at, root, length, abs(value) + error)
+        along = _along(test, at, root, beside, abs(value) + error + unsure)
         off = _SAFETY * spot.frame.widths * spot.shift[spot.frame.parameters]
         bound = off + along + 4.0 * np.finfo(float).eps * np.abs(spot.place.values)
         found = Codimension2(kind, spot.place.values, bound, spot.place.state, own.spectrum.values)
@@ -305,14 +321,10 @@ def across(spot: Spot) -> Array:
 
 
 def _along(
-    test: Callable[[float], float],
-    at: Callable[[float], Evaluated],
-    root: float,
-    length: float,
-    error: float,
+    test: Callable[[float], float], at: Callable[[float], Evaluated], root: float, h: float, error: float
 ) -> Array:
-    """How far both parameters move, shape (2,), as far along the curve as a test function leaves open."""
-    h = _BESIDE * length
+    """How far both parameters move, shape (2,), as far along the curve as a test function leaves open; from
+    differences over h."""
     try:
         slope = abs(test(root + h) - test(root - h)) / (2.0 * h)
         low, middle, high = (at(root + s).place.values for s in (-h, 0.0, h))
@@ -321,9 +333,8 @@ def _along(
     if not slope > 0.0:
         return np.full(2, np.inf)
     off = _SAFETY * error / slope
-    return np.asarray(
-        np.abs(high - low) / (2.0 * h) * off + np.abs(high - 2.0 * middle + low) / (2.0 * h * h) * off * off
-    )
+    first, second = np.abs(high - low) / (2.0 * h), np.abs(high - 2.0 * middle + low) / (h * h)
+    return np.asarray(first * off + 0.5 * second * off * off)
 
 
 def _product(factors: ComplexArray, sizes: Array, errors: Array) -> tuple[float, float]:

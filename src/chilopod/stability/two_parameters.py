@@ -200,7 +200,9 @@ class _Tracer:
     def station(self, spot: Spot) -> _Station:
         """A spot with what is said of it."""
         own = critical(self._equations.target, spot.at, spot.frame)
-        form = self._detector.form(own, spot.at, spot.frame, spot.shift) if self._coefficients else None
+        form = None
+        if self._coefficients and abs(spot.place.cosine) < 1.0:  # else the pair has met, and the curve has ended
+            form = self._detector.form(own, spot.at, spot.frame, spot.shift)
         value, error = (np.nan, np.nan) if form is None else self._detector.coefficient(form)
         image = spot.at.image
         angle = abs(float(np.angle(own.multiplier**image.returns)))
