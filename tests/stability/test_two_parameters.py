@@ -1,10 +1,13 @@
 """How a curve of bifurcation points is followed: where it ends and why, and what is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from chilopod.errors import ParameterError
-from chilopod.stability import BifurcationPoint, CurveEnd, Kind, PeriodicSystem, follow2
+from chilopod.stability import BifurcationPoint, CodimensionTwo, CurveEnd, Kind, PeriodicSystem, detection, follow2
+from chilopod.stability.amplitude import Status
 
 BOX = ((-2.0, 2.0), (-2.0, 2.0))
 
@@ -148,3 +151,34 @@ def test_what_two_parameters_would_unfold_is_refused():
     start = BifurcationPoint(Kind.PITCHFORK, 0.0, 0.0, np.zeros(1), np.ones(1, complex), 1.0 + 0j, 0.0)
     with pytest.raises(ParameterError, match="unfold"):
         follow2(family2, start, BOX, second=0.0)
+
+
+def test_a_coefficient_that_is_not_found_near_its_zero_is_bracketed(monkeypatch):
+    """x -> -(1 + p) x + (q - 0.1) x^3 turns at q = 0.1, where here no normal form is found."""
+
+    def shy(*arguments, **named):
+        form = detection_normal_form(*arguments, **named)
+        return replace(form, status=Status.OUT_OF_REACH, cubic=np.nan) if abs(form.cubic) < 0.004 else form
+
+    detection_normal_form = detection.normal_form
+    monkeypatch.setattr(detection, "normal_form", shy)
+
+    def family2(p, q):
+        def image(x):
+            return -(1.0 + p) * x + (q - 0.1) * x**3, np.array([[-(1.0 + p) + 3.0 * (q - 0.1) * x[0] ** 2]])
+
+        return PeriodicSystem(
+            1,
+            1.0,
+            lambda x, t0, t1: image(x),
+            orbit=np.zeros(1),
+            flow_with_error=lambda x, t0, t1: (*image(x), 1e-15),
+            flow_states=lambda states, t0, t1: -(1.0 + p) * states + (q - 0.1) * states**3,
+        )
+
+    start = BifurcationPoint(Kind.PERIOD_DOUBLING, 0.0, 0.0, np.zeros(1), np.ones(1, complex), -1.0 + 0j, np.pi)
+    curve = follow2(family2, start, ((-1.0, 1.0), (-1.0, 1.0)), second=-0.3)
+    (found,) = curve.special
+    assert found.kind is CodimensionTwo.GENERALISED_PERIOD_DOUBLING
+    assert abs(found.values[1] - 0.1) <= found.error_bound[1] < 0.03
+    assert curve.endings == (CurveEnd.LEFT_BOX, CurveEnd.LEFT_BOX)

@@ -25,7 +25,8 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.capabilities import KnowsOrbit, Scaled, SystemLike, spatial_symmetries
+from chilopod.stability.capabilities import KnowsOrbit, Scaled, SystemLike
+from chilopod.stability.mirrored import symmetric_states
 from chilopod.stability.orbits import from_known, known_state
 from chilopod.stability.returns import ReturnMap, Section, return_map, section_at
 from chilopod.stability.scales import sizes
@@ -39,7 +40,6 @@ _STEP = 1e-6  # of differences, in units of the frame: it sets how fast Newton's
 _ROUNDS = 14
 _ROUND_OFF = 4e-15  # of a correction, in units of the frame
 _SETTLED = 1e-8  # of the same, below which it may stop falling
-_LOOSE = 1e-6  # relative to the size of the states: how well a symmetry holds for a state that has it
 
 
 class OutOfBudget(AnalysisError):
@@ -307,7 +307,7 @@ class Equations:
     def _framed(self, system: SystemLike, place: Place, image: ReturnMap, size: Array, before: Frame | None) -> Frame:
         """The frame at a place; its borders from those of the one before, so that they change continuously."""
         n, k = size.size, 1 if self.target else 2
-        basis = np.zeros((n, 0)) if self.known else _symmetric(system, place.state, size)
+        basis = np.zeros((n, 0)) if self.known else symmetric_states(system, place.state, size)
         section = None
         if image.normal is not None:
             section = Section(place.state, image.normal, image.period / image.returns)
@@ -385,27 +385,6 @@ def _orthonormal(columns: Array) -> Array:
     if columns.shape[1] == 1:
         return columns / np.linalg.norm(columns)
     return np.asarray(np.linalg.qr(columns)[0])
-
-
-def _symmetric(system: SystemLike, state: Array, size: Array) -> Array:
-    """Orthonormal basis, in units of the states' sizes, of the states with the spatial symmetries of one of them."""
-    n = size.size
-    conditions = [np.zeros((0, n))]
-    for matrix in spatial_symmetries(system):
-        if (np.abs(matrix @ state - state) <= _LOOSE * size).all():
-            conditions.append(matrix * size / size[:, None] - np.eye(n))
-    stacked = np.vstack(conditions)
-    _, values, right = np.linalg.svd(stacked) if len(stacked) else (None, np.zeros(0), np.eye(n))
-    rank = int((values > _LOOSE).sum())
-    return np.asarray(right[rank:].T)
-
-
-def reverses(system: SystemLike, mode: NDArray[np.complex128], size: Array) -> bool:
-    """Whether a spatial symmetry of a system turns a mode, shape (n,), into its negative; ``size`` is of the states."""
-    own = np.abs(mode / size).max()
-    return any(
-        bool((np.abs(matrix @ mode + mode) / size).max() <= _LOOSE * own) for matrix in spatial_symmetries(system)
-    )
 
 
 def knows_orbit(system: SystemLike) -> bool:

@@ -6,6 +6,7 @@ Meijer, SIAM J. Sci. Comput. 26, 2005.
 
 from __future__ import annotations
 
+import contextlib
 import enum
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,10 +18,11 @@ from scipy.optimize import brentq
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.amplitude import Status
-from chilopod.stability.bordered import Equations, Evaluated, Frame, Spot, reverses
+from chilopod.stability.bordered import Equations, Evaluated, Frame, Spot
 from chilopod.stability.center_manifold import CriticalOrbit
 from chilopod.stability.codimension2 import DEGENERATE, Codimension2, CodimensionTwo, together
 from chilopod.stability.floquet import Spectrum, spectrum
+from chilopod.stability.mirrored import reverses
 from chilopod.stability.normal_form import NormalForm, normal_form
 from chilopod.stability.points import Kind
 from chilopod.stability.returns import returned_states
@@ -30,6 +32,7 @@ ComplexArray = NDArray[np.complex128]
 
 _SAFETY = 1.5
 _BESIDE = 1e-3  # of a step: how far apart a test function is differentiated
+_NEARER = (-0.1, 0.1, -0.01, 0.01, -0.001, 0.001)  # of a step, beside where a test function was found to have no value
 _POLE = 0.1  # of its values at the ends of a step: where a test function changes sign and is larger, it has a pole
 _RESOLVED = 3.0  # times the error of a test function that it has to reach within a step to mean anything
 _COMPLEX = 1e-6  # imaginary part from which a pair counts as one
@@ -251,7 +254,13 @@ class Detector:
                 return None
             root = float(brentq(resolved, 0.0, length, xtol=1e-15 * length, rtol=8.9e-16, maxiter=60, disp=False))
         except _NoValue:
-            # A coefficient that is zero may be harder to find than those beside it.
+            # A coefficient that is zero may be harder to find than those beside it, which then bracket it.
+            (gap,) = (place for place, (value, _) in seen.items() if np.isnan(value))
+            for share in _NEARER:
+                place = gap + share * length
+                if 0.0 < place < length:
+                    with contextlib.suppress(_NoValue):
+                        test(place)
             known = {place: value for place, (value, _) in seen.items() if not np.isnan(value)}
             if not known.keys() >= {0.0, length}:
                 return None

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
-from chilopod.stability.bordered import Equations, Family2, OutOfBudget, Place, Spot, knows_orbit, reverses
+from chilopod.stability.bordered import Equations, Family2, OutOfBudget, Place, Spot, knows_orbit
 from chilopod.stability.codimension2 import Codimension2, CodimensionTwo
 from chilopod.stability.curve2 import Curve2, CurveEnd, Point2
 from chilopod.stability.detection import Detector, Signals, across, critical
+from chilopod.stability.mirrored import reverses
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import return_duration
 from chilopod.stability.scales import sizes
