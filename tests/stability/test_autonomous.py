@@ -24,7 +24,6 @@ def ring(mu, twist=0.0, spin=2.0, leak=0.7, units=(1.0, 1.0, 1.0)):
         q0 = x * x + y * y
         e = np.exp(2.0 * mu * t)
         grown = mu + q0 * (e - 1.0)
-        q = mu * q0 * e / grown
         turned = spin * t + twist * (0.5 * np.log(grown / mu) - mu * t)
         share = np.sqrt(mu * e / grown)
         c, s = np.cos(turned) * share, np.sin(turned) * share
@@ -72,7 +71,9 @@ def test_known_orbits_in_any_units(mu, twist, spin, leak, angle, off, units):
     guess = np.sqrt(mu) * np.array([np.cos(angle), np.sin(angle), 0.0]) * off * units
     found = multipliers(ring(mu, twist, spin, leak, units), guess)
     assert found.period == pytest.approx(period, rel=1e-13)
-    assert np.abs(found.values - values).max() <= found.error_bound < 1e-8
+    assert np.abs(found.values - values).max() <= found.error_bound
+    if abs(2.0 * mu - leak) > 0.05:  # equal multipliers move as the square root of an error
+        assert found.error_bound < 1e-8
     assert found.stable == bool(leak > 0)
 
 

@@ -44,9 +44,11 @@ def assert_found(points, roots):
         assert point.error_bound < 1e-6
 
 
-def test_an_interval_without_a_crossing_gives_an_empty_list():
-    assert locate(diagonal(lambda mu: -0.1 - mu * mu, decaying), (-1.0, 1.0)) == []
-    assert locate(diagonal(lambda mu: 0.3 + mu * mu, decaying), (-1.0, 1.0)) == []
+def test_an_interval_without_a_crossing_has_no_points():
+    for offset in (-0.1, 0.3):
+        found = locate(diagonal(lambda mu, at=offset: at + np.sign(at) * mu * mu, decaying), (-1.0, 1.0))
+        assert len(found) == 0
+        assert found.complete
 
 
 @pytest.mark.parametrize(

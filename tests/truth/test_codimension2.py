@@ -48,7 +48,7 @@ def with_parameters(rhs, dimension, period, constants=(), **known):
 
         def flow_with_error(x, t0, t1):
             state, derivative, error = extended.flow_with_error(np.append(x, behind), t0, t1)
-            return state[:n], derivative[:n, :n], error
+            return state[:n], derivative[:n, :n], error if np.ndim(error) == 0 else error[:n, :n]
 
         def flow_states(states, t0, t1):
             return extended.flow_states(np.hstack([states, np.tile(behind, (len(states), 1))]), t0, t1)[:, :n]

@@ -8,6 +8,7 @@ False
 """
 
 from chilopod.stability.branch import Branch, BranchPoint, Ending, begin, follow, leave_pitchfork, proceed
+from chilopod.stability.called import NotAnalytic
 from chilopod.stability.capabilities import (
     Autonomous,
     CyclicallySymmetric,
@@ -23,13 +24,14 @@ from chilopod.stability.capabilities import (
 )
 from chilopod.stability.codimension2 import Codimension2, CodimensionTwo
 from chilopod.stability.curve2 import Curve2, CurveEnd, Point2
+from chilopod.stability.events import Event
 from chilopod.stability.floquet import Exponents, Multipliers, exponents, multipliers, sweep
 from chilopod.stability.jumps import UndeclaredSwitch
-from chilopod.stability.locate import locate
+from chilopod.stability.locate import Located, locate
 from chilopod.stability.orbits import Orbit, find_orbit
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
 from chilopod.stability.returns import ReturnMap
-from chilopod.stability.rhs import NotAnalytic, from_rhs
+from chilopod.stability.rhs import from_rhs
 from chilopod.stability.system import PeriodicSystem
 from chilopod.stability.two_parameters import follow2
 
@@ -45,6 +47,7 @@ __all__ = [
     "CurveEnd",
     "CyclicallySymmetric",
     "Ending",
+    "Event",
     "Exponents",
     "FlowsEach",
     "FlowsMany",
@@ -52,6 +55,7 @@ __all__ = [
     "FlowsWithError",
     "Kind",
     "KnowsOrbit",
+    "Located",
     "Multipliers",
     "NotAnalytic",
     "Orbit",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.arguments import finite_array
-from chilopod.stability.capabilities import Autonomous, KnowsOrbit, SystemLike, returns_per_period
+from chilopod.stability.capabilities import Autonomous, SystemLike, is_autonomous, known_orbit, returns_per_period
 from chilopod.stability.returns import (
     ReturnMap,
     Section,
@@ -29,6 +30,7 @@ _ROUND_OFF = 4e-16
 _SETTLED = 1e-10  # residual, of the sizes of the states, below which it may stop falling
 _RETURNED = 1e-12  # of a known orbit: it is exact
 _SINGULAR, _FAMILY = 1e-13, 1e-8  # singular values of H - 1 that count as zero, the largest being one
+_MAGNIFIED = 1e9  # move over residual beyond which H - 1 may be singular
 _KNOWN = 1e-4  # of a known orbit: it is one, if not to the last digit
 _LONGEST_SETTLING = 300  # returns
 _BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
@@ -60,6 +62,13 @@ class Orbit(ReadOnlyArrays):
         """The full period."""
         return self.image.period
 
+    @property
+    def section(self) -> Section | None:
+        """The section that ``image`` returns to, where the system does not depend on time."""
+        if self.image.normal is None:
+            return None
+        return Section(self.state, self.image.normal, self.image.period / self.image.returns)
+
 
 def known_state(system: SystemLike) -> Array:
     """The state on its orbit that a system knows of itself.
@@ -69,7 +78,7 @@ def known_state(system: SystemLike) -> Array:
     AnalysisError
         If it knows none.
     """
-    orbit = system.orbit if isinstance(system, KnowsOrbit) else None
+    orbit = known_orbit(system)
     if orbit is None:
         raise AnalysisError(
             "this system does not know its periodic orbit", field="orbit", allowed="a first guess of it"
@@ -78,7 +87,11 @@ def known_state(system: SystemLike) -> Array:
 
 
 def find_orbit(
-    system: SystemLike, guess: ArrayLike | None = None, with_error: bool = True, section: Section | None = None
+    system: SystemLike,
+    guess: ArrayLike | None = None,
+    with_error: bool = True,
+    section: Section | None = None,
+    settle: bool = True,
 ) -> Orbit:
     """A periodic orbit: a fixed point of the return map, by Newton's method.
 
@@ -95,6 +108,8 @@ def find_orbit(
     section
         Of a system that does not depend on time: where its orbit is looked for. By default across the motion in the
         guess; the orbit that is found has the section across its own motion.
+    settle
+        Whether to let the motion settle where Newton's method fails.
 
     Raises
     ------
@@ -107,7 +122,7 @@ def find_orbit(
     try:
         return _newton(system, x, with_error, section)
     except AnalysisError as failed:
-        if section is not None:
+        if not settle:
             raise
         for settled, after in _settled(system, x):
             try:
@@ -127,7 +142,7 @@ def from_known(system: SystemLike, x: Array, with_error: bool = True, image: Ret
     image
         The return map at ``x``, if it was computed already.
     """
-    if isinstance(system, Autonomous):
+    if is_autonomous(system):
         return find_orbit(system, x, with_error)
     image = return_map(system, x, with_error) if image is None else image
     moved = np.abs(image.state - x)
@@ -160,7 +175,7 @@ def _newton(system: SystemLike, x: Array, with_error: bool, section: Section | N
         residual = image.state - x
         off = _relative(residual, size)
         if off <= _ROUND_OFF or (off <= _SETTLED and off >= 0.5 * best):
-            return _at(system, x, image, with_error, section)
+            return _found(system, x, image, with_error)
         if rounds > 4 and off > 10.0 * best:
             break
         if off > best and best < _SETTLED and cutoff == _SINGULAR:
@@ -182,24 +197,48 @@ def _newton(system: SystemLike, x: Array, with_error: bool, section: Section | N
 
 def _solved(matrix: Array, right: Array, size: Array, cutoff: float) -> Array:
     """Solution of a linear system in units of the states' sizes; the shortest where orbits come in families."""
-    scaled = matrix * size / size[:, None]
-    return np.asarray(np.linalg.lstsq(scaled, right / size, rcond=cutoff)[0] * size)
+    scaled, right = matrix * size / size[:, None], right / size
+    if cutoff == _SINGULAR:
+        with contextlib.suppress(np.linalg.LinAlgError):
+            regular = np.linalg.solve(scaled, right)
+            if np.abs(regular).max() <= _MAGNIFIED * np.abs(right).max():
+                return np.asarray(regular * size)
+    return np.asarray(np.linalg.lstsq(scaled, right, rcond=cutoff)[0] * size)
 
 
-def _at(system: SystemLike, x: Array, image: ReturnMap, with_error: bool, section: Section | None) -> Orbit:
-    """The orbit through a state, with the section across its own motion and the errors that were asked for."""
-    if section is None and not with_error:
-        return Orbit(x, image, np.full(x.size, np.nan))
-    size = sizes(system, x, image.period / image.returns)  # those on the way here were of a guess
-    if section is not None:
-        section = section_at(system, x, size, image.period / image.returns)
-    image = return_map(system, x, with_error, section)
-    if not with_error:
-        return Orbit(x, image, np.full(x.size, np.nan))
-    # The state is as uncertain as the flow, of which the derivative's error tells, times what H - 1 makes of it.
-    wrong = np.abs(image.state - x) + (_matrix(image.error, size) @ size)
+def _found(system: SystemLike, x: Array, image: ReturnMap, with_error: bool) -> Orbit:
+    if with_error:
+        return bounded(system, x, image)
+    if is_autonomous(system):
+        image = return_map(system, x, False, _across(system, x, image))
+    return Orbit(x, image, np.full(x.size, np.nan))
+
+
+def _across(system: SystemLike, x: Array, image: ReturnMap) -> Section | None:
+    duration = image.period / image.returns
+    return section_at(system, x, sizes(system, x, duration), duration) if is_autonomous(system) else None
+
+
+def bounded(system: SystemLike, x: Array, image: ReturnMap, error: Array | None = None) -> Orbit:
+    """The orbit through a state that is on it, with the section across its own motion and with error bounds.
+
+    Parameters
+    ----------
+    system, x
+        The system and the state, shape (n,).
+    image
+        The return map there, or near.
+    error
+        How far off the state may be, shape (n,), if that is known.
+    """
+    size = sizes(system, x, image.period / image.returns)
+    section = _across(system, x, image)
+    image = return_map(system, x, True, section)
     scaled = image.jacobian * size / size[:, None] - np.eye(x.size)
-    error = size * (np.abs(np.linalg.pinv(scaled, rcond=_SINGULAR)) @ (wrong / size))
+    if error is None:
+        # The state is as uncertain as the flow, of which the derivative's error tells, times what H - 1 makes of it.
+        wrong = np.abs(image.state - x) + (_matrix(image.error, size) @ size)
+        error = size * (np.abs(np.linalg.pinv(scaled, rcond=_SINGULAR)) @ (wrong / size))
     # The derivative is that of a state so far off: along the direction in which the orbit is least sure.
     weakest = size * np.linalg.svd(scaled)[2][-1]
     beside = return_map(system, x + _BESIDE * weakest, with_error=False, section=section)
@@ -214,7 +253,7 @@ def _matrix(error: float | Array, size: Array) -> Array:
 
 def _settled(system: SystemLike, x: Array) -> list[tuple[Array, Section | None]]:
     """States on the orbit that attracts the motion from a state, if one does, with sections across it."""
-    if isinstance(system, Autonomous):
+    if is_autonomous(system):
         return _settled_autonomous(system, x)
     found: list[tuple[Array, Section | None]] = []
     for count in (_LONGEST_SETTLING // 10, _LONGEST_SETTLING):

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.amplitude import Status
+from chilopod.stability.equivariants import SymmetricCrossing
 from chilopod.stability.normal_form import NormalForm
 
 Array = NDArray[np.float64]
@@ -24,6 +25,8 @@ class Kind(enum.Enum):
     PERIOD_DOUBLING = "period doubling", "an orbit of twice the period branches off"
     NEIMARK_SACKER = "Neimark-Sacker", "an oscillation at a second frequency branches off: an invariant torus"
     BRANCH_POINT = "branch point", "another orbit branches off; the coefficients do not tell how"
+    COLLISION = "collision", "of a conservative system, two multipliers meet at +1 or -1 and leave the unit circle"
+    KREIN_COLLISION = "Krein collision", "of a conservative system, two pairs meet on the unit circle and leave it"
 
     def __init__(self, label: str, sentence: str) -> None:
         self.label = label
@@ -101,6 +104,15 @@ class BifurcationPoint(ReadOnlyArrays):
         point) or where there is no normal form.
     rotation, rotation_error
         Where the mode turns (Neimark-Sacker), the phase per period that an amplitude adds, rad per amplitude^2.
+    period
+        Of the orbit.
+    multiplicity
+        How many multipliers are critical, both of a pair counted.
+    modes
+        Unit critical eigenvectors where there are several, shape (n, modes): where a symmetry makes them several, those
+        along which new orbits branch off; else of the critical space some basis.
+    symmetry
+        What the spatial symmetries make of it, where the orbit has some.
     normal_form
         All that is known of the normal form, with a status that says why where it has no numbers; None where it was
         not asked for, and at folds.
@@ -119,3 +131,7 @@ class BifurcationPoint(ReadOnlyArrays):
     rotation: float | None = None
     rotation_error: float | None = None
     normal_form: NormalForm | None = None
+    period: float = np.nan
+    multiplicity: int = 1
+    modes: NDArray[np.complex128] | None = None
+    symmetry: SymmetricCrossing | None = None

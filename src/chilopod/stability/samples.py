@@ -9,18 +9,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.errors import AnalysisError
+from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.capabilities import Autonomous, SystemLike
+from chilopod.stability.capabilities import SystemLike, is_autonomous
 from chilopod.stability.fold import Fold, find_fold
 from chilopod.stability.orbits import find_orbit, from_known, known_state
 from chilopod.stability.returns import ReturnMap, return_maps, section_at
+from chilopod.stability.scales import sizes
 
 Array = NDArray[np.float64]
 Family = Callable[[float], SystemLike]
 
 _FIRST_STEPS = 8
 _SHORTEST = 2.0**-10  # step of an orbit that is followed, relative to the first
+_KEPT = 64  # systems: around a point the same one is asked for again and again
 _JUMP = 0.3  # of the orbit between prediction and correction, relative to its size
 
 
@@ -44,33 +46,66 @@ class Samples:
         Of the orbit at the lower end, or None if the systems know theirs.
     low, high
         The interval.
+    budget
+        Orbits that may be computed until the upper end is reached.
 
     Attributes
     ----------
+    low, width
+        Of the interval.
+    first
+        The orbit at the lower end, with its error bounds.
+    known
+        Whether the systems know their orbits.
     end
         Where the orbit ends, at most ``high``.
     fold
         The fold it ends in, if it does.
+    ending
+        A sentence where it ends otherwise; else empty.
     """
 
-    def __init__(self, family: Family, guess: ArrayLike | None, low: float, high: float) -> None:
-        self.family = family
-        self._known = guess is None
+    def __init__(self, family: Family, guess: ArrayLike | None, low: float, high: float, budget: int) -> None:
+        self._family = family
+        self.low, self.width = low, high - low
+        self.known = guess is None
+        self._systems: dict[float, SystemLike] = {}
         self._by_value: dict[float, Sample] = {}
         self._values: list[float] = []
+        self._budget = budget
+        self._dimension, self._timed = 0, True
+        self.count = 0
+        self.ending = ""
         self.end, self.fold = high, None
+        self.first = find_orbit(self.family(low), guess)
+        self._size = sizes(self.family(low), self.first.state, self.first.period / self.first.image.returns)
         if guess is not None:
-            self.end, self.fold = self._followed(guess, low, high)
+            self.end, self.fold = self._followed(low, high)
+
+    def family(self, value: float) -> SystemLike:
+        """The system at a value of the parameter, once it is seen to be of the same kind as the others."""
+        if value in self._systems:
+            return self._systems[value]
+        system = self._family(value)
+        timed = not is_autonomous(system)
+        if self._dimension == 0:
+            self._dimension, self._timed = system.dimension, timed
+        if system.dimension != self._dimension or timed is not self._timed:
+            what = "dimension" if system.dimension != self._dimension else "kind of period"
+            raise ParameterError(f"changes its {what} at {value:g}", field="family", allowed="systems of one kind")
+        if len(self._systems) >= _KEPT:
+            self._systems.pop(next(iter(self._systems)))
+        self._systems[value] = system
+        return system
 
     def at(self, values: Array) -> list[Sample]:
         """Samples at some values within the interval; together where the systems allow it."""
         wanted = [float(value) for value in values]
         missing = sorted({value for value in wanted if value not in self._by_value})
-        if missing and self._known:
+        if missing and self.known:
             systems = [self.family(value) for value in missing]
             states = [known_state(system) for system in systems]
-            autonomous = any(isinstance(system, Autonomous) for system in systems)
-            images = [None] * len(systems) if autonomous else return_maps(systems, states)
+            images = return_maps(systems, states) if self._timed else [None] * len(systems)
             for value, system, state, image in zip(missing, systems, states, images, strict=True):
                 orbit = from_known(system, state, image=image)
                 self._keep(Sample(value, orbit.state, orbit.image))
@@ -80,15 +115,15 @@ class Samples:
         return [self._by_value[value] for value in wanted]
 
     def _keep(self, sample: Sample) -> None:
+        self.count += 1
         self._by_value[sample.value] = sample
         bisect.insort(self._values, sample.value)
 
-    def _sampled(self, value: float, near: ArrayLike, beside: Sample | None = None) -> Sample:
+    def _sampled(self, value: float, near: Array, beside: Sample) -> Sample:
         system = self.family(value)
-        section = None
-        if beside is not None:  # which tells how long an orbit takes, where it is the orbit's to say
-            section = section_at(system, np.asarray(near), None, beside.image.period / beside.image.returns)
-        orbit = find_orbit(system, near, with_error=False, section=section)
+        # The orbit beside tells how long an orbit takes, where it is the orbit's to say.
+        section = section_at(system, near, self._size, beside.image.period / beside.image.returns)
+        orbit = find_orbit(system, near, with_error=False, section=section, settle=False)
         return Sample(value, orbit.state, orbit.image)
 
     def _between(self, value: float) -> Sample:
@@ -104,9 +139,9 @@ class Samples:
                 raise
             return reached[-1]
 
-    def _followed(self, guess: ArrayLike, low: float, high: float) -> tuple[float, Fold | None]:
+    def _followed(self, low: float, high: float) -> tuple[float, Fold | None]:
         """Follow the orbit from the lower end; where it gets to, and the fold it ends in before the upper end."""
-        samples = [self._sampled(low, guess)]
+        samples = [Sample(low, self.first.state, self.first.image)]
         self._keep(samples[0])
         for value in np.linspace(low, high, _FIRST_STEPS + 1)[1:].tolist():
             reached = self._follow(samples, value)
@@ -117,26 +152,21 @@ class Samples:
             if last.value != value:
                 fold = find_fold(self.family, last.value, last.orbit, high - low)
                 if fold is None:
-                    raise AnalysisError(
-                        "the orbit cannot be followed further",
-                        field="parameter",
-                        value=last.value,
-                        allowed="an interval in which it exists",
-                    )
-                return last.value, fold if low <= fold.value <= high else None
+                    self.ending = f"the orbit cannot be followed beyond {last.value:.9g}"
+                return last.value, fold if fold is not None and low <= fold.value <= high else None
         return high, None
 
     def _follow(self, behind: list[Sample], value: float) -> list[Sample]:
         """Samples from the last one behind to ``value``, by smaller steps where Newton's method does not carry that
         far.
 
-        They end early where the orbit does.
+        They end early where the orbit does, or the budget.
         """
         behind = behind[-2:]
         reached: list[Sample] = []
         smallest = _SHORTEST * abs(value - behind[-1].value)
         target = value
-        while True:
+        while self.count + len(reached) < self._budget:
             last = behind[-1]
             guess = last.orbit
             if len(behind) > 1:
@@ -147,7 +177,7 @@ class Samples:
             except AnalysisError:
                 found = None
             # A large jump means that Newton's method has found another orbit.
-            if found is None or np.abs(found.orbit - guess).max() > _JUMP * max(1e-3, float(np.abs(guess).max())):
+            if found is None or self._jumped(found.orbit, guess):
                 target = 0.5 * (last.value + target)
                 if abs(target - last.value) < smallest:
                     return reached
@@ -157,3 +187,7 @@ class Samples:
                 return reached
             longer = target + 2.0 * (target - last.value)
             behind, target = [last, found], longer if abs(value - longer) > smallest and longer < value else value
+        return reached
+
+    def _jumped(self, orbit: Array, guess: Array) -> bool:
+        return bool((np.abs(orbit - guess) > _JUMP * np.maximum(self._size, np.abs(guess))).any())

@@ -1,0 +1,306 @@
+"""Eigenvalues along a family of matrices, what errors of the matrices make of them, and functions that vanish where
+one of them is critical."""
+
+from __future__ import annotations
+
+import bisect
+import enum
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import matrix_balance
+
+from chilopod.errors import AnalysisError
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+Matrices = Callable[[Array], tuple[Array, Array]]
+
+_COPIES = 2
+_SAFETY = 16.0
+_ROUNDING = 2.0 * np.finfo(float).eps
+_SMALLEST = -1e300  # logarithm of zero
+_LARGEST = 1e150  # modulus beyond which multipliers are all the same
+_TURNING = 1e-6  # imaginary part of a multiplier that is not real, relative to its size
+_SPARE = 8  # factors beside the idle ones that take part in the sum over what may be left out
+_FILL = 1e-30  # of the largest entry, in place of zeros, so that a triangular matrix can be balanced
+
+
+class Event(enum.Enum):
+    """Where multipliers of a return map meet the unit circle."""
+
+    MINUS = "-1", "a real multiplier passes -1"
+    PLUS = "+1", "a real multiplier passes +1"
+    PAIR = "pair", "a complex pair passes the unit circle"
+
+    def __init__(self, label: str, sentence: str) -> None:
+        self.label = label
+        self.sentence = sentence
+
+
+class Spectra:
+    """Eigenvalues of a family of matrices M, each computed once.
+
+    Errors are found by changing M at random by what it may be wrong by (Kenney & Laub, SIAM J. Sci. Comput. 15, 1994):
+    that is right for simple and for defective eigenvalues alike. An entry may be wrong by the relative error times the
+    geometric mean of the largest entries of its row and its column, the states being in units that balance M: that
+    does not depend on the units the states came in, and a small multiplier beside a huge one is not lost where the
+    matrix keeps them apart.
+
+    Parameters
+    ----------
+    matrices
+        ``matrices(values)`` gives M, shape (k, m, m), and bounds on its relative error, shape (k,); it
+        raises AnalysisError, or gives NaN, where there is none. Asked twice for the same value where errors matter.
+    budget
+        At how many values M may be asked for.
+    """
+
+    def __init__(self, matrices: Matrices, budget: int) -> None:
+        self._matrices = matrices
+        self._budget = budget
+        self._known: dict[float, ComplexArray] = {}
+        self._stretch: dict[float, float] = {}
+        self._disturbed: dict[float, ComplexArray] = {}
+        self._values: list[float] = []
+        self._units: Array | None = None
+        self._size: int | None = None
+
+    @property
+    def evaluations(self) -> int:
+        """At how many values M was asked for."""
+        return len(self._known)
+
+    @property
+    def left(self) -> int:
+        """How many more values may be asked for."""
+        return self._budget - len(self._known)
+
+    @property
+    def size(self) -> int:
+        """Number of eigenvalues; 0 as long as no matrix is known."""
+        return self._size or 0
+
+    @property
+    def values(self) -> list[float]:
+        """The values at which there is a matrix, in order."""
+        return self._values
+
+    def at(self, values: Array) -> ComplexArray:
+        """Eigenvalues by falling modulus, shape (k, m); NaN where there is no matrix."""
+        wanted = values.tolist()
+        missing = sorted({value for value in wanted if value not in self._known})
+        if missing:
+            self._compute(np.array(missing))
+        found = np.full((values.size, self.size), np.nan + 0j)
+        for row, value in zip(found, wanted, strict=True):
+            if self._known[value].size:
+                row[:] = self._known[value]
+        return found
+
+    def _compute(self, values: Array) -> None:
+        matrices, _ = self._ask(values)
+        here = np.isfinite(matrices).all(axis=(1, 2))
+        for value in values[~here].tolist():
+            self._known[value] = np.empty(0, dtype=np.complex128)
+        if not here.any():
+            return
+        found = matrices[here]
+        nu = _eigenvalues(found)
+        stretch = self._stretches(found)
+        for value, row, log in zip(values[here].tolist(), nu, stretch.tolist(), strict=True):
+            self._known[value] = row
+            self._stretch[value] = log
+            bisect.insort(self._values, value)
+
+    def _ask(self, values: Array) -> tuple[Array, Array]:
+        """Matrices and errors; NaN at the values where there are none."""
+        try:
+            matrices, errors = self._matrices(values)
+        except AnalysisError:
+            if values.size == 1:
+                m = self.size or 1
+                return np.full((1, m, m), np.nan), np.full(1, np.nan)
+            halves = [self._ask(part) for part in np.array_split(values, 2)]
+            m = max(half[0].shape[-1] for half in halves)
+            parts = [
+                half[0] if half[0].shape[-1] == m else np.full((half[0].shape[0], m, m), np.nan) for half in halves
+            ]
+            return np.concatenate(parts), np.concatenate([half[1] for half in halves])
+        matrices = np.asarray(matrices, dtype=np.float64)
+        if np.isfinite(matrices).all(axis=(1, 2)).any():
+            self._size = matrices.shape[-1]
+        return matrices, np.broadcast_to(np.asarray(errors, dtype=np.float64), values.shape)
+
+    def _balanced(self, matrices: Array) -> Array:
+        """Matrices with the states in units in which rows and columns are of the same size; the same for all."""
+        if self._units is None:
+            size = np.abs(matrices).max(axis=0)
+            filled = size + _FILL * size.max() if size.max() > 0.0 else size
+            with np.errstate(all="ignore"):
+                units = matrix_balance(filled, permute=False, separate=True)[1][0]
+            self._units = units if (np.isfinite(units) & (units > 0.0)).all() else np.ones_like(units)
+        return np.asarray(matrices * (self._units / self._units[:, None]))
+
+    def _stretches(self, matrices: Array) -> Array:
+        """Logarithms of det(1 + M^T M)^(1/2), M balanced: positive, analytic, and larger than what it divides."""
+        balanced = self._balanced(matrices)
+        one = np.broadcast_to(np.eye(matrices.shape[-1]), matrices.shape)
+        double = np.block([[one, -np.swapaxes(balanced, 1, 2)], [balanced, one]])
+        return np.asarray(0.5 * np.linalg.slogdet(double)[1])
+
+    def exists(self, value: float) -> bool:
+        """Whether there is a matrix at a value; asked for if that is not known."""
+        self.at(np.array([value]))
+        return self._known[value].size > 0
+
+    def holes(self, low: float, high: float) -> bool:
+        """Whether there was no matrix somewhere between two values."""
+        return any(low < value < high and not nu.size for value, nu in self._known.items())
+
+    def without_pair(self, low: float, high: float) -> bool:
+        """Whether all complex multipliers are clear of the circle between two values, as far as those in between that
+        are known say.
+
+        The bialternate product also vanishes where two real multipliers have product 1.
+        """
+        values = self._values[bisect.bisect_left(self._values, low) : bisect.bisect_right(self._values, high)]
+        if len(values) < 2:
+            return False
+        nu = self.at(np.array(values))
+        turning = nu.imag > _TURNING * np.abs(nu)
+        if (turning.sum(axis=1) != turning[0].sum()).any():
+            return False
+        found = margins(nu[turning].reshape(len(values), -1))
+        least, most = found.min(axis=0), found.max(axis=0)
+        return bool(((2.0 * least - most > 0.0) | (2.0 * most - least < 0.0)).all())
+
+    def smallest(self, value: float, event: Event) -> float:
+        """Size of the smallest factor of the function of an event."""
+        return float(np.abs(factors(self.at(np.array([value])), event)).min())
+
+    def disturbed(self, values: Array) -> ComplexArray:
+        """Eigenvalues of matrices whose entries are changed by what they may be wrong by, shape (k, copies, m)."""
+        missing = sorted({value for value in values.tolist() if value not in self._disturbed})
+        if missing:
+            self.at(np.array(missing))
+            matrices, errors = self._ask(np.array(missing))
+            m = matrices.shape[-1]
+            balanced = self._balanced(matrices)
+            rows, columns = np.abs(balanced).max(axis=2), np.abs(balanced).max(axis=1)
+            amounts = np.nan_to_num(np.abs(errors), nan=0.0, posinf=1.0) + _ROUNDING
+            wrong = amounts[:, None, None] * np.sqrt(rows)[:, :, None] * np.sqrt(columns)[:, None, :]
+            signs = np.random.default_rng(m).choice(np.array([-1.0, 1.0]), size=(_COPIES, m, m))
+            changed = balanced[:, None] + wrong[:, None] * signs
+            for value, rows in zip(missing, changed, strict=True):
+                finite = np.isfinite(rows).all()
+                self._disturbed[value] = _eigenvalues(rows) if finite else np.full((_COPIES, self.size), np.nan + 0j)
+        return np.array([self._disturbed[value] for value in values.tolist()])
+
+    def margins(self, value: float) -> Array:
+        """By how much each multiplier is outside the circle (see :func:`margins`), falling, shape (m,)."""
+        return margins(self.at(np.array([value])))[0]
+
+    def margin_errors(self, value: float) -> Array:
+        """Bounds on the errors of :meth:`margins`."""
+        moved = margins(self.disturbed(np.array([value]))[0]) - self.margins(value)
+        return np.asarray(_SAFETY * np.abs(moved).max(axis=0) + _ROUNDING)
+
+    def distances(self, value: float, event: Event) -> tuple[Array, Array]:
+        """Sizes of the factors of the function of an event, rising, and what they may be wrong by."""
+        sizes = np.sort(np.abs(factors(self.at(np.array([value])), event)), axis=-1)
+        moved = np.sort(np.abs(factors(self.disturbed(np.array([value])), event)), axis=-1)[0]
+        return sizes[0], np.asarray(_SAFETY * np.abs(moved - sizes).max(axis=0) + _ROUNDING)
+
+    def function(self, values: Array, event: Event, idle: int) -> tuple[Array, Array]:
+        """The function that changes sign at an event, as signs and logarithms, shapes (k,).
+
+        det(M + 1), det(M - 1), or the bialternate product, the product of nu_i nu_j - 1 over all pairs (Kuznetsov,
+        Elements of Applied Bifurcation Theory, section 10.2.2), over a power of det(1 + M^T M) that keeps them bounded
+        however much M stretches. Where ``idle`` of the factors vanish for all values, it is the product of the others:
+        the elementary symmetric polynomial of that many factors fewer. For the bialternate product of a symplectic
+        matrix that is, up to its sign, the discriminant of the polynomial in nu + 1/nu (Howard & MacKay, J. Math. Phys.
+        28, 1987).
+        """
+        nu = self.at(values)
+        here = np.isfinite(nu).all(axis=1)
+        signs, logs = np.full((2, values.size), np.nan)
+        if here.any():
+            signs[here], logs[here] = symmetric(factors(nu[here], event), idle)
+        return signs, logs - self._bounds(values, event)
+
+    def _bounds(self, values: Array, event: Event) -> Array:
+        """Logarithms of what the functions of an event are divided by; NaN where there is no matrix."""
+        stretch = np.array([self._stretch.get(value, np.nan) for value in values.tolist()])
+        return np.asarray(stretch * (1.0 if event is not Event.PAIR else self.size - 1.0))
+
+    def function_error(self, values: Array, event: Event, idle: int) -> Array:
+        """Logarithm of what :meth:`function` may be wrong by, shape (k,)."""
+        signs, logs = symmetric(factors(self.at(values), event), idle)
+        largest = np.full(values.size, -np.inf)
+        for copy in np.moveaxis(self.disturbed(values), 1, 0):
+            other_signs, other_logs = symmetric(factors(copy, event), idle)
+            top = np.maximum(np.maximum(logs, other_logs), _SMALLEST)
+            with np.errstate(divide="ignore"):
+                moved = np.log(np.abs(signs * np.exp(logs - top) - other_signs * np.exp(other_logs - top)))
+            largest = np.fmax(largest, moved + top)
+        return np.asarray(largest - self._bounds(values, event) + np.log(_SAFETY))
+
+
+def margins(nu: ComplexArray) -> Array:
+    """tanh(ln |nu|), falling along the last axis: the distance from the circle near it, -1 for 0, 1 for infinity."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(-np.sort(-np.tanh(np.log(np.abs(nu))), axis=-1))
+
+
+def factors(nu: ComplexArray, event: Event) -> ComplexArray:
+    """What vanishes at an event: nu + 1, nu - 1, or nu_i nu_j - 1 over all pairs, along the last axis."""
+    if event is Event.MINUS:
+        return nu + 1.0
+    if event is Event.PLUS:
+        return nu - 1.0
+    first, second = _pairs(nu.shape[-1])
+    nu = nu * (_LARGEST / np.maximum(np.abs(nu), _LARGEST))  # so that no product overflows
+    return np.asarray(nu[..., first] * nu[..., second] - 1.0)
+
+
+def symmetric(terms: ComplexArray, left_out: int) -> tuple[Array, Array]:
+    """Elementary symmetric polynomials of the rows of ``terms``, all but ``left_out`` of them at a time.
+
+    The rows are closed under conjugation; signs and logarithms, shapes (k,).
+    """
+    sizes = np.abs(terms)
+    small = np.zeros((terms.shape[0], left_out + 1), dtype=np.complex128)
+    small[:, 0] = 1.0
+    logs = np.zeros(terms.shape[0])
+    if left_out:
+        order = np.argsort(sizes, axis=1)
+        terms = np.take_along_axis(terms, order, axis=1)
+        few = min(terms.shape[1], 2 * left_out + _SPARE)
+        for term in terms[:, :few].T:
+            # Times (term + t), up to t^left_out; the others are so far from zero that leaving one of them out instead
+            # changes nothing.
+            scale = np.maximum(np.abs(term), 1.0)
+            logs += np.log(scale)
+            shifted = np.concatenate([np.zeros_like(small[:, :1]), small[:, :-1]], axis=1)
+            small = small * (term / scale)[:, None] + shifted / scale[:, None]
+        terms, sizes = terms[:, few:], np.abs(terms[:, few:])
+    last = small[:, left_out]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        logs = logs + np.log(sizes).sum(axis=1) + np.log(np.abs(last.real if left_out else last))
+    signs = np.sign((np.prod(terms / np.where(sizes == 0.0, 1.0, sizes), axis=1) * last).real)
+    return np.asarray(signs), np.asarray(logs)
+
+
+@cache
+def _pairs(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    first, second = np.triu_indices(count, 1)
+    return first, second
+
+
+def _eigenvalues(matrices: Array) -> ComplexArray:
+    """By falling modulus, shape (k, m)."""
+    nu = np.linalg.eigvals(matrices).astype(np.complex128)
+    return np.asarray(np.take_along_axis(nu, np.argsort(-np.abs(nu), axis=-1), axis=-1))
