@@ -338,34 +338,38 @@ def test_cusp_of_the_forced_duffing_oscillator():
 
 
 def test_folds_of_cycles_of_an_autonomous_system():
-    """r' = p + q (r - 1) - (r - 1)^3 with the angle going round once in 2 pi."""
+    """r' = p - 0.1 + (q - 0.2) (r - 1) - (r - 1)^3 with the angle going round once in 2 pi."""
     plain, _ = with_parameters(polar, 2, 1.0)
 
     def family2(p, q):
         return replace(
-            plain(p, q), period=None, velocity=lambda x: polar(0.0, np.append(x, [p, q]))[:2], guess_period=2.0 * np.pi
+            plain(p, q),
+            period=None,
+            velocity=lambda x: polar(0.0, np.append(x, [p, q]))[:2],
+            guess_period=2.0 * np.pi,
+            flow_with_error=None,
         )
 
     x = -np.sqrt(0.1 / 3.0)
     start = BifurcationPoint(
-        Kind.FOLD, x**3 - 0.1 * x, 0.0, np.array([1.0 + x, 0.0]), np.array([1.0 + 0j, 0.0]), 1.0 + 0j, 0.0
+        Kind.FOLD, 0.1 + x**3 - 0.1 * x, 0.0, np.array([1.0 + x, 0.0]), np.array([1.0 + 0j, 0.0]), 1.0 + 0j, 0.0
     )
     curve = follow2(
-        family2, start, ((-0.2, 0.2), (-0.5, 0.5)), second=0.3, points=8, step=0.2, longest=0.4, rising=False
+        family2, start, ((-0.1, 0.3), (-0.3, 0.7)), second=0.3, points=4, step=0.3, longest=0.4, rising=False
     )
     for point in curve.points:
-        p, q = point.values
+        p, q = point.values - [0.1, 0.2]
         assert 27.0 * p**2 == pytest.approx(4.0 * q**3, abs=1e-11)
     (cusp,) = curve.special
     assert cusp.kind is CodimensionTwo.CUSP
-    assert (np.abs(cusp.values) <= cusp.error_bound).all()
+    assert (np.abs(cusp.values - [0.1, 0.2]) <= cusp.error_bound).all()
     assert (cusp.error_bound < 1e-9).all()
 
 
 @numba.njit
 def polar(t, x):
     r = np.sqrt(x[0] * x[0] + x[1] * x[1])
-    grown = (x[2] + x[3] * (r - 1.0) - (r - 1.0) * (r - 1.0) * (r - 1.0)) / r
+    grown = (x[2] - 0.1 + (x[3] - 0.2) * (r - 1.0) - (r - 1.0) * (r - 1.0) * (r - 1.0)) / r
     return np.array([grown * x[0] - x[1], grown * x[1] + x[0], 0.0 * x[2], 0.0 * x[3]])
 
 
