@@ -268,7 +268,7 @@ def _factors(system: SystemLike, orbit: Orbit) -> tuple[list[Array], Array]:
         times = np.linspace(0.0, duration, count + 1)
         states, factors = [x], []
         for t0, t1 in zip(times, times[1:], strict=False):
-            state, factor = system.flow(states[-1], float(t0), float(t1))
+            state, factor = system.flow(states[-1].copy(), float(t0), float(t1))
             states.append(state)
             factors.append(factor * units / units[:, None])
         if system.symmetry is not None:
