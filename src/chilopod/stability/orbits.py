@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,6 +30,7 @@ _ROUND_OFF = 4e-16
 _SETTLED = 1e-10  # residual, of the sizes of the states, below which it may stop falling
 _RETURNED = 1e-12  # of a known orbit: it is exact
 _SINGULAR, _FAMILY = 1e-13, 1e-8  # singular values of H - 1 that count as zero, the largest being one
+_MAGNIFIED = 1e9  # move over residual beyond which H - 1 may be singular
 _KNOWN = 1e-4  # of a known orbit: it is one, if not to the last digit
 _LONGEST_SETTLING = 300  # returns
 _BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
@@ -195,8 +197,13 @@ def _newton(system: SystemLike, x: Array, with_error: bool, section: Section | N
 
 def _solved(matrix: Array, right: Array, size: Array, cutoff: float) -> Array:
     """Solution of a linear system in units of the states' sizes; the shortest where orbits come in families."""
-    scaled = matrix * size / size[:, None]
-    return np.asarray(np.linalg.lstsq(scaled, right / size, rcond=cutoff)[0] * size)
+    scaled, right = matrix * size / size[:, None], right / size
+    if cutoff == _SINGULAR:
+        with contextlib.suppress(np.linalg.LinAlgError):
+            regular = np.linalg.solve(scaled, right)
+            if np.abs(regular).max() <= _MAGNIFIED * np.abs(right).max():
+                return np.asarray(regular * size)
+    return np.asarray(np.linalg.lstsq(scaled, right, rcond=cutoff)[0] * size)
 
 
 def _found(system: SystemLike, x: Array, image: ReturnMap, with_error: bool) -> Orbit:
