@@ -180,7 +180,8 @@ def _blocks(system: SystemLike, orbit: Orbit) -> tuple[tuple[Block | None, ...],
 
 def _relative(image: ReturnMap) -> float:
     """Error of the derivative, of its largest entry, the states being in units that balance it."""
-    units = numerical_balance(image.jacobian)
+    # An entry that is nothing but round-off says nothing of the units.
+    units = numerical_balance(np.abs(image.jacobian) + np.nan_to_num(image.error))
     largest = float(np.abs(image.jacobian * units / units[:, None]).max())
     if not largest > 0.0:
         return _LEAST_ERROR
