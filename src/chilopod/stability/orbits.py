@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 
 _ROUNDS = 30
 _ROUND_OFF = 4e-16
+_NOTHING = 1e-13  # of the sizes of the states around a guess: a state that small may be zero
 _SETTLED = 1e-10  # residual, of the sizes of the states, below which it may stop falling
 _RETURNED = 1e-12  # of a known orbit: it is exact
 _SINGULAR, _FAMILY = 1e-13, 1e-8  # singular values of H - 1 that count as zero, the largest being one
@@ -173,6 +174,7 @@ def _newton(system: SystemLike, x: Array, with_error: bool, section: Section | N
         residual = image.state - x
         off = _relative(residual, size)
         if off <= _ROUND_OFF or (off <= _SETTLED and off >= 0.5 * best):
+            x, image = _cleared(system, x, image, size, section)
             return _found(system, x, image, with_error)
         if rounds > 4 and off > 10.0 * best:
             break
@@ -191,6 +193,20 @@ def _newton(system: SystemLike, x: Array, with_error: bool, section: Section | N
         field="orbit",
         allowed="a guess closer to the orbit",
     )
+
+
+def _cleared(
+    system: SystemLike, x: Array, image: ReturnMap, size: Array, section: Section | None
+) -> tuple[Array, ReturnMap]:
+    """An orbit with the states that are only just not zero at zero, if it is an orbit still: what is left of a guess
+    would pass for the size of the orbit."""
+    small = (x != 0.0) & (np.abs(x) <= _NOTHING * size)
+    if section is not None or not small.any():
+        return x, image
+    cleared = np.where(small, 0.0, x)
+    there = return_map(system, cleared, with_error=False)
+    off = _relative(there.state - cleared, size)
+    return (cleared, there) if off <= max(_ROUND_OFF, _relative(image.state - x, size)) else (x, image)
 
 
 def _solved(matrix: Array, right: Array, size: Array, cutoff: float) -> Array:

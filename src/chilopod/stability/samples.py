@@ -144,6 +144,8 @@ class Samples:
             last = samples[-1]
             if last.value != value:
                 fold = find_fold(self.family, last.value, last.orbit, high - low)
+                if fold is not None and not np.isfinite(fold.error_bound):
+                    fold = None  # something else, or too flat to be told from it
                 if fold is None:
                     self.ending = f"the orbit cannot be followed beyond {last.value:.9g}"
                 return last.value, fold if fold is not None and low <= fold.value <= high else None
