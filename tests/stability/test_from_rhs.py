@@ -1,7 +1,7 @@
 """Building a system from a right-hand side: what is warned of, what is refused, and how the derivative is had."""
 
 import warnings
-from math import cos, exp, pi, sin
+from math import cos, exp, fabs, pi, sin
 
 import numba
 import numpy as np
@@ -25,8 +25,9 @@ def hill(coefficient):
 @pytest.mark.parametrize("size", [1.0, 0.1, 0.01, 1e-4])
 @pytest.mark.parametrize("background", [lambda t: 1.0, cos, lambda t: cos(t) + 0.3 * cos(5 * t)])
 def test_undeclared_jump_is_warned_of(size, background):
+    """By a branch, which cannot be traced: a jump of a function that can is crossed exactly, declared or not."""
     with pytest.warns(UndeclaredSwitch, match=r"jumps at t = 1\.2661\d*, 5\.0170\d*, not among"):
-        from_rhs(hill(lambda t: background(t) + size * np.sign(cos(t) - 0.3)), 2, 2 * pi, orbit=[0, 0])
+        from_rhs(hill(lambda t: background(t) + (size if cos(t) > 0.3 else -size)), 2, 2 * pi, orbit=[0, 0])
 
 
 def test_each_undeclared_jump_is_listed():
@@ -36,7 +37,7 @@ def test_each_undeclared_jump_is_listed():
 
 def test_one_of_two_switches_declared():
     with pytest.warns(UndeclaredSwitch, match=r"t = 4\.71238\d*, not among"):
-        from_rhs(hill(lambda t: 1 + 0.5 * np.sign(cos(t))), 2, 2 * pi, switch_times=[pi / 2])
+        from_rhs(hill(lambda t: 1.5 if cos(t) > 0 else 0.5), 2, 2 * pi, switch_times=[pi / 2])
 
 
 def test_a_jump_that_multiplies_zero_on_the_orbit_is_found():
@@ -94,7 +95,8 @@ def test_no_false_alarm_for_declared_switches():
 
 def test_no_alarm_where_a_function_is_not_defined_everywhere():
     system = from_rhs(lambda t, x: [1 - x[0] ** 0.5 if x[0] > 0 else 1 / 0], 1, 2.0)
-    found = multipliers(system, [1.1])
+    with pytest.warns(NotAnalytic):
+        found = multipliers(system, [1.1])
     assert found.orbit[0] == pytest.approx(1.0, abs=1e-12)
     assert abs(found.values[0] - exp(-1.0)) <= found.error_bound
 
@@ -107,17 +109,26 @@ def cube_by_power(t, x):
     return np.array([x[1], -x[0] - 0.2 * x[1] - x[0] ** 3])
 
 
-def test_a_compiled_power_is_warned_of_and_still_right():
-    with pytest.warns(NotAnalytic, match=r"write x\*x\*x"):
-        system = from_rhs(cube_by_power, 2, 2.0, orbit=[0, 0])
-    plain = from_rhs(cube_by_power.py_func, 2, 2.0, orbit=[0, 0])
+def test_a_compiled_power_is_exact():
+    system = from_rhs(cube_by_power, 2, 2.0, orbit=[0, 0])
+    plain = from_rhs(lambda t, x: [x[1], -x[0] - 0.2 * x[1] - x[0] * x[0] * x[0]], 2, 2.0, orbit=[0, 0])
     x = np.array([-0.7, 0.4])
-    np.testing.assert_allclose(system.flow(x, 0.0, 2.0)[1], plain.flow(x, 0.0, 2.0)[1], rtol=1e-12)
+    np.testing.assert_allclose(system.flow(x, 0.0, 2.0)[1], plain.flow(x, 0.0, 2.0)[1], rtol=1e-14)
 
 
-@pytest.mark.parametrize("absolute", [abs, np.abs, lambda v: v if v > 0 else -v])
-def test_a_function_that_takes_no_complex_states_is_differenced(absolute):
+@pytest.mark.parametrize("absolute", [abs, np.abs])
+def test_a_modulus_is_traced(absolute):
     found = multipliers(from_rhs(lambda t, x: [-x[0] * absolute(2.0 + x[0])], 1, 1.5, orbit=[0.0]))
+    assert abs(found.values[0] - exp(-3.0)) <= found.error_bound < 1e-14
+
+
+def test_a_branch_on_the_state_is_differenced_and_warned_of():
+    def absolute(v):
+        return fabs(v) if v > 0 else -v
+
+    system = from_rhs(lambda t, x: [-x[0] * absolute(2.0 + x[0])], 1, 1.5, orbit=[0.0])
+    with pytest.warns(NotAnalytic, match="a branch"):
+        found = multipliers(system)
     assert found.values[0] == pytest.approx(exp(-3.0), rel=1e-8)
     assert abs(found.values[0] - exp(-3.0)) <= found.error_bound < 1e-6
 
@@ -132,12 +143,9 @@ def test_not_analytic_in_one_part_of_the_period_only(compiled):
             slope[0] -= abs(x[0] + 1.0) - 1.0
         return slope
 
-    if compiled:
-        with pytest.warns(NotAnalytic):
-            system = from_rhs(numba.njit(rhs), 1, 2.0, switch_times=[1.0], orbit=[0.0])
-    else:
-        system = from_rhs(rhs, 1, 2.0, switch_times=[1.0], orbit=[0.0])
-    found = multipliers(system)
+    system = from_rhs(numba.njit(rhs) if compiled else rhs, 1, 2.0, switch_times=[1.0], orbit=[0.0])
+    with pytest.warns(NotAnalytic):
+        found = multipliers(system)
     assert found.values[0] == pytest.approx(exp(-3.0), rel=1e-8)
     assert abs(found.values[0] - exp(-3.0)) <= found.error_bound
 
@@ -164,6 +172,65 @@ def test_own_jacobian_complex_step_and_compiled_agree():
     np.testing.assert_allclose(many[0], results[0][0], rtol=1e-12)
 
 
+def test_a_wrong_jacobian_is_refused():
+    with pytest.raises(ParameterError, match=r"entry \(1, 0\) at .* should be -1") as error:
+        from_rhs(oscillator, 2, 2.0, jacobian=lambda t, x: [[0.0, 1.0], [1.0, 0.0]])
+    assert error.value.field == "jacobian"
+
+
+# Jumps with the state, and pulses, in functions that can only be called
+
+
+def test_a_jump_with_the_state_in_a_branch_is_noticed():
+    """x' = 1 below x = 1 and 3 above: the derivative 1 that is found should be 3, and the bound says so."""
+    system = from_rhs(lambda t, x: [3.0 + 0 * x[0] if x[0].real > 1.0 else 1.0 + 0 * x[0]], 1, 2.0)
+    with pytest.warns(UndeclaredSwitch, match="jumps somewhere in the state"):
+        _, derivative, error = system.flow_with_error(np.zeros(1), 0.0, 2.0)
+    assert abs(derivative[0, 0] - 3.0) <= error
+
+
+@pytest.mark.parametrize("width", [0.1, 1e-2, 1e-3])
+def test_a_pulse_in_a_branch_is_not_stepped_over(width):
+    def rhs(t, x):
+        if t > 5.0:
+            return x
+        z = (t - 1.1) / width
+        return (-1 + 3 / width * np.exp(-0.5 * z * z) / np.sqrt(2 * pi)) * x
+
+    found = multipliers(from_rhs(rhs, 1, 2.0, orbit=[0.0]))
+    assert found.values[0] == pytest.approx(exp(1.0), rel=1e-10)
+    assert abs(found.values[0] - exp(1.0)) <= found.error_bound
+
+
+def test_a_traced_pulse_and_a_traced_jump_with_the_state():
+    def rhs(t, x):
+        return (-1 + 3e3 * np.exp(-0.5 * ((t - 1.1) / 1e-3) ** 2) / np.sqrt(2 * pi)) * x
+
+    found = multipliers(from_rhs(rhs, 1, 2.0, orbit=[0.0]))
+    assert abs(found.values[0] - exp(1.0)) <= found.error_bound < 1e-11
+    system = from_rhs(lambda t, x: [np.where(x[0] > 1.0, 3.0, 1.0)], 1, 2.0)
+    _, derivative, error = system.flow_with_error(np.zeros(1), 0.0, 2.0)
+    assert abs(derivative[0, 0] - 3.0) <= error < 1e-13
+
+
+@pytest.mark.parametrize("called", [False, True])
+def test_states_in_any_units(called):
+    """The multipliers of a driven pendulum with lengths and speeds in units 10^9 apart."""
+    values = []
+    for units in (np.ones(2), np.array([2.0**-30, 2.0**30])):
+
+        def rhs(t, x, units=units):
+            y = x / units
+            slope = np.array([y[1], -1.7 * np.sin(y[0]) * (1 + 0.3 * np.cos(t)) - 0.1 * y[1]]) * units
+            return slope if not called or t < 99.0 else x
+
+        system = from_rhs(rhs, 2, 2 * pi)
+        state, derivative = system.flow(np.array([0.9, -0.2]) * units, 0.0, 6.0)
+        values.append((state / units, derivative * units / units[:, None]))
+    np.testing.assert_allclose(values[1][0], values[0][0], rtol=1e-13)
+    np.testing.assert_allclose(values[1][1], values[0][1], rtol=1e-12)
+
+
 # Time
 
 
@@ -180,7 +247,7 @@ def test_the_function_is_never_asked_at_a_switch():
 
     def rhs(t, x):
         asked.append(t)
-        return -1.0 * x
+        return -1.0 * x if t < 9.0 else x  # a branch, or it would be traced and never asked again
 
     system = from_rhs(rhs, 1, 2.0, switch_times=[0.5, 1.25], orbit=[0.0])
     asked.clear()

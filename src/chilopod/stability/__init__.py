@@ -8,6 +8,7 @@ False
 """
 
 from chilopod.stability.branch import Branch, BranchPoint, Ending, begin, follow, leave_pitchfork, proceed
+from chilopod.stability.called import NotAnalytic
 from chilopod.stability.capabilities import (
     Autonomous,
     CyclicallySymmetric,
@@ -21,13 +22,14 @@ from chilopod.stability.capabilities import (
     Switches,
     SystemLike,
 )
+from chilopod.stability.events import Event
 from chilopod.stability.floquet import Exponents, Multipliers, exponents, multipliers, sweep
 from chilopod.stability.jumps import UndeclaredSwitch
 from chilopod.stability.locate import Located, locate
 from chilopod.stability.orbits import Orbit, find_orbit
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
 from chilopod.stability.returns import ReturnMap
-from chilopod.stability.rhs import NotAnalytic, from_rhs
+from chilopod.stability.rhs import from_rhs
 from chilopod.stability.system import PeriodicSystem
 
 __all__ = [
@@ -38,6 +40,7 @@ __all__ = [
     "Criticality",
     "CyclicallySymmetric",
     "Ending",
+    "Event",
     "Exponents",
     "FlowsEach",
     "FlowsMany",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import operator
 from collections.abc import Callable
 from typing import Any
@@ -15,12 +14,14 @@ from chilopod.errors import ParameterError
 Array = NDArray[np.float64]
 
 _COARSEST = 1e-3
+_SIZES = (1e-6, 1e-3, 1.0, 1e3)
+_SAME = 1e-6
 
 
 def checked_arguments(
-    rhs: object, dimension: object, period: object, args: object, tolerance: object
-) -> tuple[int, float, tuple[Any, ...], float]:
-    """Dimension, period, args and tolerance as what they should be."""
+    rhs: object, dimension: object, args: object, tolerance: object
+) -> tuple[int, tuple[Any, ...], float]:
+    """Dimension, args and tolerance as what they should be."""
     if not callable(rhs):
         raise ParameterError("must be a function", field="rhs", value=rhs, allowed="rhs(t, x, *args)")
     try:
@@ -31,13 +32,20 @@ def checked_arguments(
         raise ParameterError("must be a whole number", field="dimension", value=dimension, allowed="1 or more")
     if not isinstance(args, tuple):
         raise ParameterError("must be a tuple", field="args", value=args, allowed="such as (0.5,)")
-    length = float(finite_array(period, (), "period"))
-    if not length > 0:
-        raise ParameterError("must be positive and finite", field="period", value=period)
     error = float(finite_array(tolerance, (), "tolerance"))
     if not 0 < error <= _COARSEST:
         raise ParameterError("is out of range", field="tolerance", value=tolerance, allowed=f"0 to {_COARSEST:g}")
-    return size, length, args, error
+    return size, args, error
+
+
+def checked_duration(field: str, value: object) -> float:
+    """A period, or a guess of it, as a positive number."""
+    if value is None:
+        raise ParameterError("must be given", field=field, value=None, allowed="about the period of the orbit")
+    duration = float(finite_array(value, (), field))
+    if not duration > 0:
+        raise ParameterError("must be positive and finite", field=field, value=value)
+    return duration
 
 
 def finite_array(value: Any, shape: tuple[int, ...], field: str) -> Array:
@@ -77,29 +85,59 @@ def check_shape(
         raise ParameterError("returns the wrong shape", field=field, value=result.shape, allowed=str(shape))
 
 
+Slopes = Callable[[Array, Array], Array]
+"""``slopes(times, states) -> dx/dt``, shapes (samples,), (n, samples) and (n, samples); NaN where it is not defined."""
+
+
 def check_symmetry(
-    field: str,
-    matrix: Array,
-    shift: float,
-    rhs: Callable[..., ArrayLike],
-    args: tuple[Any, ...],
-    times: Array,
-    base: Array,
-    period: float,
+    field: str, matrix: Array, shift: float, slopes: Slopes, times: Array, base: Array, period: float
 ) -> None:
-    """Test S f(t, x) = f(t + shift, S x) at some times and states: a wrong symmetry gives wrong multipliers in
-    silence."""
-    for t, turn in itertools.product(times.tolist(), (1.0, 2.0)):
-        x = base + np.cos(3.0 * np.arange(base.size) + turn)
-        try:
-            with np.errstate(all="ignore"):
-                here = np.asarray(rhs(t, x, *args), dtype=np.float64)
-                there = np.asarray(rhs((t + shift) % period, matrix @ x, *args), dtype=np.float64)
-        except (ArithmeticError, ValueError):  # not defined at this state
-            continue
-        if np.abs(matrix @ here - there).max() > 1e-6 * max(1.0, float(np.abs(here).max())):
-            raise ParameterError(
-                f"is no symmetry of the right-hand side, as at t = {t:g}",
-                field=field,
-                allowed="S with S f(t, x) = f(t + T/2, S x)" if shift else "P with P f(t, x) = f(t, P x)",
-            )
+    """Test S f(t, x) = f(t + shift, S x) at some times and states of all sizes: a wrong symmetry gives wrong
+    multipliers in silence."""
+    n = base.size
+    turns, sizes = np.arange(1.0, 3.0), np.array(_SIZES)
+    # Axes: state, size, turn and time.
+    shape = (n, sizes.size, turns.size, times.size)
+    wave = np.cos(3.0 * np.arange(n)[:, None, None, None] + turns[:, None])
+    x = np.broadcast_to(base[:, None, None, None] + sizes[:, None, None] * wave, shape).reshape(n, -1)
+    t = np.broadcast_to(times, shape[1:]).ravel()
+    both = slopes(np.concatenate([t, (t + shift) % period]), np.concatenate([x, matrix @ x], axis=1))
+    here, there = np.split(both, 2, axis=1)
+    off = np.abs(matrix @ here - there)
+    terms = np.abs(matrix) @ np.abs(here) + np.abs(there)
+    largest = np.where(np.isfinite(terms), terms, 0.0).reshape(shape).max(axis=(2, 3), keepdims=True)
+    wrong = (off.reshape(shape) > _SAME * largest).reshape(n, -1).any(axis=0)
+    if wrong.any():
+        raise ParameterError(
+            f"is no symmetry of the right-hand side, as at t = {t[wrong][0]:g}",
+            field=field,
+            allowed="S with S f(t, x) = f(t + T/2, S x)" if shift else "P with P f(t, x) = f(t, P x)",
+        )
+
+
+def check_timeless(slopes: Slopes, base: Array, duration: float) -> None:
+    """See that a right-hand side without a period does not depend on time."""
+    n = base.size
+    sizes = np.array(_SIZES)
+    x = base[:, None] + sizes * np.cos(3.0 * np.arange(n)[:, None] + 1.0)
+    one, other = (slopes(np.full(sizes.size, part * duration), x) for part in (0.1234, 0.5678))
+    differs = np.isfinite(one) & np.isfinite(other) & (np.abs(one - other) > _SAME * np.abs(one))
+    if differs.any():
+        raise ParameterError("must be given", field="period", value=None, allowed="T: the right-hand side depends on t")
+
+
+def sampled(rhs: Callable[..., ArrayLike], args: tuple[Any, ...], n: int) -> Slopes:
+    """A right-hand side at many times and states, asked for one after the other."""
+
+    def slopes(times: Array, states: Array) -> Array:
+        columns = []
+        for t, x in zip(times.tolist(), states.T, strict=True):
+            try:
+                with np.errstate(all="ignore"):
+                    column = np.asarray(rhs(t, x.copy(), *args), dtype=np.float64)
+            except (ArithmeticError, ValueError):  # not defined at this state
+                column = np.full(n, np.nan)
+            columns.append(column)
+        return np.array(columns).T
+
+    return slopes

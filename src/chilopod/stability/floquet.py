@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.capabilities import Autonomous, SystemLike
+from chilopod.stability.capabilities import SystemLike, is_autonomous
 from chilopod.stability.orbits import Orbit, find_orbit, from_known, known_state
 from chilopod.stability.returns import ReturnMap, return_maps
 from chilopod.stability.scales import numerical_balance
@@ -192,7 +192,7 @@ def sweep(systems: Sequence[SystemLike]) -> list[Multipliers]:
     """Multipliers of many systems at their known orbits, on all cores where the systems allow it."""
     if not systems:
         return []
-    if any(isinstance(system, Autonomous) for system in systems):
+    if any(is_autonomous(system) for system in systems):
         return [multipliers(system) for system in systems]
     states = [known_state(system) for system in systems]
     images = return_maps(systems, states)
@@ -245,8 +245,8 @@ def _factors(system: SystemLike, orbit: Orbit) -> tuple[list[Array], Array]:
             factors.append(factor * units / units[:, None])
         if system.symmetry is not None:
             factors[-1] = (system.symmetry * units / units[:, None]) @ factors[-1]
-        basis = np.diag(units)
-        if isinstance(system, Autonomous):
+        basis, worst = np.diag(units), max(float(np.linalg.cond(factor)) for factor in factors)
+        if is_autonomous(system):
             sections = [_normal_basis(system.velocity(at) / units) for at in states[:-1]]
             sections.append(sections[0])
             factors = [after.T @ f @ before for f, before, after in zip(factors, sections, sections[1:], strict=False)]
@@ -255,7 +255,7 @@ def _factors(system: SystemLike, orbit: Orbit) -> tuple[list[Array], Array]:
             whole = image.jacobian * units / units[:, None]
             if np.abs(functools.reduce(lambda m, f: f @ m, factors) - whole).max() > _COMPOSED * np.abs(whole).max():
                 return [whole], basis  # a map, which has no parts
-        if max((float(np.linalg.cond(factor)) for factor in factors), default=1.0) < _WORST_CONDITION:
+        if worst < _WORST_CONDITION:
             return factors, basis
         count *= 2
         if count > _MOST_FACTORS:

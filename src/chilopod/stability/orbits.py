@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.arguments import finite_array
-from chilopod.stability.capabilities import Autonomous, KnowsOrbit, SystemLike, returns_per_period
+from chilopod.stability.capabilities import Autonomous, SystemLike, is_autonomous, known_orbit, returns_per_period
 from chilopod.stability.returns import (
     ReturnMap,
     Section,
@@ -77,7 +77,7 @@ def known_state(system: SystemLike) -> Array:
     AnalysisError
         If it knows none.
     """
-    orbit = system.orbit if isinstance(system, KnowsOrbit) else None
+    orbit = known_orbit(system)
     if orbit is None:
         raise AnalysisError(
             "this system does not know its periodic orbit", field="orbit", allowed="a first guess of it"
@@ -141,7 +141,7 @@ def from_known(system: SystemLike, x: Array, with_error: bool = True, image: Ret
     image
         The return map at ``x``, if it was computed already.
     """
-    if isinstance(system, Autonomous):
+    if is_autonomous(system):
         return find_orbit(system, x, with_error)
     image = return_map(system, x, with_error) if image is None else image
     moved = np.abs(image.state - x)
@@ -218,14 +218,14 @@ def _solved(matrix: Array, right: Array, size: Array, cutoff: float) -> Array:
 def _found(system: SystemLike, x: Array, image: ReturnMap, with_error: bool) -> Orbit:
     if with_error:
         return bounded(system, x, image)
-    if isinstance(system, Autonomous):
+    if is_autonomous(system):
         image = return_map(system, x, False, _across(system, x, image))
     return Orbit(x, image, np.full(x.size, np.nan))
 
 
 def _across(system: SystemLike, x: Array, image: ReturnMap) -> Section | None:
     duration = image.period / image.returns
-    return section_at(system, x, sizes(system, x, duration), duration) if isinstance(system, Autonomous) else None
+    return section_at(system, x, sizes(system, x, duration), duration) if is_autonomous(system) else None
 
 
 def bounded(system: SystemLike, x: Array, image: ReturnMap, error: Array | None = None) -> Orbit:
@@ -262,7 +262,7 @@ def _matrix(error: float | Array, size: Array) -> Array:
 
 def _settled(system: SystemLike, x: Array) -> list[tuple[Array, Section | None]]:
     """States on the orbit that attracts the motion from a state, if one does, with sections across it."""
-    if isinstance(system, Autonomous):
+    if is_autonomous(system):
         return _settled_autonomous(system, x)
     found: list[tuple[Array, Section | None]] = []
     for count in (_LONGEST_SETTLING // 10, _LONGEST_SETTLING):

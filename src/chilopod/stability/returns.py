@@ -21,8 +21,9 @@ from chilopod.stability.capabilities import (
     FlowsMany,
     FlowsStates,
     FlowsWithError,
-    Scaled,
     SystemLike,
+    given_scale,
+    is_autonomous,
     returns_per_period,
     spatial_symmetries,
 )
@@ -98,11 +99,11 @@ class _WholePeriod:
         self.flow = system.flow
         symmetries = spatial_symmetries(system)
         self.spatial_symmetry = np.stack(symmetries) if symmetries else None
-        self.scale = system.scale if isinstance(system, Scaled) else None
+        self.scale = given_scale(system)
         self.flow_with_error = system.flow_with_error if isinstance(system, FlowsWithError) else None
         self.flow_states = system.flow_states if isinstance(system, FlowsStates) else None
         self.velocity = None
-        if isinstance(system, Autonomous):
+        if is_autonomous(system):
             self.guess_period = periods * system.guess_period
             self.velocity = system.velocity
 
@@ -132,7 +133,7 @@ def section_at(
     AnalysisError
         If the motion rests in this state.
     """
-    if not isinstance(system, Autonomous):
+    if not is_autonomous(system):
         return None
     velocity = _velocity(system, x)
     if duration is None:
@@ -147,7 +148,7 @@ def section_at(
 
 def return_duration(system: SystemLike) -> float:
     """How long a return takes; about, where the period belongs to the orbit."""
-    whole = system.guess_period if isinstance(system, Autonomous) else _period(system)
+    whole = system.guess_period if is_autonomous(system) else _period(system)
     return whole / returns_per_period(system)
 
 
@@ -212,7 +213,7 @@ def return_map(system: SystemLike, x: ArrayLike, with_error: bool = True, sectio
     if x.shape != (n,):
         raise ParameterError("has the wrong shape", field="orbit", value=x.shape, allowed=f"({n},)")
     count = returns_per_period(system)
-    if isinstance(system, Autonomous):
+    if is_autonomous(system):
         return _return_to_section(system, x, with_error, section or section_at(system, x))
     duration = return_duration(system)
     error: float | Array = np.nan
@@ -326,7 +327,7 @@ def returned_states(system: SystemLike, states: Array, section: Section | None =
     states = np.array(states)  # a system may write into what it is given
     if section is None:
         return _turned(system, _carried(system, states, return_duration(system)))
-    assert isinstance(system, Autonomous)
+    assert is_autonomous(system)
     approach = _APPROACHES[0]
     before = _carried(system, states, (1.0 - approach) * section.duration)
     rests = [_time_to_section(system, x, section, approach * section.duration) for x in before]

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.capabilities import Autonomous, SystemLike
+from chilopod.stability.capabilities import SystemLike, is_autonomous
 from chilopod.stability.fold import Fold, find_fold
 from chilopod.stability.orbits import find_orbit, from_known, known_state
 from chilopod.stability.returns import ReturnMap, return_maps, section_at
@@ -83,7 +83,7 @@ class Samples:
     def family(self, value: float) -> SystemLike:
         """The system at a value of the parameter, once it is seen to be of the same kind as the others."""
         system = self._family(value)
-        timed = not isinstance(system, Autonomous)
+        timed = not is_autonomous(system)
         if self._dimension == 0:
             self._dimension, self._timed = system.dimension, timed
         if system.dimension != self._dimension or timed is not self._timed:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import matrix_balance
+from scipy.linalg.lapack import dgebal
 
 from chilopod.errors import AnalysisError
-from chilopod.stability.capabilities import Scaled, SystemLike
+from chilopod.stability.capabilities import SystemLike, given_scale
 
 Array = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ def sizes(system: SystemLike, x: Array, duration: float) -> Array:
     AnalysisError
         If the flow gives anything that is not finite.
     """
-    given = system.scale if isinstance(system, Scaled) else None
+    given = given_scale(system)
     if given is not None:
         return given
     later, derivative = system.flow(np.array(x), 0.0, _PART * duration)
@@ -54,6 +54,5 @@ def sizes(system: SystemLike, x: Array, duration: float) -> Array:
 def numerical_balance(matrix: Array) -> Array:
     """Sizes d of the states for which the rows and columns of ``matrix[i, j] * d[j] / d[i]`` are about alike, by
     LAPACK: for bounds on round-off."""
-    with np.errstate(invalid="ignore"):  # scipy takes large factors for indices, which are not asked for
-        d: Array = matrix_balance(matrix, permute=False, separate=True)[1][0]
+    d: Array = dgebal(matrix, scale=1, permute=0)[3]
     return d

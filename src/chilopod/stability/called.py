@@ -1,0 +1,264 @@
+"""The flow of a right-hand side that can only be called: scipy's DOP853 for state and tangents together."""
+
+from __future__ import annotations
+
+import itertools
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.integrate import solve_ivp
+
+from chilopod.errors import AnalysisError
+from chilopod.stability.jumps import UndeclaredSwitch
+from chilopod.stability.taylor import pieces
+
+Array = NDArray[np.float64]
+Parts = list[tuple[float, float]]
+
+_COMPLEX_STEP = 1e-40
+_OTHER = 5.0  # two independent errors differ by less than a fifth of them rarely enough
+_ANALYTIC_FLOOR = 1e-14
+_DIFFERENCE_FLOOR = 1e-8
+_SMALL = 1e-4
+_DISAGREES = 1e-5
+_STEPS_IN_FAST_PART = 16
+_MOST_CALLS = 2_000_000
+
+
+class NotAnalytic(UserWarning):
+    """A right-hand side can neither be traced nor differentiated by a complex step."""
+
+
+@dataclass(frozen=True)
+class CalledFlow:
+    """Flow and derivative of dx/dt = rhs(t, x, *args) from calls of the function.
+
+    States are measured in units of their largest size on the way, so that tolerances mean the same in all units.
+
+    Attributes
+    ----------
+    rhs, args, jacobian
+        As for :func:`chilopod.stability.from_rhs`. Without a jacobian the derivative is taken by a complex step if the
+        function takes it, else by central differences; that is seen at the first state.
+    edges
+        Times from 0 to the period at which the integration stops and starts anew.
+    fast
+        Borders of the parts of the period in which the function changes fast, shape (parts, 2): the step is limited
+        there.
+    times
+        One inside every interval between edges.
+    reason
+        Why the function cannot be traced.
+    tolerance
+        Local error per step.
+    """
+
+    rhs: Callable[..., ArrayLike]
+    args: tuple[Any, ...]
+    jacobian: Callable[..., ArrayLike] | None
+    edges: Array
+    fast: Array
+    times: Array
+    reason: str
+    tolerance: float
+    _analytic: list[bool] = field(default_factory=list, repr=False)
+    _warned: list[bool] = field(default_factory=list, repr=False)
+
+    def flow(self, x: Array, t0: float, t1: float) -> tuple[Array, Array]:
+        """State at t1 and its derivative with respect to the state at t0."""
+        parts = self._parts(t0, t1)
+        return self._over(x, parts, self.tolerance, self._sizes(x, parts))
+
+    def flow_with_error(self, x: Array, t0: float, t1: float) -> tuple[Array, Array, float]:
+        """The same with a bound on the error of the largest entry of the derivative."""
+        parts = self._parts(t0, t1)
+        sizes = self._sizes(x, parts)
+        state, derivative = self._over(x, parts, self.tolerance, sizes)
+        # The same with a tolerance a hundred times as large errs at least ten times as much, so the difference bounds
+        # the error. Except where the step control is deceived: its estimate passes through zero now and then, and lets
+        # a step through that is too long. Other steps, from other starts, are not deceived alike.
+        _, coarse = self._over(x, parts, 100.0 * self.tolerance, sizes)
+        _, shifted = self._over(x, _cut(parts), self.tolerance, sizes)
+        unit = sizes[None, :] / sizes[:, None]
+        rough = float(np.abs((coarse - derivative) * unit).max())
+        other = _OTHER * float(np.abs((shifted - derivative) * unit).max())
+        floor = _ANALYTIC_FLOOR if self.jacobian is not None or self._analytic[0] else _DIFFERENCE_FLOOR
+        error = max(rough, other) + floor * float(np.abs(derivative * unit).max())
+        error = max(error, self._missed(x, parts, derivative * unit, sizes))
+        return state, derivative, error * float((1.0 / unit).max())
+
+    def flow_states(self, states: Array, t0: float, t1: float) -> Array:
+        """Many states, shape (states, n), without derivatives."""
+        parts = self._parts(t0, t1)
+        return np.array([self._carry(x, parts, self.tolerance, self._sizes(x, parts)) for x in states])
+
+    def _parts(self, t0: float, t1: float) -> Parts:
+        return pieces(np.unique(np.concatenate([self.edges, self.fast.ravel()])), float(self.edges[-1]), t0, t1)
+
+    def _longest(self, a: float, b: float) -> float:
+        """The longest step in a part."""
+        middle = (0.5 * (a + b)) % float(self.edges[-1])
+        inside = (self.fast[:, 0] < middle) & (middle < self.fast[:, 1])
+        return (b - a) / _STEPS_IN_FAST_PART if inside.any() else np.inf
+
+    def _sizes(self, x: Array, parts: Parts) -> Array:
+        """The largest modulus of every state on the way, at a glance."""
+        n = x.size
+        largest = np.abs(x)
+        unit = np.ones(n) * (float(largest.max()) or 1.0)
+        for a, b in parts:
+            answer = self._solved(self._state_slope(a, b, unit), x / unit, a, b, 1e-3, 1e-6)
+            largest = np.maximum(largest, np.abs(answer).max(axis=1) * unit)
+            x = answer[:, -1] * unit
+        return np.where(largest > 0.0, largest, float(largest.max()) or 1.0)
+
+    def _state_slope(self, a: float, b: float, sizes: Array) -> Callable[[float, Array], Array]:
+        inner_a, inner_b = np.nextafter(a, b), np.nextafter(b, a)
+        # At a switch itself it is anybody's guess which side counts.
+        return lambda t, y: self._slope(min(max(t, inner_a), inner_b), y * sizes) / sizes
+
+    def _over(self, x: Array, parts: Parts, tolerance: float, sizes: Array) -> tuple[Array, Array]:
+        if self.jacobian is None and not self._analytic:
+            self._analytic.append(_is_analytic(self.rhs, self.args, x, sizes, self.times))
+            if not self._analytic[0]:
+                warnings.warn(
+                    f"the right-hand side cannot be traced ({self.reason}) nor differentiated by a complex step: its "
+                    "derivative is taken by differences, with about nine digits",
+                    NotAnalytic,
+                    stacklevel=3,
+                )
+        n = x.size
+        y = np.concatenate([x / sizes, np.eye(n).ravel()])
+        for a, b in parts:
+            inner_a, inner_b = np.nextafter(a, b), np.nextafter(b, a)
+
+            def both(t: float, y: Array, low: float = inner_a, high: float = inner_b) -> Array:
+                t, state = min(max(t, low), high), y[:n] * sizes
+                gradient = self._gradient(t, state, sizes) * (sizes[None, :] / sizes[:, None])
+                return np.concatenate([self._slope(t, state) / sizes, (gradient @ y[n:].reshape(n, n)).ravel()])
+
+            y = self._solved(both, y, a, b, tolerance, 0.01 * tolerance)[:, -1]
+        return y[:n] * sizes, y[n:].reshape(n, n) * (sizes[:, None] / sizes[None, :])
+
+    def _carry(self, x: Array, parts: Parts, tolerance: float, sizes: Array) -> Array:
+        y = x / sizes
+        for a, b in parts:
+            y = self._solved(self._state_slope(a, b, sizes), y, a, b, tolerance, 0.01 * tolerance)[:, -1]
+        return np.asarray(y * sizes)
+
+    def _missed(self, x: Array, parts: Parts, derivative: Array, sizes: Array) -> float:
+        """What the derivative lacks of differences of the flow: where f jumps with the state, that stays however small
+        the difference is taken."""
+        direction = np.cos(5.0 * np.arange(x.size) + 0.7)
+        off = []
+        for h in (_SMALL, _SMALL / 3.0):
+            up, down = (self._carry(x + sign * h * direction * sizes, parts, self.tolerance, sizes) for sign in (1, -1))
+            off.append(float(np.abs((up - down) / (2.0 * h * sizes) - derivative @ direction).max()))
+            if off[-1] <= _DISAGREES * float(np.abs(derivative).max()):
+                return 0.0
+        if off[1] < 0.5 * off[0]:
+            return 0.0  # falls with the difference: curvature
+        if not self._warned:
+            self._warned.append(True)
+            warnings.warn(
+                "the derivative of the flow disagrees with its differences: the right-hand side jumps somewhere in the "
+                "state. Write it without branches (numpy.where, sign, maximum), and the jumps are crossed exactly",
+                UndeclaredSwitch,
+                stacklevel=4,
+            )
+        return 2.0 * max(off) / float(np.abs(direction).min())
+
+    def _slope(self, t: float, x: Array) -> Array:
+        return np.asarray(self.rhs(t, x, *self.args), dtype=np.float64)
+
+    def _gradient(self, t: float, x: Array, sizes: Array) -> Array:
+        if self.jacobian is not None:
+            return np.asarray(self.jacobian(t, x, *self.args), dtype=np.float64)
+        columns = []
+        for j in range(x.size):
+            if self._analytic[0]:
+                z = x.astype(np.complex128)
+                z[j] += 1j * _COMPLEX_STEP * sizes[j]
+                columns.append(np.asarray(self.rhs(t, z, *self.args)).imag / (_COMPLEX_STEP * sizes[j]))
+            else:
+                h = 6e-6 * sizes[j]
+                up, down = x.copy(), x.copy()
+                up[j] += h
+                down[j] -= h
+                columns.append((self._slope(t, up) - self._slope(t, down)) / (up[j] - down[j]))
+        return np.array(columns).T
+
+    def _solved(
+        self, f: Callable[[float, Array], Array], y: Array, a: float, b: float, tolerance: float, smallest: float
+    ) -> Array:
+        """States at the steps, shape (states, steps)."""
+        calls = 0
+
+        def finite(t: float, y: Array) -> Array:
+            nonlocal calls
+            calls += 1
+            if calls > _MOST_CALLS:
+                raise AnalysisError(
+                    f"takes too many steps, and came to t = {t:g} only",
+                    field="rhs",
+                    allowed="a right-hand side that is less stiff, or one without branches, which is traced",
+                )
+            slope = f(t, y)
+            if not np.isfinite(slope).all():  # scipy would shorten its step for ever
+                raise AnalysisError(
+                    f"the motion diverges, or the right-hand side is not finite, at t = {t:g}", field="rhs"
+                )
+            return slope
+
+        if not np.isfinite(y).all():
+            raise AnalysisError("the state is not finite", field="rhs")
+        # scipy takes no rtol below 100 eps; a small atol keeps the digits of small states and tangents.
+        answer = solve_ivp(
+            finite,
+            (a, b),
+            y,
+            method="DOP853",
+            rtol=max(tolerance, 2.3e-14),
+            atol=smallest,
+            max_step=self._longest(a, b),
+        )
+        if not answer.success:
+            raise AnalysisError(
+                f"the integration from {a:g} to {b:g} stopped: the motion is singular, or jumps with the state",
+                field="rhs",
+            )
+        return np.asarray(answer.y)
+
+
+def _cut(parts: Parts) -> Parts:
+    """The same parts, each in three, so that the steps fall elsewhere almost from the start."""
+    cuts = [[a + part * (b - a) for part in (0.0, 0.0477, 0.382)] + [b] for a, b in parts]
+    return [part for times in cuts for part in zip(times, times[1:], strict=False)]
+
+
+def _is_analytic(rhs: Callable[..., ArrayLike], args: tuple[Any, ...], x: Array, sizes: Array, times: Array) -> bool:
+    """Whether a right-hand side takes complex states, and complex steps agree with differences on both sides of zero,
+    at all of some times."""
+    step = sizes * np.cos(2.0 * np.arange(x.size) + 0.1)
+    shift = sizes * np.cos(np.arange(x.size) + 0.3)
+    for t, part in itertools.product(times.tolist(), (0.7, -0.7, 3.1, -3.1)):
+        probe = x + part * shift
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                tilted = np.asarray(rhs(t, probe + 1j * _COMPLEX_STEP * step, *args))
+                up, down = (np.asarray(rhs(t, probe + h * step, *args), dtype=np.float64) for h in (1e-6, -1e-6))
+        except Exception:  # whatever a user's function raises on complex input means the same: it does not take it
+            return False
+        if not np.iscomplexobj(tilted):
+            return False
+        difference = (up - down) / 2e-6
+        # Where terms cancel, the difference has their round-off: relative to f, in units of the state.
+        allowed = 1e-4 * (np.abs(difference) + np.abs(up))
+        if not (np.abs(tilted.imag / _COMPLEX_STEP - difference) <= allowed).all():
+            return False
+    return True

@@ -1,0 +1,85 @@
+"""A right-hand side as data: the list of the elementary operations that evaluate it.
+
+A :class:`chilopod.stability.graph.Graph` collects operations while a function is traced, and
+:func:`chilopod.stability.ordering.ordered` orders them into a :class:`Tape`. The operations are those whose
+Taylor coefficients obey a recurrence (Griewank and Walther, *Evaluating Derivatives*, 2nd ed., SIAM 2008, sec. 13.2):
+
+* ``LINEAR``: a sum of nodes with constant weights, ``PRODUCT``, ``SQUARE``, ``QUOTIENT``;
+* functions c = phi(a) with c' = w a', where w is another node of the tape: sin, cos, exp, ... ;
+* ``STEP`` (the sign of its operand) and ``FLOOR``, constant along a step of the integration and the only places where
+  a right-hand side or its derivatives may jump, and ``SELECT``, one of two nodes by a ``STEP``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.frozen import ReadOnlyArrays
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+STATE, TIME, PARAMETER, NUMBER = 0, 1, 2, 3
+LINEAR, PRODUCT, SQUARE, QUOTIENT = 4, 5, 6, 7
+STEP, FLOOR, SELECT = 8, 9, 10
+EXP, SIN, COS, TAN, SINH, COSH, TANH, LOG, SQRT, POWER, ATAN, ASIN = range(11, 23)
+
+GUARD = 23
+"""As a kind of switch: the guard of an event."""
+
+CONSTANT, TIMED, MOVING = 0, 1, 2
+"""What a node depends on: parameters only, time too, or the state."""
+
+
+@dataclass(frozen=True)
+class Tape(ReadOnlyArrays):
+    """The operations that evaluate dx/dt = f(t, x), the guards g_k(t, x) and resets r_k(t, x) of its events.
+
+    Nodes are numbered: n states, time, parameters, numbers, then operations, each after its operands: those that depend
+    on the parameters only, those of f and the guards, those of the resets.
+
+    Attributes
+    ----------
+    program
+        Shape (5, nodes): operation, its three operands (of ``LINEAR`` the first and past-last of its terms; of ``STEP``
+        and ``FLOOR`` the second is the number of the switch; of functions the third is w), and whether tangents of the
+        node are needed.
+    terms
+        Shape (2, terms): weight and node of each term of the ``LINEAR`` operations.
+    numbers
+        Values of the number nodes.
+    layout
+        n, number of parameters, first operation, first that is not constant, first of the resets, number of nodes.
+    slopes
+        Nodes of f, shape (n,).
+    switches
+        Shape (3, switches): kind (``STEP``, ``FLOOR`` or ``GUARD``), node of the switching function, and for guards the
+        number of the event, else the node of the switch.
+    resets
+        Nodes of the resets, shape (events, n).
+    clocks
+        Functions of time alone that are more than polynomials in t, cos(a t), sin(a t): these may hold pulses that a
+        Taylor series does not see.
+    """
+
+    program: Integers
+    terms: Integers
+    numbers: Array
+    layout: Integers
+    slopes: Integers
+    switches: Integers
+    resets: Integers
+    clocks: Integers
+
+    @property
+    def dimension(self) -> int:
+        """Number of states n."""
+        return int(self.layout[0])
+
+    @property
+    def parameters(self) -> int:
+        """Number of parameters."""
+        return int(self.layout[1])
