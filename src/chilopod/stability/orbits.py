@@ -31,6 +31,7 @@ _SETTLED = 1e-10  # residual, of the sizes of the states, below which it may sto
 _RETURNED = 1e-12  # of a known orbit: it is exact
 _SINGULAR, _FAMILY = 1e-13, 1e-8  # singular values of H - 1 that count as zero, the largest being one
 _KNOWN = 1e-4  # of a known orbit: it is one, if not to the last digit
+_ONWARD = 0.382  # of the guessed return, where a guess is of no use
 _LONGEST_SETTLING = 300  # returns
 _BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
 _MARCHED, _MARCHES = 48, 8  # steps a guessed period, and guessed periods, in which a motion is to come back
@@ -94,7 +95,8 @@ def find_orbit(
 ) -> Orbit:
     """A periodic orbit: a fixed point of the return map, by Newton's method.
 
-    Where it does not converge from the guess, the motion is given time to settle on an orbit that attracts it.
+    Where it does not converge from the guess, it is tried from a state further along the motion if every state may be
+    time 0, and then the motion is given time to settle on an orbit that attracts it.
 
     Parameters
     ----------
@@ -123,7 +125,7 @@ def find_orbit(
     except AnalysisError as failed:
         if not settle:
             raise
-        for settled, after in _settled(system, x):
+        for settled, after in [*_onward(system, x), *_settled(system, x)]:
             try:
                 return _newton(system, settled, with_error, after)
             except AnalysisError:
@@ -258,6 +260,17 @@ def bounded(system: SystemLike, x: Array, image: ReturnMap, error: Array | None 
 def _matrix(error: float | Array, size: Array) -> Array:
     """The error of every entry of a derivative."""
     return error if isinstance(error, np.ndarray) else np.full((size.size, size.size), error)
+
+
+def _onward(system: SystemLike, x: Array) -> list[tuple[Array, Section | None]]:
+    """A state further along the motion, where every state may be time 0: in the guess itself something may just have
+    happened, such as an impact, and a motion that ends there ends before it or after it by round-off."""
+    if not isinstance(system, Autonomous):
+        return []
+    try:
+        return [(system.flow(np.array(x), 0.0, _ONWARD * return_duration(system))[0], None)]
+    except AnalysisError:
+        return []
 
 
 def _settled(system: SystemLike, x: Array) -> list[tuple[Array, Section | None]]:
