@@ -203,10 +203,10 @@ def _cleared(
     """An orbit with the states that are only just not zero at zero, if it is an orbit still: what is left of a guess
     would pass for the size of the orbit."""
     small = (x != 0.0) & (np.abs(x) <= _NOTHING * size)
-    if section is not None or not small.any():
+    if not small.any():
         return x, image
     cleared = np.where(small, 0.0, x)
-    there = return_map(system, cleared, with_error=False)
+    there = return_map(system, cleared, with_error=False, section=section)
     off = _relative(there.state - cleared, size)
     return (cleared, there) if off <= max(_ROUND_OFF, _relative(image.state - x, size)) else (x, image)
 
