@@ -76,6 +76,7 @@ format: $(DEV)  ## rewrite files in the project's style
 
 bench: $(BENCH)  ## benchmarks beside their peers; rewrites the tables in benchmarks/README.md
 	$(BIN)/python benchmarks/straight_walk.py
+	$(BIN)/python benchmarks/periodic_systems.py
 	$(BIN)/python benchmarks/simulation.py
 	$(BIN)/python benchmarks/stepping.py
 	$(BIN)/python benchmarks/twin.py

@@ -71,7 +71,9 @@ def test_known_orbits_in_any_units(mu, twist, spin, leak, angle, off, units):
     guess = np.sqrt(mu) * np.array([np.cos(angle), np.sin(angle), 0.0]) * off * units
     found = multipliers(ring(mu, twist, spin, leak, units), guess)
     assert found.period == pytest.approx(period, rel=1e-13)
-    assert np.abs(found.values - values).max() <= found.error_bound < 1e-8
+    assert np.abs(found.values - values).max() <= found.error_bound
+    if abs(2.0 * mu - leak) > 0.05:  # equal multipliers move as the square root of an error
+        assert found.error_bound < 1e-8
     assert found.stable == bool(leak > 0)
 
 

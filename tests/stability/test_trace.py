@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numba
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from chilopod.stability.evaluation import evaluate, evaluate_jacobian
@@ -241,7 +241,10 @@ def test_random_expressions(data):
     def rhs(t, x, p):
         return [one(t, x, p), other(t, x, p)]
 
-    traced = trace(rhs, 2, (0.37,))
+    try:
+        traced = trace(rhs, 2, (0.37,))
+    except Untraceable:  # the sign of what is zero but for round-off: no two ways to compute it agree
+        assume(False)
     x = np.array([0.613, -1.371])
     np.testing.assert_allclose(
         evaluate(traced.tape, 0.517, x, traced.params)[traced.tape.slopes],

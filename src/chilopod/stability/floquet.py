@@ -26,6 +26,8 @@ anything."""
 
 _WORST_CONDITION = 1e6
 _FEWEST_FACTORS, _MOST_FACTORS = 8, 4096
+_FIRST_ORDER = 1e-6  # of the largest multiplier: errors up to here are those of first-order perturbations
+_DRAWS, _DRAWN = 8, 10.0  # changes of a matrix, and how much farther than by the worst of them eigenvalues may move
 _COMPOSED = 1e-6  # by so much the parts of a flow may miss the whole
 _SAME_ANGLE = 1e-12
 
@@ -133,7 +135,26 @@ def spectrum(image: ReturnMap) -> Spectrum:
         error += np.einsum("ik,ij,jk->k", np.abs(left), image.error, np.abs(right))
     else:
         error += 4.0 * image.error * np.linalg.norm(left, axis=0)
-    return Spectrum(values, right, left, np.where(np.isfinite(error), error, np.inf))
+    error = np.where(np.isfinite(error), error, np.inf)
+    if (error > _FIRST_ORDER * np.abs(values).max(initial=0.0)).any():
+        scaled = np.abs(out_of) @ np.broadcast_to(image.error, image.jacobian.shape) @ np.abs(into)
+        error = np.minimum(error, _moved(values, jacobian, scaled))
+    return Spectrum(values, right, left, error)
+
+
+def _moved(values: ComplexArray, matrix: Array, error: Array) -> Array:
+    """How far eigenvalues move when a matrix changes by its error: where several nearly agree without eigenvectors of
+    their own, by its square root, which no condition number tells."""
+    random = np.random.default_rng(0)
+    error = error + 4.0 * np.finfo(float).eps * np.abs(matrix)
+    if not np.isfinite(error).all():
+        return np.full(values.size, np.inf)
+    moved = np.zeros(values.size)
+    for _ in range(_DRAWS):
+        others = np.linalg.eigvals(matrix + error * random.choice([-1.0, 1.0], matrix.shape))
+        moved = np.maximum(moved, np.abs(values[:, None] - others).min(axis=1))
+        moved = np.maximum(moved, np.abs(values[:, None] - others).min(axis=0).max())
+    return _DRAWN * moved
 
 
 def across(image: ReturnMap) -> tuple[Array, Array]:
@@ -149,6 +170,13 @@ def across(image: ReturnMap) -> tuple[Array, Array]:
     into = units[:, None] * basis
     along = np.eye(n) - np.outer(image.velocity, image.normal) / float(image.normal @ image.velocity)
     return into, (basis.T / units) @ along
+
+
+def phased(right: ComplexArray, left: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+    """The pair with the largest entry of the right vector real and positive, left^H right = 1 kept."""
+    peak = right[np.abs(right).argmax()]
+    turn = np.abs(peak) / peak
+    return right * turn, left * turn
 
 
 def counts_outside(values: ComplexArray) -> tuple[int, int, int]:
@@ -240,7 +268,7 @@ def _factors(system: SystemLike, orbit: Orbit) -> tuple[list[Array], Array]:
         times = np.linspace(0.0, duration, count + 1)
         states, factors = [x], []
         for t0, t1 in zip(times, times[1:], strict=False):
-            state, factor = system.flow(states[-1], float(t0), float(t1))
+            state, factor = system.flow(states[-1].copy(), float(t0), float(t1))
             states.append(state)
             factors.append(factor * units / units[:, None])
         if system.symmetry is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,6 +31,7 @@ _NOTHING = 1e-13  # of the sizes of the states around a guess: a state that smal
 _SETTLED = 1e-10  # residual, of the sizes of the states, below which it may stop falling
 _RETURNED = 1e-12  # of a known orbit: it is exact
 _SINGULAR, _FAMILY = 1e-13, 1e-8  # singular values of H - 1 that count as zero, the largest being one
+_MAGNIFIED = 1e9  # move over residual beyond which H - 1 may be singular
 _KNOWN = 1e-4  # of a known orbit: it is one, if not to the last digit
 _ONWARD = 0.382  # of the guessed return, where a guess is of no use
 _LONGEST_SETTLING = 300  # returns
@@ -213,8 +215,13 @@ def _cleared(
 
 def _solved(matrix: Array, right: Array, size: Array, cutoff: float) -> Array:
     """Solution of a linear system in units of the states' sizes; the shortest where orbits come in families."""
-    scaled = matrix * size / size[:, None]
-    return np.asarray(np.linalg.lstsq(scaled, right / size, rcond=cutoff)[0] * size)
+    scaled, right = matrix * size / size[:, None], right / size
+    if cutoff == _SINGULAR:
+        with contextlib.suppress(np.linalg.LinAlgError):
+            regular = np.linalg.solve(scaled, right)
+            if np.abs(regular).max() <= _MAGNIFIED * np.abs(right).max():
+                return np.asarray(regular * size)
+    return np.asarray(np.linalg.lstsq(scaled, right, rcond=cutoff)[0] * size)
 
 
 def _found(system: SystemLike, x: Array, image: ReturnMap, with_error: bool) -> Orbit:

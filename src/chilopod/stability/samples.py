@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import bisect
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,17 +10,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.capabilities import SystemLike, is_autonomous
+from chilopod.stability.capabilities import Family, SystemLike, is_autonomous
 from chilopod.stability.fold import Fold, find_fold
 from chilopod.stability.orbits import find_orbit, from_known, known_state
 from chilopod.stability.returns import ReturnMap, return_maps, section_at
 from chilopod.stability.scales import sizes
 
 Array = NDArray[np.float64]
-Family = Callable[[float], SystemLike]
 
 _FIRST_STEPS = 8
 _SHORTEST = 2.0**-10  # step of an orbit that is followed, relative to the first
+_KEPT = 64  # systems: around a point the same one is asked for again and again
 _JUMP = 0.3  # of the orbit between prediction and correction, relative to its size
 
 
@@ -68,6 +67,7 @@ class Samples:
         self._family = family
         self.low, self.width = low, high - low
         self.known = guess is None
+        self._systems: dict[float, SystemLike] = {}
         self._by_value: dict[float, Sample] = {}
         self._values: list[float] = []
         self._budget = budget
@@ -82,6 +82,8 @@ class Samples:
 
     def family(self, value: float) -> SystemLike:
         """The system at a value of the parameter, once it is seen to be of the same kind as the others."""
+        if value in self._systems:
+            return self._systems[value]
         system = self._family(value)
         timed = not is_autonomous(system)
         if self._dimension == 0:
@@ -89,6 +91,9 @@ class Samples:
         if system.dimension != self._dimension or timed is not self._timed:
             what = "dimension" if system.dimension != self._dimension else "kind of period"
             raise ParameterError(f"changes its {what} at {value:g}", field="family", allowed="systems of one kind")
+        if len(self._systems) >= _KEPT:
+            self._systems.pop(next(iter(self._systems)))
+        self._systems[value] = system
         return system
 
     def at(self, values: Array) -> list[Sample]:

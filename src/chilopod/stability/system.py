@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -125,7 +126,13 @@ class PeriodicSystem(ReadOnlyArrays):
 
 
 def _order(matrix: Array) -> int:
+    return _order_of(matrix.tobytes(), len(matrix))  # families ask for the same one at every value
+
+
+@functools.lru_cache(maxsize=256)
+def _order_of(entries: bytes, n: int) -> int:
     """The smallest k > 0 with matrix^k = 1; 0 if there is none."""
+    matrix = np.frombuffer(entries).reshape(n, n)
     if not np.isfinite(matrix).all():
         return 0
     one = np.eye(len(matrix))
