@@ -244,8 +244,9 @@ def _touch_bound(samples: Samples, crossing: Crossing, uncertain: float) -> floa
     for each in found:
         values = np.linalg.eigvals(each.image.jacobian)
         away.append(float(np.abs(values[np.abs(values - crossing.multiplier).argmin()])))
-    bend = abs(away[0] - 2.0 * away[1] + away[2]) / step**2
-    return _SAFETY * float(np.sqrt(2.0 * uncertain / bend)) if bend > 0.0 else np.inf
+    # The step is left out of the root: its square may be no number.
+    bend = abs(away[0] - 2.0 * away[1] + away[2])
+    return _SAFETY * step * float(np.sqrt(2.0 * uncertain / bend)) if bend > 0.0 else np.inf
 
 
 def _collision_bound(samples: Samples, crossing: Crossing, orbit: Orbit) -> float:

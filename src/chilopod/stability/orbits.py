@@ -27,11 +27,13 @@ Array = NDArray[np.float64]
 
 _ROUNDS = 30
 _ROUND_OFF = 4e-16
+_NOTHING = 1e-13  # of the sizes of the states around a guess: a state that small may be zero
 _SETTLED = 1e-10  # residual, of the sizes of the states, below which it may stop falling
 _RETURNED = 1e-12  # of a known orbit: it is exact
 _SINGULAR, _FAMILY = 1e-13, 1e-8  # singular values of H - 1 that count as zero, the largest being one
 _MAGNIFIED = 1e9  # move over residual beyond which H - 1 may be singular
 _KNOWN = 1e-4  # of a known orbit: it is one, if not to the last digit
+_ONWARD = 0.382  # of the guessed return, where a guess is of no use
 _LONGEST_SETTLING = 300  # returns
 _BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
 _MARCHED, _MARCHES = 48, 8  # steps a guessed period, and guessed periods, in which a motion is to come back
@@ -95,7 +97,8 @@ def find_orbit(
 ) -> Orbit:
     """A periodic orbit: a fixed point of the return map, by Newton's method.
 
-    Where it does not converge from the guess, the motion is given time to settle on an orbit that attracts it.
+    Where it does not converge from the guess, it is tried from a state further along the motion if every state may be
+    time 0, and then the motion is given time to settle on an orbit that attracts it.
 
     Parameters
     ----------
@@ -124,7 +127,7 @@ def find_orbit(
     except AnalysisError as failed:
         if not settle:
             raise
-        for settled, after in _settled(system, x):
+        for settled, after in [*_onward(system, x), *_settled(system, x)]:
             try:
                 return _newton(system, settled, with_error, after)
             except AnalysisError:
@@ -175,6 +178,7 @@ def _newton(system: SystemLike, x: Array, with_error: bool, section: Section | N
         residual = image.state - x
         off = _relative(residual, size)
         if off <= _ROUND_OFF or (off <= _SETTLED and off >= 0.5 * best):
+            x, image = _cleared(system, x, image, size, section)
             return _found(system, x, image, with_error)
         if rounds > 4 and off > 10.0 * best:
             break
@@ -193,6 +197,20 @@ def _newton(system: SystemLike, x: Array, with_error: bool, section: Section | N
         field="orbit",
         allowed="a guess closer to the orbit",
     )
+
+
+def _cleared(
+    system: SystemLike, x: Array, image: ReturnMap, size: Array, section: Section | None
+) -> tuple[Array, ReturnMap]:
+    """An orbit with the states that are only just not zero at zero, if it is an orbit still: what is left of a guess
+    would pass for the size of the orbit."""
+    small = (x != 0.0) & (np.abs(x) <= _NOTHING * size)
+    if not small.any():
+        return x, image
+    cleared = np.where(small, 0.0, x)
+    there = return_map(system, cleared, with_error=False, section=section)
+    off = _relative(there.state - cleared, size)
+    return (cleared, there) if off <= max(_ROUND_OFF, _relative(image.state - x, size)) else (x, image)
 
 
 def _solved(matrix: Array, right: Array, size: Array, cutoff: float) -> Array:
@@ -249,6 +267,17 @@ def bounded(system: SystemLike, x: Array, image: ReturnMap, error: Array | None 
 def _matrix(error: float | Array, size: Array) -> Array:
     """The error of every entry of a derivative."""
     return error if isinstance(error, np.ndarray) else np.full((size.size, size.size), error)
+
+
+def _onward(system: SystemLike, x: Array) -> list[tuple[Array, Section | None]]:
+    """A state further along the motion, where every state may be time 0: in the guess itself something may just have
+    happened, such as an impact, and a motion that ends there ends before it or after it by round-off."""
+    if not isinstance(system, Autonomous):
+        return []
+    try:
+        return [(system.flow(np.array(x), 0.0, _ONWARD * return_duration(system))[0], None)]
+    except AnalysisError:
+        return []
 
 
 def _settled(system: SystemLike, x: Array) -> list[tuple[Array, Section | None]]:

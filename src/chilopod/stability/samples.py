@@ -149,6 +149,8 @@ class Samples:
             last = samples[-1]
             if last.value != value:
                 fold = find_fold(self.family, last.value, last.orbit, high - low)
+                if fold is not None and not self._ends_in(last, fold):
+                    fold = None
                 if fold is None:
                     self.ending = f"the orbit cannot be followed beyond {last.value:.9g}"
                 return last.value, fold if fold is not None and low <= fold.value <= high else None
@@ -186,6 +188,15 @@ class Samples:
             longer = target + 2.0 * (target - last.value)
             behind, target = [last, found], longer if abs(value - longer) > smallest and longer < value else value
         return reached
+
+    def _ends_in(self, last: Sample, fold: Fold) -> bool:
+        """Whether a fold is just past the last sample, on the same orbit; others may be anywhere."""
+        further = fold.value - last.value
+        return (
+            bool(np.isfinite(fold.error_bound))
+            and -fold.error_bound <= further <= self.width / _FIRST_STEPS
+            and not self._jumped(fold.image.state, last.orbit)
+        )
 
     def _jumped(self, orbit: Array, guess: Array) -> bool:
         return bool((np.abs(orbit - guess) > _JUMP * np.maximum(self._size, np.abs(guess))).any())
