@@ -47,7 +47,8 @@ _MOST_EVENTS = 4096
 _FEWEST_PER_THREAD = 16
 _LEAST_TOLERANCE = 1.2e-16
 _OTHER_ORDER = 4
-_OTHER = 5.0  # two independent errors differ by less than a fifth of them rarely enough
+_OWN = 10.0  # two independent errors differ by less than a tenth of them rarely enough
+_COMMON = 20.0  # the usual difference of all entries, for those that agree by chance
 _SHAKE = 4.0 * 2.0**-53
 _UNDERFLOW = 1e-290  # numbers below have no full precision
 _NOTHING = np.empty((0, 0))
@@ -152,7 +153,8 @@ class TaylorFlow(ReadOnlyArrays):
         The bound of the error is round-off and the last terms of each step, carried along by the steps' own
         derivatives, and the difference to a second computation of another order, with other steps, at the start
         and after every step off by several times round-off. Entries err alike relative to the first part, so that is
-        stretched until it covers several times the largest difference of all.
+        stretched to many times what is usual among them; an entry that passes through zero differs by more, and has
+        several times its own difference on top.
 
         Raises
         ------
@@ -173,8 +175,8 @@ class TaylorFlow(ReadOnlyArrays):
         self._run(other_x, t0, t1, params, other, _NOTHING, self.order - _OTHER_ORDER, _SHAKE)
         difference = np.abs(other - derivative)
         known = bound > _UNDERFLOW
-        worst = float(np.max(difference[known] / bound[known], initial=0.0))
-        bound = np.where(known, bound * (1.0 + _OTHER * worst), bound + _OTHER * difference)
+        usual = float(np.median(difference[known] / bound[known])) if known.any() else 0.0
+        bound = bound * (1.0 + _COMMON * usual) + _OWN * difference
         return Passage(x, derivative, bound, events, steps)
 
     def states(self, states: Array, t0: float, t1: float, params: Array) -> Array:
