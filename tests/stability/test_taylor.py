@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from chilopod.errors import AnalysisError
-from chilopod.stability.taylor import TaylorFlow
-from chilopod.stability.trace import trace
+from chilopod.stability.taylor.taylor import TaylorFlow
+from chilopod.stability.taylor.trace import trace
 
 GRAVITY = 9.81
 
