@@ -76,7 +76,7 @@ def most_steps_in_a_piece(model, x):
         nonlocal calls
         calls += 1
         start, width = args
-        out[:] = model.rhs(x, start + min(t, width * (1 - 1e-9)))
+        out[:] = model.rhs(start + min(t, width * (1 - 1e-9)), x)
 
     integrate = integrator(counted, on_disk=False).py_func  # interpreted: a period is enough
     work, h, most = np.empty((16, x.size)), 0.0, 0

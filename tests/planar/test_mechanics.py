@@ -26,7 +26,7 @@ def test_power_balances_and_friction_only_takes(robot, seed, fraction, inside):
     model = PlanarModel(robot)
     t, x = mid_interval(model, fraction, inside), state_of(model, seed, bend=1.5)
     power = powers(model, x, t)
-    slope = model.rhs(x, t)
+    slope = model.rhs(t, x)
     rate = energy_rate(model, x, slope)
     # Accelerations carry the round-off of a nearly singular mass matrix; times the momenta it is this much.
     _, twist = module_motion(model, x)
@@ -68,7 +68,7 @@ def test_seen_in_a_mirror_left_and_right_change_places(robot, seed, fraction, in
     late = robot.gait.side_phase / (2 * math.pi) * model.period
     t, x = mid_interval(model, fraction, inside), state_of(model, seed)
     mirror = model.reflection
-    there, here = mirrored.rhs(mirror @ x, t + late), mirror @ model.rhs(x, t)
+    there, here = mirrored.rhs(t + late, mirror @ x), mirror @ model.rhs(t, x)
     np.testing.assert_allclose(there, here, rtol=0, atol=1e-10 * np.abs(here).max())
 
 
@@ -78,9 +78,9 @@ def test_half_a_period_later_the_sides_have_changed_places(robot, seed, fraction
     model = PlanarModel(robot)
     t, x, mirror = mid_interval(model, fraction, inside), state_of(model, seed), model.symmetry
     assert mirror is not None
-    here = mirror @ model.rhs(x, t)
+    here = mirror @ model.rhs(t, x)
     np.testing.assert_allclose(
-        model.rhs(mirror @ x, t + model.period / 2), here, rtol=0, atol=1e-10 * np.abs(here).max()
+        model.rhs(t + model.period / 2, mirror @ x), here, rtol=0, atol=1e-10 * np.abs(here).max()
     )
     half, whole = (model.flow(model.orbit, 0.0, part * model.period)[1] for part in (0.5, 1.0))
     np.testing.assert_allclose(
@@ -95,8 +95,8 @@ def test_legs_that_move_together_make_every_motion_a_mirror_image_of_another(rob
     t, x, mirror = mid_interval(model, fraction, inside), state_of(model, seed), model.spatial_symmetry
     assert mirror is not None
     assert model.symmetry is None
-    here = mirror @ model.rhs(x, t)
-    np.testing.assert_allclose(model.rhs(mirror @ x, t), here, rtol=0, atol=1e-12 * np.abs(here).max())
+    here = mirror @ model.rhs(t, x)
+    np.testing.assert_allclose(model.rhs(t, mirror @ x), here, rtol=0, atol=1e-12 * np.abs(here).max())
 
 
 def test_other_side_phases_have_no_symmetry_to_offer():
@@ -145,8 +145,8 @@ def test_other_units_of_length_mass_and_time_change_nothing_else(robot, a, b, c)
     units = (scale / scale[:, None]).max()
     np.testing.assert_allclose(there, here, rtol=0, atol=bound + other_bound * units)
     x = state_of(first, 1)
-    slope = first.rhs(x, mid_interval(first, 0.3))
-    scaled = second.rhs(x * scale, mid_interval(second, 0.3)) / scale * time
+    slope = first.rhs(mid_interval(first, 0.3), x)
+    scaled = second.rhs(mid_interval(second, 0.3), x * scale) / scale * time
     for rows in (slice(0, 2), slice(2, 3), slice(3, n + 2), slice(n + 2, None)):
         np.testing.assert_allclose(scaled[rows], slope[rows], rtol=0, atol=1e-10 * np.abs(slope[rows]).max())
 

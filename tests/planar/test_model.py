@@ -32,7 +32,7 @@ def one_line(caught):
 def test_states_of_the_wrong_shape_are_refused(x):
     for call in (
         lambda: MODEL.flow(x, 0.0, 0.6),
-        lambda: MODEL.rhs(x, 0.0),
+        lambda: MODEL.rhs(0.0, x),
         lambda: MODEL.drift(x),
     ):
         with pytest.raises(ParameterError) as caught:
@@ -54,7 +54,7 @@ def test_states_that_are_not_finite_are_refused(bad, place):
     x[place] = bad
     for call in (
         lambda: MODEL.flow(x, 0.0, 0.6),
-        lambda: MODEL.rhs(x, 0.1),
+        lambda: MODEL.rhs(0.1, x),
         lambda: MODEL.drift(x),
         lambda: MODEL.flow_states([MODEL.orbit, x], 0.0, 0.6),
     ):
@@ -79,7 +79,7 @@ def test_times_must_be_finite_and_in_order(t0, t1):
 @pytest.mark.parametrize("t", [np.nan, np.inf])
 def test_the_right_hand_side_refuses_times_that_are_not_finite(t):
     with pytest.raises(ParameterError):
-        MODEL.rhs(MODEL.orbit, t)
+        MODEL.rhs(t, MODEL.orbit)
 
 
 @pytest.mark.parametrize(("place", "size"), [(12, 1e200), (0, 1e300), (2, 1e160), (7, 1e20)])
@@ -182,7 +182,7 @@ def test_robots_of_every_size_walk(modules):
 def test_a_thousand_modules_have_a_right_hand_side_and_a_flow_without_derivative():
     model = PlanarModel(with_modules(1000))
     x = state_of(model, 0, bend=1e-3)
-    slope = model.rhs(x, 0.05)
+    slope = model.rhs(0.05, x)
     assert slope.shape == (2001,)
     assert np.isfinite(slope).all()
     after = model.flow_states([model.orbit], 0.0, 0.01)[0]

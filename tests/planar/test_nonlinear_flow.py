@@ -108,7 +108,7 @@ def test_flows_compose(robot, seed, start, first, second):
 def test_its_slope_is_the_right_hand_side(robot, seed, fraction, inside):
     model = PlanarModel(robot)
     t, x = mid_interval(model, fraction, inside), state_of(model, seed)
-    slope = model.rhs(x, t)
+    slope = model.rhs(t, x)
 
     def quotient(h):
         return (model.flow_states([model.flow_states([x], t, t)[0]], t, t + h)[0] - x) / h
@@ -128,7 +128,7 @@ def test_the_straight_walk_stays_straight_for_every_gait(robot):
     after = model.flow_states([model.orbit], 0.3 * model.period, 1.8 * model.period)[0]
     np.testing.assert_allclose(after, model.orbit, rtol=1e-13, atol=1e-15 * model.robot.gait.speed)
     for fraction in (0.0, 0.4, 0.9):
-        still = model.rhs(model.orbit, mid_interval(model, fraction))
+        still = model.rhs(mid_interval(model, fraction), model.orbit)
         assert np.abs(still).max() <= 1e-13 * robot.ground.friction / robot.module_mass * robot.gait.speed
 
 

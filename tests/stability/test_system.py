@@ -15,6 +15,7 @@ from chilopod.stability import (
     SystemLike,
     exponents,
     find_orbit,
+    from_rhs,
     locate,
     multipliers,
     sweep,
@@ -219,3 +220,17 @@ def test_a_guess_that_is_no_state_is_one_line(guess):
         multipliers(system, guess)
     assert str(error.value).startswith("orbit")
     assert "\n" not in str(error.value)
+
+
+def test_a_sweep_in_threads_is_that_of_one_after_the_other():
+    def damped(delta):
+        return from_rhs(
+            lambda t, x, d: [x[1], -(d + 0.3 * np.cos(t)) * x[0] - 0.1 * x[1]],
+            2,
+            2 * pi,
+            args=(delta,),
+            orbit=[0.0, 0.0],
+        )
+
+    systems = [damped(delta) for delta in np.linspace(0.1, 2.0, 12)]
+    assert [m.values.tolist() for m in sweep(systems)] == [multipliers(s).values.tolist() for s in systems]

@@ -135,8 +135,16 @@ def family(robot: Robot, parameter: str) -> Callable[[float], PlanarModel]:
     return lambda value: PlanarModel(robot.with_value(parameter, value), use_symmetry=symmetric)
 
 
+def _unsaid(remark: str) -> None:
+    """What is not asked for."""
+
+
 def bifurcations(
-    robot: Robot, parameter: str, between: tuple[float, float], normal_form: bool = True
+    robot: Robot,
+    parameter: str,
+    between: tuple[float, float],
+    normal_form: bool = True,
+    remark: Callable[[str], None] = _unsaid,
 ) -> list[WalkBifurcation]:
     """Every bifurcation of the straight walk in an interval of a parameter.
 
@@ -150,6 +158,8 @@ def bifurcations(
         The interval in SI units, rising.
     normal_form
         Whether to compute the coefficients and verdicts.
+    remark
+        Called with a sentence for what leaves open whether these are all points.
 
     Returns
     -------
@@ -158,7 +168,11 @@ def bifurcations(
     make = family(robot, parameter)
     unit = robot.unit_of(parameter)
     found = []
-    for point in stability.locate(make, between, normal_form=normal_form):
+    located = stability.locate(make, between, normal_form=normal_form)
+    if not located.complete:
+        for sentence in (located.status.sentence, *located.remarks):
+            remark(sentence)
+    for point in located:
         components = joint_components(point.mode, robot.body.modules)
         # The share of the unit mode that is joint angle turns an amplitude of the one into that of the other.
         share = float(np.linalg.norm(point.mode[_joints(robot.body.modules)]))

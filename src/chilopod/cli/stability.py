@@ -62,7 +62,7 @@ def bifurcation(
     folder = prepared(out)
     from chilopod.analysis import bifurcations
 
-    points = bifurcations(described, parameter, (low, high))
+    points = bifurcations(described, parameter, (low, high), remark=lambda text: typer.echo(f"note: {text}", err=True))
     result = {"points": [point.as_json() for point in points]}
     if folder:
         save_json(folder / "bifurcation.json", result)

@@ -174,7 +174,7 @@ class PlanarModel(ReadOnlyArrays):
         self._advance(batch, t0, t1)
         return batch
 
-    def rhs(self, x: ArrayLike, t: float) -> Array:
+    def rhs(self, t: float, x: ArrayLike) -> Array:
         """dx/dt at time t (s) in state x, shape (2N+1,)."""
         x = self._checked(x)
         starts, _, interval = self._pieces(t, t + self.period)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chilopod.cores import cores
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.capabilities import SystemLike, is_autonomous
@@ -16,6 +18,7 @@ from chilopod.stability.orbits import Orbit, find_orbit, from_known, known_state
 from chilopod.stability.returns import ReturnMap, return_maps
 from chilopod.stability.scales import numerical_balance, sizes
 from chilopod.stability.splitting import split_product
+from chilopod.stability.system import PeriodicSystem
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -220,6 +223,9 @@ def sweep(systems: Sequence[SystemLike]) -> list[Multipliers]:
     """Multipliers of many systems at their known orbits, on all cores where the systems allow it."""
     if not systems:
         return []
+    if all(isinstance(system, PeriodicSystem) and system.concurrent for system in systems):
+        with ThreadPoolExecutor(cores()) as threads:
+            return list(threads.map(multipliers, systems))
     if any(is_autonomous(system) for system in systems):
         return [multipliers(system) for system in systems]
     states = [known_state(system) for system in systems]

@@ -52,6 +52,10 @@ class PeriodicSystem(ReadOnlyArrays):
         ``velocity(x)`` -> dx/dt, shape (n,), of a system that does not depend on time.
     guess_period
         About how long an orbit of such a system takes.
+    flow_with_error, flow_states
+        See :mod:`chilopod.stability.capabilities`.
+    concurrent
+        Whether flows may run in several threads at once, which :func:`chilopod.stability.sweep` then does.
     """
 
     dimension: int
@@ -67,6 +71,7 @@ class PeriodicSystem(ReadOnlyArrays):
         default=None, repr=False
     )
     flow_states: Callable[[Array, float, float], Array] | None = field(default=None, repr=False)
+    concurrent: bool = field(default=False, repr=False)
     symmetry_order: int = field(init=False, default=1, repr=False)
 
     def __post_init__(self) -> None:
