@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,6 +33,10 @@ _RETURNED = 1e-12  # of a known orbit: it is exact
 _SINGULAR, _FAMILY = 1e-13, 1e-8  # singular values of H - 1 that count as zero, the largest being one
 _MAGNIFIED = 1e9  # move over residual beyond which H - 1 may be singular
 _KNOWN = 1e-4  # of a known orbit: it is one, if not to the last digit
+_SHOTS, _LONGEST_SHOT = 20, 4.0  # rounds, and guessed periods
+_FARTHEST_MOVE = 0.3  # of the sizes, and of how far the motion would go at its speed, in a move of Newton's method
+_FARTHEST_STRETCH = 0.3  # likewise of the period
+_CLOSED = 1e-6  # of the same: a motion that about closes
 _LONGEST_SETTLING = 300  # returns
 _BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
 _MARCHED, _MARCHES = 48, 8  # steps a guessed period, and guessed periods, in which a motion is to come back
@@ -124,9 +129,9 @@ def find_orbit(
     except AnalysisError as failed:
         if not settle:
             raise
-        for settled, after in _settled(system, x):
+        for nearer, after in _nearer(system, x):
             try:
-                return _newton(system, settled, with_error, after)
+                return _newton(system, nearer, with_error, after)
             except AnalysisError:
                 continue
         raise failed
@@ -249,6 +254,55 @@ def bounded(system: SystemLike, x: Array, image: ReturnMap, error: Array | None 
 def _matrix(error: float | Array, size: Array) -> Array:
     """The error of every entry of a derivative."""
     return error if isinstance(error, np.ndarray) else np.full((size.size, size.size), error)
+
+
+def _nearer(system: SystemLike, x: Array) -> Iterator[tuple[Array, Section | None]]:
+    """States nearer to an orbit than a guess, with sections across the motion."""
+    if is_autonomous(system):
+        shot = _shot(system, x)
+        if shot is not None:
+            yield shot
+    yield from _settled(system, x)
+
+
+def _shot(system: Autonomous, x: Array) -> tuple[Array, Section | None] | None:
+    """A state and a period at which the motion about closes, by Newton's method for both together, each move at right
+    angles to the motion (Seydel, *Practical Bifurcation and Stability Analysis*, 2010, section 7.1).
+
+    Unlike a return to a section it needs no motion that comes back from the guess: of an orbit with a strongly stable
+    direction only guesses on its stable manifold do.
+    """
+    count = returns_per_period(system)
+    turn = np.eye(x.size) if system.symmetry is None else system.symmetry
+    duration = system.guess_period / count
+    longest, best = _LONGEST_SHOT * duration, np.inf
+    try:
+        for _ in range(_SHOTS):
+            size = sizes(system, x, duration)
+            later, derivative = system.flow(x, 0.0, duration)
+            start = np.asarray(system.velocity(x)) * duration / size
+            end = turn @ np.asarray(system.velocity(later)) * duration / size
+            residual = (turn @ later - x) / size
+            moved = float(np.linalg.norm(start))
+            off = float(np.abs(residual).max())
+            if not off <= 2.0 * best or moved <= _SETTLED:
+                return None
+            if off <= _CLOSED * moved:
+                return x, section_at(system, x, size, duration)
+            best = min(best, off)
+            closing = (turn @ derivative) * size / size[:, None] - np.eye(x.size)
+            bordered = np.block([[closing, end[:, None]], [start[None] / moved, np.zeros((1, 1))]])
+            move = np.linalg.lstsq(bordered, np.append(-residual, 0.0), rcond=_SINGULAR)[0]
+            move *= min(1.0, _FARTHEST_MOVE * min(1.0, moved) / float(np.abs(move[:-1]).max(initial=0.0) or np.inf))
+            x, duration = (
+                x + move[:-1] * size,
+                duration * (1.0 + float(np.clip(move[-1], -_FARTHEST_STRETCH, _FARTHEST_STRETCH))),
+            )
+            if duration > longest:
+                return None
+    except (AnalysisError, np.linalg.LinAlgError):
+        return None
+    return None
 
 
 def _settled(system: SystemLike, x: Array) -> list[tuple[Array, Section | None]]:
