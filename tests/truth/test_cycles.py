@@ -1,7 +1,7 @@
 """Limit cycles born at Hopf points: the Brusselator, and two coupled Stuart-Landau oscillators in closed form.
 
-z' = (1 + i w) z - (1 + i c) |z|^2 z + k (1 + i e) (other - z): in phase |z| = 1, in antiphase |z|^2 = 1 - 2 k, and in the
-frame that turns with them the disturbances obey constant matrices of order two.
+z' = (1 + i w) z - (1 + i c) |z|^2 z + k (1 + i e) (other - z): in phase |z| = 1, in antiphase |z|^2 = 1 - 2 k, and in
+the frame that turns with them the disturbances obey constant matrices of order two.
 """
 
 import numpy as np
@@ -132,7 +132,9 @@ def test_uncoupled_phases_are_free(symmetry):
     assert point.multiplier == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize("how", [{}, {"spatial_symmetry": -EXCHANGE}, {"symmetry": EXCHANGE}], ids=["", "spatial", "time"])
+@pytest.mark.parametrize(
+    "how", [{}, {"spatial_symmetry": -EXCHANGE}, {"symmetry": EXCHANGE}], ids=["", "spatial", "time"]
+)
 def test_neimark_sacker_in_antiphase(how):
     """The trace of the matrix vanishes at k = 1/4; its determinant is 3/4 there."""
     r = np.sqrt(0.7)
