@@ -146,3 +146,11 @@ def test_neimark_sacker_in_antiphase(how):
     assert point.period == pytest.approx(2.0 * np.pi / 2.75, rel=1e-10)
     angle = np.sqrt(0.75) * point.period
     assert point.frequency == pytest.approx(min(angle, 2.0 * np.pi - angle) / point.period, rel=1e-9)
+
+
+@pytest.mark.parametrize("damping", [0.1, -0.1, 1.0])
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
+def test_a_spiral_returns_to_its_section_but_is_no_orbit(damping, size):
+    spiral = from_rhs(lambda t, x: [x[1], -x[0] - damping * x[1]], 2, None, guess_period=6.3)
+    with pytest.raises(AnalysisError, match=r"^orbit: [^\n]*$"):
+        multipliers(spiral, [size, 0.0])

@@ -29,6 +29,7 @@ Array = NDArray[np.float64]
 _ROUNDS = 30
 _ROUND_OFF = 4e-16
 _SETTLED = 1e-10  # residual, of the sizes of the states, below which it may stop falling
+_RESTS = 1e-8  # of the sizes at the guess: a motion that short is none
 _RETURNED = 1e-12  # of a known orbit: it is exact
 _SINGULAR, _FAMILY = 1e-13, 1e-8  # singular values of H - 1 that count as zero, the largest being one
 _MAGNIFIED = 1e9  # move over residual beyond which H - 1 may be singular
@@ -180,6 +181,12 @@ def _newton(system: SystemLike, x: Array, with_error: bool, section: Section | N
         residual = image.state - x
         off = _relative(residual, size)
         if off <= _ROUND_OFF or (off <= _SETTLED and off >= 0.5 * best):
+            if image.velocity is not None and _relative(image.velocity * image.period / image.returns, size) <= _RESTS:
+                raise AnalysisError(
+                    "the motion rests in an equilibrium near the guess",
+                    field="orbit",
+                    allowed="a guess closer to an orbit",
+                )
             return _found(system, x, image, with_error)
         if rounds > 4 and off > 10.0 * best:
             break
