@@ -154,3 +154,23 @@ def test_a_spiral_returns_to_its_section_but_is_no_orbit(damping, size):
     spiral = from_rhs(lambda t, x: [x[1], -x[0] - damping * x[1]], 2, None, guess_period=6.3)
     with pytest.raises(AnalysisError, match=r"^orbit: [^\n]*$"):
         multipliers(spiral, [size, 0.0])
+
+
+@pytest.mark.parametrize("high", [0.5, 0.4321])
+def test_two_cycles_that_meet(high):
+    """r' = r (mu + r^2 - r^4), turning with speed 2: at mu = -1/4, where r^2 = 1/2; once a node of the search exactly."""
+
+    def rhs(t, x, mu):
+        q = x[0] * x[0] + x[1] * x[1]
+        growth = mu + q - q * q
+        return [growth * x[0] - 2.0 * x[1], growth * x[1] + 2.0 * x[0]]
+
+    found = locate(
+        lambda minus_mu: from_rhs(rhs, 2, None, args=(-minus_mu,), guess_period=3.0), (-0.3, high), orbit=[1.15, 0.0]
+    )
+    assert found.complete
+    (point,) = found
+    assert point.kind is Kind.FOLD
+    assert abs(point.value - 0.25) <= point.error_bound < 1e-12
+    assert point.period == pytest.approx(np.pi, rel=1e-12)
+    assert np.hypot(*point.orbit) == pytest.approx(np.sqrt(0.5), rel=1e-7)

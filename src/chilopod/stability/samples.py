@@ -23,6 +23,7 @@ Family = Callable[[float], SystemLike]
 _FIRST_STEPS = 8
 _SHORTEST = 2.0**-10  # step of an orbit that is followed, relative to the first
 _KEPT = 64  # systems: around a point the same one is asked for again and again
+_BEFORE = 1e-6  # of the interval: so far from a fold other crossings are looked for
 _AT_REST = 0.03  # of the motion of the first orbit
 _PARTS = 5  # of a return, to see how far the motion goes
 _JUMP = 0.3  # of the orbit between prediction and correction, relative to its size
@@ -159,7 +160,10 @@ class Samples:
                     return last.value, None
                 if fold is None:
                     self.ending = f"the orbit cannot be followed beyond {last.value:.9g}"
-                return last.value, fold if fold is not None and low <= fold.value <= high else None
+                if fold is None or not low <= fold.value <= high:
+                    return last.value, None
+                # In the fold itself multipliers move as a root of the distance, which no search sees through.
+                return max(low, min(last.value, fold.value - _BEFORE * (high - low))), fold
         return high, None
 
     def _at_rest(self, last: Sample) -> bool:
