@@ -1,4 +1,4 @@
-"""One's own systems: flows with derivatives, multipliers, bifurcation points and branches, beside other tools, in one run.
+"""One's own systems: flows with derivatives, multipliers, points and branches, beside other tools, in one run.
 
 Run by `make bench`; rewrites a table in README.md. The system is the forced Duffing oscillator x'' + 0.2 x' + x^3 =
 F cos t, whose symmetric orbit loses its symmetry in a pitchfork at F = 2.40337711605714; the chain has 30 masses on
@@ -65,7 +65,7 @@ def heyoka_duffing() -> Callable[[float, Array], tuple[Array, Array]]:
 
     x, v = hk.make_vars("x", "v")
     equations = [(x, v), (v, -0.2 * v - x**3 + hk.par[0] * hk.cos(hk.time))]
-    integrator = hk.taylor_adaptive(hk.var_ode_sys(equations, hk.var_args.vars), [0.0, 0.0], tol=1e-15, compact_mode=False)
+    integrator = hk.taylor_adaptive(hk.var_ode_sys(equations, hk.var_args.vars), [0.0, 0.0], tol=1e-15)
 
     def flow(force: float, state: Array) -> tuple[Array, Array]:
         integrator.time = 0.0

@@ -16,9 +16,9 @@ from chilopod.planar import PlanarModel
 from chilopod.planar.along import FollowedModel, walk_means
 from chilopod.planar.flow import advance
 from chilopod.robot import load_robot
+from chilopod.stability.branches.fold import find_fold
 from chilopod.stability.floquet import spectrum
-from chilopod.stability.fold import find_fold
-from chilopod.stability.system import find_orbit
+from chilopod.stability.orbits import find_orbit
 from chilopod.steering.criteria import Criteria, Outcome
 from chilopod.steering.radius_law import RadiusLaw
 
@@ -53,7 +53,7 @@ def pitchfork(mu: float) -> stability.PeriodicSystem:
 
 def branch() -> stability.Branch:
     (point,) = stability.locate(pitchfork, (-0.3, 0.4))
-    return stability.follow(pitchfork, stability.leave_pitchfork(pitchfork, point), (-0.3, 0.4), points=2)
+    return stability.follow(pitchfork, stability.switch(pitchfork, point)[0], (-0.3, 0.4), points=2)
 
 
 THINGS = {
@@ -66,12 +66,12 @@ THINGS = {
     "multipliers at a guess": lambda: stability.multipliers(system(-0.1), np.array([-0.3])),
     "sweep": lambda: stability.sweep([MODEL, MODEL]),
     "exponents": lambda: stability.exponents(MODEL),
-    "return map": lambda: find_orbit(MODEL)[1],
-    "spectrum": lambda: spectrum(find_orbit(MODEL)[1]),
+    "return map": lambda: find_orbit(MODEL).image,
+    "spectrum": lambda: spectrum(find_orbit(MODEL).image),
     "located": lambda: stability.locate(pitchfork, (-0.3, 0.4)),
     "fold": lambda: find_fold(system, -0.01, np.array([-0.1]), 1.0),
     "branch": branch,
-    "begun": lambda: stability.begin(system, -0.1, [-0.3162], True, 1.0),
+    "begun": lambda: stability.begin(system, -0.1, [-0.3162]),
     "means": lambda: walk_means([MODEL], MODEL.orbit[None]),
     "straight walk": lambda: straight_walk(PRESET),
     "walk bifurcation": lambda: bifurcations(PRESET, "springs.stiffness[0]", BETWEEN, normal_form=False),

@@ -5,7 +5,7 @@ import pytest
 
 from chilopod.errors import ParameterError
 from chilopod.stability import Kind, PeriodicSystem, from_rhs, locate
-from chilopod.stability.branch import Ending, begin, follow, leave_pitchfork, proceed
+from chilopod.stability.branches.branch import Ending, begin, follow, proceed, switch
 
 PERIOD = 2.0
 
@@ -23,7 +23,7 @@ def abrupt(mu):
 @pytest.mark.parametrize("side", [1, -1])
 def test_the_branch_of_a_supercritical_pitchfork(side):
     (fork,) = locate(gentle, (-0.1, 0.2))
-    branch = follow(gentle, leave_pitchfork(gentle, fork, side), (-0.1, 0.2), step=0.05)
+    branch = follow(gentle, switch(gentle, fork)[side < 0], (-0.1, 0.2), step=0.05)
     assert branch.ending is Ending.LEFT_INTERVAL
     assert [point.special for point in branch.special_points] == [Kind.PITCHFORK]
     for point in branch.points[1:]:
@@ -34,7 +34,7 @@ def test_the_branch_of_a_supercritical_pitchfork(side):
 
 def test_the_branch_of_a_subcritical_pitchfork_folds_back():
     (fork,) = locate(abrupt, (-0.3, 0.2))
-    branch = follow(abrupt, leave_pitchfork(abrupt, fork), (-0.3, 0.2), step=0.05)
+    branch = follow(abrupt, switch(abrupt, fork)[0], (-0.3, 0.2), step=0.05)
     fork, fold = branch.special_points
     assert (fork.special, fold.special) == (Kind.PITCHFORK, Kind.FOLD)
     assert fold.value == pytest.approx(-0.25, abs=1e-9)
@@ -49,11 +49,11 @@ def test_the_branch_of_a_subcritical_pitchfork_folds_back():
 
 def test_in_pieces_as_in_one():
     (fork,) = locate(abrupt, (-0.3, 0.2))
-    start = leave_pitchfork(abrupt, fork)
-    whole = follow(abrupt, start, (-0.3, 0.2), points=12, step=0.05)
-    piece = follow(abrupt, start, (-0.3, 0.2), points=5, step=0.05)
+    start = switch(abrupt, fork)[0]
+    whole = follow(abrupt, start, (-0.3, 0.2), points=12, step=0.05, closely=False)
+    piece = follow(abrupt, start, (-0.3, 0.2), points=5, step=0.05, closely=False)
     assert piece.ending is Ending.ENOUGH_POINTS
-    pieces = proceed(abrupt, piece, (-0.3, 0.2), points=7)
+    pieces = proceed(abrupt, piece, (-0.3, 0.2), points=7, closely=False)
     assert (pieces.ending, pieces.scale, pieces.step) == (whole.ending, whole.scale, whole.step)
     assert [point.value for point in pieces.points] == [point.value for point in whole.points]
     assert [point.orbit.tolist() for point in pieces.points] == [point.orbit.tolist() for point in whole.points]
@@ -62,13 +62,13 @@ def test_in_pieces_as_in_one():
 
 def test_a_branch_that_left_goes_on_in_a_wider_interval():
     (fork,) = locate(gentle, (-0.1, 0.1))
-    branch = follow(gentle, leave_pitchfork(gentle, fork), (-0.1, 0.1), step=0.05)
+    branch = follow(gentle, switch(gentle, fork)[0], (-0.1, 0.1), step=0.05)
     assert branch.ending is Ending.LEFT_INTERVAL
     with pytest.raises(ParameterError, match="last point"):
         proceed(gentle, branch, (-0.1, 0.1))
     wider = proceed(gentle, branch, (-0.1, 0.4))
     assert wider.points[: len(branch.points)] == branch.points
-    assert wider.points[-1].value > 0.4
+    assert wider.points[-1].value == 0.4
     for point in wider.points[1:]:
         assert point.orbit[0] == pytest.approx(np.sqrt(point.value), abs=1e-9)
 
@@ -87,14 +87,14 @@ def mapped(matrix):
     ("matrix", "kind"),
     [
         (lambda mu: [[-1.0 - mu]], Kind.PERIOD_DOUBLING),
-        (lambda mu: [[1.0 + mu]], Kind.BRANCH_POINT),
+        (lambda mu: [[1.0 + mu]], Kind.PITCHFORK),
         (lambda mu: (1.0 + mu) * np.array([[0.6, -0.8], [0.8, 0.6]]), Kind.NEIMARK_SACKER),
         (lambda mu: [[1.5, 1.0], [mu, 1.5]], None),  # a pair outside the circle becomes real: nothing happens
     ],
 )
 def test_special_points_on_the_way_are_named_and_located(matrix, kind):
     family, between = mapped(matrix), (-0.1, 0.137)
-    start = begin(family, -0.09, np.zeros(len(matrix(0.0))), rising=True, width=0.237)
+    start = begin(family, -0.09, np.zeros(len(matrix(0.0))), rising=True)
     special = follow(family, start, between).special_points
     assert [point.special for point in special] == ([kind] if kind else [])
     for point in special:
@@ -103,25 +103,26 @@ def test_special_points_on_the_way_are_named_and_located(matrix, kind):
 
 def test_a_step_out_of_what_the_system_can_have_is_shortened():
     def family(mu):
-        if mu > 0.21:
+        if mu > 0.2 - 1e-6:
             raise ParameterError("cannot be", field="mu", value=mu)
         return gentle(mu)
 
     (fork,) = locate(gentle, (-0.1, 0.2))
-    branch = follow(family, leave_pitchfork(gentle, fork), (-0.1, 0.2), step=0.1, longest=1.0)
-    assert branch.ending is Ending.LEFT_INTERVAL
-    assert 0.2 < branch.points[-1].value < 0.21
+    branch = follow(family, switch(gentle, fork)[0], (-0.1, 0.2), step=0.1, longest=1.0)
+    assert branch.ending is Ending.LOST
+    assert "cannot be" in branch.reason
+    assert 0.19 < branch.points[-1].value < 0.2
 
 
 def test_a_branch_begins_at_a_known_orbit():
-    start = begin(gentle, 0.1, [np.sqrt(0.1)], rising=False, width=0.3)
+    start = begin(gentle, 0.1, [np.sqrt(0.1)], rising=False)
     branch = follow(gentle, start, (0.02, 0.2), step=0.02)
-    assert branch.points[-1].value < 0.02
+    assert branch.points[-1].value == 0.02
     assert branch.points[1].value < 0.1
 
 
 def test_bad_arguments_are_named():
-    start = begin(gentle, 0.1, [np.sqrt(0.1)], rising=True, width=0.3)
+    start = begin(gentle, 0.1, [np.sqrt(0.1)], rising=True)
     with pytest.raises(ParameterError, match="between"):
         follow(gentle, start, (0.2, 0.1))
     with pytest.raises(ParameterError, match="points"):

@@ -170,3 +170,26 @@ def test_a_family_without_known_orbits_needs_a_guess():
 
     with pytest.raises(AnalysisError, match="does not know its periodic orbit"):
         locate(system, (0.0, 1.0))
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-6, 1e9])
+def test_an_orbit_at_rest_is_followed_from_a_guess_beside_it(unit):
+    """x' = (p - 1/4) x - x^3 / unit^2 over a time 2, in closed form: the zero orbit has a pitchfork at 1/4."""
+
+    def family(p):
+        a = p - 0.25
+
+        def flow(x, t0, t1):
+            grow = np.exp(a * (t1 - t0))
+            spread = (grow * grow - 1.0) / a if a else 2.0 * (t1 - t0)
+            share = 1.0 + (x[0] / unit) ** 2 * spread
+            return x * grow / np.sqrt(share), np.array([[grow / share**1.5]])
+
+        return PeriodicSystem(1, 2.0, flow)
+
+    found = locate(family, (-0.5, 1.0), orbit=[0.3 * unit])
+    assert found.complete
+    (point,) = found
+    assert point.kind is Kind.PITCHFORK
+    assert abs(point.value - 0.25) <= point.error_bound < 1e-10
+    assert not point.orbit.any()

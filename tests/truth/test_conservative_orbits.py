@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 from chilopod.stability import exponents, from_rhs, locate, multipliers
-from chilopod.stability.crossings import Status
+from chilopod.stability.unit_circle.crossings import Status
 
 
 def pendulum(guess_period, length=1.0, time=1.0):

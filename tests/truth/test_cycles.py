@@ -158,7 +158,7 @@ def test_a_spiral_returns_to_its_section_but_is_no_orbit(damping, size):
 
 @pytest.mark.parametrize("high", [0.5, 0.4321])
 def test_two_cycles_that_meet(high):
-    """r' = r (mu + r^2 - r^4), turning with speed 2: at mu = -1/4, where r^2 = 1/2; once a node of the search exactly."""
+    """r' = r (mu + r^2 - r^4), at mu = -1/4, where r^2 = 1/2; once a node of the search exactly."""
 
     def rhs(t, x, mu):
         q = x[0] * x[0] + x[1] * x[1]

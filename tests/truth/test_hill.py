@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipeinc, ellipj, ellipk, mathieu_a, mathieu_b
 
 from chilopod.stability import Kind, from_rhs, locate
-from chilopod.stability.crossings import Status
+from chilopod.stability.unit_circle.crossings import Status
 
 ORIGIN = [0.0, 0.0]
 

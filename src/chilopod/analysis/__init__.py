@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         pitchfork,
         straight_walk,
     )
+    from chilopod.analysis.transition_curves import TransitionCurve, transition_curve
     from chilopod.analysis.undulation import undulating_walks
 else:
     __getattr__, __dir__ = exports(
@@ -32,6 +33,7 @@ else:
                 "pitchfork",
                 "straight_walk",
             ),
+            "transition_curves": ("TransitionCurve", "transition_curve"),
             "undulation": ("undulating_walks",),
         },
     )
@@ -40,6 +42,7 @@ __all__ = [
     "RadiusLaws",
     "SquareRootFit",
     "StraightWalk",
+    "TransitionCurve",
     "WalkBifurcation",
     "bifurcations",
     "curved_walks",
@@ -50,5 +53,6 @@ __all__ = [
     "resumed",
     "square_root_fit",
     "straight_walk",
+    "transition_curve",
     "undulating_walks",
 ]

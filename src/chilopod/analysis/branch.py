@@ -20,8 +20,8 @@ from chilopod.errors import AnalysisError, ParameterError
 from chilopod.planar.along import FollowedModel, walk_means
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
-from chilopod.stability import Branch, BranchPoint, Criticality, Ending, Kind, follow, leave_pitchfork, proceed
-from chilopod.stability.branch import LONGEST
+from chilopod.stability import Branch, BranchPoint, Criticality, Ending, Kind, follow, proceed, switch
+from chilopod.stability.branches.branch import LONGEST
 
 Array = NDArray[np.float64]
 
@@ -97,10 +97,13 @@ def curved_walks(
     make = _followed(robot, parameter)
     # The positive side of the mode is that of positive joint angles.
     angles = fork.point.mode.real[3 : robot.body.modules + 2]
-    start = leave_pitchfork(make, fork.point, side if angles.sum() >= 0 else -side)
+    along, against = switch(make, fork.point)
+    start = along if (side > 0) is bool(angles.sum() >= 0) else against
     branch = follow(
-        make, start, between, points=points, longest=longest, progress=_shown(robot, parameter, points, progress)
-    )
+        make, start, between, points=points, longest=longest, closely=False,
+        precision=TOLERANCE,
+        progress=_shown(robot, parameter, points, progress),
+    )  # fmt: skip
     attributes = {"side": side, **_verdict(robot, parameter, fork, branch)}
     return _walked(robot, parameter, between, branch, attributes)
 
@@ -159,7 +162,8 @@ def resumed(
         raise ParameterError("the saved branch turns to the other side", field="side")
     between = (data.attrs["lowest_si"], data.attrs["highest_si"]) if between is None else between
     (low, high), end = sorted(between), float(data.parameter_si[-1])
-    if not low <= end <= high:
+    ended = data.attrs["ending"] == Ending.LEFT_INTERVAL.label and end in (low, high)
+    if ended or not low <= end <= high:
         unit = robot.unit_of(parameter)
         raise ParameterError(
             "does not hold the saved branch's last point, beyond which nothing is left to follow",
@@ -169,10 +173,12 @@ def resumed(
         )
     branch = proceed(
         _followed(saved, parameter),
-        _branch_of(data),
+        _branch_of(data, _followed(saved, parameter)(value).scale),
         between,
         points=points,
         longest=longest,
+        closely=False,
+        precision=TOLERANCE,
         progress=_shown(saved, parameter, points, progress),
     )
     kept = {name: data.attrs[name] for name in _VERDICT}
@@ -269,12 +275,13 @@ def _verdict(robot: Robot, parameter: str, fork: WalkBifurcation, branch: Branch
     }
 
 
-def _branch_of(data: xr.Dataset) -> Branch:
+def _branch_of(data: xr.Dataset, sizes: Array) -> Branch:
     """The branch that a dataset was made from, to the last bit."""
     kinds = {kind.label: kind for kind in Kind}
     multipliers = data.multiplier_real.values + 1j * data.multiplier_imag.values
+    units = np.append(sizes, float(data.attrs["scale"]))
     points = tuple(
-        BranchPoint(float(value), orbit, row, tangent, kinds.get(str(special)))
+        BranchPoint(float(value), orbit, row, tangent, kinds.get(str(special)), units)
         for value, orbit, row, tangent, special in zip(
             data.parameter_si.values,
             data.orbit.values,
@@ -285,7 +292,7 @@ def _branch_of(data: xr.Dataset) -> Branch:
         )
     )
     (ending,) = (each for each in Ending if each.label == data.attrs["ending"])
-    return Branch(points, ending, float(data.attrs["scale"]), float(data.attrs["step"]))
+    return Branch(points, ending, float(data.attrs["step"]))
 
 
 def _walked(

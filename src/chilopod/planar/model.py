@@ -92,10 +92,10 @@ class PlanarModel(ReadOnlyArrays):
         state[0] = self.robot.gait.speed
         return read_only(state)
 
-    @property
+    @cached_property
     def scale(self) -> Array:
         """Large changes of the states: m/s, rad/s and rad are of the order of one."""
-        return np.ones(self.dimension)
+        return read_only(np.ones(self.dimension))
 
     @property
     def schedule(self) -> Schedule:

@@ -7,7 +7,7 @@
 False
 """
 
-from chilopod.stability.branch import Branch, BranchPoint, Ending, begin, follow, leave_pitchfork, proceed
+from chilopod.stability.branches.branch import Branch, BranchPoint, Ending, Start, begin, follow, proceed, switch
 from chilopod.stability.called import NotAnalytic
 from chilopod.stability.capabilities import (
     Autonomous,
@@ -22,6 +22,9 @@ from chilopod.stability.capabilities import (
     Switches,
     SystemLike,
 )
+from chilopod.stability.codimension_two.codimension2 import Codimension2, CodimensionTwo
+from chilopod.stability.codimension_two.curve2 import Curve2, CurveEnd, Point2
+from chilopod.stability.codimension_two.two_parameters import follow2
 from chilopod.stability.events import Event
 from chilopod.stability.floquet import Exponents, Multipliers, exponents, multipliers, sweep
 from chilopod.stability.jumps import UndeclaredSwitch
@@ -37,7 +40,11 @@ __all__ = [
     "BifurcationPoint",
     "Branch",
     "BranchPoint",
+    "Codimension2",
+    "CodimensionTwo",
     "Criticality",
+    "Curve2",
+    "CurveEnd",
     "CyclicallySymmetric",
     "Ending",
     "Event",
@@ -53,9 +60,11 @@ __all__ = [
     "NotAnalytic",
     "Orbit",
     "PeriodicSystem",
+    "Point2",
     "ReturnMap",
     "Scaled",
     "SpatiallySymmetric",
+    "Start",
     "Switches",
     "SystemLike",
     "UndeclaredSwitch",
@@ -63,10 +72,11 @@ __all__ = [
     "exponents",
     "find_orbit",
     "follow",
+    "follow2",
     "from_rhs",
-    "leave_pitchfork",
     "locate",
     "multipliers",
     "proceed",
     "sweep",
+    "switch",
 ]

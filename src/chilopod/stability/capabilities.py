@@ -11,7 +11,7 @@ derivative has the derivative of state i with respect to state j at the start in
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol, Self, TypeGuard, runtime_checkable
 
 import numpy as np
@@ -46,6 +46,10 @@ class SystemLike(Protocol):
     def flow(self, x: Array, t0: float, t1: float, /) -> tuple[Array, Array]:
         """State at t1, shape (n,), and its derivative with respect to the state x at t0, shape (n, n)."""
         ...
+
+
+Family = Callable[[float], SystemLike]
+"""The system at a value of a parameter."""
 
 
 @runtime_checkable

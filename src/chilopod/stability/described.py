@@ -9,20 +9,20 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.stability.center_manifold import CriticalOrbit
-from chilopod.stability.crossings import Crossing
-from chilopod.stability.equivariants import Critical, SymmetricCrossing, symmetric_crossing
-from chilopod.stability.floquet import Spectrum, spectrum
-from chilopod.stability.fold import Fold
-from chilopod.stability.isotypic import Block
-from chilopod.stability.normal_form import NormalForm
-from chilopod.stability.normal_form import normal_form as normal_form_of
+from chilopod.stability.branches.fold import Fold
+from chilopod.stability.floquet import Spectrum, phased, spectrum
+from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
+from chilopod.stability.normal_forms.normal_form import NormalForm
+from chilopod.stability.normal_forms.normal_form import normal_form as normal_form_of
 from chilopod.stability.orbits import Orbit, bounded, from_known
-from chilopod.stability.points import BifurcationPoint, Kind, criticality, kind_at_plus_one
+from chilopod.stability.points import BifurcationPoint, Kind, kind_at_plus_one, with_coefficients
 from chilopod.stability.returns import returned_states
 from chilopod.stability.samples import Samples
 from chilopod.stability.scales import sizes
-from chilopod.stability.spectra import Event
+from chilopod.stability.symmetry.equivariants import Critical, SymmetricCrossing, symmetric_crossing
+from chilopod.stability.symmetry.isotypic import Block
+from chilopod.stability.unit_circle.crossings import Crossing
+from chilopod.stability.unit_circle.spectra import Event
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -66,7 +66,7 @@ def describe(samples: Samples, crossing: Crossing, block: Block | None, with_nor
     if regular is None:
         bound = _bound(samples, crossing, orbit, spec, critical)
     bound += 4.0 * _EPSILON * abs(value)
-    mode, left = _phased(spec.right[:, critical[0]], spec.left[:, critical[0]])
+    mode, left = phased(spec.right[:, critical[0]], spec.left[:, critical[0]])
     frequency, k = 0.0, orbit.image.returns
     if crossing.event is Event.PAIR:
         angle = float(np.angle(np.exp(1j * k * np.angle(nu))))
@@ -101,25 +101,11 @@ def describe(samples: Samples, crossing: Crossing, block: Block | None, with_nor
     return with_coefficients(point, form) if form is not None and with_normal_form else point
 
 
-def with_coefficients(point: BifurcationPoint, form: NormalForm) -> BifurcationPoint:
-    """A point with what its normal form says, where that means something."""
-    point = replace(point, normal_form=form)
-    if point.kind in (Kind.FOLD, Kind.TRANSCRITICAL, Kind.BRANCH_POINT):
-        return point
-    verdict = criticality(form)
-    if verdict is None:
-        return point
-    point = replace(point, criticality=verdict, coefficient=form.cubic, coefficient_error=form.cubic_error)
-    if point.kind is Kind.NEIMARK_SACKER:
-        point = replace(point, rotation=form.rotation, rotation_error=form.rotation_error)
-    return point
-
-
 def fold_point(fold: Fold, samples: Samples, with_normal_form: bool) -> BifurcationPoint:
     """The fold that a followed orbit ends in."""
     spec = spectrum(fold.image)
     critical = _nearest(spec, Event.PLUS, 1.0 + 0.0j, 1)[0]
-    mode, left = _phased(spec.right[:, critical], spec.left[:, critical])
+    mode, left = phased(spec.right[:, critical], spec.left[:, critical])
     orbit = Orbit(fold.image.state, fold.image, np.zeros(fold.image.state.size))
     form = _form(samples, fold.value, orbit, 1.0 + 0.0j, mode, left) if with_normal_form else None
     return BifurcationPoint(
@@ -258,8 +244,9 @@ def _touch_bound(samples: Samples, crossing: Crossing, uncertain: float) -> floa
     for each in found:
         values = np.linalg.eigvals(each.image.jacobian)
         away.append(float(np.abs(values[np.abs(values - crossing.multiplier).argmin()])))
-    bend = abs(away[0] - 2.0 * away[1] + away[2]) / step**2
-    return _SAFETY * float(np.sqrt(2.0 * uncertain / bend)) if bend > 0.0 else np.inf
+    # The step is left out of the root: its square may be no number.
+    bend = abs(away[0] - 2.0 * away[1] + away[2])
+    return _SAFETY * step * float(np.sqrt(2.0 * uncertain / bend)) if bend > 0.0 else np.inf
 
 
 def _collision_bound(samples: Samples, crossing: Crossing, orbit: Orbit) -> float:
@@ -335,10 +322,3 @@ def _form(
     return normal_form_of(
         lambda states: returned_states(system, states, section), at, uncertainty=uncertainty, scale=scale
     )
-
-
-def _phased(right: ComplexArray, left: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-    """The pair with the largest entry of the right vector real and positive, left^H right = 1 kept."""
-    peak = right[np.abs(right).argmax()]
-    turn = np.abs(peak) / peak
-    return right * turn, left * turn

@@ -172,6 +172,13 @@ def across(image: ReturnMap) -> tuple[Array, Array]:
     return into, (basis.T / units) @ along
 
 
+def phased(right: ComplexArray, left: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+    """The pair with the largest entry of the right vector real and positive, left^H right = 1 kept."""
+    peak = right[np.abs(right).argmax()]
+    turn = np.abs(peak) / peak
+    return right * turn, left * turn
+
+
 def counts_outside(values: ComplexArray) -> tuple[int, int, int]:
     """Number of multipliers beyond -1, beyond +1, and of complex pairs outside the unit circle."""
     real = np.abs(values.imag) < 1e-9 * np.maximum(1e-3, np.abs(values))
@@ -262,7 +269,7 @@ def _factors(system: SystemLike, orbit: Orbit) -> tuple[list[Array], Array]:
         times = np.linspace(0.0, duration, count + 1)
         states, factors = [x], []
         for t0, t1 in zip(times, times[1:], strict=False):
-            state, factor = system.flow(states[-1], float(t0), float(t1))
+            state, factor = system.flow(states[-1].copy(), float(t0), float(t1))
             states.append(state)
             factors.append(factor * units / units[:, None])
         if system.symmetry is not None:

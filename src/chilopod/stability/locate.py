@@ -11,16 +11,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import ParameterError
-from chilopod.stability.capabilities import SystemLike, spatial_symmetries
-from chilopod.stability.crossings import Crossings, Status, find_crossings
+from chilopod.stability.capabilities import Family, SystemLike, spatial_symmetries
 from chilopod.stability.described import describe, fold_point
-from chilopod.stability.groups import centraliser, commutes, finite_group, isotropy
-from chilopod.stability.isotypic import Block, Type, isotypic
 from chilopod.stability.orbits import Orbit
 from chilopod.stability.points import BifurcationPoint
 from chilopod.stability.returns import ReturnMap
-from chilopod.stability.samples import Family, Samples
+from chilopod.stability.samples import Samples
 from chilopod.stability.scales import numerical_balance
+from chilopod.stability.symmetry.groups import centraliser, commutes, finite_group, isotropy
+from chilopod.stability.symmetry.isotypic import Block, Type, isotypic
+from chilopod.stability.unit_circle.crossings import Crossings, Status, find_crossings
 
 Array = NDArray[np.float64]
 

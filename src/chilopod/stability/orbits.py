@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 
 _ROUNDS = 30
 _ROUND_OFF = 4e-16
+_NOTHING = 1e-13  # of the sizes of the states around a guess: a state that small may be zero
 _SETTLED = 1e-10  # residual, of the sizes of the states, below which it may stop falling
 _RESTS = 1e-8  # of the sizes at the guess: a motion that short is none
 _RETURNED = 1e-12  # of a known orbit: it is exact
@@ -38,6 +39,7 @@ _SHOTS, _LONGEST_SHOT = 20, 4.0  # rounds, and guessed periods
 _FARTHEST_MOVE = 0.3  # of the sizes, and of how far the motion would go at its speed, in a move of Newton's method
 _FARTHEST_STRETCH = 0.3  # likewise of the period
 _CLOSED = 1e-6  # of the same: a motion that about closes
+_ONWARD = 0.382  # of the guessed return, where a guess is of no use
 _LONGEST_SETTLING = 300  # returns
 _BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
 _MARCHED, _MARCHES = 48, 8  # steps a guessed period, and guessed periods, in which a motion is to come back
@@ -101,7 +103,8 @@ def find_orbit(
 ) -> Orbit:
     """A periodic orbit: a fixed point of the return map, by Newton's method.
 
-    Where it does not converge from the guess, the motion is given time to settle on an orbit that attracts it.
+    Where it does not converge from the guess, it is tried from a state further along the motion if every state may be
+    time 0, and then the motion is given time to settle on an orbit that attracts it.
 
     Parameters
     ----------
@@ -187,6 +190,7 @@ def _newton(system: SystemLike, x: Array, with_error: bool, section: Section | N
                     field="orbit",
                     allowed="a guess closer to an orbit",
                 )
+            x, image = _cleared(system, x, image, size, section)
             return _found(system, x, image, with_error)
         if rounds > 4 and off > 10.0 * best:
             break
@@ -205,6 +209,20 @@ def _newton(system: SystemLike, x: Array, with_error: bool, section: Section | N
         field="orbit",
         allowed="a guess closer to the orbit",
     )
+
+
+def _cleared(
+    system: SystemLike, x: Array, image: ReturnMap, size: Array, section: Section | None
+) -> tuple[Array, ReturnMap]:
+    """An orbit with the states that are only just not zero at zero, if it is an orbit still: what is left of a guess
+    would pass for the size of the orbit."""
+    small = (x != 0.0) & (np.abs(x) <= _NOTHING * size)
+    if not small.any():
+        return x, image
+    cleared = np.where(small, 0.0, x)
+    there = return_map(system, cleared, with_error=False, section=section)
+    off = _relative(there.state - cleared, size)
+    return (cleared, there) if off <= max(_ROUND_OFF, _relative(image.state - x, size)) else (x, image)
 
 
 def _solved(matrix: Array, right: Array, size: Array, cutoff: float) -> Array:
@@ -269,6 +287,7 @@ def _nearer(system: SystemLike, x: Array) -> Iterator[tuple[Array, Section | Non
         shot = _shot(system, x)
         if shot is not None:
             yield shot
+    yield from _onward(system, x)
     yield from _settled(system, x)
 
 
@@ -301,15 +320,24 @@ def _shot(system: Autonomous, x: Array) -> tuple[Array, Section | None] | None:
             bordered = np.block([[closing, end[:, None]], [start[None] / moved, np.zeros((1, 1))]])
             move = np.linalg.lstsq(bordered, np.append(-residual, 0.0), rcond=_SINGULAR)[0]
             move *= min(1.0, _FARTHEST_MOVE * min(1.0, moved) / float(np.abs(move[:-1]).max(initial=0.0) or np.inf))
-            x, duration = (
-                x + move[:-1] * size,
-                duration * (1.0 + float(np.clip(move[-1], -_FARTHEST_STRETCH, _FARTHEST_STRETCH))),
-            )
+            x = x + move[:-1] * size
+            duration *= 1.0 + float(np.clip(move[-1], -_FARTHEST_STRETCH, _FARTHEST_STRETCH))
             if duration > longest:
                 return None
     except (AnalysisError, np.linalg.LinAlgError):
         return None
     return None
+
+
+def _onward(system: SystemLike, x: Array) -> list[tuple[Array, Section | None]]:
+    """A state further along the motion, where every state may be time 0: in the guess itself something may just have
+    happened, such as an impact, and a motion that ends there ends before it or after it by round-off."""
+    if not isinstance(system, Autonomous):
+        return []
+    try:
+        return [(system.flow(np.array(x), 0.0, _ONWARD * return_duration(system))[0], None)]
+    except AnalysisError:
+        return []
 
 
 def _settled(system: SystemLike, x: Array) -> list[tuple[Array, Section | None]]:

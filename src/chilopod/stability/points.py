@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.amplitude import Status
-from chilopod.stability.equivariants import SymmetricCrossing
-from chilopod.stability.normal_form import NormalForm
+from chilopod.stability.normal_forms.amplitude import Status
+from chilopod.stability.normal_forms.normal_form import NormalForm
+from chilopod.stability.symmetry.equivariants import SymmetricCrossing
 
 Array = NDArray[np.float64]
 
@@ -135,3 +135,17 @@ class BifurcationPoint(ReadOnlyArrays):
     multiplicity: int = 1
     modes: NDArray[np.complex128] | None = None
     symmetry: SymmetricCrossing | None = None
+
+
+def with_coefficients(point: BifurcationPoint, form: NormalForm) -> BifurcationPoint:
+    """A point with what its normal form says, where that means something."""
+    point = replace(point, normal_form=form)
+    if point.kind in (Kind.FOLD, Kind.TRANSCRITICAL, Kind.BRANCH_POINT):
+        return point
+    verdict = criticality(form)
+    if verdict is None:
+        return point
+    point = replace(point, criticality=verdict, coefficient=form.cubic, coefficient_error=form.cubic_error)
+    if point.kind is Kind.NEIMARK_SACKER:
+        point = replace(point, rotation=form.rotation, rotation_error=form.rotation_error)
+    return point

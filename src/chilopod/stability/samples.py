@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import bisect
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,14 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.capabilities import SystemLike, is_autonomous
-from chilopod.stability.fold import Fold, find_fold
+from chilopod.stability.branches.fold import Fold, find_fold
+from chilopod.stability.capabilities import Family, SystemLike, is_autonomous
 from chilopod.stability.orbits import find_orbit, from_known, known_state
 from chilopod.stability.returns import ReturnMap, return_maps, section_at
 from chilopod.stability.scales import sizes
 
 Array = NDArray[np.float64]
-Family = Callable[[float], SystemLike]
 
 _FIRST_STEPS = 8
 _SHORTEST = 2.0**-10  # step of an orbit that is followed, relative to the first
@@ -154,6 +152,8 @@ class Samples:
             last = samples[-1]
             if last.value != value:
                 fold = find_fold(self.family, last.value, last.orbit, high - low)
+                if fold is not None and not self._ends_in(last, fold):
+                    fold = None
                 here = last if fold is None else Sample(fold.value, fold.image.state, fold.image)
                 if self._at_rest(here):
                     self.ending = f"the orbit shrinks into an equilibrium near {here.value:.9g}: a Hopf point"
@@ -213,6 +213,15 @@ class Samples:
             longer = target + 2.0 * (target - last.value)
             behind, target = [last, found], longer if abs(value - longer) > smallest and longer < value else value
         return reached
+
+    def _ends_in(self, last: Sample, fold: Fold) -> bool:
+        """Whether a fold is just past the last sample, on the same orbit; others may be anywhere."""
+        further = fold.value - last.value
+        return (
+            bool(np.isfinite(fold.error_bound))
+            and -fold.error_bound <= further <= self.width / _FIRST_STEPS
+            and not self._jumped(fold.image.state, last.orbit)
+        )
 
     def _jumped(self, orbit: Array, guess: Array) -> bool:
         return bool((np.abs(orbit - guess) > _JUMP * np.maximum(self._size, np.abs(guess))).any())

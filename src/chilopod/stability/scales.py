@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dgebal
 
+from chilopod.errors import AnalysisError
 from chilopod.stability.capabilities import SystemLike, given_scale
 
 Array = NDArray[np.float64]
@@ -28,11 +29,18 @@ def sizes(system: SystemLike, x: Array, duration: float) -> Array:
         The system and a state at time 0, shape (n,).
     duration
         Of a return.
+
+    Raises
+    ------
+    AnalysisError
+        If the flow gives anything that is not finite.
     """
     given = given_scale(system)
     if given is not None:
         return given
     later, derivative = system.flow(np.array(x), 0.0, _PART * duration)
+    if not (np.isfinite(later).all() and np.isfinite(derivative).all()):
+        raise AnalysisError("the flow is not finite over one return", field="flow")
     size = np.maximum(np.abs(x), np.abs(later))
     if not size.any():
         return numerical_balance(derivative)

@@ -1,0 +1,153 @@
+"""Where the straight walk of a robot changes, in the plane of two of its parameters, and in their units."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod import units
+from chilopod.analysis.straight_walk import bifurcations
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.planar import PlanarModel
+from chilopod.progress import Progress, silent
+from chilopod.robot import Robot
+from chilopod.stability import Curve2, Kind, follow2
+
+Array = NDArray[np.float64]
+
+Box = tuple[tuple[float, float], tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class TransitionCurve:
+    """A curve of bifurcations of the straight walk in the plane of two parameters.
+
+    Attributes
+    ----------
+    curve
+        In SI units, see :class:`chilopod.stability.Curve2`.
+    parameters, units
+        Dotted paths of the two parameters, and the units they are shown in.
+    """
+
+    curve: Curve2
+    parameters: tuple[str, str]
+    units: tuple[str, str]
+
+    @property
+    def values(self) -> Array:
+        """Both parameters at all points, in ``units``, shape (points, 2)."""
+        return np.array([self.shown(point.values) for point in self.curve.points])
+
+    def shown(self, values: Array) -> Array:
+        """SI values of both parameters, or errors of them, in ``units``."""
+        return np.array([units.from_si(float(value), unit) for value, unit in zip(values, self.units, strict=True)])
+
+    def as_json(self) -> dict[str, Any]:
+        """The result as plain numbers, in ``units``."""
+        return {
+            "kind": self.curve.kind.label,
+            "parameters": list(self.parameters),
+            "units": list(self.units),
+            "endings": [ending.label for ending in self.curve.endings],
+            "points": [
+                {
+                    "values": self.shown(point.values).tolist(),
+                    "error_bounds": np.abs(self.shown(point.error_bound)).tolist(),
+                    "frequency_rad_s": point.frequency,
+                    "coefficient": point.coefficient,
+                }
+                for point in self.curve.points
+            ],
+            "special": [
+                {
+                    "kind": point.kind.label,
+                    "values": self.shown(point.values).tolist(),
+                    "error_bounds": np.abs(self.shown(point.error_bound)).tolist(),
+                }
+                for point in self.curve.special
+            ],
+        }
+
+
+def family2(robot: Robot, parameters: tuple[str, str]) -> Callable[[float, float], PlanarModel]:
+    """The planar model as a function of two parameters in SI units.
+
+    Raises
+    ------
+    ParameterError
+        If one does not vary continuously, or both are the same.
+    """
+    if parameters[0] == parameters[1]:
+        raise ParameterError("must be two", field="parameters", value=parameters)
+    for parameter in parameters:
+        robot.unit_of(parameter)  # refuses what is no parameter
+        if parameter == "body.modules":
+            raise ParameterError("is a whole number, not a continuous parameter", field="parameters", value=parameter)
+    symmetric = "gait.side_phase" not in parameters
+    first, second = parameters
+    return lambda p, q: PlanarModel(robot.with_value(first, p).with_value(second, q), use_symmetry=symmetric)
+
+
+def transition_curve(
+    robot: Robot,
+    parameters: tuple[str, str],
+    between: Box,
+    kind: Kind,
+    *,
+    second: float,
+    points: int = 100,
+    longest: float = 0.05,
+    progress: Progress = silent,
+) -> TransitionCurve:
+    """The curve on which the straight walk changes, through the topmost such point at one value of the second
+    parameter.
+
+    Parameters
+    ----------
+    robot
+        The robot; what it has for the two parameters does not matter.
+    parameters
+        Their dotted paths, such as ``springs.stiffness[0]`` and ``legs.forward_offset``.
+    between
+        Both intervals in SI units: the first is searched for a point to start from, and the curve is followed in both.
+    kind
+        Of the bifurcation.
+    second
+        Value of the second parameter (SI) at which the first is searched.
+    points
+        At most so many, in each direction.
+    longest
+        Largest step, in units of ``between``.
+    progress
+        Told how many points there are.
+
+    Raises
+    ------
+    AnalysisError
+        If there is no such bifurcation to start from.
+    """
+    family = family2(robot, parameters)
+    there = robot.with_value(parameters[1], second)
+    found = [each.point for each in bifurcations(there, parameters[0], between[0], normal_form=False)]
+    starts = [point for point in found if point.kind is kind]
+    if not starts:
+        raise AnalysisError(
+            f"no {kind.label} in the interval",
+            field=parameters[0],
+            allowed=", ".join(point.kind.label for point in found),
+        )
+    curve = follow2(
+        family,
+        starts[-1],
+        between,
+        second=second,
+        points=points,
+        longest=longest,
+        progress=lambda count, point: progress(min(1.0, count / points), f"{count} points"),
+    )
+    return TransitionCurve(curve, parameters, (robot.unit_of(parameters[0]), robot.unit_of(parameters[1])))

@@ -1,0 +1,109 @@
+"""Points of codimension two: where something else becomes critical as well along a curve of critical periodic orbits.
+
+What they are is told in Kuznetsov, *Elements of Applied Bifurcation Theory*, sections 9.1 to 9.6.
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.points import Kind
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+
+class CodimensionTwo(enum.Enum):
+    """What happens at a point of codimension two; each member's ``sentence`` says it in words."""
+
+    CUSP = "cusp", "two curves of folds meet and vanish: beyond it one orbit is left of three"
+    DEGENERATE_PITCHFORK = (
+        "degenerate pitchfork",
+        "the pitchfork turns from super- to subcritical: a curve of folds of the orbits that branch off ends here",
+    )
+    DEGENERATE_TRANSCRITICAL = (
+        "degenerate transcritical",
+        "the quadratic term vanishes: the two orbits exchange stability as in a pitchfork",
+    )
+    GENERALISED_PERIOD_DOUBLING = (
+        "generalised period doubling",
+        "the period doubling turns from super- to subcritical: a curve of folds of the doubled orbit ends here",
+    )
+    CHENCINER = (
+        "Chenciner",
+        "the Neimark-Sacker bifurcation turns from super- to subcritical: tori that meet and vanish begin here",
+    )
+    RESONANCE_1_1 = "1:1 resonance", "two multipliers of the return map are +1: the curve of Neimark-Sacker ends here"
+    RESONANCE_1_2 = "1:2 resonance", "two multipliers of the return map are -1: the curve of Neimark-Sacker ends here"
+    RESONANCE_1_3 = "1:3 resonance", "the pair of the return map is at 120 degrees: orbits of three returns are near"
+    RESONANCE_1_4 = "1:4 resonance", "the pair of the return map is at 90 degrees: orbits of four returns are near"
+    FOLD_FLIP = "fold-flip", "a fold and a period doubling at once"
+    FOLD_NEIMARK_SACKER = "fold-Neimark-Sacker", "a fold and a Neimark-Sacker bifurcation at once"
+    FLIP_NEIMARK_SACKER = "flip-Neimark-Sacker", "a period doubling and a Neimark-Sacker bifurcation at once"
+    DOUBLE_NEIMARK_SACKER = "double Neimark-Sacker", "two pairs of multipliers are on the unit circle at once"
+    PITCHFORK_FOLD = "pitchfork-fold", "a pitchfork and a fold at once"
+    PITCHFORK_FLIP = "pitchfork-flip", "a pitchfork and a period doubling at once"
+    PITCHFORK_NEIMARK_SACKER = "pitchfork-Neimark-Sacker", "a pitchfork and a Neimark-Sacker bifurcation at once"
+    DOUBLE_PITCHFORK = "double pitchfork", "two pitchforks at once"
+    SEVERAL_CRITICAL = "several critical", "another multiplier becomes critical as well"
+
+    def __init__(self, label: str, sentence: str) -> None:
+        self.label = label
+        self.sentence = sentence
+
+
+@dataclass(frozen=True)
+class Codimension2(ReadOnlyArrays):
+    """A located point of codimension two.
+
+    Attributes
+    ----------
+    kind
+        What it is.
+    values
+        Of both parameters, shape (2,).
+    error_bound
+        Bounds on their errors, shape (2,): that of the test function over its rate of change along the curve, and that
+        of the curve.
+    orbit
+        State on the orbit at time 0, shape (n,).
+    multipliers
+        Of the return map, by falling modulus.
+    """
+
+    kind: CodimensionTwo
+    values: Array
+    error_bound: Array
+    orbit: Array
+    multipliers: ComplexArray
+
+
+DEGENERATE = {
+    Kind.FOLD: CodimensionTwo.CUSP,
+    Kind.PITCHFORK: CodimensionTwo.DEGENERATE_PITCHFORK,
+    Kind.TRANSCRITICAL: CodimensionTwo.DEGENERATE_TRANSCRITICAL,
+    Kind.PERIOD_DOUBLING: CodimensionTwo.GENERALISED_PERIOD_DOUBLING,
+    Kind.NEIMARK_SACKER: CodimensionTwo.CHENCINER,
+}
+"""What it is where the coefficient of a curve's normal form vanishes."""
+
+_TOGETHER = {
+    frozenset({Kind.FOLD, Kind.PERIOD_DOUBLING}): CodimensionTwo.FOLD_FLIP,
+    frozenset({Kind.FOLD, Kind.NEIMARK_SACKER}): CodimensionTwo.FOLD_NEIMARK_SACKER,
+    frozenset({Kind.PERIOD_DOUBLING, Kind.NEIMARK_SACKER}): CodimensionTwo.FLIP_NEIMARK_SACKER,
+    frozenset({Kind.NEIMARK_SACKER}): CodimensionTwo.DOUBLE_NEIMARK_SACKER,
+    frozenset({Kind.PITCHFORK, Kind.FOLD}): CodimensionTwo.PITCHFORK_FOLD,
+    frozenset({Kind.PITCHFORK, Kind.PERIOD_DOUBLING}): CodimensionTwo.PITCHFORK_FLIP,
+    frozenset({Kind.PITCHFORK, Kind.NEIMARK_SACKER}): CodimensionTwo.PITCHFORK_NEIMARK_SACKER,
+    frozenset({Kind.PITCHFORK}): CodimensionTwo.DOUBLE_PITCHFORK,
+}
+
+
+def together(one: Kind, other: Kind) -> CodimensionTwo:
+    """What it is where two bifurcations happen at once."""
+    return _TOGETHER.get(frozenset({one, other}), CodimensionTwo.SEVERAL_CRITICAL)

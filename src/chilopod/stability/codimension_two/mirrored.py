@@ -1,0 +1,33 @@
+"""Spatial symmetries of a state, and of a mode, where these are known to an accuracy only."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.stability.capabilities import SystemLike, spatial_symmetries
+
+Array = NDArray[np.float64]
+
+_LOOSE = 1e-6  # relative to the size of the states: how well a symmetry holds for a state that has it
+
+
+def symmetric_states(system: SystemLike, state: Array, size: Array) -> Array:
+    """Orthonormal basis, in units of the states' sizes, of the states with the spatial symmetries of one of them."""
+    n = size.size
+    conditions = [np.zeros((0, n))]
+    for matrix in spatial_symmetries(system):
+        if (np.abs(matrix @ state - state) <= _LOOSE * size).all():
+            conditions.append(matrix * size / size[:, None] - np.eye(n))
+    stacked = np.vstack(conditions)
+    _, values, right = np.linalg.svd(stacked) if len(stacked) else (None, np.zeros(0), np.eye(n))
+    rank = int((values > _LOOSE).sum())
+    return np.asarray(right[rank:].T)
+
+
+def reverses(system: SystemLike, mode: NDArray[np.complex128], size: Array) -> bool:
+    """Whether a spatial symmetry of a system turns a mode, shape (n,), into its negative; ``size`` is of the states."""
+    own = np.abs(mode / size).max()
+    return any(
+        bool((np.abs(matrix @ mode + mode) / size).max() <= _LOOSE * own) for matrix in spatial_symmetries(system)
+    )

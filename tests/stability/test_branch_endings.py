@@ -1,0 +1,148 @@
+"""How branches end, and what is refused: no family, however hostile, ends in anything but an ending or one line."""
+
+import numpy as np
+import pytest
+
+from chilopod.errors import AnalysisError, ChilopodError, ParameterError
+from chilopod.stability import Ending, Kind, PeriodicSystem, begin, find_orbit, follow, proceed, switch
+
+
+def of_map(function, dimension, size=1.0):
+    """A system with a period of 1 whose return map is a function, its derivative by differences."""
+    step = 1e-6 * size
+
+    def flow(x, t0, t1):
+        if t1 - t0 < 0.5:
+            return x, np.eye(dimension)
+        with np.errstate(all="ignore"):
+            columns = [function(x + step * e) - function(x - step * e) for e in np.eye(dimension)]
+            return function(x), np.array(columns).T / (2 * step)
+
+    return PeriodicSystem(dimension, 1.0, flow)
+
+
+def linear(p):
+    return of_map(lambda x: 0.5 * x + p, 1)
+
+
+def circle(p):
+    return of_map(lambda x: x + 0.3 * (0.25 - x**2 - p**2), 1)
+
+
+def hostile(kind, random):
+    """A family with something wrong, the size of its states, and the unit of its parameter."""
+    c = random.normal(size=3)
+    narrow, size = 10 ** random.uniform(-3, -1), 10 ** random.uniform(-9, 9)
+    unit = 10.0 ** random.choice([-290, -9, 9, 290])
+    dimension = int(random.integers(1, 3))
+    p_unit = unit if kind == "huge" else 1.0
+
+    def image(y, p):
+        if kind == "nan":
+            return np.nan if abs(p - 0.4) < narrow else 0.4 * y + p
+        if kind == "jump":
+            return 0.5 * y + (p > 0.3) * c[0]
+        if kind == "kink":
+            return 0.5 * y + 0.3 * abs(y - p)
+        if kind == "ripple":
+            return 0.5 * y + 0.1 * np.sin(p / narrow)
+        if kind == "vanishing":
+            return y + 0.3 * (0.1 * c[0] - p - y * y)
+        if kind == "raising":
+            if p > 0.5:
+                raise ValueError("no such thing")
+            return 0.3 * y + p * p
+        if kind == "rough":
+            return 0.5 * y + sum(0.5**j * np.cos(np.pi * 3**j * p) for j in range(12))
+        return 0.5 * y + p + 0.1 * y * y / (1 + y * y)
+
+    def family(value):
+        def function(x):
+            y = x / size
+            return size * np.array([image(y[0], value / p_unit), 0.3 * y[-1] + 0.1 * y[0]])[:dimension]
+
+        return of_map(function, dimension, size)
+
+    return family, size * np.full(dimension, 0.3), p_unit
+
+
+KINDS = ("nan", "jump", "kink", "ripple", "vanishing", "raising", "rough", "huge")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_hostile_families_end(kind):
+    random = np.random.default_rng(KINDS.index(kind))
+    for _ in range(3):
+        family, guess, unit = hostile(kind, random)
+        try:
+            start = begin(family, 0.05 * unit, guess)
+            branch = follow(family, start, (-0.3 * unit, unit), points=25, budget=4000)
+        except ChilopodError:
+            continue
+        assert branch.points
+        assert all(-0.3 * unit <= point.value <= unit for point in branch.points)
+        assert (branch.ending is Ending.LOST) == bool(branch.reason)
+        if kind == "huge":
+            assert branch.ending is Ending.LEFT_INTERVAL
+
+
+def test_the_last_point_is_on_the_end_of_the_interval():
+    asked = []
+
+    def family(p):
+        asked.append(p)
+        return linear(p)
+
+    for rising, end in ((True, 0.7), (False, -0.3)):
+        branch = follow(family, begin(family, 0.1, [0.2], rising), (-0.3, 0.7))
+        assert branch.ending is Ending.LEFT_INTERVAL
+        assert branch.points[-1].value == end
+        assert branch.points[-1].orbit[0] == pytest.approx(2 * end, abs=1e-12)
+    assert -0.3 <= min(asked) <= max(asked) <= 0.7
+
+
+def test_a_branch_that_starts_outward_ends_at_once():
+    branch = follow(linear, begin(linear, 0.7, [1.4]), (0.0, 0.7))
+    assert branch.ending is Ending.LEFT_INTERVAL
+    assert len(branch.points) == 1
+
+
+def test_a_budget_ends_a_branch_and_keeps_what_was_found():
+    branch = follow(circle, begin(circle, 0.0, [0.5]), (-1.0, 1.0), budget=150)
+    assert branch.ending is Ending.BUDGET
+    assert len(branch.points) > 2
+    on = proceed(circle, branch, (-1.0, 1.0))
+    assert on.ending is Ending.CLOSED
+
+
+def test_a_guess_and_an_orbit_start_a_branch():
+    by_guess = follow(linear, [0.1], (0.0, 1.0))
+    by_orbit = follow(linear, find_orbit(linear(0.0), [0.1]), (0.0, 1.0))
+    assert by_guess.points[0].orbit == pytest.approx([0.0], abs=1e-12)
+    assert by_guess.points[-1].value == by_orbit.points[-1].value == 1.0
+
+
+def test_a_branch_goes_on_from_any_of_its_points():
+    branch = follow(circle, begin(circle, 0.0, [0.5]), (-1.0, 1.0))
+    on = follow(circle, branch.points[3], (-2.0, 2.0), points=30)
+    assert on.scale == 4.0
+    assert on.special_points[0].special is Kind.FOLD
+    assert on.points[1].value > branch.points[3].value
+
+
+def test_what_cannot_be_is_one_line():
+    with pytest.raises(ParameterError, match="too narrow"):
+        follow(linear, [0.1], (1.0, 1.0 + 1e-12))
+    with pytest.raises(ParameterError, match="between"):
+        follow(linear, [0.1], (-1e308, 1e308))
+    with pytest.raises(ParameterError, match="does not hold the start"):
+        follow(linear, begin(linear, 2.0, [0.1]), (0.0, 1.0))
+    pitchfork = {p: of_map(lambda x, p=p: (1 + p) * x - x**3, 1) for p in (0.0,)}
+    with pytest.raises(AnalysisError, match="branches meet here"):
+        follow(lambda p: of_map(lambda x: (1 + p) * x - x**3, 1), begin(pitchfork.get, 0.0, [0.0]), (-1.0, 1.0))
+
+
+def test_switching_needs_a_special_point():
+    branch = follow(linear, [0.1], (0.0, 1.0))
+    with pytest.raises(ParameterError, match="no special point"):
+        switch(linear, branch.points[1])

@@ -1,0 +1,184 @@
+"""How a curve of bifurcation points is followed: where it ends and why, and what is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chilopod.errors import ParameterError
+from chilopod.stability import BifurcationPoint, CodimensionTwo, CurveEnd, Kind, PeriodicSystem, detection, follow2
+from chilopod.stability.normal_forms.amplitude import Status
+
+BOX = ((-2.0, 2.0), (-2.0, 2.0))
+
+
+def circle(hole=None):
+    """x -> -(p^2 + q^2) x, which doubles its period on the unit circle."""
+
+    def family2(p, q):
+        size = -(p * p + q * q)
+        if hole is not None and hole(p, q):
+            size = np.nan
+
+        def image(x):
+            return size * x, np.array([[size]])
+
+        return PeriodicSystem(
+            1,
+            1.0,
+            lambda x, t0, t1: image(x),
+            orbit=np.zeros(1),
+            flow_with_error=lambda x, t0, t1: (*image(x), 1e-15),
+            flow_states=lambda states, t0, t1: size * states,
+        )
+
+    return family2
+
+
+def start_at(angle, kind=Kind.PERIOD_DOUBLING):
+    point = BifurcationPoint(kind, np.cos(angle), 0.0, np.zeros(1), np.ones(1, complex), -1.0 + 0j, np.pi)
+    return point, np.sin(angle)
+
+
+@pytest.mark.parametrize("rising", [None, True, False])
+def test_closed_curve_ends_where_it_began(rising):
+    point, second = start_at(0.4)
+    curve = follow2(circle(), point, BOX, second=second, rising=rising, points=500)
+    assert CurveEnd.CLOSED in curve.endings
+    assert not curve.special
+    angles = np.unwrap(np.arctan2(curve.values[:, 1], curve.values[:, 0]))
+    assert np.abs(np.hypot(*curve.values.T) - 1.0).max() < 1e-13
+    turn = abs(angles[-1] - angles[0])
+    assert 2.0 * np.pi - 0.15 < turn < 2.0 * np.pi
+
+
+def test_edges_of_the_box_are_met_exactly():
+    point, second = start_at(0.4)
+    curve = follow2(circle(), point, ((0.3, 2.0), (-0.7, 2.0)), second=second)
+    assert curve.endings == (CurveEnd.LEFT_BOX, CurveEnd.LEFT_BOX)
+    (one, other) = (curve.values[0], curve.values[-1])
+    assert one[1] == -0.7
+    assert one[0] == pytest.approx(np.sqrt(1.0 - 0.49), abs=1e-13)
+    assert other[0] == 0.3
+    assert other[1] == pytest.approx(np.sqrt(1.0 - 0.09), abs=1e-13)
+    assert (curve.values >= [0.3, -0.7]).all()
+
+
+def test_a_direction_is_kept():
+    point, second = start_at(0.4)
+    up = follow2(circle(), point, ((0.3, 2.0), (-0.7, 2.0)), second=second, rising=True)
+    down = follow2(circle(), point, ((0.3, 2.0), (-0.7, 2.0)), second=second, rising=False)
+    assert up.endings == (CurveEnd.START, CurveEnd.LEFT_BOX)
+    assert (np.diff(up.values[:, 1]) > 0.0).all()
+    assert (np.diff(down.values[:, 1]) < 0.0).all()
+
+
+def test_where_the_map_does_not_exist_the_curve_is_lost_with_a_reason():
+    point, second = start_at(0.4)
+    curve = follow2(circle(hole=lambda p, q: q > 0.8), point, BOX, second=second, rising=True)
+    assert curve.endings[1] is CurveEnd.LOST
+    assert "not finite" in curve.reasons[1]
+    assert 0.8 - 1e-5 < curve.values[-1][1] <= 0.8
+
+
+def test_a_family_that_refuses_values_ends_the_curve():
+    def family2(p, q):
+        if q > 0.8:
+            raise ParameterError("must be at most 0.8", field="q", value=q)
+        return circle()(p, q)
+
+    point, second = start_at(0.4)
+    curve = follow2(family2, point, BOX, second=second, rising=True)
+    assert curve.endings[1] is CurveEnd.LOST
+    assert "at most 0.8" in curve.reasons[1]
+
+
+def test_budgets_are_kept():
+    point, second = start_at(0.4)
+    calls = []
+
+    def family2(p, q):
+        calls.append((p, q))
+        return circle()(p, q)
+
+    curve = follow2(family2, point, BOX, second=second, rising=True, budget=200, coefficients=False)
+    assert curve.endings[1] is CurveEnd.OUT_OF_BUDGET
+    assert len(calls) < 1000
+    short = follow2(circle(), point, BOX, second=second, points=7)
+    assert short.endings == (CurveEnd.ENOUGH_POINTS, CurveEnd.ENOUGH_POINTS)
+    assert len(short.points) == 15
+
+
+def test_progress_is_told():
+    point, second = start_at(0.4)
+    told = []
+    follow2(circle(), point, BOX, second=second, points=3, progress=lambda count, at: told.append((count, at.values)))
+    assert [count for count, _ in told] == [1, 2, 3, 1, 2, 3]
+
+
+@pytest.mark.parametrize(
+    ("given", "field"),
+    [
+        ({"between": ((-2.0, 2.0), (2.0, -2.0))}, "between"),
+        ({"between": (-2.0, 2.0)}, "between"),
+        ({"between": ((-2.0, 2.0), (0.0, np.inf))}, "between"),
+        ({"between": ((-2.0, 0.5), (-2.0, 2.0))}, "between"),
+        ({"second": np.nan}, "between"),
+        ({"points": 0}, "points"),
+        ({"step": 0.0}, "step"),
+        ({"budget": -1}, "budget"),
+        ({"start": "here"}, "start"),
+        (
+            {"start": start_at(0.4)[0].__class__(Kind.FOLD, 0.9, 0.0, np.zeros(2), np.ones(2, complex), 1 + 0j, 0.0)},
+            "start",
+        ),
+    ],
+)
+def test_what_is_refused(given, field):
+    point, second = start_at(0.4)
+    arguments = {"family2": circle(), "start": point, "between": BOX, "second": second} | given
+    with pytest.raises(ParameterError) as refused:
+        follow2(**arguments)
+    assert refused.value.field == field
+
+
+def test_what_two_parameters_would_unfold_is_refused():
+    """x -> (1 + p) x - x^3 of an orbit that is neither known nor symmetric as far as anybody says."""
+
+    def family2(p, q):
+        return PeriodicSystem(1, 1.0, lambda x, t0, t1: ((1.0 + p) * x - x**3, np.array([[1.0 + p - 3.0 * x[0] ** 2]])))
+
+    start = BifurcationPoint(Kind.PITCHFORK, 0.0, 0.0, np.zeros(1), np.ones(1, complex), 1.0 + 0j, 0.0)
+    with pytest.raises(ParameterError, match="unfold"):
+        follow2(family2, start, BOX, second=0.0)
+
+
+def test_a_coefficient_that_is_not_found_near_its_zero_is_bracketed(monkeypatch):
+    """x -> -(1 + p) x + (q - 0.1) x^3 turns at q = 0.1, where here no normal form is found."""
+
+    def shy(*arguments, **named):
+        form = detection_normal_form(*arguments, **named)
+        return replace(form, status=Status.OUT_OF_REACH, cubic=np.nan) if abs(form.cubic) < 0.004 else form
+
+    detection_normal_form = detection.normal_form
+    monkeypatch.setattr(detection, "normal_form", shy)
+
+    def family2(p, q):
+        def image(x):
+            return -(1.0 + p) * x + (q - 0.1) * x**3, np.array([[-(1.0 + p) + 3.0 * (q - 0.1) * x[0] ** 2]])
+
+        return PeriodicSystem(
+            1,
+            1.0,
+            lambda x, t0, t1: image(x),
+            orbit=np.zeros(1),
+            flow_with_error=lambda x, t0, t1: (*image(x), 1e-15),
+            flow_states=lambda states, t0, t1: -(1.0 + p) * states + (q - 0.1) * states**3,
+        )
+
+    start = BifurcationPoint(Kind.PERIOD_DOUBLING, 0.0, 0.0, np.zeros(1), np.ones(1, complex), -1.0 + 0j, np.pi)
+    curve = follow2(family2, start, ((-1.0, 1.0), (-1.0, 1.0)), second=-0.3)
+    (found,) = curve.special
+    assert found.kind is CodimensionTwo.GENERALISED_PERIOD_DOUBLING
+    assert abs(found.values[1] - 0.1) <= found.error_bound[1] < 0.03
+    assert curve.endings == (CurveEnd.LEFT_BOX, CurveEnd.LEFT_BOX)

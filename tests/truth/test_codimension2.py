@@ -1,0 +1,423 @@
+"""Curves of bifurcation points in two parameters, and their points of codimension two, with known answers."""
+
+from dataclasses import replace
+from functools import cache
+
+import numba
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.special import mathieu_b
+
+from chilopod.stability import (
+    BifurcationPoint,
+    CodimensionTwo,
+    CurveEnd,
+    Kind,
+    PeriodicSystem,
+    follow2,
+    from_rhs,
+    locate,
+)
+
+
+def mapped(dimension, image, **known):
+    """A system given by its return map: ``image(x)`` -> (H(x), H'(x))."""
+    return PeriodicSystem(
+        dimension,
+        1.0,
+        lambda x, t0, t1: image(x),
+        flow_with_error=lambda x, t0, t1: (*image(x), 1e-15),
+        flow_states=lambda states, t0, t1: np.array([image(x)[0] for x in states]),
+        **known,
+    )
+
+
+def with_parameters(rhs, dimension, period, constants=(), **known):
+    """``family2`` of a right-hand side that has both parameters, and constants, as its last states, at rest: built but
+    once."""
+    n = dimension
+    extended = from_rhs(rhs, n + 2 + len(constants), period)
+
+    def family2(p, q):
+        behind = [p, q, *constants]
+
+        def flow(x, t0, t1):
+            state, derivative = extended.flow(np.append(x, behind), t0, t1)
+            return state[:n], derivative[:n, :n]
+
+        def flow_with_error(x, t0, t1):
+            state, derivative, error = extended.flow_with_error(np.append(x, behind), t0, t1)
+            return state[:n], derivative[:n, :n], error if np.ndim(error) == 0 else error[:n, :n]
+
+        def flow_states(states, t0, t1):
+            return extended.flow_states(np.hstack([states, np.tile(behind, (len(states), 1))]), t0, t1)[:, :n]
+
+        return PeriodicSystem(n, period, flow, flow_with_error=flow_with_error, flow_states=flow_states, **known)
+
+    return family2, extended
+
+
+def kinds(curve):
+    return [point.kind for point in curve.special]
+
+
+def check_special(curve, *expected):
+    """Kinds and values, within their bounds."""
+    assert kinds(curve) == [kind for kind, _ in expected]
+    for point, (_, values) in zip(curve.special, expected, strict=True):
+        assert (np.abs(point.values - values) <= point.error_bound).all()
+        assert (point.error_bound <= 1e-9 * (1.0 + np.abs(values))).all()
+
+
+def check_curve(curve, across):
+    """``across(values)``, a function that is zero on the curve, is so within the bounds of all points."""
+    for point in curve.points:
+        slopes = [
+            (across(point.values + h) - across(point.values - h)) / 2e-6
+            for h in (np.array([1e-6, 0]), np.array([0, 1e-6]))
+        ]
+        assert abs(across(point.values)) <= np.abs(slopes) @ point.error_bound
+        assert (point.error_bound < 1e-11 * (1.0 + np.abs(point.values))).all()
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-9])
+def test_cusp(unit):
+    """x -> x + p + q x - x^3 has folds at 27 p^2 = 4 q^3."""
+
+    def family2(p, q):
+        return mapped(1, lambda x: (x + p + q * x - x**3 / unit**2, np.array([[1.0 + q - 3.0 * x[0] ** 2 / unit**2]])))
+
+    x = -np.sqrt(0.5 / 3.0)
+    start = BifurcationPoint(
+        Kind.FOLD, unit * (x**3 - 0.5 * x), 0.0, np.array([x * unit]), np.ones(1, complex), 1.0 + 0j, 0.0
+    )
+    curve = follow2(family2, start, ((-unit, unit), (-1.0, 1.0)), second=0.5)
+    check_curve(curve, lambda values: 27.0 * (values[0] / unit) ** 2 - 4.0 * values[1] ** 3) if unit == 1.0 else None
+    assert kinds(curve) == [CodimensionTwo.CUSP]
+    (cusp,) = curve.special
+    assert (np.abs(cusp.values) <= cusp.error_bound).all()
+    assert (cusp.error_bound <= 1e-13 * np.array([unit, 1.0])).all()
+    assert curve.endings == (CurveEnd.LEFT_BOX, CurveEnd.LEFT_BOX)
+    assert curve.values[0][1] == curve.values[-1][1] == 1.0
+    assert curve.values[0][0] == pytest.approx(-curve.values[-1][0], rel=1e-12)
+
+
+def area_changing(a, b, c=0.2):
+    """(x, y) -> (y, a - b x - y^2 + c x y): at its fixed point the determinant is b - c x, the trace (c - 2) x."""
+    return mapped(
+        2,
+        lambda x: (
+            np.array([x[1], a - b * x[0] - x[1] * x[1] + c * x[0] * x[1]]),
+            np.array([[0.0, 1.0], [c * x[1] - b, c * x[0] - 2.0 * x[1]]]),
+        ),
+    )
+
+
+def parameters_at(x, b, c=0.2):
+    """(b, a) for which x is the fixed point."""
+    return np.array([b, x * x * (1.0 - c) + (1.0 + b) * x])
+
+
+@cache
+def torus_curve():
+    (start,) = locate(lambda b: area_changing(0.2, b), (0.2, 1.5), orbit=[0.1, 0.1], normal_form=False)
+    return follow2(
+        lambda b, a: area_changing(a, b), start, ((0.2, 1.9), (-2.0, 5.0)), second=0.2, points=150, longest=0.1
+    )
+
+
+def test_resonances_on_a_curve_of_neimark_sacker():
+    curve = torus_curve()
+    assert curve.kind is Kind.NEIMARK_SACKER
+    expected = []
+    for kind, cosine in [
+        (CodimensionTwo.RESONANCE_1_1, 1.0),
+        (CodimensionTwo.RESONANCE_1_4, 0.0),
+        (CodimensionTwo.RESONANCE_1_3, -0.5),
+        (CodimensionTwo.RESONANCE_1_2, -1.0),
+    ]:
+        x = 2.0 * cosine / (0.2 - 2.0)
+        expected.append((kind, parameters_at(x, 1.0 + 0.2 * x)))
+    check_special(curve, *expected)
+    assert curve.endings == (CurveEnd.RESONANCE, CurveEnd.RESONANCE)
+    for point in curve.points:
+        x = 2.0 * point.multiplier.real / (0.2 - 2.0)
+        np.testing.assert_allclose(point.values, parameters_at(x, 1.0 + 0.2 * x), atol=1e-12)
+
+
+def test_double_multiplier_and_flip_on_a_curve_of_folds():
+    x = np.full(2, -1.5 / 1.6)
+    start = BifurcationPoint(Kind.FOLD, -(1.5**2) / 3.2, 0.0, x, np.ones(2, complex), 1.0 + 0j, 0.0)
+    curve = follow2(area_changing, start, ((-2.0, 1.0), (-2.0, 1.5)), second=0.5, longest=0.1)
+    check_curve(curve, lambda values: values[0] + (1.0 + values[1]) ** 2 / 3.2)
+    check_special(
+        curve,
+        (CodimensionTwo.FOLD_FLIP, (0.0, -1.0)),
+        (CodimensionTwo.RESONANCE_1_1, (-((16.0 / 9.0) ** 2) / 3.2, 7.0 / 9.0)),
+    )
+
+
+def test_double_multiplier_on_a_curve_of_flips():
+    """The Henon map (x, y) -> (1 - a x^2 + y, b x) has its period doubling at a = 3 (1 - b)^2 / 4."""
+
+    def henon(a, b):
+        return mapped(
+            2,
+            lambda x: (np.array([1.0 - a * x[0] ** 2 + x[1], b * x[0]]), np.array([[-2.0 * a * x[0], 1.0], [b, 0.0]])),
+        )
+
+    (start,) = locate(lambda a: henon(a, 0.3), (0.1, 0.8), orbit=[0.8, 0.24])
+    curve = follow2(henon, start, ((0.05, 5.0), (-1.4, 0.7)), second=0.3, longest=0.1)
+    check_curve(curve, lambda values: values[0] - 0.75 * (1.0 - values[1]) ** 2)
+    check_special(curve, (CodimensionTwo.RESONANCE_1_2, (3.0, -1.0)))
+    nearest = min(curve.points, key=lambda point: abs(point.values[1] - 0.3))
+    assert nearest.coefficient == pytest.approx(start.coefficient, rel=1e-6)
+
+
+def test_generalised_period_doubling():
+    """Twice x -> -m x + e x^2 + c x^3 at m = 1 is x - 2 (c + e^2) x^3 + ...; here m = 1 + p - q^2, c = q."""
+
+    def family2(p, q):
+        m = 1.0 + p - q * q
+        return mapped(
+            1,
+            lambda x: (-m * x + 0.6 * x**2 + q * x**3, np.array([[-m + 1.2 * x[0] + 3.0 * q * x[0] ** 2]])),
+            orbit=np.zeros(1),
+        )
+
+    (start,) = locate(lambda p: family2(p, 0.1), (-0.2, 0.3))
+    curve = follow2(family2, start, ((-0.5, 0.5), (-0.6, 0.6)), second=0.1)
+    check_curve(curve, lambda values: values[0] - values[1] ** 2)
+    check_special(curve, (CodimensionTwo.GENERALISED_PERIOD_DOUBLING, (0.36**2, -0.36)))
+    for point in curve.points:
+        assert point.coefficient == pytest.approx(-2.0 * (point.values[1] + 0.36), abs=1e-7)
+
+
+def test_degenerate_pitchfork_of_an_orbit_with_a_spatial_symmetry():
+    """x -> x (1 + p + y) - (2.5 + q) x^3, y -> y / 2 + q / 5 + x^2: y = 0.4 q + 2 x^2 on the centre manifold."""
+
+    def family2(p, q):
+        return mapped(
+            2,
+            lambda z: (
+                np.array([z[0] * (1.0 + p + z[1]) - (2.5 + q) * z[0] ** 3, 0.5 * z[1] + 0.2 * q + z[0] ** 2]),
+                np.array([[1.0 + p + z[1] - 3.0 * (2.5 + q) * z[0] ** 2, z[0]], [2.0 * z[0], 0.5]]),
+            ),
+            spatial_symmetry=np.diag([-1.0, 1.0]),
+        )
+
+    start = BifurcationPoint(Kind.PITCHFORK, -0.2, 0.0, np.array([0.0, 0.2]), np.array([1.0 + 0j, 0.0]), 1.0 + 0j, 0.0)
+    curve = follow2(family2, start, ((-1.0, 1.0), (-1.0, 1.0)), second=0.5)
+    check_curve(curve, lambda values: values[0] + 0.4 * values[1])
+    check_special(curve, (CodimensionTwo.DEGENERATE_PITCHFORK, (0.2, -0.5)))
+
+
+def test_chenciner():
+    """z -> z e^(i w) (1 + p - q^2 + (q - 0.3) |z|^2 - |z|^4 / 2) turns at q = 0.3."""
+
+    def family2(p, q):
+        turn = np.exp(1j * (1.1 + 0.3 * q))
+
+        def image(x):
+            z = complex(*x)
+            size = abs(z) ** 2
+            factor = 1.0 + p - q * q + (q - 0.3) * size - 0.5 * size**2
+            slope = (q - 0.3) - size
+            columns = []
+            for direction in (1.0, 1.0j):
+                moved = turn * (direction * factor + z * slope * 2.0 * (z.conjugate() * direction).real)
+                columns.append([moved.real, moved.imag])
+            mapped_z = turn * z * factor
+            return np.array([mapped_z.real, mapped_z.imag]), np.array(columns).T
+
+        return mapped(2, image, orbit=np.zeros(2))
+
+    (start,) = locate(lambda p: family2(p, 0.1), (-0.2, 0.3))
+    curve = follow2(family2, start, ((-0.5, 0.5), (-0.6, 0.6)), second=0.1)
+    check_curve(curve, lambda values: values[0] - values[1] ** 2)
+    check_special(curve, (CodimensionTwo.CHENCINER, (0.09, 0.3)))
+
+
+def turning(angle, size):
+    return size * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "expected"),
+    [
+        (-np.eye(1), turning(1.0, 1.0), CodimensionTwo.FLIP_NEIMARK_SACKER),
+        (turning(1.0, 1.0), -np.eye(1), CodimensionTwo.FLIP_NEIMARK_SACKER),
+        (turning(0.7, 1.0), turning(1.9, 1.0), CodimensionTwo.DOUBLE_NEIMARK_SACKER),
+    ],
+)
+def test_two_at_once(first, second, expected):
+    """A linear map of two blocks that are critical at p = q / 4 and at q = 0.2, in slanted coordinates."""
+    n = len(first) + len(second)
+    basis = np.eye(n) + 0.3 * np.sin(np.arange(n * n)).reshape(n, n)
+
+    def family2(p, q):
+        blocks = np.zeros((n, n))
+        blocks[: len(first), : len(first)] = (1.0 + p - 0.25 * q) * first
+        blocks[len(first) :, len(first) :] = (1.0 + p * p + q - 0.2) * second
+        matrix = basis @ blocks @ np.linalg.inv(basis)
+        return mapped(n, lambda x: (matrix @ x, matrix), orbit=np.zeros(n))
+
+    (start,) = locate(lambda p: family2(p, 0.05), (-0.1, 0.2), normal_form=False)
+    curve = follow2(family2, start, ((-0.5, 0.5), (-0.4, 0.4)), second=0.05, coefficients=False)
+    check_curve(curve, lambda values: values[0] - 0.25 * values[1])
+    q = 8.0 * (np.sqrt(1.0 + 0.05) - 1.0)  # of q^2 / 16 + q = 0.2
+    check_special(curve, (expected, (0.25 * q, q)))
+
+
+def test_first_tongue_of_the_mathieu_equation():
+    """x'' + (a - 2 q cos 2t) x = 0 doubles its period at a = b_1(q); nothing is damped, so -1 is double all along."""
+    family2, _ = with_parameters(mathieu, 2, np.pi, orbit=[0.0, 0.0])
+    value = float(mathieu_b(1, 0.5))
+    start = BifurcationPoint(Kind.PERIOD_DOUBLING, value, 0.0, np.zeros(2), np.array([0.0, 1.0 + 0j]), -1.0 + 0j, 1.0)
+    curve = follow2(family2, start, ((0.0, 1.0), (0.3, 0.8)), second=0.5, step=0.3, longest=0.5, coefficients=False)
+    assert curve.endings == (CurveEnd.LEFT_BOX, CurveEnd.LEFT_BOX)
+    assert not curve.special
+    for point in curve.points:
+        a, q = point.values
+        assert abs(a - mathieu_b(1, q)) <= point.error_bound.sum() < 1e-9
+
+
+@numba.njit
+def mathieu(t, x):
+    return np.array([x[1], -(x[2] - 2.0 * x[3] * np.cos(2.0 * t)) * x[0], 0.0 * x[2], 0.0 * x[3]])
+
+
+@numba.njit
+def duffing(t, x):
+    """x'' + d x' + c x + x^3 = F cos(w t), in units of w t, with F, d, w and c behind."""
+    slope = -x[3] * x[1] - x[5] * x[0] - x[0] * x[0] * x[0] + x[2] * np.cos(t)
+    return np.array([x[1] / x[4], slope / x[4], 0.0 * x[2], 0.0 * x[3], 0.0 * x[4], 0.0 * x[5]])
+
+
+def test_cusp_of_the_forced_duffing_oscillator():
+    """Where the resonance of a hardening spring begins to fold over as its damping falls, w = 1.7.
+
+    Along the orbits at a damping, in the order of their speeds at time 0, F' and F'' vanish together there.
+    """
+    family2, extended = with_parameters(duffing, 2, 2.0 * np.pi, (1.7, 1.0))
+    located = locate(lambda force: family2(force, 0.6), (0.2, 1.8), orbit=[-0.1, 0.05], normal_form=False)
+    start = next(point for point in located if point.kind is Kind.FOLD)
+    curve = follow2(family2, start, ((0.05, 2.0), (0.1, 1.0)), second=0.6, rising=True, points=14, longest=0.2)
+    cusp = curve.special[0]
+    assert cusp.kind is CodimensionTwo.CUSP
+    assert (cusp.error_bound < 1e-8).all()
+
+    nodes = np.cos(np.pi * (np.arange(12) + 0.5) / 12)
+    x, speed = cusp.orbit
+
+    def forces(damping):
+        """F of the orbits with given speeds x'(0), as a series; unknown are x(0) and F."""
+        found = []
+        for node in nodes:
+            state = np.array([x, speed + 0.05 * node, cusp.values[0], damping, 1.7, 1.0])
+            for _ in range(6):
+                image, slope = extended.flow(state, 0.0, 2.0 * np.pi)
+                matrix = slope[:2, [0, 2]] - np.array([[1.0, 0.0], [0.0, 0.0]])
+                state[[0, 2]] += np.linalg.solve(matrix, (state - image)[:2])
+            found.append(state[2])
+        return np.polynomial.chebyshev.Chebyshev.fit(nodes, found, 11, domain=[-1, 1])
+
+    def flattest(series):
+        roots = series.deriv(2).roots()
+        return roots[np.abs(roots).argmin()].real
+
+    def least_slope(damping):
+        series = forces(damping)
+        return float(series.deriv(1)(flattest(series)))
+
+    damping = brentq(least_slope, cusp.values[1] - 0.01, cusp.values[1] + 0.01, xtol=1e-9)
+    assert damping == pytest.approx(cusp.values[1], abs=1e-7)
+    series = forces(damping)
+    assert series(flattest(series)) == pytest.approx(cusp.values[0], abs=1e-7)
+
+
+def test_folds_of_cycles_of_an_autonomous_system():
+    """r' = p - 0.1 + (q - 0.2) (r - 1) - (r - 1)^3 with the angle going round once in 2 pi."""
+    plain, _ = with_parameters(polar, 2, 1.0)
+
+    def family2(p, q):
+        return replace(
+            plain(p, q),
+            period=None,
+            velocity=lambda x: polar(0.0, np.append(x, [p, q]))[:2],
+            guess_period=2.0 * np.pi,
+        )
+
+    x = -np.sqrt(0.1 / 3.0)
+    start = BifurcationPoint(
+        Kind.FOLD, 0.1 + x**3 - 0.1 * x, 0.0, np.array([1.0 + x, 0.0]), np.array([1.0 + 0j, 0.0]), 1.0 + 0j, 0.0
+    )
+    curve = follow2(
+        family2, start, ((-0.1, 0.3), (-0.3, 0.7)), second=0.3, points=4, step=0.3, longest=0.4, rising=False
+    )
+    for point in curve.points:
+        p, q = point.values - [0.1, 0.2]
+        assert 27.0 * p**2 == pytest.approx(4.0 * q**3, abs=1e-11)
+    (cusp,) = curve.special
+    assert cusp.kind is CodimensionTwo.CUSP
+    assert (np.abs(cusp.values - [0.1, 0.2]) <= cusp.error_bound).all()
+    assert (cusp.error_bound < 1e-9).all()
+
+
+@numba.njit
+def polar(t, x):
+    r = np.sqrt(x[0] * x[0] + x[1] * x[1])
+    grown = (x[2] - 0.1 + (x[3] - 0.2) * (r - 1.0) - (r - 1.0) * (r - 1.0) * (r - 1.0)) / r
+    return np.array([grown * x[0] - x[1], grown * x[1] + x[0], 0.0 * x[2], 0.0 * x[3]])
+
+
+def test_pitchfork_of_the_half_period_map_to_a_known_one():
+    """The pitchfork at d = 0.2, known to twenty digits, reached along the curve from another damping."""
+    family2, _ = with_parameters(duffing, 2, 2.0 * np.pi, (1.0, 0.0), symmetry=-np.eye(2))
+    (start,) = locate(lambda force: family2(force, 0.22), (2.3, 2.7), orbit=[1.88, 0.64], normal_form=False)
+    curve = follow2(family2, start, ((2.0, 3.0), (0.2, 0.3)), second=0.22, rising=False, longest=0.2)
+    assert curve.kind is Kind.PITCHFORK
+    end = curve.points[-1]
+    assert end.values[1] == 0.2
+    assert abs(end.values[0] - 2.40337711605714358988) <= end.error_bound.sum() < 1e-10
+    np.testing.assert_allclose(end.orbit, [1.87793925257730701435, 0.63506905472679528861], atol=1e-11)
+    assert end.frequency == 0.0
+    assert end.coefficient < -end.coefficient_error
+
+
+def test_units_of_states_and_parameters_change_nothing():
+    """The same curve of folds with states in units of 1e-7 and 1e5, and a parameter in units of 1e6."""
+    units, thousand = np.array([1e-7, 1e5]), 1e6
+
+    def family2(a, b):
+        plain = area_changing(a / thousand, b)
+
+        def image(x):
+            state, jacobian = plain.flow(x / units, 0.0, 1.0)
+            return state * units, jacobian * units[:, None] / units
+
+        def flow_with_error(x, t0, t1):
+            return (*image(x), 1e-15 * np.outer(units, 1.0 / units))
+
+        return PeriodicSystem(
+            2,
+            1.0,
+            lambda x, t0, t1: image(x),
+            flow_with_error=flow_with_error,
+            flow_states=lambda states, t0, t1: np.array([image(x)[0] for x in states]),
+        )
+
+    x = np.full(2, -1.5 / 1.6)
+    start = BifurcationPoint(
+        Kind.FOLD, -(1.5**2) / 3.2 * thousand, 0.0, x * units, units.astype(complex), 1.0 + 0j, 0.0
+    )
+    curve = follow2(family2, start, ((-2.0 * thousand, thousand), (-2.0, 1.5)), second=0.5, longest=0.1)
+    a, b = curve.values.T
+    np.testing.assert_allclose(a / thousand, -((1.0 + b) ** 2) / 3.2, atol=1e-13)
+    assert kinds(curve) == [CodimensionTwo.FOLD_FLIP, CodimensionTwo.RESONANCE_1_1]
+    for point, values in zip(curve.special, [(0.0, -1.0), (-((16.0 / 9.0) ** 2) / 3.2, 7.0 / 9.0)], strict=True):
+        off = np.abs(point.values / [thousand, 1.0] - values)
+        bound = point.error_bound / [thousand, 1.0]
+        assert (off <= bound).all()
+        assert (bound < 1e-11).all()
