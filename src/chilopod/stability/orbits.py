@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,10 +30,15 @@ _ROUNDS = 30
 _ROUND_OFF = 4e-16
 _NOTHING = 1e-13  # of the sizes of the states around a guess: a state that small may be zero
 _SETTLED = 1e-10  # residual, of the sizes of the states, below which it may stop falling
+_RESTS = 1e-8  # of the sizes at the guess: a motion that short is none
 _RETURNED = 1e-12  # of a known orbit: it is exact
 _SINGULAR, _FAMILY = 1e-13, 1e-8  # singular values of H - 1 that count as zero, the largest being one
 _MAGNIFIED = 1e9  # move over residual beyond which H - 1 may be singular
 _KNOWN = 1e-4  # of a known orbit: it is one, if not to the last digit
+_SHOTS, _LONGEST_SHOT = 20, 4.0  # rounds, and guessed periods
+_FARTHEST_MOVE = 0.3  # of the sizes, and of how far the motion would go at its speed, in a move of Newton's method
+_FARTHEST_STRETCH = 0.3  # likewise of the period
+_CLOSED = 1e-6  # of the same: a motion that about closes
 _ONWARD = 0.382  # of the guessed return, where a guess is of no use
 _LONGEST_SETTLING = 300  # returns
 _BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
@@ -127,9 +133,9 @@ def find_orbit(
     except AnalysisError as failed:
         if not settle:
             raise
-        for settled, after in [*_onward(system, x), *_settled(system, x)]:
+        for nearer, after in _nearer(system, x):
             try:
-                return _newton(system, settled, with_error, after)
+                return _newton(system, nearer, with_error, after)
             except AnalysisError:
                 continue
         raise failed
@@ -178,6 +184,12 @@ def _newton(system: SystemLike, x: Array, with_error: bool, section: Section | N
         residual = image.state - x
         off = _relative(residual, size)
         if off <= _ROUND_OFF or (off <= _SETTLED and off >= 0.5 * best):
+            if image.velocity is not None and _relative(image.velocity * image.period / image.returns, size) <= _RESTS:
+                raise AnalysisError(
+                    "the motion rests in an equilibrium near the guess",
+                    field="orbit",
+                    allowed="a guess closer to an orbit",
+                )
             x, image = _cleared(system, x, image, size, section)
             return _found(system, x, image, with_error)
         if rounds > 4 and off > 10.0 * best:
@@ -267,6 +279,54 @@ def bounded(system: SystemLike, x: Array, image: ReturnMap, error: Array | None 
 def _matrix(error: float | Array, size: Array) -> Array:
     """The error of every entry of a derivative."""
     return error if isinstance(error, np.ndarray) else np.full((size.size, size.size), error)
+
+
+def _nearer(system: SystemLike, x: Array) -> Iterator[tuple[Array, Section | None]]:
+    """States nearer to an orbit than a guess, with sections across the motion."""
+    if is_autonomous(system):
+        shot = _shot(system, x)
+        if shot is not None:
+            yield shot
+    yield from _onward(system, x)
+    yield from _settled(system, x)
+
+
+def _shot(system: Autonomous, x: Array) -> tuple[Array, Section | None] | None:
+    """A state and a period at which the motion about closes, by Newton's method for both together, each move at right
+    angles to the motion (Seydel, *Practical Bifurcation and Stability Analysis*, 2010, section 7.1).
+
+    Unlike a return to a section it needs no motion that comes back from the guess: of an orbit with a strongly stable
+    direction only guesses on its stable manifold do.
+    """
+    count = returns_per_period(system)
+    turn = np.eye(x.size) if system.symmetry is None else system.symmetry
+    duration = system.guess_period / count
+    longest, best = _LONGEST_SHOT * duration, np.inf
+    try:
+        for _ in range(_SHOTS):
+            size = sizes(system, x, duration)
+            later, derivative = system.flow(x, 0.0, duration)
+            start = np.asarray(system.velocity(x)) * duration / size
+            end = turn @ np.asarray(system.velocity(later)) * duration / size
+            residual = (turn @ later - x) / size
+            moved = float(np.linalg.norm(start))
+            off = float(np.abs(residual).max())
+            if not off <= 2.0 * best or moved <= _SETTLED:
+                return None
+            if off <= _CLOSED * moved:
+                return x, section_at(system, x, size, duration)
+            best = min(best, off)
+            closing = (turn @ derivative) * size / size[:, None] - np.eye(x.size)
+            bordered = np.block([[closing, end[:, None]], [start[None] / moved, np.zeros((1, 1))]])
+            move = np.linalg.lstsq(bordered, np.append(-residual, 0.0), rcond=_SINGULAR)[0]
+            move *= min(1.0, _FARTHEST_MOVE * min(1.0, moved) / float(np.abs(move[:-1]).max(initial=0.0) or np.inf))
+            x = x + move[:-1] * size
+            duration *= 1.0 + float(np.clip(move[-1], -_FARTHEST_STRETCH, _FARTHEST_STRETCH))
+            if duration > longest:
+                return None
+    except (AnalysisError, np.linalg.LinAlgError):
+        return None
+    return None
 
 
 def _onward(system: SystemLike, x: Array) -> list[tuple[Array, Section | None]]:

@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 _FIRST_STEPS = 8
 _SHORTEST = 2.0**-10  # step of an orbit that is followed, relative to the first
 _KEPT = 64  # systems: around a point the same one is asked for again and again
+_BEFORE = 1e-6  # of the interval: so far from a fold other crossings are looked for
+_AT_REST = 0.03  # of the motion of the first orbit
+_PARTS = 5  # of a return, to see how far the motion goes
 _JUMP = 0.3  # of the orbit between prediction and correction, relative to its size
 
 
@@ -151,10 +154,32 @@ class Samples:
                 fold = find_fold(self.family, last.value, last.orbit, high - low)
                 if fold is not None and not self._ends_in(last, fold):
                     fold = None
+                here = last if fold is None else Sample(fold.value, fold.image.state, fold.image)
+                if self._at_rest(here):
+                    self.ending = f"the orbit shrinks into an equilibrium near {here.value:.9g}: a Hopf point"
+                    return last.value, None
                 if fold is None:
                     self.ending = f"the orbit cannot be followed beyond {last.value:.9g}"
-                return last.value, fold if fold is not None and low <= fold.value <= high else None
+                if fold is None or not low <= fold.value <= high:
+                    return last.value, None
+                # In the fold itself multipliers move as a root of the distance, which no search sees through.
+                return max(low, min(last.value, fold.value - _BEFORE * (high - low))), fold
         return high, None
+
+    def _at_rest(self, last: Sample) -> bool:
+        """Whether hardly anything of the motion is left where an orbit ends: beyond there is none, and what looks like
+        a fold is the same orbit again, half a period later."""
+        if self._timed:
+            return False
+        first = self._moved(self.family(self.low), self.first.image)
+        return self._moved(self.family(last.value), last.image) < _AT_REST * first
+
+    def _moved(self, system: SystemLike, image: ReturnMap) -> float:
+        """How far the motion goes within a return, relative to the sizes of the states."""
+        path = [image.state]
+        for _ in range(_PARTS - 1):
+            path.append(system.flow(path[-1], 0.0, image.period / image.returns / _PARTS)[0])
+        return float((np.ptp(np.array(path), axis=0) / self._size).max())
 
     def _follow(self, behind: list[Sample], value: float) -> list[Sample]:
         """Samples from the last one behind to ``value``, by smaller steps where Newton's method does not carry that

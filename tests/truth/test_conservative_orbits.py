@@ -1,0 +1,84 @@
+"""Orbits of systems that conserve an energy: they come in families, with a multiplier 1 besides that of the motion."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.special import ellipk
+
+from chilopod.stability import exponents, from_rhs, locate, multipliers
+from chilopod.stability.unit_circle.crossings import Status
+
+
+def pendulum(guess_period, length=1.0, time=1.0):
+    def rhs(t, x):
+        return [x[1] / time, -np.sin(x[0] / length) * length / time]
+
+    return from_rhs(rhs, 2, None, guess_period=guess_period)
+
+
+def period_of(swing):
+    return 4.0 * float(ellipk(np.sin(swing / 2.0) ** 2))
+
+
+@pytest.mark.parametrize(("length", "time"), [(1.0, 1.0), (1e9, 1e-6), (1e-9, 1e6)])
+@pytest.mark.parametrize("swing", [0.01, 0.5, 2.0, 3.0])
+def test_pendulum(swing, length, time):
+    """The multiplier 1 is double and defective: the period depends on the swing."""
+    found = multipliers(pendulum(1.01 * period_of(swing) * time, length, time), [swing * length, 0.0])
+    angle, speed = found.orbit / length
+    swung = np.arccos(np.cos(angle) - 0.5 * speed**2)
+    assert found.period / time == pytest.approx(period_of(swung), rel=1e-11)
+    assert abs(found.values[0] - 1.0) <= found.error_bound < 1e-3
+    assert not found.stable
+
+
+def test_exponent_of_the_pendulum():
+    found = exponents(pendulum(8.4), [2.0, 0.0])
+    np.testing.assert_allclose(found.values, [0.0], atol=1e-10)
+
+
+def henon_heiles(guess_period, strength=1.0, units=(1.0, 1.0)):
+    length, time = units
+
+    def rhs(t, s, strength):
+        x, y, u, v = s[0] / length, s[1] / length, s[2] / length, s[3] / length
+        forces = [-x - 2.0 * strength * x * y, -y - strength * (x * x - y * y)]
+        return [u * length / time, v * length / time, forces[0] * length / time, forces[1] * length / time]
+
+    return from_rhs(rhs, 4, None, args=(strength,), guess_period=guess_period * time)
+
+
+@pytest.mark.parametrize("units", [(1.0, 1.0), (1e9, 1e-6), (1e-9, 1e6)])
+@pytest.mark.parametrize("height", [0.2, 0.4, 0.7, 0.95])
+def test_henon_heiles_on_its_axis(height, units):
+    """y'' = -y + y^2 alone, and across it Hill's equation x'' = -(1 + 2 y) x, whose trace is found by scipy."""
+    length, time = units
+    found = multipliers(henon_heiles(6.5 if height < 0.5 else 8.0, units=units), [0.0, height * length, 0.0, 0.0])
+    start = found.orbit / length
+    np.testing.assert_allclose(start[[0, 2]], 0.0, atol=1e-9)
+
+    def with_hill(t, s):
+        y, v, *hill = s
+        x, u = np.array(hill[:2]), np.array(hill[2:])
+        return [v, -y + y * y, *u, *(-(1.0 + 2.0 * y) * x)]
+
+    period = found.period / time
+    end = solve_ivp(
+        with_hill, (0.0, period), [start[1], start[3], 1.0, 0.0, 0.0, 1.0], "DOP853", rtol=1e-12, atol=1e-13
+    )
+    np.testing.assert_allclose(end.y[:2, -1], start[[1, 3]], atol=1e-8)
+    trace = end.y[2, -1] + end.y[5, -1]
+    # Without that of the motion: 1, for the energy, and the pair across.
+    assert found.values.sum().real == pytest.approx(1.0 + trace, abs=1e-7)
+    assert np.abs(found.values - 1.0).min() <= found.error_bound < 1e-6
+    assert not found.stable
+
+
+def test_searches_end():
+    """Stronger and stronger coupling is the same orbit at higher energies."""
+    found = locate(
+        lambda strength: henon_heiles(6.5, strength), (0.5, 1.5), orbit=[0.0, 0.4, 0.0, 0.0], normal_form=False
+    )
+    assert found.status is Status.CONSERVATIVE
+    assert len(found) == 0
+    assert any("+1 throughout" in remark for remark in found.remarks)
