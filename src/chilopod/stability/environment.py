@@ -33,7 +33,7 @@ def python_function(value: Any) -> Any:
 
 
 def _own(value: Any) -> bool:
-    return isinstance(value, types.FunctionType) and value.__module__.partition(".")[0] not in _OUTSIDE
+    return isinstance(value, types.FunctionType) and (value.__module__ or "").partition(".")[0] not in _OUTSIDE
 
 
 @functools.lru_cache(maxsize=1024)
@@ -88,7 +88,7 @@ def describe(value: Any, floats: list[float], seen: dict[int, int]) -> Any:
     if isinstance(value, functools.partial):
         return "partial", *(describe(part, floats, seen) for part in (value.func, value.args, value.keywords))
     if isinstance(value, types.MethodType | types.ModuleType | types.BuiltinFunctionType | type | np.ufunc) or (
-        callable(value) and getattr(value, "__module__", "").partition(".")[0] in _OUTSIDE
+        callable(value) and (getattr(value, "__module__", None) or "").partition(".")[0] in _OUTSIDE
     ):
         if isinstance(value, types.MethodType):
             raise Opaque
