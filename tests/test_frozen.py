@@ -16,8 +16,8 @@ from chilopod.planar import PlanarModel
 from chilopod.planar.along import FollowedModel, walk_means
 from chilopod.planar.flow import advance
 from chilopod.robot import load_robot
+from chilopod.stability.branches.fold import find_fold
 from chilopod.stability.floquet import spectrum
-from chilopod.stability.fold import find_fold
 from chilopod.stability.orbits import find_orbit
 from chilopod.steering.criteria import Criteria, Outcome
 from chilopod.steering.radius_law import RadiusLaw

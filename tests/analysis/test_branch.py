@@ -12,8 +12,8 @@ from chilopod.planar import PlanarModel
 from chilopod.planar.along import walk_means
 from chilopod.report import write_branch
 from chilopod.robot import load_robot
-from chilopod.stability.branch_points import BranchPoint
-from chilopod.stability.curve import Curve
+from chilopod.stability.branches.branch_points import BranchPoint
+from chilopod.stability.branches.curve import Curve
 from chilopod.stability.returns import whole_period
 
 ROBOT = load_robot("aoi2022-planar")

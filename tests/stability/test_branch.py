@@ -5,7 +5,7 @@ import pytest
 
 from chilopod.errors import ParameterError
 from chilopod.stability import Kind, PeriodicSystem, from_rhs, locate
-from chilopod.stability.branch import Ending, begin, follow, proceed, switch
+from chilopod.stability.branches.branch import Ending, begin, follow, proceed, switch
 
 PERIOD = 2.0
 

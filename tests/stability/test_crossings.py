@@ -8,8 +8,8 @@ from scipy.optimize import brentq
 from scipy.special import mathieu_a, mathieu_b
 
 from chilopod.errors import ParameterError
-from chilopod.stability.crossings import Status, find_crossings
-from chilopod.stability.spectra import Event
+from chilopod.stability.unit_circle.crossings import Status, find_crossings
+from chilopod.stability.unit_circle.spectra import Event
 
 MINUS, PLUS, PAIR = Event.MINUS, Event.PLUS, Event.PAIR
 

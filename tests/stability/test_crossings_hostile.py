@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chilopod.errors import AnalysisError
-from chilopod.stability.crossings import Status, find_crossings
+from chilopod.stability.unit_circle.crossings import Status, find_crossings
 
 BUDGET = 600
 HARM = ("rough", "jumps", "holes", "noise", "refused", "spike", "constant", "ever faster", "infinite", "flat", "huge")

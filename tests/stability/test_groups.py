@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.stability.equivariants import Critical, SymmetricKind, Wave, symmetric_crossing
-from chilopod.stability.groups import centraliser, commutes, finite_group, isotropy
-from chilopod.stability.isotypic import Type, isotypic, reduced_matrices
+from chilopod.stability.symmetry.equivariants import Critical, SymmetricKind, Wave, symmetric_crossing
+from chilopod.stability.symmetry.groups import centraliser, commutes, finite_group, isotropy
+from chilopod.stability.symmetry.isotypic import Type, isotypic, reduced_matrices
 
 
 def permutation(*images):

@@ -5,9 +5,9 @@ import pytest
 
 from chilopod.errors import AnalysisError
 from chilopod.stability import Kind
-from chilopod.stability.amplitude import Status
-from chilopod.stability.center_manifold import CriticalOrbit
-from chilopod.stability.normal_form import normal_form
+from chilopod.stability.normal_forms.amplitude import Status
+from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
+from chilopod.stability.normal_forms.normal_form import normal_form
 from chilopod.stability.points import criticality, kind_at_plus_one
 
 

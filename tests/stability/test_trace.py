@@ -11,9 +11,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from chilopod.stability.evaluation import evaluate, evaluate_jacobian
-from chilopod.stability.trace import trace
-from chilopod.stability.traced import Untraceable
+from chilopod.stability.taylor.evaluation import evaluate, evaluate_jacobian
+from chilopod.stability.taylor.trace import trace
+from chilopod.stability.taylor.traced import Untraceable
 
 STIFFNESS = 1.7
 MATRIX = np.array([[0.0, 1.0, 0.5], [-1.0, 0.0, 0.2], [0.3, 0.1, -0.4]])

@@ -7,7 +7,7 @@ import pytest
 
 from chilopod.errors import ParameterError
 from chilopod.stability import BifurcationPoint, CodimensionTwo, CurveEnd, Kind, PeriodicSystem, detection, follow2
-from chilopod.stability.amplitude import Status
+from chilopod.stability.normal_forms.amplitude import Status
 
 BOX = ((-2.0, 2.0), (-2.0, 2.0))
 

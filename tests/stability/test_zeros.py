@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 from scipy.special import jn_zeros, jv
 
-from chilopod.stability.zeros import find_zeros, signed_log
+from chilopod.stability.unit_circle.zeros import find_zeros, signed_log
 
 
 def zeros(function, low, high):

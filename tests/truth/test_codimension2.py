@@ -347,7 +347,6 @@ def test_folds_of_cycles_of_an_autonomous_system():
             period=None,
             velocity=lambda x: polar(0.0, np.append(x, [p, q]))[:2],
             guess_period=2.0 * np.pi,
-            flow_with_error=None,
         )
 
     x = -np.sqrt(0.1 / 3.0)

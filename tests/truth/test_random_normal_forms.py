@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from chilopod.stability.amplitude import Status
-from chilopod.stability.center_manifold import CriticalOrbit
-from chilopod.stability.normal_form import normal_form
+from chilopod.stability.normal_forms.amplitude import Status
+from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
+from chilopod.stability.normal_forms.normal_form import normal_form
 
 CASES = 60
 SHEARS = 3

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from chilopod.stability.equivariants import Critical, SymmetricKind, symmetric_crossing
-from chilopod.stability.groups import commutes, finite_group
-from chilopod.stability.isotypic import Type, isotypic, reduced_matrices
+from chilopod.stability.symmetry.equivariants import Critical, SymmetricKind, symmetric_crossing
+from chilopod.stability.symmetry.groups import commutes, finite_group
+from chilopod.stability.symmetry.isotypic import Type, isotypic, reduced_matrices
 
 
 def ring_group(cells, states, mirrored, scales):

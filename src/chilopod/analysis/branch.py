@@ -21,7 +21,7 @@ from chilopod.planar.along import FollowedModel, walk_means
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import Branch, BranchPoint, Criticality, Ending, Kind, follow, proceed, switch
-from chilopod.stability.branch import LONGEST
+from chilopod.stability.branches.branch import LONGEST
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@
 False
 """
 
-from chilopod.stability.branch import Branch, BranchPoint, Ending, Start, begin, follow, proceed, switch
+from chilopod.stability.branches.branch import Branch, BranchPoint, Ending, Start, begin, follow, proceed, switch
 from chilopod.stability.called import NotAnalytic
 from chilopod.stability.capabilities import (
     Autonomous,
@@ -22,8 +22,9 @@ from chilopod.stability.capabilities import (
     Switches,
     SystemLike,
 )
-from chilopod.stability.codimension2 import Codimension2, CodimensionTwo
-from chilopod.stability.curve2 import Curve2, CurveEnd, Point2
+from chilopod.stability.codimension_two.codimension2 import Codimension2, CodimensionTwo
+from chilopod.stability.codimension_two.curve2 import Curve2, CurveEnd, Point2
+from chilopod.stability.codimension_two.two_parameters import follow2
 from chilopod.stability.events import Event
 from chilopod.stability.floquet import Exponents, Multipliers, exponents, multipliers, sweep
 from chilopod.stability.jumps import UndeclaredSwitch
@@ -33,7 +34,6 @@ from chilopod.stability.points import BifurcationPoint, Criticality, Kind
 from chilopod.stability.returns import ReturnMap
 from chilopod.stability.rhs import from_rhs
 from chilopod.stability.system import PeriodicSystem
-from chilopod.stability.two_parameters import follow2
 
 __all__ = [
     "Autonomous",

@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 
 from chilopod.errors import AnalysisError
 from chilopod.stability.jumps import UndeclaredSwitch
-from chilopod.stability.taylor import pieces
+from chilopod.stability.taylor.taylor import pieces
 
 Array = NDArray[np.float64]
 Parts = list[tuple[float, float]]

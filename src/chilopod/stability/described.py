@@ -8,21 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.stability.center_manifold import CriticalOrbit
-from chilopod.stability.crossings import Crossing
-from chilopod.stability.equivariants import Critical, SymmetricCrossing, symmetric_crossing
+from chilopod.stability.branches.fold import Fold
 from chilopod.stability.floquet import Spectrum, phased, spectrum
-from chilopod.stability.fold import Fold
-from chilopod.stability.isotypic import Block
-from chilopod.stability.normal_form import NormalForm
-from chilopod.stability.normal_form import normal_form as normal_form_of
+from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
+from chilopod.stability.normal_forms.normal_form import NormalForm
+from chilopod.stability.normal_forms.normal_form import normal_form as normal_form_of
 from chilopod.stability.orbits import Orbit, bounded, from_known
 from chilopod.stability.points import BifurcationPoint, Kind, kind_at_plus_one, with_coefficients
 from chilopod.stability.returns import returned_states
 from chilopod.stability.samples import Samples
 from chilopod.stability.scales import sizes
 from chilopod.stability.singular import past_singular
-from chilopod.stability.spectra import Event
+from chilopod.stability.symmetry.equivariants import Critical, SymmetricCrossing, symmetric_crossing
+from chilopod.stability.symmetry.isotypic import Block
+from chilopod.stability.unit_circle.crossings import Crossing
+from chilopod.stability.unit_circle.spectra import Event
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

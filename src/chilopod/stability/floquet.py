@@ -14,7 +14,7 @@ from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.capabilities import SystemLike, is_autonomous
 from chilopod.stability.orbits import Orbit, find_orbit, from_known, known_state
 from chilopod.stability.returns import ReturnMap, return_maps
-from chilopod.stability.scales import numerical_balance
+from chilopod.stability.scales import numerical_balance, sizes
 from chilopod.stability.splitting import split_product
 
 Array = NDArray[np.float64]
@@ -261,8 +261,9 @@ def _factors(system: SystemLike, orbit: Orbit) -> tuple[list[Array], Array]:
     Of a system that does not depend on time, the derivatives between sections across the motion.
     """
     x, image = orbit.state, orbit.image
-    units = numerical_balance(image.jacobian)
     duration = image.period / image.returns
+    # The derivative on a section may be nothing but round-off; an orbit that moves has sizes of its own.
+    units = sizes(system, x, duration) if is_autonomous(system) else numerical_balance(image.jacobian)
     count = _FEWEST_FACTORS
     while True:
         times = np.linspace(0.0, duration, count + 1)

@@ -12,15 +12,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import ParameterError
 from chilopod.stability.capabilities import Family, SystemLike, spatial_symmetries
-from chilopod.stability.crossings import Crossings, Status, find_crossings
 from chilopod.stability.described import describe, fold_point
-from chilopod.stability.groups import centraliser, commutes, finite_group, isotropy
-from chilopod.stability.isotypic import Block, Type, isotypic
 from chilopod.stability.orbits import Orbit
 from chilopod.stability.points import BifurcationPoint
 from chilopod.stability.returns import ReturnMap
 from chilopod.stability.samples import Samples
 from chilopod.stability.scales import numerical_balance
+from chilopod.stability.symmetry.groups import centraliser, commutes, finite_group, isotropy
+from chilopod.stability.symmetry.isotypic import Block, Type, isotypic
+from chilopod.stability.unit_circle.crossings import Crossings, Status, find_crossings
 
 Array = NDArray[np.float64]
 
@@ -180,7 +180,8 @@ def _blocks(system: SystemLike, orbit: Orbit) -> tuple[tuple[Block | None, ...],
 
 def _relative(image: ReturnMap) -> float:
     """Error of the derivative, of its largest entry, the states being in units that balance it."""
-    units = numerical_balance(image.jacobian)
+    # An entry that is nothing but round-off says nothing of the units.
+    units = numerical_balance(np.abs(image.jacobian) + np.nan_to_num(image.error))
     largest = float(np.abs(image.jacobian * units / units[:, None]).max())
     if not largest > 0.0:
         return _LEAST_ERROR

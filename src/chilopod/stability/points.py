@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.amplitude import Status
-from chilopod.stability.equivariants import SymmetricCrossing
-from chilopod.stability.normal_form import NormalForm
+from chilopod.stability.normal_forms.amplitude import Status
+from chilopod.stability.normal_forms.normal_form import NormalForm
+from chilopod.stability.symmetry.equivariants import SymmetricCrossing
 
 Array = NDArray[np.float64]
 

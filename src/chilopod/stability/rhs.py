@@ -21,13 +21,13 @@ from chilopod.stability.arguments import (
 )
 from chilopod.stability.called import CalledFlow
 from chilopod.stability.capabilities import spatial_symmetries
-from chilopod.stability.evaluation import evaluate, evaluate_jacobian
 from chilopod.stability.events import Event, checked_events
 from chilopod.stability.jumps import fast_parts, warn_of_jumps
 from chilopod.stability.system import PeriodicSystem
-from chilopod.stability.taylor import TaylorFlow
-from chilopod.stability.trace import Trace, trace
-from chilopod.stability.traced import Untraceable
+from chilopod.stability.taylor.evaluation import evaluate, evaluate_jacobian
+from chilopod.stability.taylor.taylor import TaylorFlow
+from chilopod.stability.taylor.trace import Trace, trace
+from chilopod.stability.taylor.traced import Untraceable
 
 Array = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.branches.fold import Fold, find_fold
 from chilopod.stability.capabilities import Family, SystemLike, is_autonomous
-from chilopod.stability.fold import Fold, find_fold
 from chilopod.stability.orbits import find_orbit, from_known, known_state
 from chilopod.stability.returns import ReturnMap, return_maps, section_at
 from chilopod.stability.scales import sizes

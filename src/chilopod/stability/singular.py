@@ -9,11 +9,11 @@ from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.stability.crossings import Crossing
 from chilopod.stability.floquet import spectrum
 from chilopod.stability.orbits import Orbit, bounded
 from chilopod.stability.samples import Sample, Samples
-from chilopod.stability.spectra import Event
+from chilopod.stability.unit_circle.crossings import Crossing
+from chilopod.stability.unit_circle.spectra import Event
 
 Array = NDArray[np.float64]
 

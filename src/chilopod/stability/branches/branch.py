@@ -1,0 +1,396 @@
+"""Branches of periodic orbits: pseudo-arclength continuation in one parameter, with what happens along the way.
+
+A branch is a curve of pairs (orbit, parameter) with H(x, p) = x. It is followed by its arclength, so that folds are
+ordinary points of it (see :mod:`.curve`). Every step is looked into for what happens in it (see
+:mod:`.inspection`). A branch can be followed in pieces: what it ends with is all that the next step
+depends on.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chilopod.errors import AnalysisError, ChilopodError, ParameterError
+from chilopod.stability.branches.branch_points import Anchor, BranchPoint, Step
+from chilopod.stability.branches.branch_starts import Start, anchored, begin, branch_sizes, switch
+from chilopod.stability.branches.closure import closes
+from chilopod.stability.branches.curve import PRECISION, Curve, OutsideIntervalError
+from chilopod.stability.branches.inspection import Found, inspect
+from chilopod.stability.capabilities import Family
+from chilopod.stability.orbits import Orbit
+from chilopod.stability.points import BifurcationPoint
+
+__all__ = ["Branch", "BranchPoint", "Ending", "Start", "begin", "follow", "proceed", "switch"]
+
+Array = NDArray[np.float64]
+
+LONGEST = 0.15
+"""Largest step along a curve by default, in units of the states' sizes and of the branch's scale."""
+
+BUDGET = 200_000
+"""Flows that a branch may ask for by default."""
+
+_SHORTEST = 1e-5  # step at which a curve is lost, relative to the longest
+_FEW, _MANY = 4, 7  # corrections after which steps grow, and shrink
+_STRAIGHT = 0.7  # cosine between a step and the tangent where it starts
+_SURPRISE = 0.3  # of a step: predicted worse than that, it is held against half of it
+_AWAY = 0.1  # of a step
+_OVER = 2.0  # of a step that has to end on the interval's end: as long as that at most
+_NARROWEST = 1e-9  # width of an interval, relative to the values in it
+
+Progress = Callable[[int, BranchPoint], None]
+
+
+def _silent(count: int, point: BranchPoint) -> None:
+    """A :data:`Progress` that shows nothing."""
+
+
+class Ending(enum.Enum):
+    """Why a branch ends where it does; each member's ``sentence`` says it in words."""
+
+    LEFT_INTERVAL = "left the interval", "the parameter reached an end of the interval"
+    ENOUGH_POINTS = "enough points", "as many points as were asked for"
+    CLOSED = "closed", "the curve came back to where it started"
+    BUDGET = "budget", "as many flows as were allowed were spent"
+    LOST = "lost", "the step became too small: the curve could not be followed further"
+
+    def __init__(self, label: str, sentence: str) -> None:
+        self.label = label
+        self.sentence = sentence
+
+
+@dataclass(frozen=True)
+class Branch:
+    """A followed branch.
+
+    Attributes
+    ----------
+    points
+        Along the curve, special points among them.
+    ending
+        Why it ends.
+    step
+        Along the curve, with which it goes on.
+    periods
+        How many periods of the systems its orbits take.
+    symmetric
+        Whether it stays among the orbits with the systems' symmetry in time.
+    reason
+        What stood in the way, if the curve was lost.
+    remarks
+        What could not be made out on the way, a sentence each.
+    """
+
+    points: tuple[BranchPoint, ...]
+    ending: Ending
+    step: float
+    periods: int = 1
+    symmetric: bool = False
+    reason: str = ""
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def units(self) -> Array:
+        """Sizes of the states and scale of the parameter along the curve, shape (n+1,)."""
+        units = self.points[0].units
+        return np.ones(self.points[0].tangent.size) if units is None else units
+
+    @property
+    def sizes(self) -> Array:
+        """Sizes of the states along the curve, shape (n,): tangents have them in these units."""
+        return self.units[:-1]
+
+    @property
+    def scale(self) -> float:
+        """Of the parameter along the curve: tangents have it in this unit."""
+        return float(self.units[-1])
+
+    @property
+    def special_points(self) -> tuple[BranchPoint, ...]:
+        """Folds and secondary bifurcations."""
+        return tuple(point for point in self.points if point.special is not None)
+
+
+def follow(
+    family: Family,
+    start: Start | BranchPoint | Orbit | ArrayLike,
+    between: tuple[float, float],
+    *,
+    points: int = 100,
+    step: float = 0.02,
+    longest: float = LONGEST,
+    closely: bool = True,
+    precision: float = PRECISION,
+    symmetric: bool = False,
+    budget: int = BUDGET,
+    progress: Progress = _silent,
+) -> Branch:
+    """Follow a branch from a point along its tangent.
+
+    Parameters
+    ----------
+    family
+        ``family(value)`` is the system.
+    start
+        From :func:`begin` or :func:`switch`; or a point of another branch; or an orbit, or a guess of one, at the lower
+        end of the interval.
+    between
+        Interval of the parameter; the branch ends where it reaches an end of it, and the family is asked for no value
+        outside. Its width becomes the branch's scale.
+    points
+        At most so many ordinary points.
+    step, longest
+        First and largest step along the curve, in units of the states' sizes and of the scale.
+    closely
+        Whether to look at the multipliers at nine places within every step, a flow each; otherwise only where the ends
+        of a step tell that something happens.
+    precision
+        How closely orbits are solved for, of the sizes of the states: as good as the flow is at best.
+    symmetric
+        Whether to stay among the orbits that have the systems' symmetry in time. By default the full period is used
+        even where there is such a symmetry, for the orbits of interest have lost it.
+    budget
+        At most so many flows.
+    progress
+        Called with the number of points and the newest one.
+
+    Raises
+    ------
+    ParameterError
+        If the interval is no interval, or ``points`` or a step is not positive; or if ``start`` is a bifurcation point,
+        which :func:`switch` is for.
+    AnalysisError
+        If there is no orbit to start with.
+    """
+    low, high = _checked(between, points, longest)
+    if not step > 0:
+        raise ParameterError("must be positive", field="step", value=step)
+    curve = Curve(family, high - low, between=between, symmetric=symmetric, precision=precision, budget=budget)
+    anchor = _anchored(family, curve, start, low, step)
+    return _followed(
+        curve, Branch((anchor.last,), Ending.ENOUGH_POINTS, step, curve.periods, symmetric), anchor, points, longest,
+        closely, progress,
+    )  # fmt: skip
+
+
+def proceed(
+    family: Family,
+    branch: Branch,
+    between: tuple[float, float],
+    *,
+    points: int = 100,
+    longest: float = LONGEST,
+    closely: bool = True,
+    precision: float = PRECISION,
+    budget: int = BUDGET,
+    progress: Progress = _silent,
+) -> Branch:
+    """Follow a branch on from where it ends; in pieces it has the same points as in one.
+
+    Parameters
+    ----------
+    family, points, longest, closely, precision, budget, progress
+        As for :func:`follow`; ``points`` are those that are added.
+    branch
+        From :func:`follow` or from here.
+    between
+        Interval of the parameter, which may have become another one; the branch keeps its units.
+
+    Returns
+    -------
+    The branch as it was with the new points behind.
+
+    Raises
+    ------
+    ParameterError
+        As :func:`follow`, and if the branch leaves the interval where it ends.
+    """
+    low, high = _checked(between, points, longest)
+    end = branch.points[-1]
+    if not low <= end.value <= high or _outward(end, between):
+        raise ParameterError(
+            "does not go on beyond the branch's last point", field="between", value=between,
+            allowed=f"{end.value!r} well within",
+        )  # fmt: skip
+    curve = Curve(
+        family,
+        branch.scale,
+        branch.sizes,
+        between=between,
+        periods=branch.periods,
+        symmetric=branch.symmetric,
+        precision=precision,
+        budget=budget,
+    )
+    first = branch.points[0]
+    last, *earlier = [point for point in reversed(branch.points) if point.special is None or point is first]
+    leaving = last.special is not None
+    # At a point where branches meet the matrix is singular, so it is taken a step ahead.
+    ahead = branch.step if leaving else 0.0
+    anchor = curve.anchor(last, earlier[0] if earlier else None, ahead, leaving)
+    return _followed(curve, branch, anchor, points, longest, closely, progress)
+
+
+def _checked(between: tuple[float, float], points: int, longest: float) -> tuple[float, float]:
+    low, high = between
+    if not (np.isfinite(low) and np.isfinite(high) and low < high and np.isfinite(high - low)):
+        raise ParameterError("must rise from a lower to a higher finite value", field="between", value=between)
+    if not high - low > _NARROWEST * max(abs(low), abs(high)) + 1e9 * np.finfo(float).smallest_subnormal:
+        raise ParameterError("is too narrow for the numbers in it", field="between", value=between)
+    for name, value in (("points", points), ("longest", longest)):
+        if not value > 0:
+            raise ParameterError("must be positive", field=name, value=value)
+    return float(low), float(high)
+
+
+def _anchored(
+    family: Family, curve: Curve, start: Start | BranchPoint | Orbit | ArrayLike, low: float, step: float
+) -> Anchor:
+    """Where the first step starts; the curve gets the sizes of its states."""
+    if isinstance(start, BifurcationPoint):
+        raise ParameterError(
+            "is a bifurcation point", field="start", value=start.kind.label, allowed="what switch(family, point) gives"
+        )
+    if isinstance(start, Orbit):
+        start = begin(family, low, start.state, symmetric=curve.symmetric)
+    elif not isinstance(start, Start | BranchPoint):
+        start = begin(family, low, start, symmetric=curve.symmetric)
+    if not curve.between[0] <= start.value <= curve.between[1]:
+        raise ParameterError("does not hold the start", field="between", value=curve.between, allowed=f"{start.value}")
+    if isinstance(start, Start):
+        curve.periods = start.periods
+        section = curve.section_at(start.orbit, start.value, start.period)
+        curve.sizes = branch_sizes(curve, start.orbit, start.value, section)
+        return anchored(curve, start, step)
+    section = curve.section_at(start.orbit, start.value, start.period)
+    curve.sizes = branch_sizes(curve, start.orbit, start.value, section)
+    units = curve.units(start.orbit.size)
+    tangent = start.tangent * (1.0 if start.units is None else start.units) / units
+    return curve.anchor(replace(start, tangent=tangent / np.linalg.norm(tangent), units=units, special=None))
+
+
+def _outward(point: BranchPoint, between: tuple[float, float]) -> bool:
+    """Whether a curve leaves the interval where it is."""
+    ahead = float(point.tangent[-1])
+    return bool((point.value <= between[0] and ahead < 0.0) or (point.value >= between[1] and ahead > 0.0))
+
+
+def _followed(
+    curve: Curve, branch: Branch, anchor: Anchor, points: int, longest: float, closely: bool, progress: Progress
+) -> Branch:
+    size, found, remarks = branch.step, list(branch.points), list(branch.remarks)
+
+    def ended(ending: Ending, reason: str = "") -> Branch:
+        kept = tuple(dict.fromkeys(remarks))
+        return replace(branch, points=tuple(found), ending=ending, step=size, reason=reason, remarks=kept)
+
+    _take_error(curve, found)
+    if _outward(found[-1], curve.between):
+        return ended(Ending.LEFT_INTERVAL)
+    for count in range(1, points + 1):
+        shortened = False
+        while True:
+            if curve.left <= 0:
+                return ended(Ending.BUDGET)
+            try:
+                step, left = _taken(curve, anchor, size)
+                what, closed = inspect(curve, step, closely), None
+                if count > 2 and not left:
+                    closed = closes(curve, found[0], step)
+                break
+            except ChilopodError as error:
+                # A parameter may also step out of what the system can have.
+                if not isinstance(error, AnalysisError | ParameterError):
+                    raise
+                size, shortened = 0.5 * size, True
+                if size < _SHORTEST * longest:
+                    return ended(Ending.LOST, str(error))
+        if closed is not None:
+            what = Found(tuple(p for p in what.points if _before(p, closed, step)), what.remarks)
+            step = closed
+        found += [*what.points, step.end.last]
+        remarks += what.remarks
+        anchor = step.end
+        if not shortened:  # or an edge of what the system can have would be met again at once
+            size *= 1.5 if step.corrections <= _FEW else 1.0 if step.corrections <= _MANY else 0.6
+        size = min(longest, size)
+        if curve.relative_error is None:
+            _take_error(curve, found)
+            found[-1] = replace(found[-1], error_bound=curve.multipliers(step.image)[1])
+            anchor = replace(anchor, last=found[-1])
+        progress(count, found[-1])
+        if closed is not None:
+            return ended(Ending.CLOSED)
+        if left:
+            return ended(Ending.LEFT_INTERVAL)
+    return ended(Ending.ENOUGH_POINTS)
+
+
+def _before(point: BranchPoint, closed: Step, step: Step) -> bool:
+    """Whether a special point within a step comes before the place where the curve closes."""
+    start = step.start.last
+    assert start.units is not None
+    moved = np.append(point.orbit - start.orbit, point.value - start.value) / start.units
+    return float(start.tangent @ moved) <= closed.size
+
+
+def _take_error(curve: Curve, found: list[BranchPoint]) -> None:
+    """The error of the flow, at the first point that is not special."""
+    point = next((point for point in found if point.special is None), None)
+    if point is None or curve.relative_error is not None:
+        return
+    try:
+        image = curve.image(point.orbit, point.value, curve.section(point), with_error=True)
+    except ChilopodError:
+        return
+    sizes = curve.units(point.orbit.size)[:-1]
+    wrong = image.error * sizes / sizes[:, None] if isinstance(image.error, np.ndarray) else image.error
+    size = float(np.linalg.norm(image.jacobian * sizes / sizes[:, None]))
+    curve.relative_error = float(np.max(wrong)) / size if size > 0.0 else 0.0
+
+
+def _taken(curve: Curve, anchor: Anchor, size: float) -> tuple[Step, bool]:
+    """A step of a size, or a shorter one to the end of the interval, and whether it is that."""
+    last = anchor.last
+    guess, matrix = curve.predicted(anchor, size)
+    low, high = ((end - last.value) / curve.scale for end in curve.between)
+    left = not low <= guess[-1] <= high
+    step: Step | None = None
+    if not left:
+        try:
+            step = curve.step(anchor, size)
+        except OutsideIntervalError:
+            left = True
+    if step is None:
+        end = curve.between[0] if abs(guess[-1] - low) < abs(guess[-1] - high) else curve.between[1]
+        target = (end - last.value) / curve.scale
+        place = _reaches(curve, anchor, size, target)
+        guess, matrix = curve.predicted(anchor, place)
+        guess[-1] = target
+        step = curve.to_value(anchor, end, guess, matrix)
+        if not 0.0 < step.size <= _OVER * size:
+            raise AnalysisError("the curve does not reach the end of the interval so soon", field="step")
+    length = float(np.linalg.norm(step.moved))
+    if not step.size >= _STRAIGHT * length:
+        raise AnalysisError("the step went astray", field="step")
+    if step.missed > _SURPRISE * length:
+        half = curve.within(step, 0.5 * step.size)
+        if not float(np.linalg.norm(half.moved - step.between(half.size)[0])) <= _AWAY * length:
+            raise AnalysisError("the curve is not smooth within the step", field="step")
+    return step, left
+
+
+def _reaches(curve: Curve, anchor: Anchor, size: float, target: float) -> float:
+    """At which part of a step the parameter is predicted to reach an end of the interval, first."""
+    low, high = 0.0, size
+    beyond = np.sign(curve.predicted(anchor, size)[0][-1] - target)
+    for _ in range(30):
+        middle = 0.5 * (low + high)
+        past = (curve.predicted(anchor, middle)[0][-1] - target) * beyond > 0.0
+        low, high = (low, middle) if past else (middle, high)
+    return high

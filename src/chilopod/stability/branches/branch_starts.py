@@ -1,0 +1,304 @@
+"""Where branches start: at an orbit that is known, or at a point where others leave one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.branches.branch_points import Anchor, BranchPoint
+from chilopod.stability.branches.curve import Curve
+from chilopod.stability.capabilities import Family, given_scale, is_autonomous, known_orbit
+from chilopod.stability.orbits import find_orbit, known_state
+from chilopod.stability.points import BifurcationPoint, Kind
+from chilopod.stability.returns import Section, returned_states, whole_period
+from chilopod.stability.scales import sizes
+
+Array = NDArray[np.float64]
+
+_BESIDE = 1e-3  # in units: where second differences are taken
+_SINGULAR = 1e-9  # of the largest singular value: below it another curve passes
+_BENT = 0.3  # of a change of state: by so much a map departs from its linear part at the size of a state
+_DECADES, _HALVINGS = 12, 12  # of the size, on its logarithm
+
+
+@dataclass(frozen=True)
+class Start(ReadOnlyArrays):
+    """Where a branch starts, and which way.
+
+    Attributes
+    ----------
+    value, orbit
+        Parameter, and state on the orbit at time 0, shape (n,).
+    rising
+        Whether the parameter rises at first, along the curve through the orbit.
+    mode
+        If not None: the direction of the state, shape (n,), in which the branch leaves; ``rising`` means nothing then.
+    crossing
+        Whether the branch that leaves has a direction of its own in the parameter as well (transcritical).
+    old
+        The tangent of the branch that is left, shape (n+1,), in the states' and the parameter's own units, if known.
+    periods
+        How many periods its orbits take.
+    period
+        The full period of the orbit that is left, where the system does not depend on time.
+    bifurcation
+        The point that is left, if it is one.
+    """
+
+    value: float
+    orbit: Array
+    rising: bool = True
+    mode: Array | None = None
+    crossing: bool = False
+    old: Array | None = None
+    periods: int = 1
+    period: float | None = None
+    bifurcation: BifurcationPoint | None = None
+
+
+def begin(
+    family: Family,
+    value: float,
+    orbit: ArrayLike | None = None,
+    rising: bool = True,
+    *,
+    periods: int = 1,
+    symmetric: bool = False,
+) -> Start:
+    """The start of a branch at an orbit, towards a rising or falling parameter.
+
+    Parameters
+    ----------
+    family
+        ``family(value)`` is the system.
+    value
+        Of the parameter.
+    orbit
+        A state on the orbit or near it, shape (n,): the orbit is solved for. Not needed where the system knows it.
+    rising
+        The direction to start in.
+    periods, symmetric
+        As for :func:`chilopod.stability.follow`.
+
+    Raises
+    ------
+    AnalysisError
+        If there is no orbit near the guess.
+    """
+    system = family(value)
+    guess = known_state(system) if orbit is None else orbit
+    found = find_orbit(system if symmetric else whole_period(system, periods), guess, with_error=False)
+    period = found.period if is_autonomous(system) else None
+    return Start(float(value), found.state, rising, periods=periods, period=period)
+
+
+def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: int = 1) -> tuple[Start, ...]:
+    """The starts of the branches that leave a bifurcation point.
+
+    Parameters
+    ----------
+    family
+        As it was given to :func:`chilopod.stability.locate` or :func:`chilopod.stability.follow`.
+    point
+        The located point, or a special point on a branch.
+    periods
+        How many periods the orbits of the branch take that is left.
+
+    Returns
+    -------
+    Of a pitchfork two: along the critical mode and against it. Of a transcritical point and a branch point two: the two
+    directions of the other branch. Of a period doubling one: the two sides are the same orbits, a period later. Where
+    there are several critical modes, as a symmetry makes them, so many for each of ``point.modes``.
+
+    Raises
+    ------
+    ParameterError
+        If nothing that can be followed leaves the point, or it is no special point.
+    """
+    old = None
+    if isinstance(point, BranchPoint):
+        if point.bifurcation is None:
+            raise ParameterError("is no special point", field="point", value=point.value)
+        old = None if point.units is None else point.tangent * point.units
+        point = point.bifurcation
+    kind = point.kind
+    if kind is Kind.FOLD:
+        raise ParameterError(
+            "is a fold: the branch itself goes round it", field="point", value=point.value, allowed="follow"
+        )
+    if kind is Kind.NEIMARK_SACKER:
+        raise ParameterError(
+            "is a Neimark-Sacker point: what leaves it is a torus, which is announced but not followed",
+            field="point",
+            value=point.value,
+        )
+    modes = point.mode.real[None] if point.modes is None else point.modes.real.T
+    system = family(point.value)
+    period = None
+    if is_autonomous(system):
+        period = find_orbit(whole_period(system, periods), point.orbit, with_error=False).period
+    if kind is Kind.PERIOD_DOUBLING:
+        twice = None if period is None else 2.0 * period
+        return tuple(
+            Start(point.value, point.orbit, mode=mode, periods=2 * periods, period=twice, bifurcation=point)
+            for mode in modes
+        )
+    # Of several modes each has a branch of its own, and the equation for where two curves cross does not hold.
+    crossing = kind is not Kind.PITCHFORK and len(modes) == 1
+    return tuple(
+        Start(point.value, point.orbit, True, sign * mode, crossing, old, periods, period, point)
+        for mode in modes
+        for sign in (1.0, -1.0)
+    )
+
+
+def branch_sizes(curve: Curve, x: Array, value: float, section: Section | None) -> Array:
+    """Sizes of the states along a branch, shape (n,): the system's own, or how far from the orbit its return map is no
+    longer linear, or what the interval makes of the orbit, with ratios that the orbit tells."""
+    system = curve.system(value)
+    given = given_scale(system)
+    if given is not None:
+        return given
+    image = curve.image(x, value, section)
+    base = sizes(system, x, image.period / image.returns)
+    direction = np.cos(1.0 + 3.0 * np.arange(x.size))
+    direction = base * direction / np.abs(direction).max()
+    if image.velocity is not None and image.normal is not None:
+        direction -= image.velocity * float(image.normal @ direction) / float(image.normal @ image.velocity)
+    linear = image.jacobian @ direction
+    reach = max(float(np.abs(linear / base).max()), 1.0)
+
+    def bent(r: float) -> bool:
+        try:
+            with np.errstate(all="ignore"):
+                moved = returned_states(system, (x + r * direction)[None], section)[0] - image.state
+        except (AnalysisError, ArithmeticError, ValueError):
+            return True
+        off = float(np.abs((moved - r * linear) / base).max())
+        return not off <= _BENT * r * reach
+
+    step = 0.1 if bent(1.0) else 10.0
+    low = high = 1.0
+    for _ in range(_DECADES):
+        low, high = high, high * step
+        if bent(high) is (step > 1.0):
+            break
+    else:  # linear: as far as the interval takes the orbit
+        n = x.size
+        derivative = curve.parameter_derivative(x, value, section)
+        slope = np.linalg.lstsq(np.eye(n) - image.jacobian * base / base[:, None], derivative / base)[0]
+        return base * max(1.0, float(np.abs(slope).max()))
+    for _ in range(_HALVINGS):
+        middle = float(np.sqrt(low * high))
+        low, high = (middle, high) if bent(middle) is not (step > 1.0) else (low, middle)
+    return base * float(np.sqrt(low * high))
+
+
+def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
+    """Where the first step of a branch starts, its matrix taken so far ``ahead`` if others start there too.
+
+    Raises
+    ------
+    AnalysisError
+        If the branch has no direction of its own there.
+    """
+    section = curve.section_at(start.orbit, start.value, start.period)
+    image = curve.image(start.orbit, start.value, section)
+    derivative = curve.parameter_derivative(start.orbit, start.value, section)
+    n = start.orbit.size
+    units = curve.units(n)
+    matrix = curve.matrix(image.jacobian, derivative, np.zeros(n + 1))[:-1]
+    if not np.isfinite(matrix).all():
+        raise AnalysisError(
+            "the flow is not finite at values of the parameter beside it", field="start", allowed="another value"
+        )
+    if start.mode is None:
+        tangent = _along(matrix, start.rising)
+    elif start.crossing:
+        tangent = _other(curve, start, section, matrix)
+    else:
+        tangent = np.append(start.mode / units[:-1], 0.0)
+        tangent /= np.linalg.norm(tangent)
+    values, _ = curve.multipliers(image)
+    special = start.bifurcation.kind if start.bifurcation is not None else None
+    point = BranchPoint(
+        start.value, start.orbit, values, tangent, special, units, image.period, bifurcation=start.bifurcation
+    )
+    leaving = start.mode is not None
+    if not leaving:
+        return Anchor(point, np.vstack([matrix, tangent]), None, section)
+    return curve.anchor(point, ahead=ahead, leaving=True)
+
+
+def _along(matrix: Array, rising: bool) -> Array:
+    """Unit vector that a matrix, shape (n, n+1), maps to zero."""
+    _, values, rows = np.linalg.svd(matrix)
+    if values[-1] <= _SINGULAR * max(1.0, float(values[0])):
+        raise AnalysisError(
+            "branches meet here: the orbit alone does not tell which one to follow",
+            field="start",
+            allowed="another value, or switch from the located point",
+        )
+    tangent: Array = rows[-1]
+    # At a fold neither way rises: then along the largest part of the state.
+    along = tangent[-1] if abs(tangent[-1]) > 1e-6 else tangent[np.abs(tangent).argmax()]
+    return tangent if bool(along > 0.0) is rising else -tangent
+
+
+def _other(curve: Curve, start: Start, section: Section | None, matrix: Array) -> Array:
+    """Tangent of the other of two curves that cross: of the algebraic branching equation (Keller 1977; Kuznetsov,
+    *Elements of Applied Bifurcation Theory*, section 10.2.3), with second differences of H."""
+    n = start.orbit.size
+    units = curve.units(n)
+    left, _, rows = np.linalg.svd(matrix)
+    w, basis = left[:, -1], rows[-2:]
+
+    def residual(z: Array) -> float:
+        x, value = start.orbit + units[:n] * z[:n], start.value + curve.scale * float(z[n])
+        mapped = returned_states(curve.system(value), x[None], section)[0]
+        return float(w @ ((mapped - x) / units[:n]))
+
+    here = residual(np.zeros(n + 1))
+
+    def second(direction: Array) -> float:
+        return (residual(_BESIDE * direction) - 2.0 * here + residual(-_BESIDE * direction)) / _BESIDE**2
+
+    a, c = second(basis[0]), second(basis[1])
+    b = 0.5 * (second(basis[0] + basis[1]) - a - c)
+    discriminant = b * b - a * c
+    if not discriminant > 0.0:
+        raise AnalysisError("no other branch crosses here", field="start", value=start.value)
+    # a s^2 + 2 b s t + c t^2 = 0, written so that nothing cancels
+    q = b + np.copysign(np.sqrt(discriminant), b)
+    found = [s * basis[0] + t * basis[1] for s, t in ((-q, a), (c, -q))]
+    found = [each / np.linalg.norm(each) for each in found]
+    old = _old_tangent(curve, start, units)
+    if old is not None:
+        other = min(found, key=lambda each: abs(float(each @ old)))
+    else:  # the one that is less of a function of the parameter
+        other = min(found, key=lambda each: abs(float(each[-1])))
+    assert start.mode is not None
+    along = float(other[:-1] @ (start.mode / units[:-1]))
+    return other if along >= 0.0 else -other
+
+
+def _old_tangent(curve: Curve, start: Start, units: Array) -> Array | None:
+    """Unit tangent of the branch that is left, in units; None if nothing tells it."""
+    if start.old is not None:
+        old = start.old / units
+        return np.asarray(old / np.linalg.norm(old))
+    states = []
+    for sign in (1.0, -1.0):
+        value = start.value + sign * _BESIDE * curve.scale
+        if not curve.between[0] <= value <= curve.between[1]:
+            value = start.value
+        system = curve.system(value)
+        if known_orbit(system) is None:
+            return None
+        states.append(np.append(known_state(system), value) / units)
+    old = states[0] - states[1]
+    return np.asarray(old / np.linalg.norm(old))

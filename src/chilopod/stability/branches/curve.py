@@ -1,0 +1,382 @@
+"""One step along a curve of periodic orbits.
+
+The curve is H(x, p) = x, parametrised by its arclength in units: x in the sizes of the states, p in a scale. A step is
+predicted from the last two points and their tangents, and corrected at right angles to the last tangent (Keller 1977;
+Kuznetsov, *Elements of Applied Bifurcation Theory*, section 10.2). Of a system without a period of its own, every step
+has the section across the motion where it starts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeGuard
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.errors import AnalysisError
+from chilopod.frozen import read_only
+from chilopod.stability.branches.branch_points import Anchor, BranchPoint, Step
+from chilopod.stability.capabilities import Family, FlowsEach, SystemLike, is_autonomous, returns_per_period
+from chilopod.stability.floquet import across
+from chilopod.stability.returns import ReturnMap, Section, return_map, returned_states, section_at, whole_period
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+PRECISION = 1e-12
+"""How closely orbits are solved for by default, of the sizes of the states; where the flow is not as good, as it is."""
+
+_COUNTED = 1e-10  # residuals above it count as corrections, by which steps grow or shrink
+_SETTLED = 1e-8  # residual below which it may stop falling
+_FALLING = 0.5
+_MOST_CORRECTIONS = 12
+_PARAMETER_STEP = 1e-6  # of the difference, in units of the scale
+_SHARPEST_TURN = 0.5  # cosine between two tangents: beyond it the step may have landed on another curve
+_KEPT = 8  # systems: making one may cost more than a flow
+_USER_ERRORS = (ArithmeticError, ValueError, np.linalg.LinAlgError)
+
+
+class Curve:
+    """The curve H(x, p) = x of a family.
+
+    Where its systems flow each (see :class:`chilopod.stability.capabilities.FlowsEach`), the derivative with respect to
+    the parameter costs next to nothing on two cores.
+
+    Parameters
+    ----------
+    family
+        ``family(value)`` is the system.
+    scale
+        Of the parameter along the curve.
+    sizes
+        Of the states along the curve, shape (n,); None: their own units.
+    between
+        Values of the parameter that the family is asked for at most.
+    periods
+        How many periods an orbit takes.
+    symmetric
+        Whether to stay among the orbits that have the systems' symmetry in time.
+    precision
+        How closely orbits are solved for, of the sizes of the states.
+    budget
+        Flows that may be asked for.
+    """
+
+    def __init__(
+        self,
+        family: Family,
+        scale: float,
+        sizes: Array | None = None,
+        *,
+        between: tuple[float, float] = (-np.inf, np.inf),
+        periods: int = 1,
+        symmetric: bool = False,
+        precision: float = PRECISION,
+        budget: float = np.inf,
+    ) -> None:
+        self._family = family
+        self.scale = scale
+        self.sizes = sizes
+        self.between = between
+        self.periods = periods
+        self.symmetric = symmetric
+        self.precision = precision
+        self.left = budget
+        self.relative_error: float | None = None
+        self._known: dict[float, tuple[SystemLike, SystemLike]] = {}
+        self._each: dict[type, bool] = {}
+
+    def system(self, value: float) -> SystemLike:
+        """What is studied: over the full period, or as many as the orbits take."""
+        return self._systems(value)[1]
+
+    def _systems(self, value: float) -> tuple[SystemLike, SystemLike]:
+        """The family's system, and what is studied of it."""
+        known = self._known.get(value)
+        if known is None:
+            try:
+                own = self._family(value)
+            except _USER_ERRORS as error:
+                raise AnalysisError(f"has no system here ({error})", field="family", value=value) from error
+            whole = self.symmetric or (own.symmetry is None and self.periods == 1)
+            known = own, own if whole else whole_period(own, self.periods)
+            if len(self._known) >= _KEPT:
+                self._known.clear()
+            self._known[value] = known
+        return known
+
+    def units(self, count: int) -> Array:
+        """Sizes of the states and scale of the parameter, shape (n+1,)."""
+        return np.append(np.ones(count) if self.sizes is None else self.sizes, self.scale)
+
+    def image(self, x: Array, value: float, section: Section | None = None, with_error: bool = False) -> ReturnMap:
+        """The return map and its derivative."""
+        system = self.system(value)
+        self.left -= 1
+        try:
+            if section is None and system.period is None:
+                section = section_at(system, x, self.sizes)
+            return return_map(system, x, with_error, section)
+        except _USER_ERRORS as error:
+            raise AnalysisError(f"cannot be evaluated ({error})", field="flow", value=value) from error
+
+    def parameter_derivative(self, x: Array, value: float, section: Section | None = None) -> Array:
+        """dH/dp at a state, per scale, shape (n,)."""
+        mapped, beside = self._mapped(x, value, section)
+        return self._difference(x, value, section, mapped, beside)
+
+    def matrix(self, jacobian: Array, derivative: Array, tangent: Array) -> Array:
+        """Jacobian of [H - x; tangent . step] with respect to state and parameter, in units."""
+        sizes = self.units(len(jacobian))[:-1]
+        scaled = jacobian * sizes / sizes[:, None] - np.eye(len(jacobian))
+        return np.block([[scaled, (derivative / sizes)[:, None]], [tangent[None]]])
+
+    def anchor(
+        self, last: BranchPoint, before: BranchPoint | None = None, ahead: float = 0.0, leaving: bool = False
+    ) -> Anchor:
+        """Where a step from a point starts, its matrix taken so far ``ahead`` along the tangent."""
+        section = self.section(last)
+        matrix = self._matrix_at(last, ahead, section)
+        # The matrix of a point where branches meet was not its own, so it tells nothing about the next one.
+        if before is None or before.special is not None:
+            return Anchor(last, matrix, None, section, leaving)
+        return Anchor(last, matrix, (before, read_only(self._matrix_at(before, 0.0, section))), section)
+
+    def section(self, point: BranchPoint) -> Section | None:
+        """Across the motion in a point, where returns need one."""
+        return self.section_at(point.orbit, point.value, point.period)
+
+    def section_at(self, x: Array, value: float, period: float | None) -> Section | None:
+        """Across the motion in a state, where returns need one; the full period is a guess of the system if None."""
+        system = self.system(value)
+        duration = None if period is None else period / returns_per_period(system)
+        return section_at(system, x, self.sizes, duration)
+
+    def _matrix_at(self, point: BranchPoint, ahead: float, section: Section | None) -> Array:
+        x = point.orbit + ahead * point.tangent[:-1] * self.units(point.orbit.size)[:-1]
+        jacobian = self.image(x, point.value, section).jacobian
+        derivative = self.parameter_derivative(x, point.value, section)
+        return self.matrix(jacobian, derivative, point.tangent)
+
+    def step(self, anchor: Anchor, size: float) -> Step:
+        """A step so far along the tangent.
+
+        Raises
+        ------
+        AnalysisError
+            If the corrections do not converge, or end where the curve would have turned too sharply.
+        """
+        moved, matrix = self.predicted(anchor, size)
+        return self._stepped(anchor, moved, matrix, anchor.last.tangent, size)
+
+    def within(self, step: Step, place: float) -> Step:
+        """As much of a step as leads to a place within it."""
+        moved, matrix = step.between(place)
+        return self._stepped(step.start, moved, matrix, step.start.last.tangent, place)
+
+    def to_value(self, anchor: Anchor, value: float, guess: Array, matrix: Array) -> Step:
+        """A step that ends at a value of the parameter exactly, from a guess of the displacement."""
+        row = np.zeros(guess.size)
+        row[-1] = 1.0
+        return self._stepped(anchor, guess, matrix, row, (value - anchor.last.value) / self.scale, value)
+
+    def predicted(self, anchor: Anchor, size: float) -> tuple[Array, Array]:
+        """Displacement at which a step should end, in units, and the matrix there: by the cubic through the last two
+        points along their tangents and by the straight line through their matrices; by the tangent and the matrix where
+        there is but one point."""
+        last = anchor.last
+        if anchor.before is None:
+            return size * last.tangent, np.array(anchor.matrix)
+        before, matrix_before = anchor.before
+        units = self.units(last.orbit.size)
+        back = np.append(last.orbit - before.orbit, last.value - before.value) / units
+        earlier = np.array(before.tangent)
+        if anchor.section is not None:
+            along = self._onto(anchor)
+            back[:-1], earlier[:-1] = along @ back[:-1], along @ earlier[:-1]
+        length = float(np.linalg.norm(back))
+        # Newton's form over the nodes 0, 0, -length, -length.
+        slope = back / length
+        second = (last.tangent - slope) / length
+        third = (second - (slope - earlier) / length) / length
+        matrix = anchor.matrix + (size / length) * (anchor.matrix - matrix_before)
+        matrix[-1] = last.tangent
+        return size * (last.tangent + size * (second + (size + length) * third)), matrix
+
+    def _onto(self, anchor: Anchor) -> Array:
+        """Projection along the motion onto the section of a step, in units, shape (n, n)."""
+        assert anchor.section is not None
+        system = self.system(anchor.last.value)
+        assert is_autonomous(system)
+        return self._projection(np.asarray(system.velocity(anchor.section.point)), anchor.section)
+
+    def _projection(self, velocity: Array, section: Section) -> Array:
+        sizes = self.units(velocity.size)[:-1]
+        normal = section.normal * sizes
+        return np.eye(velocity.size) - np.outer(velocity / sizes, normal) / float(section.normal @ velocity)
+
+    def _stepped(
+        self, anchor: Anchor, guess: Array, matrix: Array, row: Array, target: float, value: float | None = None
+    ) -> Step:
+        """Correct a guess to H = x and row . moved = target."""
+        last, section = anchor.last, anchor.section
+        n = last.orbit.size
+        units = self.units(n)
+        moved, matrix = np.array(guess), np.array(matrix)
+        matrix[-1] = row
+        try:
+            inverse = np.linalg.inv(matrix)
+        except np.linalg.LinAlgError:
+            raise AnalysisError("the curve has no direction here", field="step") from None
+        largest = np.inf
+        move = residual_before = np.zeros(n + 1)
+        rounds = corrections = 0
+        while True:
+            x = last.orbit + units[:n] * moved[:n]
+            here = last.value + self.scale * float(moved[n]) if value is None else value
+            if not self.between[0] <= here <= self.between[1]:
+                raise OutsideIntervalError("leaves the interval", field="parameter", value=here)
+            mapped, beside = self._mapped(x, here, section)
+            residual = np.append((mapped - x) / units[:n], row @ moved - target)
+            now = float(np.abs(residual).max())
+            if not np.isfinite(now) or (now > 10.0 * largest and now > _SETTLED):
+                raise AnalysisError("corrections diverge", field="step")
+            size = max(1.0, float(np.abs(x / units[:n]).max()))
+            # A residual that no longer falls is what the flow is good to.
+            if now <= self.precision * size or (now <= _SETTLED * size and now >= _FALLING * largest):
+                break
+            if rounds == _MOST_CORRECTIONS:
+                raise AnalysisError("corrections do not converge", field="step")
+            if rounds:
+                # Broyden's update keeps the matrix of the last point good enough for the whole step.
+                change = inverse @ (residual - residual_before)
+                along = float(move @ change)
+                if along == 0.0:
+                    raise AnalysisError("corrections do not converge", field="step")
+                inverse = inverse + np.outer(move - change, move @ inverse) / along
+            move = -inverse @ residual
+            residual_before, largest = residual, now
+            moved = moved + move
+            rounds += 1
+            corrections += now > _COUNTED * size
+        image = self.image(x, here, section)
+        derivative = self._difference(x, here, section, mapped, beside)
+        bordered = self.matrix(image.jacobian, derivative, last.tangent)
+        tangent = _null_vector(bordered)
+        if not tangent @ last.tangent >= _SHARPEST_TURN:
+            raise AnalysisError("the curve turns too sharply", field="step")
+        bordered[n] = tangent
+        end = self._end(anchor, x, here, image, tangent, bordered)
+        missed = float(np.linalg.norm(moved - guess))
+        return Step(anchor, end, float(last.tangent @ moved), moved, tangent, bordered, image, corrections, missed)
+
+    def _end(self, anchor: Anchor, x: Array, value: float, image: ReturnMap, tangent: Array, matrix: Array) -> Anchor:
+        """Where the next step starts."""
+        values, bound = self.multipliers(image)
+        before = None if anchor.leaving or anchor.last.special is not None else (anchor.last, anchor.matrix)
+        section = None
+        if anchor.section is not None:
+            system = self.system(value)
+            section = section_at(system, x, self.sizes, image.period / image.returns)
+            assert section is not None
+            assert is_autonomous(system)
+            along = self._projection(np.asarray(system.velocity(x)), section)
+            tangent, matrix = np.array(tangent), np.array(matrix)
+            tangent[:-1] = along @ tangent[:-1]
+            tangent /= np.linalg.norm(tangent)
+            matrix[:-1] = along @ matrix[:-1]
+            # H - x on the new section: the motion itself is mapped to zero, not to its negative shadow.
+            matrix[:-1, :-1] += along - np.eye(x.size)
+            matrix[-1] = tangent
+        point = BranchPoint(value, x, values, tangent, units=self.units(x.size), period=image.period, error_bound=bound)
+        return Anchor(point, matrix, before, section)
+
+    def multipliers(self, image: ReturnMap) -> tuple[ComplexArray, float]:
+        """Of the full period, by falling modulus, and a bound on their errors."""
+        nu = return_multipliers(image)
+        values = nu**image.returns if image.returns > 1 else nu
+        if not self.relative_error:
+            return values, 0.0
+        sizes = self.units(image.state.size)[:-1]
+        scaled = image.jacobian * sizes / sizes[:, None]
+        eigenvalues, right = np.linalg.eig(scaled)
+        with np.errstate(all="ignore"):
+            try:
+                left = np.linalg.inv(right)
+            except np.linalg.LinAlgError:
+                return values, float(np.sqrt(self.relative_error))
+        condition = np.linalg.norm(left, axis=1)[np.abs(eigenvalues) > 0.5]
+        if not condition.size:
+            return values, 0.0
+        error = self.relative_error * float(np.linalg.norm(scaled)) * float(condition.max())
+        return values, image.returns * error * max(1.0, float(np.abs(nu[0]))) ** (image.returns - 1)
+
+    def _mapped(self, x: Array, value: float, section: Section | None) -> tuple[Array, Array | None]:
+        """H at a state, and at a neighbouring value of the parameter if that costs no time."""
+        self.left -= 1
+        own, system = self._systems(value)
+        try:
+            period = own.period
+            if section is None and period is not None and not self.symmetric and self.periods == 1:
+                beside = self._systems(value + self._parameter_step(value))[0] if self._flows_each(own) else own
+                same = beside.period == period
+                if self._flows_each(own) and self._flows_each(beside):
+                    both: Sequence[FlowsEach] = [own, beside]
+                    mapped, moved = own.flow_each(both, np.array([x, x]), 0.0, period)
+                    return (mapped, moved) if same else (mapped, None)
+            mapped = returned_states(system, x[None], section)[0]
+        except _USER_ERRORS as error:
+            raise AnalysisError(f"cannot be evaluated ({error})", field="flow", value=value) from error
+        return mapped, None
+
+    def _flows_each(self, system: SystemLike) -> TypeGuard[FlowsEach]:
+        """Whether a system flows each; asked once for each class, for the answer takes longer than some flows."""
+        kind = type(system)
+        if kind not in self._each:
+            self._each[kind] = isinstance(system, FlowsEach)
+        return self._each[kind]
+
+    def _parameter_step(self, value: float) -> float:
+        """A small change of the parameter that stays within the interval, as the numbers are that differ by it."""
+        step = _PARAMETER_STEP * self.scale
+        return (value + step) - value if value + step <= self.between[1] else (value - step) - value
+
+    def _difference(
+        self, x: Array, value: float, section: Section | None, mapped: Array, beside: Array | None
+    ) -> Array:
+        step = self._parameter_step(value)
+        if beside is None:
+            self.left -= 1
+            try:
+                beside = returned_states(self.system(value + step), x[None], section)[0]
+            except _USER_ERRORS as error:
+                raise AnalysisError(f"cannot be evaluated ({error})", field="flow", value=value) from error
+        difference: Array = (beside - mapped) / (step / self.scale)
+        return difference
+
+
+class OutsideIntervalError(AnalysisError):
+    """A step asked for a value of the parameter outside the interval."""
+
+
+def return_multipliers(image: ReturnMap) -> ComplexArray:
+    """Eigenvalues of a return map by falling modulus, without the zero that stands for the motion itself."""
+    jacobian = image.jacobian
+    if image.normal is not None:
+        into, out_of = across(image)
+        jacobian = out_of @ jacobian @ into
+    values = np.linalg.eigvals(jacobian).astype(np.complex128)
+    return values[np.lexsort((-values.imag, -np.abs(values)))]
+
+
+def _null_vector(bordered: Array) -> Array:
+    """Unit vector that all but the last row of a matrix map to zero, on the side of the last row.
+
+    Exactly at a branch point the matrix is singular; of its solutions the shortest strays least.
+    """
+    n = len(bordered) - 1
+    if not np.isfinite(bordered).all():
+        raise AnalysisError("the return map is not finite", field="flow")
+    tangent: Array = np.linalg.lstsq(bordered, np.append(np.zeros(n), 1.0))[0]
+    return tangent / np.linalg.norm(tangent)

@@ -1,0 +1,73 @@
+"""Folds: where an orbit that is followed through a parameter ends, because it meets another one and both vanish."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.errors import ChilopodError
+from chilopod.stability.branches.branch import Branch, Ending, follow, proceed
+from chilopod.stability.branches.branch_points import BranchPoint
+from chilopod.stability.branches.branch_starts import begin
+from chilopod.stability.capabilities import Family, returns_per_period
+from chilopod.stability.points import Kind
+from chilopod.stability.returns import ReturnMap, return_map, section_at
+
+Array = NDArray[np.float64]
+
+_STEPS = 40
+_STEP = 0.01  # along the curve, in units of the states' sizes and the parameter's scale
+
+
+@dataclass(frozen=True)
+class Fold:
+    """A fold of periodic orbits.
+
+    Attributes
+    ----------
+    value
+        Of the parameter.
+    error_bound
+        Bound on its error.
+    image
+        Return map at the critical orbit.
+    """
+
+    value: float
+    error_bound: float
+    image: ReturnMap
+
+
+def find_fold(family: Family, value: float, orbit: Array, scale: float) -> Fold | None:
+    """Follow an orbit, towards a rising parameter, round the fold next to it; None if there is none.
+
+    Parameters
+    ----------
+    family
+        ``family(value)`` is the system; orbits with its symmetry in time are looked at.
+    value, orbit
+        Parameter and orbit to start from, close to the fold.
+    scale
+        Of the parameter: the fold is looked for as far away as that.
+    """
+    between = value - scale, value + scale
+    try:
+        start = begin(family, value, orbit, symmetric=True)
+        branch = follow(family, start, between, points=1, step=_STEP, closely=False, symmetric=True)
+        while not _folds(branch) and branch.ending is Ending.ENOUGH_POINTS and len(branch.points) < _STEPS:
+            branch = proceed(family, branch, between, points=1, closely=False)
+        fold = next(iter(_folds(branch)), None)
+        if fold is None or fold.bifurcation is None:
+            return None
+        system = family(fold.value)
+        duration = None if fold.period is None else fold.period / returns_per_period(system)
+        image = return_map(system, fold.orbit, section=section_at(system, fold.orbit, branch.sizes, duration))
+    except ChilopodError:
+        return None
+    return Fold(fold.value, fold.bifurcation.error_bound, image)
+
+
+def _folds(branch: Branch) -> list[BranchPoint]:
+    return [point for point in branch.points if point.special is Kind.FOLD]

@@ -1,0 +1,274 @@
+"""What happens within a step along a curve of periodic orbits.
+
+The return map is looked at in the ends of a step and at nine places in between. Where polynomials of degree eight
+through what vanishes at an event fit, and stay clear of zero or pass it once, nothing else happens; elsewhere the step
+is searched, on orbits that are solved for, for all crossings of the unit circle (:mod:`.crossings`).
+What is guaranteed is that of an interpolation: a course of the multipliers that the places show is followed however
+close its crossings lie; one that is confined between two places, which are a sixth of a step apart at most, is not
+seen.
+
+A determinant that changes its sign where no branches meet tells of a step that landed on another curve.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from chilopod.errors import AnalysisError
+from chilopod.stability.branches.branch_points import BranchPoint, Step
+from chilopod.stability.branches.curve import Curve
+from chilopod.stability.branches.special_points import Place, described
+from chilopod.stability.floquet import counts_outside
+from chilopod.stability.unit_circle.crossings import Crossings, Status, find_crossings
+from chilopod.stability.unit_circle.spectra import Event
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+_DEGREE = 8
+_PLACES: Array = np.append(np.cos(np.pi * np.arange(_DEGREE, -1, -1) / _DEGREE), [-0.618, 0.137])
+_FIT = np.linalg.inv(chebyshev.chebvander(_PLACES[: _DEGREE + 1], _DEGREE))
+_AT_CHECKS = chebyshev.chebvander(_PLACES[_DEGREE + 1 :], _DEGREE) @ _FIT
+_FINE = np.linspace(-1.0, 1.0, 65)
+_AT_FINE = chebyshev.chebvander(_FINE, _DEGREE) @ _FIT
+_CLEAR = 4.0  # times what a polynomial is uncertain by
+_BESIDE = 2  # fine places on either side of a simple zero that need not be clear
+_OFF = 1e-5  # of a step: an orbit that the cubic misses by more is solved for
+_AWAY = 0.1  # of a step: the curve between its ends is another one
+_LEAVING = 0.05  # of a step off a point where branches meet, where the search begins
+_BUDGET = 400  # orbits that are solved for within one step
+_ERROR = 1e-10  # relative, of the return map's derivative at an orbit that was solved for
+_CLOSE = 1e-9  # of a step: how closely a point is located along the curve
+_SIDE = 1e-3  # of a step: how far beside a crossing the curve's sides are looked at
+_BRANCHING = 1e-4  # smallest singular value of [H' - 1, dH/dp], in units, where branches meet
+_EVENTS = (Event.MINUS, Event.PLUS, Event.PAIR)
+
+Bracket = tuple[Event, float, float]
+
+
+@dataclass(frozen=True)
+class Found:
+    """What happens within a step: the special points in order, and a sentence for each thing that could not be made
+    out."""
+
+    points: tuple[BranchPoint, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+
+class Within:
+    """Orbits within a step, each solved for once."""
+
+    def __init__(self, curve: Curve, step: Step) -> None:
+        self.curve, self.step = curve, step
+        self.low = _LEAVING * step.size if step.start.leaving else 0.0
+        self._known = {step.size: step}
+
+    def at(self, place: float) -> Step:
+        """The part of the step up to a place."""
+        if place not in self._known:
+            self._known[place] = self.curve.within(self.step, place)
+        return self._known[place]
+
+    def sides(self, place: float) -> tuple[Step, Step]:
+        """Parts of the step that end a little before and a little after a place."""
+        beside = _SIDE * self.step.size
+        return self.at(max(place - beside, self.low)), self.at(min(place + beside, self.step.size))
+
+
+def inspect(curve: Curve, step: Step, closely: bool) -> Found:
+    """Find what happens within a step.
+
+    Parameters
+    ----------
+    curve, step
+        The step and its curve.
+    closely
+        Whether to look between its ends even where these give no reason to.
+
+    Raises
+    ------
+    AnalysisError
+        If the step landed on another curve, or the curve cannot be solved for in between.
+    """
+    within = Within(curve, step)
+    leaving = step.start.leaving
+    rising = float(step.start.last.tangent[-1])
+    # What starts at a fold does not find it again.
+    turned = not leaving and abs(rising) > _CLOSE and rising * float(step.tangent[-1]) < 0.0
+    flipped = not leaving and _sign(step.start.matrix) != _sign(step.matrix)
+    brackets = _brackets_from_places(within) if closely else _brackets_from_ends(within, turned)
+    if brackets == [] and not turned and not flipped:
+        return Found()
+    places, remarks = _places(within, brackets, turned)
+    if flipped and not any(place.branching for place in places):
+        raise AnalysisError("the step landed on another curve", field="step")
+    points = [described(curve, within.at, place, (within.low, step.size)) for place in places]
+    return Found(tuple(point for point in points if point is not None), remarks)
+
+
+def _places(within: Within, brackets: list[Bracket] | None, turned: bool) -> tuple[list[Place], tuple[str, ...]]:
+    """Where something happens within a step, in order; ``brackets`` None: anything may."""
+    step = within.step
+    remarks: tuple[str, ...] = ()
+    roots: list[tuple[Event, float]] = []
+    if brackets is None:
+        found = _searched(within)
+        if found.status in (Status.BUDGET, Status.INCOMPLETE):
+            remarks = tuple(f"near {step.end.last.value:.6g}: {remark}" for remark in found.remarks)
+        roots = [(crossing.event, crossing.value) for crossing in found.crossings]
+    else:
+        roots = [(event, _root(within, event, a, b)) for event, a, b in brackets]
+    roots = [(event, root) for event, root in roots if root > _CLOSE * step.size]
+    places = [_placed(within, event, root) for event, root in roots]
+    if turned and not any(place.fold for place in places):
+        places.append(_fold(within, 0.0, step.size))
+    return sorted(places, key=lambda place: place.place), remarks
+
+
+def _placed(within: Within, event: Event, root: float) -> Place:
+    """What a zero of a test function is."""
+    if event is not Event.PLUS:
+        return Place(root, event)
+    before, after = within.sides(root)
+    branching = _branches_meet(within.at(root))
+    if float(before.tangent[-1] * after.tangent[-1]) < 0.0 and not branching:
+        return _fold(within, before.size, after.size)
+    return Place(root, event, branching=branching)
+
+
+def _fold(within: Within, a: float, b: float) -> Place:
+    """Where the tangent has no part along the parameter; it changes its sign between two places."""
+
+    def along(place: float) -> float:
+        tangent = within.step.start.last.tangent if place == 0.0 else within.at(place).tangent
+        return float(tangent[-1])
+
+    place = float(brentq(along, a, b, xtol=_CLOSE * within.step.size))
+    return Place(place, Event.PLUS, fold=True)
+
+
+def _branches_meet(step: Step) -> bool:
+    """Whether the curve is not the only one through the end of a step."""
+    return bool(np.linalg.svd(step.matrix[:-1], compute_uv=False)[-1] <= _BRANCHING)
+
+
+def _sign(matrix: Array) -> float:
+    return float(np.linalg.slogdet(matrix)[0])
+
+
+def _searched(within: Within) -> Crossings:
+    curve, step = within.curve, within.step
+
+    def matrices(places: Array) -> tuple[Array, Array]:
+        found = [_start_jacobian(within) if place == 0.0 else within.at(place).image.jacobian for place in places]
+        return np.array(found), np.full(places.size, _ERROR)
+
+    budget = int(min(_BUDGET, max(curve.left, 0.0)))
+    return find_crossings(matrices, within.low, step.size, budget=max(budget, 30))
+
+
+def _root(within: Within, event: Event, a: float, b: float) -> float:
+    """Zero of a test function between two places at which it has opposite signs."""
+
+    def test(place: float) -> float:
+        jacobian = _start_jacobian(within) if place == 0.0 else within.at(place).image.jacobian
+        return float(_tests(np.linalg.eigvals(jacobian).astype(np.complex128)[None])[0, _EVENTS.index(event)])
+
+    if test(a) * test(b) > 0.0:
+        raise AnalysisError("the curve is not smooth within the step", field="step")
+    return float(brentq(test, a, b, xtol=1e-3 * _CLOSE * within.step.size))
+
+
+def _start_jacobian(within: Within) -> Array:
+    """Of the return map at the start of a step."""
+    matrix = within.step.start.matrix[:-1, :-1]
+    sizes = within.curve.units(len(matrix))[:-1]
+    jacobian: Array = (matrix + np.eye(len(matrix))) * sizes[:, None] / sizes
+    return jacobian
+
+
+def _tests(nu: ComplexArray) -> Array:
+    """What changes its sign at each of the events, shape (places, 3), from multipliers, shape (places, n)."""
+    first, second = np.triu_indices(nu.shape[-1], 1)
+    with np.errstate(all="ignore"):
+        pairs = (nu[:, first] * nu[:, second] - 1.0).prod(axis=1)
+        return np.stack([(nu + 1.0).prod(axis=1).real, (nu - 1.0).prod(axis=1).real, pairs.real], axis=1)
+
+
+def _brackets_from_places(within: Within) -> list[Bracket] | None:
+    """The one event that happens within a step between places that separate it from the others, none if none does; None
+    where this is not clear."""
+    low, size = within.low, within.step.size
+    places = low + 0.5 * (1.0 + _PLACES) * (size - low)
+    places[_DEGREE] = size
+    nu = np.linalg.eigvals(np.array([_jacobian_at(within, place) for place in places.tolist()])).astype(np.complex128)
+    tests = _tests(nu)
+    if not np.isfinite(tests).all():
+        return None
+    nodes, checks = tests[: _DEGREE + 1], tests[_DEGREE + 1 :]
+    uncertain = np.maximum(np.abs(_AT_CHECKS @ nodes - checks).max(axis=0), np.abs((_FIT @ nodes)[-2:]).max(axis=0))
+    fine = _AT_FINE @ nodes
+    unclear = np.abs(fine) <= _CLEAR * uncertain
+    outside = (np.abs(nu) > 1.0).sum(axis=1)
+    changes = [np.flatnonzero(fine[1:, i] * fine[:-1, i] <= 0.0) for i in range(len(_EVENTS))]
+    passed = [i for i, change in enumerate(changes) if change.size]
+    if not passed:
+        return [] if not unclear.any() and (outside == outside[0]).all() else None
+    (i,), change = passed[:1], changes[passed[0]]
+    if len(passed) > 1 or change.size > 1 or abs(int(outside[_DEGREE]) - int(outside[0])) != (2 if i == 2 else 1):
+        return None
+    left, right = int(change[0]) - _BESIDE, int(change[0]) + 1 + _BESIDE
+    unclear[max(left, 0) : right + 1, i] = False
+    if unclear.any() or left < 0 or right >= _FINE.size:
+        return None
+    a, b = (low + 0.5 * (1.0 + _FINE[j]) * (size - low) for j in (left, right))
+    return [(_EVENTS[i], float(a), float(b))]
+
+
+def _jacobian_at(within: Within, place: float) -> Array:
+    """Of the return map at a place within a step, on the cubic through its ends where that is close enough."""
+    curve, step = within.curve, within.step
+    if place == step.size:
+        return step.image.jacobian
+    if place == 0.0:
+        return _start_jacobian(within)
+    moved, matrix = step.between(place)
+    last, n = step.start.last, step.image.state.size
+    units = curve.units(n)
+    x, value = last.orbit + units[:n] * moved[:n], last.value + curve.scale * float(moved[n])
+    image = curve.image(x, value, step.start.section)
+    try:
+        off = float(np.abs(np.linalg.solve(matrix, np.append((image.state - x) / units[:n], 0.0))).max())
+    except np.linalg.LinAlgError:
+        off = np.inf
+    if not off <= _OFF * step.size:
+        exact = within.at(place)
+        if not float(np.linalg.norm(exact.moved - moved)) <= _AWAY * step.size:
+            raise AnalysisError("the curve is not smooth within the step", field="step")
+        image = exact.image
+    return image.jacobian
+
+
+def _brackets_from_ends(within: Within, turned: bool) -> list[Bracket] | None:
+    """As :func:`_brackets_from_places`, from the ends of a step alone."""
+    step = within.step
+    start, end = (np.linalg.eigvals(jacobian) for jacobian in (_start_jacobian(within), step.image.jacobian))
+    if step.start.leaving:
+        critical = int(np.abs(start - 1.0).argmin()), int(np.abs(end - 1.0).argmin())
+        start, end = np.delete(start, critical[0]), np.delete(end, critical[1])
+    before, after = counts_outside(start.astype(np.complex128)), counts_outside(end.astype(np.complex128))
+    changed = [i for i in range(len(_EVENTS)) if before[i] != after[i]]
+    if turned and before[1] != after[1]:
+        changed.remove(1)  # the fold itself
+    if not changed:
+        return []
+    (i,) = changed[:1]
+    tests = _tests(np.array([start, end], dtype=np.complex128))
+    if len(changed) > 1 or step.start.leaving or abs(before[i] - after[i]) > 1 or tests[0, i] * tests[1, i] >= 0.0:
+        return None
+    return [(_EVENTS[i], 0.0, step.size)]

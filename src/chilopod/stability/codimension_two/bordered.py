@@ -1,0 +1,392 @@
+"""The equations of a curve of critical periodic orbits in two parameters.
+
+Unknown are the state x, the two parameters and, where a pair of multipliers is critical, its cosine kappa = cos theta.
+The equations are H(x) = x for the return map H and, for a multiplier nu = +1 or -1, g = 0 with g from
+
+    [[H' - nu, b], [c^T, 0]] (v, g) = (0, 1),
+
+which vanishes with det(H' - nu) but is as smooth as H' and well scaled (Govaerts, *Numerical Methods for Bifurcations
+of Dynamical Equilibria*, SIAM 2000, ch. 4). For a pair, H'^2 - 2 kappa H' + 1 is bordered twice and G = 0 is a matrix
+of shape (2, 2) (ch. 5; Kuznetsov, *Elements of Applied Bifurcation Theory*, section 10.3). On the critical plane
+H'^2 - 2 kappa H' + 1 = (trace - 2 kappa) H' + (1 - det), so G has but two independent entries, and these two factors
+are what is solved for: regular also where the pair meets at +1 or -1.
+
+Where the systems know their orbit, x is no unknown; where the orbit has a spatial symmetry, x varies among the states
+that have it. H - 1 is then regular also on a curve of pitchforks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.errors import AnalysisError
+from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.capabilities import KnowsOrbit, Scaled, SystemLike
+from chilopod.stability.codimension_two.mirrored import symmetric_states
+from chilopod.stability.orbits import from_known, known_state
+from chilopod.stability.returns import ReturnMap, Section, return_map, section_at
+from chilopod.stability.scales import sizes
+
+Array = NDArray[np.float64]
+
+Family2 = Callable[[float, float], SystemLike]
+"""``family2(p, q)`` is the system at values of two parameters."""
+
+_STEP = 1e-6  # of differences, in units of the frame: it sets how fast Newton's method converges, not where to
+_ROUNDS = 14
+_ROUND_OFF = 4e-15  # of a correction, in units of the frame
+_SETTLED = 1e-8  # of the same, below which it may stop falling
+
+
+class OutOfBudget(AnalysisError):
+    """As many return maps as were allowed have been evaluated."""
+
+
+@dataclass(frozen=True)
+class Place(ReadOnlyArrays):
+    """Unknowns: ``state``, shape (n,), ``values`` of both parameters, shape (2,), and the cosine of a pair (else 0)."""
+
+    state: Array
+    values: Array
+    cosine: float
+
+
+@dataclass(frozen=True)
+class Frame(ReadOnlyArrays):
+    """Units and borders that the equations are written in; adapted from point to point of a curve.
+
+    With m directions that the orbit may move in (none if it is known) and k = 1 critical multiplier or k = 2:
+
+    Attributes
+    ----------
+    size
+        Of the states, shape (n,).
+    widths
+        Of the parameters' intervals, shape (2,).
+    basis
+        Orthonormal directions, in units of ``size``, shape (n, m).
+    column, row
+        Borders b and c, shape (n, k).
+    mixture
+        Makes the k equations of the entries of G, shape (k, k * k).
+    section
+        Where a return ends, of a system that does not depend on time.
+    """
+
+    size: Array
+    widths: Array
+    basis: Array
+    column: Array
+    row: Array
+    mixture: Array
+    section: Section | None
+
+    def between(self, start: Place, end: Place) -> Array:
+        """Coordinates of one place seen from another: state, parameters, and cosine where there is one."""
+        moved = self.basis.T @ ((end.state - start.state) / self.size)
+        turned = [end.cosine - start.cosine] if self.column.shape[1] == 2 else []
+        return np.concatenate([moved, (end.values - start.values) / self.widths, turned])
+
+    def moved(self, start: Place, step: Array) -> Place:
+        """The place that far from another; the inverse of :meth:`between`."""
+        m = self.basis.shape[1]
+        turned = float(step[m + 2]) if self.column.shape[1] == 2 else 0.0
+        return Place(
+            start.state + self.size * (self.basis @ step[:m]),
+            start.values + self.widths * step[m : m + 2],
+            start.cosine + turned,
+        )
+
+    def carried(self, direction: Array, other: Frame) -> Array:
+        """A direction given by its coordinates in another frame of the same curve, in those of this one."""
+        m = other.basis.shape[1]
+        state = other.size * (other.basis @ direction[:m]) / self.size
+        return np.concatenate([self.basis.T @ state, direction[m:]])
+
+    @property
+    def parameters(self) -> slice:
+        """Where the parameters stand among the coordinates."""
+        m = self.basis.shape[1]
+        return slice(m, m + 2)
+
+
+@dataclass(frozen=True)
+class Evaluated(ReadOnlyArrays):
+    """The equations at a place.
+
+    Attributes
+    ----------
+    place, image
+        Where, and the return map there.
+    jacobian
+        Of the return map in units of the frame, shape (n, n).
+    residual
+        Left sides of the equations, shape (m + k,).
+    right, left
+        v and w, shape (n, k), which are null vectors where the residual is zero; in units of the frame.
+    reach
+        Norm of the inverse of the bordered matrix.
+    """
+
+    place: Place
+    image: ReturnMap
+    jacobian: Array
+    residual: Array
+    right: Array
+    left: Array
+    reach: float
+
+
+@dataclass(frozen=True)
+class Spot(ReadOnlyArrays):
+    """A point of a curve, with what the next step needs.
+
+    Attributes
+    ----------
+    at, frame
+        The equations there, and the frame they are written in, adapted to this point.
+    matrix
+        Derivative of the equations, shape (m + k, m + k + 1).
+    tangent
+        Unit null vector of ``matrix``, shape (m + k + 1,).
+    uncertainty
+        Bounds on the errors of the left sides of the equations, shape (m + k,).
+    """
+
+    at: Evaluated
+    frame: Frame
+    matrix: Array
+    tangent: Array
+    uncertainty: Array
+
+    @property
+    def place(self) -> Place:
+        """Where it is."""
+        return self.at.place
+
+    @property
+    def shift(self) -> Array:
+        """How far every coordinate may be off, at right angles to the curve, shape (m + k + 1,)."""
+        return np.asarray(np.abs(np.linalg.pinv(self.matrix)) @ self.uncertainty)
+
+
+class Equations:
+    """The equations of a curve.
+
+    Parameters
+    ----------
+    family2
+        The systems.
+    target
+        The critical multiplier of the return map: +1 or -1, or 0 for a pair.
+    known
+        Whether to take the orbit that the systems know, which is then no unknown.
+    box
+        Lower and upper ends of both parameters' intervals, shape (2, 2): one row for each parameter.
+    budget
+        How many return maps may be evaluated.
+    """
+
+    def __init__(self, family2: Family2, target: int, known: bool, box: Array, budget: int) -> None:
+        self._family2 = family2
+        self.target = target
+        self.known = known
+        self.box = box
+        self._left = budget
+
+    def system(self, values: Array) -> SystemLike:
+        """The system at values of both parameters."""
+        return self._family2(float(values[0]), float(values[1]))
+
+    def begin(self, place: Place) -> Spot:
+        """The point of the curve nearest to a place that is close to it."""
+        system = self.system(place.values)
+        section = None if self.known else section_at(system, place.state)
+        place, image = self._mapped(place, section, False)
+        size = self._size(system, place, image, section)
+        frame = self._framed(system, place, image, size, None)
+        best = np.inf
+        for _ in range(_ROUNDS):
+            at = self.evaluated(place, frame)
+            matrix = self._derivative(at, frame)
+            move = np.asarray(-np.linalg.lstsq(matrix, at.residual)[0], dtype=np.float64)
+            off = float(np.abs(move).max())
+            if off <= _ROUND_OFF or (off <= _SETTLED and off >= 0.5 * best):
+                return self.spot(place, frame, None)
+            if not off < 1.0:
+                break
+            best = min(best, off)
+            place = frame.moved(place, move)
+        raise AnalysisError(
+            "the curve was not found", field="start", allowed="a point that was located in this family at `second`"
+        )
+
+    def spot(self, place: Place, frame: Frame, before: Array | None) -> Spot:
+        """What there is to know of a point on the curve, in a frame of its own; its tangent goes the same way as the
+        one ``before``."""
+        system = self.system(place.values)
+        section = frame.section
+        if section is not None:
+            section = section_at(system, place.state, frame.size, section.duration)
+        place, image = self._mapped(place, section, True)
+        own = self._framed(system, place, image, np.maximum(frame.size, np.abs(place.state)), frame)
+        at = self._equations(place, image, own)
+        matrix = self._derivative(at, own)
+        tangent = np.linalg.svd(matrix)[2][-1]
+        if before is not None:
+            tangent = tangent * np.sign(tangent @ own.carried(before, frame))
+        return Spot(at, own, matrix, tangent, self._uncertainty(at, own))
+
+    def corrected(self, spot: Spot, guess: Place, row: Array, target: float) -> tuple[Evaluated, int]:
+        """The point of the curve near a guess that is ``target`` away from a spot, as measured by a row of its
+        coordinates; and how many corrections that took.
+
+        Raises
+        ------
+        AnalysisError
+            If Newton's method (with Broyden's updates) does not converge.
+        """
+        frame = spot.frame
+        inverse = np.linalg.inv(np.vstack([spot.matrix, row]))
+        at, best = self.evaluated(guess, frame), np.inf
+        residual = np.append(at.residual, row @ frame.between(spot.place, at.place) - target)
+        for corrections in range(_ROUNDS):
+            move = -inverse @ residual
+            off = float(np.abs(move).max())
+            if off <= _ROUND_OFF or (off <= _SETTLED and off >= 0.5 * best):
+                return at, corrections
+            if not off < 10.0 * best:
+                break
+            best = min(best, off)
+            at = self.evaluated(frame.moved(at.place, move), frame)
+            new = np.append(at.residual, row @ frame.between(spot.place, at.place) - target)
+            change = inverse @ (new - residual)
+            if move @ change != 0.0:
+                inverse = inverse + np.outer(move - change, move @ inverse) / (move @ change)
+            residual = new
+        raise AnalysisError("corrections do not converge", field="step")
+
+    def evaluated(self, place: Place, frame: Frame) -> Evaluated:
+        """The equations at a place, without error bounds."""
+        place, image = self._mapped(place, frame.section, False)
+        return self._equations(place, image, frame)
+
+    def _mapped(self, place: Place, section: Section | None, with_error: bool) -> tuple[Place, ReturnMap]:
+        if self._left <= 0:
+            raise OutOfBudget("as many return maps as were allowed have been evaluated", field="budget")
+        self._left -= 1
+        system = self.system(place.values)
+        if self.known:
+            orbit = from_known(system, known_state(system), with_error)
+            return replace(place, state=orbit.state), orbit.image
+        return place, return_map(system, place.state, with_error, section)
+
+    def _size(self, system: SystemLike, place: Place, image: ReturnMap, section: Section | None) -> Array:
+        size = sizes(system, place.state, image.period / image.returns)
+        if self.known or place.state.any() or (isinstance(system, Scaled) and system.scale is not None):
+            return size
+        # An orbit that rests at zero is as large as the parameters make it.
+        widths = self.box[:, 1] - self.box[:, 0]
+        reach = 0.0
+        for j in range(2):
+            values = place.values.copy()
+            values[j] += self._inward(place, j) * widths[j]
+            moved = self._mapped(replace(place, values=values), section, False)[1].state - image.state
+            reach = max(reach, float((np.abs(moved) / size).max()) / _STEP)
+        return size * reach if reach > 0.0 else size
+
+    def _inward(self, place: Place, j: int) -> float:
+        """A step of one parameter, in units of its interval, that stays within it."""
+        low, high = self.box[j]
+        return _STEP if place.values[j] + _STEP * (high - low) <= high else -_STEP
+
+    def _framed(self, system: SystemLike, place: Place, image: ReturnMap, size: Array, before: Frame | None) -> Frame:
+        """The frame at a place; its borders from those of the one before, so that they change continuously."""
+        n, k = size.size, 1 if self.target else 2
+        basis = np.zeros((n, 0)) if self.known else symmetric_states(system, place.state, size)
+        section = None
+        if image.normal is not None:
+            section = Section(place.state, image.normal, image.period / image.returns)
+        jacobian = image.jacobian * size / size[:, None]
+        critical = self._critical(jacobian, place.cosine)
+        if before is None:
+            left, _, right = np.linalg.svd(critical)
+            column, row = left[:, n - k :], right[n - k :].T
+        else:
+            units = size[:, None] / before.size[:, None]
+            row, column, _ = _bordered(critical, before.column / units, before.row * units)
+        column, row = _orthonormal(column), _orthonormal(row)
+        frame = Frame(size, self.box[:, 1] - self.box[:, 0], basis, column, row, np.eye(k, k * k), section)
+        if k == 1:
+            return frame
+        right, left, _ = _bordered(critical, column, row)
+        shapes = np.stack([-(left.T @ jacobian @ right).ravel(), -(left.T @ right).ravel()], axis=1)
+        return replace(frame, mixture=np.asarray(np.linalg.pinv(shapes), dtype=np.float64))
+
+    def _critical(self, jacobian: Array, cosine: float) -> Array:
+        one = np.eye(len(jacobian))
+        if self.target:
+            return jacobian - self.target * one
+        return np.asarray(jacobian @ jacobian - 2.0 * cosine * jacobian + one)
+
+    def _equations(self, place: Place, image: ReturnMap, frame: Frame) -> Evaluated:
+        jacobian = image.jacobian * frame.size / frame.size[:, None]
+        right, left, inverse = _bordered(self._critical(jacobian, place.cosine), frame.column, frame.row)
+        k = right.shape[1]
+        orbit = frame.basis.T @ ((image.state - place.state) / frame.size)
+        residual = np.concatenate([orbit, frame.mixture @ inverse[-k:, -k:].ravel()])
+        return Evaluated(place, image, jacobian, residual, right, left, float(np.linalg.norm(inverse, 2)))
+
+    def _derivative(self, at: Evaluated, frame: Frame) -> Array:
+        """Derivative of the equations with respect to the coordinates, by differences but for what is known exactly."""
+        m, k = frame.basis.shape[1], at.right.shape[1]
+        columns = []
+        for j in range(m + 2):
+            step = np.zeros(m + k + 1)
+            step[j] = self._inward(at.place, j - m) if j >= m else _STEP
+            columns.append((self.evaluated(frame.moved(at.place, step), frame).residual - at.residual) / step[j])
+        if k == 2:
+            turned = 2.0 * frame.mixture @ (at.left.T @ at.jacobian @ at.right).ravel()
+            columns.append(np.append(np.zeros(m), turned))
+        matrix = np.array(columns).T
+        matrix[:m, :m] = frame.basis.T @ (at.jacobian @ frame.basis - frame.basis)
+        return matrix
+
+    def _uncertainty(self, at: Evaluated, frame: Frame) -> Array:
+        size = frame.size
+        error = np.broadcast_to(np.asarray(at.image.error, dtype=np.float64), at.jacobian.shape) * size / size[:, None]
+        wrong = error
+        if not self.target:
+            own = np.abs(at.jacobian)
+            wrong = error @ own + own @ error + 2.0 * abs(at.place.cosine) * error
+        rounding = 4.0 * np.finfo(float).eps
+        # The state returns with an error of which that of the derivative tells.
+        returned = error.sum(axis=1) + rounding * np.abs(at.place.state) / size
+        critical = np.abs(frame.mixture) @ (np.abs(at.left.T) @ wrong @ np.abs(at.right)).ravel()
+        norms = np.linalg.norm(at.left) * np.linalg.norm(at.right) * np.linalg.norm(frame.mixture, 2)
+        power = 1 if self.target else 2
+        critical = critical + rounding * float(norms * np.linalg.norm(at.jacobian) ** power)
+        return np.abs(at.residual) + np.concatenate([np.abs(frame.basis.T) @ returned, critical])
+
+
+def _bordered(matrix: Array, column: Array, row: Array) -> tuple[Array, Array, Array]:
+    """v and w of the bordered matrix, shape (n, k) each, and its inverse, with G in its last corner."""
+    n, k = column.shape
+    inverse = np.linalg.inv(np.block([[matrix, column], [row.T, np.zeros((k, k))]]))
+    return inverse[:n, n:], inverse[n:, :n].T, inverse
+
+
+def _orthonormal(columns: Array) -> Array:
+    """Orthonormal columns of the same span; a single one keeps its direction."""
+    if columns.shape[1] == 1:
+        return columns / np.linalg.norm(columns)
+    return np.asarray(np.linalg.qr(columns)[0])
+
+
+def knows_orbit(system: SystemLike) -> bool:
+    """Whether a system knows its orbit."""
+    return isinstance(system, KnowsOrbit) and system.orbit is not None

@@ -1,0 +1,344 @@
+"""Curves of bifurcation points in two parameters: where a bifurcation goes as a second parameter changes.
+
+A curve is followed by its arclength (see :mod:`.branch` for that of orbits in one parameter) with the
+equations of :mod:`.bordered`, and on the way the points of codimension two are located (see
+:mod:`.detection`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from chilopod.errors import AnalysisError, ChilopodError, ParameterError
+from chilopod.stability.codimension_two.bordered import Equations, Family2, OutOfBudget, Place, Spot, knows_orbit
+from chilopod.stability.codimension_two.codimension2 import Codimension2, CodimensionTwo
+from chilopod.stability.codimension_two.curve2 import Curve2, CurveEnd, Point2
+from chilopod.stability.codimension_two.detection import Detector, Signals, across, critical
+from chilopod.stability.codimension_two.mirrored import reverses
+from chilopod.stability.points import BifurcationPoint, Kind
+from chilopod.stability.returns import return_duration
+from chilopod.stability.scales import sizes
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+BUDGET = 20_000
+"""Return maps, with derivatives, that a curve may take by default."""
+
+_SHORTEST = 1e-6  # step at which a curve is lost, relative to the longest
+_FEW, _MANY = 7, 10  # corrections after which steps grow, and shrink
+_SHARPEST_TURN = 0.9  # cosine between tangents at both ends of a step
+_FARTHEST = 0.3  # of a step, from where it was predicted to end
+_SAME = 1e-6  # of a step: how near a curve comes to its start to be closed
+
+Progress2 = Callable[[int, Point2], None]
+
+
+def _silent(count: int, point: Point2) -> None:
+    """A :data:`Progress2` that shows nothing."""
+
+
+def follow2(
+    family2: Family2,
+    start: BifurcationPoint,
+    between: tuple[tuple[float, float], tuple[float, float]],
+    *,
+    second: float,
+    rising: bool | None = None,
+    points: int = 100,
+    step: float = 0.01,
+    longest: float = 0.05,
+    coefficients: bool = True,
+    budget: int = BUDGET,
+    progress: Progress2 = _silent,
+) -> Curve2:
+    """Follow a bifurcation point as two parameters change.
+
+    Parameters
+    ----------
+    family2
+        ``family2(p, q)`` is the system at values of both parameters.
+    start
+        A point that :func:`chilopod.stability.locate` found in the family of p with q = ``second``.
+    between
+        Intervals of both parameters: the box in which the curve is followed. Their widths are the parameters' units.
+    second
+        The value of q at the start.
+    rising
+        Whether to start towards rising or falling q; None for both, which makes one curve of the two halves.
+    points
+        At most so many, in each direction.
+    step, longest
+        First and largest step along the curve, in units of the box and of the states.
+    coefficients
+        Whether to compute normal forms, without which cusps and degenerate points are not found.
+    budget
+        How many return maps with derivatives may be evaluated (normal forms have a budget of their own).
+    progress
+        Called with the number of points and the newest one.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is out of range; for a pitchfork, transcritical or branch point, if nothing keeps it one as
+        both parameters change: neither a symmetry nor an orbit that the systems know.
+    AnalysisError
+        If no point of a curve is found at the start.
+    """
+    box = _checked(between, points, step, longest, budget)
+    if not isinstance(start, BifurcationPoint):
+        raise ParameterError("is no located point", field="start", value=start, allowed="one that `locate` gives")
+    values = np.array([start.value, second], dtype=np.float64)
+    if not ((box[:, 0] <= values) & (values <= box[:, 1])).all():
+        raise ParameterError("does not hold the start", field="between", value=between, allowed=f"{values} within")
+    target, known = _what(family2, start, second)
+    equations = Equations(family2, target, known, box, budget)
+    nu = complex(start.multiplier)
+    first = equations.begin(Place(start.orbit, values, 0.0 if target else nu.real / abs(nu)))
+    tracer = _Tracer(equations, start.kind, coefficients, points, step, longest, progress)
+    origin = tracer.station(first)
+    upward = float(np.sign(first.tangent[first.frame.parameters][1]) or 1.0)
+    signs = (1.0, -1.0) if rising is None else (1.0,) if rising else (-1.0,)
+    halves = []
+    for sign in signs:
+        halves.append(tracer.traced(origin, sign * upward))
+        if halves[-1].ending is CurveEnd.CLOSED:
+            return _joined(start.kind, origin, _Half((), (), CurveEnd.CLOSED, ""), halves[-1])
+    if rising is None:
+        return _joined(start.kind, origin, halves[1], halves[0])
+    return _joined(start.kind, origin, _Half((), (), CurveEnd.START, ""), halves[0])
+
+
+def _checked(between: object, points: int, step: float, longest: float, budget: int) -> Array:
+    try:
+        box = np.array(between, dtype=np.float64)
+    except (TypeError, ValueError):
+        box = np.zeros(0)
+    if box.shape != (2, 2) or not (np.isfinite(box).all() and (box[:, 0] < box[:, 1]).all()):
+        raise ParameterError(
+            "must be two intervals", field="between", value=between, allowed="((p_low, p_high), (q_low, q_high))"
+        )
+    for name, value in (("points", points), ("step", step), ("longest", longest), ("budget", budget)):
+        if not value > 0:
+            raise ParameterError("must be positive", field=name, value=value)
+    return box
+
+
+def _what(family2: Family2, start: BifurcationPoint, second: float) -> tuple[int, bool]:
+    """The critical multiplier, 0 for a pair, and whether the orbit is no unknown."""
+    system = family2(start.value, second)
+    if start.orbit.shape != (system.dimension,):
+        raise ParameterError("is of another system", field="start", value=start.orbit.shape)
+    known = knows_orbit(system) and start.kind is not Kind.FOLD
+    if start.kind is Kind.NEIMARK_SACKER:
+        return 0, known
+    target = 1 if start.multiplier.real > 0.0 else -1
+    if target < 0 or start.kind is Kind.FOLD or known:
+        return target, known
+    if not reverses(system, start.mode, sizes(system, start.orbit, return_duration(system))):
+        raise ParameterError(
+            f"is a {start.kind.label} that two parameters would unfold",
+            field="start",
+            allowed="one that the systems' spatial_symmetry keeps, or systems that know their orbit",
+        )
+    return target, known
+
+
+@dataclass(frozen=True)
+class _Station:
+    """A spot with what is said of it."""
+
+    spot: Spot
+    point: Point2
+    signals: Signals
+
+
+@dataclass(frozen=True)
+class _Half:
+    """A curve in one direction, without its start."""
+
+    stations: tuple[_Station, ...]
+    special: tuple[Codimension2, ...]
+    ending: CurveEnd
+    reason: str
+
+
+def _joined(kind: Kind, origin: _Station, before: _Half, after: _Half) -> Curve2:
+    points = (*(each.point for each in reversed(before.stations)), origin.point)
+    return Curve2(
+        kind,
+        (*points, *(each.point for each in after.stations)),
+        (*reversed(before.special), *after.special),
+        (before.ending, after.ending),
+        (before.reason, after.reason),
+    )
+
+
+class _Tracer:
+    def __init__(
+        self,
+        equations: Equations,
+        kind: Kind,
+        coefficients: bool,
+        points: int,
+        step: float,
+        longest: float,
+        progress: Progress2,
+    ) -> None:
+        self._equations = equations
+        self._detector = Detector(equations, kind, coefficients)
+        self._kind = kind
+        self._coefficients = coefficients
+        self._points = points
+        self._first, self._longest = step, longest
+        self._progress = progress
+
+    def station(self, spot: Spot) -> _Station:
+        """A spot with what is said of it."""
+        own = critical(self._equations.target, spot.at, spot.frame)
+        form = None
+        if self._coefficients and abs(spot.place.cosine) < 1.0:  # else the pair has met, and the curve has ended
+            form = self._detector.form(own, spot.at, spot.frame, spot.shift)
+        value, error = (np.nan, np.nan) if form is None else self._detector.coefficient(form)
+        image = spot.at.image
+        angle = abs(float(np.angle(own.multiplier**image.returns)))
+        point = Point2(
+            spot.place.values,
+            across(spot) + 4.0 * np.finfo(float).eps * np.abs(spot.place.values),
+            spot.place.state,
+            own.mode,
+            own.multiplier,
+            own.spectrum.values,
+            angle / image.period,
+            None if np.isnan(value) else value,
+            None if np.isnan(value) else error,
+        )
+        return _Station(spot, point, self._detector.measured(spot, own, form))
+
+    def traced(self, origin: _Station, sign: float) -> _Half:
+        """The curve from its start on, along the tangent or against it."""
+        last = replace(origin, spot=replace(origin.spot, tangent=sign * origin.spot.tangent))
+        home = last.spot
+        found: list[_Station] = []
+        special: list[Codimension2] = []
+        size = min(self._first, self._longest)
+        while len(found) < self._points:
+            try:
+                new, corrections, edge = self._step(last.spot, size)
+                if len(found) > 1 and self._closes(last.spot, new, home):
+                    return _Half(tuple(found), tuple(special), CurveEnd.CLOSED, "")
+                station = self.station(new)
+                events = self._detector.between(last.spot, last.signals, new, station.signals)
+            except OutOfBudget:
+                return _Half(tuple(found), tuple(special), CurveEnd.OUT_OF_BUDGET, "")
+            except (ChilopodError, ArithmeticError, ValueError) as error:
+                # Parameters may step out of what the systems can have, whatever these then raise.
+                size *= 0.5
+                if size < _SHORTEST * self._longest:
+                    return _Half(tuple(found), tuple(special), CurveEnd.LOST, str(error))
+                continue
+            for _, spot, event in events:
+                special.append(event)
+                if self._equations.target == 0 and event.kind in (
+                    CodimensionTwo.RESONANCE_1_1,
+                    CodimensionTwo.RESONANCE_1_2,
+                ):
+                    found.append(self.station(spot))
+                    return _Half(tuple(found), tuple(special), CurveEnd.RESONANCE, "")
+            if np.array_equal(new.place.values, last.spot.place.values):
+                return _Half(tuple(found), tuple(special), CurveEnd.LEFT_BOX, "")
+            found.append(station)
+            self._progress(len(found), station.point)
+            last = station
+            if edge:
+                return _Half(tuple(found), tuple(special), CurveEnd.LEFT_BOX, "")
+            size = min(self._longest, size * (1.5 if corrections <= _FEW else 1.0 if corrections <= _MANY else 0.6))
+        return _Half(tuple(found), tuple(special), CurveEnd.ENOUGH_POINTS, "")
+
+    def _step(self, last: Spot, size: float) -> tuple[Spot, int, bool]:
+        """The spot a step further, how many corrections it took, and whether it is on the edge of the box."""
+        predicted = last.frame.moved(last.place, size * last.tangent)
+        edge = self._edge(last.place, predicted)
+        if edge is None:
+            at, corrections = self._equations.corrected(last, predicted, last.tangent, size)
+            _check_near(last, predicted, at.place, size)
+            predicted = at.place
+            edge = self._edge(last.place, predicted)
+            if edge is None:
+                return self._arrived(last, predicted), corrections, False
+        place, corrections = self._on_edge(last, predicted, edge, size)
+        edge = self._edge(last.place, place)
+        if edge is not None:  # of the other parameter, and before
+            place, corrections = self._on_edge(last, place, edge, size)
+            if self._edge(last.place, place) is not None:
+                raise AnalysisError("the step does not end within the box", field="step")
+        return self._arrived(last, place), corrections, True
+
+    def _edge(self, last: Place, place: Place) -> tuple[int, float, float] | None:
+        """The edge that is crossed first on the way to a place: of which parameter, where, and after what share."""
+        edges = []
+        for j, (low, high) in enumerate(self._equations.box):
+            value = float(place.values[j])
+            if not low <= value <= high:
+                bound = float(high if value > high else low)
+                edges.append((j, bound, float((bound - last.values[j]) / (value - last.values[j]))))
+        return min(edges, key=lambda edge: edge[2]) if edges else None
+
+    def _on_edge(self, last: Spot, beyond: Place, edge: tuple[int, float, float], size: float) -> tuple[Place, int]:
+        """The point of the curve on an edge of the box, which is crossed on the way to a place beyond."""
+        j, bound, share = edge
+        frame = last.frame
+        row = np.zeros(last.tangent.size)
+        row[frame.parameters.start + j] = 1.0
+        guess = frame.moved(last.place, share * frame.between(last.place, beyond))
+        target = (bound - float(last.place.values[j])) / float(frame.widths[j])
+        at, corrections = self._equations.corrected(last, guess, row, target)
+        _check_near(last, guess, at.place, size)
+        if last.tangent @ frame.between(last.place, at.place) < 0.0:
+            raise AnalysisError("the curve meets the edge of the box elsewhere", field="step")
+        values = at.place.values.copy()
+        values[j] = bound
+        return replace(at.place, values=values), corrections
+
+    def _arrived(self, last: Spot, place: Place) -> Spot:
+        new = self._equations.spot(place, last.frame, last.tangent)
+        before = new.frame.carried(last.tangent, last.frame)
+        if new.tangent @ before < _SHARPEST_TURN * np.linalg.norm(before):
+            raise AnalysisError("the curve turns too sharply", field="step")
+        return new
+
+    def _closes(self, last: Spot, new: Spot, home: Spot) -> bool:
+        """Whether the start of the curve lies within the step from one spot to the next."""
+        frame = last.frame
+        # The same orbit may be met at another instant where the system does not depend on time.
+        seen = slice(frame.parameters.start if frame.section is not None else 0, None)
+        tangent = last.tangent[seen]
+        if tangent @ frame.carried(home.tangent, home.frame)[seen] <= 0.0:
+            return False
+        whole = frame.between(last.place, new.place)
+        length = float(last.tangent @ whole)
+
+        def ahead(start: Place) -> float:
+            return float(tangent @ frame.between(start, home.place)[seen])
+
+        if ahead(last.place) <= 0.0 or ahead(new.place) > 0.0:
+            return False
+        if np.linalg.norm(frame.between(last.place, home.place)[seen]) > 2.0 * length:
+            return False
+
+        def at(place: float) -> Place:
+            guess = frame.moved(last.place, whole * (place / length))
+            return self._equations.corrected(last, guess, last.tangent, place)[0].place
+
+        nearest = at(float(brentq(lambda place: ahead(at(place)), 0.0, length, xtol=1e-12 * length)))
+        return bool(np.abs(frame.between(nearest, home.place)[seen]).max() <= _SAME * length)
+
+
+def _check_near(last: Spot, predicted: Place, place: Place, size: float) -> None:
+    if np.linalg.norm(last.frame.between(predicted, place)) > _FARTHEST * size:
+        raise AnalysisError("the step ends far from where it was predicted to, perhaps on another curve", field="step")

@@ -1,0 +1,188 @@
+"""The return map on a curve, or a disc, in its critical eigenspace that is bent along the centre manifold.
+
+The manifold is W(z) = x + z q + z^2 w20 + ... (and complex conjugates), with z real at a real multiplier. It is
+sampled on circles |z| = r, or at z = +-r; Fourier series in the angle and Chebyshev series in r give the Taylor
+coefficients of H(W(z)), and what these have in excess of W's own tells how W must bend (the homological equations of
+Kuznetsov, *Elements of Applied Bifurcation Theory*, section 8.7, and of Kuznetsov and Meijer 2005, here solved on
+measured numbers).
+
+Nothing here depends on the units of the states: every entry of a state is only ever compared with itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.errors import AnalysisError
+from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.normal_forms.extrapolation import RADII, Series, radii, series
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+ReturnedStates = Callable[[Array], Array]
+"""The return map: states, shape (k, n), to their images, shape (k, n)."""
+
+Powers = tuple[int, int]
+"""i and j of a monomial z^i conj(z)^j; j = 0 where z is real."""
+
+Curve = Mapping[Powers, ComplexArray]
+"""Coefficient of every monomial, shape (n,); of two that are conjugate only the one with i >= j."""
+
+_ANGLES = 8
+_HIGHEST = 5.0  # power of a radius that has to be a number
+
+
+@dataclass(frozen=True)
+class CriticalOrbit(ReadOnlyArrays):
+    """A fixed point of a return map, and the multiplier that is critical there.
+
+    Attributes
+    ----------
+    state
+        The fixed point, shape (n,).
+    jacobian
+        Of the return map there, shape (n, n).
+    multiplier
+        nu: exactly +1, exactly -1, or the one of a complex pair whose mode is ``right``.
+    right, left
+        Critical eigenvectors, shape (n,), ``right`` of unit length in the user's units, left^H right = 1.
+    returns
+        How many returns make a full period.
+    """
+
+    state: Array
+    jacobian: Array
+    multiplier: complex
+    right: ComplexArray
+    left: ComplexArray
+    returns: int = 1
+
+    @property
+    def real(self) -> bool:
+        """Whether the multiplier is."""
+        return self.multiplier.imag == 0.0
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """Chebyshev series of the harmonics of H(W(z)) - x.
+
+    Attributes
+    ----------
+    harmonics
+        Harmonic h at index h, negative ones from the end; entries are the n states and, last, the projection
+        left^H (H(W(z)) - x).
+    noise
+        Bounds on the errors of the samples, shape (n + 1,).
+    blur
+        Error of the projection at x itself, from round-off and what is known of the map's.
+    shrink
+        Factor of the radius at which the series of the projection would fall to the noise that was to be expected.
+    falling
+        Whether they still fall at their end; noise would not.
+    size
+        Largest distance from x, on the curve or of its image, of every state: shape (n,).
+    radius
+        Largest |z|.
+    outermost
+        Harmonics of the projection at the largest of the :func:`radii`, shape (angles,).
+    """
+
+    harmonics: tuple[Series, ...]
+    noise: Array
+    blur: float
+    shrink: float
+    falling: bool
+    size: Array
+    radius: float
+    outermost: ComplexArray
+
+    def taylor(self, powers: Powers) -> tuple[ComplexArray, Array]:
+        """Coefficient of a monomial in H(W(z)), and its error: shape (n + 1,)."""
+        i, j = powers
+        order = i + j
+        value, error = self.harmonics[(i - j) % len(self.harmonics)].taylor(order, self.noise)
+        return value / self.radius**order, error / self.radius**order
+
+
+def turns(at: CriticalOrbit) -> ComplexArray:
+    """Directions of z that are sampled: +-1 where it is real, else a circle."""
+    count = 2 if at.real else _ANGLES
+    result: ComplexArray = np.exp(2j * np.pi * np.arange(count) / count)
+    return result
+
+
+def displacements(at: CriticalOrbit, curve: Curve, z: ComplexArray) -> Array:
+    """W(z) - x, shape (*z.shape, n)."""
+    total = np.zeros((*z.shape, at.state.size))
+    for (i, j), coefficient in curve.items():
+        twice = 1.0 if at.real or i == j else 2.0
+        total += twice * ((z**i * z.conj() ** j)[..., None] * coefficient).real
+    return total
+
+
+def images(mapped: ReturnedStates, at: CriticalOrbit, displaced: Array) -> Array | None:
+    """H - x at x + ``displaced``, of the same shape; None where the map does not exist."""
+    flat = at.state + displaced.reshape(-1, at.state.size)
+    try:
+        result = np.asarray(mapped(flat), dtype=np.float64).reshape(displaced.shape) - at.state
+    except (AnalysisError, ArithmeticError):
+        return None
+    return result if np.isfinite(result).all() else None
+
+
+def sample(mapped: ReturnedStates, at: CriticalOrbit, curve: Curve, radius: float, noise: float) -> Sampled | None:
+    """The map on a curve up to a radius; None where it does not exist. ``noise`` is relative, see
+    :func:`chilopod.stability.normal_form.normal_form`."""
+    directions = turns(at)
+    displaced = displacements(at, curve, radius * radii()[:, None] * directions)
+    highest = np.power(radius, _HIGHEST)
+    if not (0.0 < highest < np.inf and np.isfinite(displaced).all()):
+        return None
+    image = images(mapped, at, displaced)
+    if image is None:
+        return None
+    columns = np.concatenate([image, (image @ at.left.conj())[..., None]], axis=-1)
+    harmonics = np.fft.fft(columns, axis=1) / directions.size
+    if not np.isfinite(harmonics).all():
+        return None
+    found = tuple(series(harmonics[:, h], h % 2) for h in range(directions.size))
+    size = np.maximum(np.abs(displaced), np.abs(image)).max(axis=(0, 1))
+    blur, floor = (_expected_noise(at, reached, noise) for reached in (np.abs(at.state), np.abs(at.state) + size))
+    # Noise of the samples is spread evenly over the coefficients of a cosine transform, smaller by this factor.
+    seen = np.sqrt(RADII / 2.0) * np.max([one.roughness for one in found], axis=0)
+    shrink = float(min(1.0, floor[-1] / seen[-1]) ** (0.5 / (RADII - 2))) if seen[-1] > 0.0 else 1.0
+    falling = any(one.falling[-1] for one in found)
+    return Sampled(found, np.maximum(floor, seen), float(blur[-1]), shrink, falling, size, radius, harmonics[0, :, -1])
+
+
+def _expected_noise(at: CriticalOrbit, reached: Array, noise: float) -> Array:
+    """Errors of images of a size, shape (n,), and of their projection: shape (n + 1,)."""
+    rounding = 2.0 * np.finfo(float).eps * (reached + np.abs(at.jacobian) @ reached)
+    floor: Array = np.maximum(rounding, noise * reached)
+    return np.append(floor, np.abs(at.left) @ floor)
+
+
+def solve_homological(
+    at: CriticalOrbit, powers: Powers, right_side: NDArray[np.inexact], resonant: bool
+) -> ComplexArray:
+    """The solution w of (nu^i conj(nu)^j - A) w = r, shape (n,) both.
+
+    Where nu^i conj(nu)^j is critical itself (``resonant``: nu, or its conjugate at the resonance 1:3) the part along
+    that critical direction is left out.
+    """
+    i, j = powers
+    n = at.state.size
+    factor = at.multiplier**i * at.multiplier.conjugate() ** j
+    matrix = factor * np.eye(n) - at.jacobian
+    if not resonant:
+        return np.asarray(np.linalg.solve(matrix, right_side), dtype=np.complex128)
+    q, p = (at.right, at.left) if abs(factor - at.multiplier) < 0.5 else (at.right.conj(), at.left.conj())
+    bordered = np.block([[matrix, q[:, None]], [p.conj()[None], np.zeros((1, 1))]])
+    padded = np.append(right_side - q * (p.conj() @ right_side), 0.0)
+    return np.asarray(np.linalg.solve(bordered, padded)[:n], dtype=np.complex128)

@@ -1,0 +1,236 @@
+"""Normal-form coefficients at a bifurcation, from evaluations of the return map alone.
+
+Near the critical orbit the return map H is sampled along the critical mode, bent by its quadratic part that leaves the
+critical space; the terms of second and third order on the critical space are read off (Kuznetsov, *Elements of Applied
+Bifurcation Theory*, sections 5.4, 8.7 and 9.2). Nothing but H is needed: no derivative of the right-hand side by hand,
+no symbolic algebra. The amplitude at which H is sampled is found from H itself, by what its series look like: any
+units give the same digits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chilopod.stability.normal_forms.amplitude import Fit, Search, Status
+from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, ReturnedStates, images
+from chilopod.stability.normal_forms.quintic import quintic_term
+from chilopod.stability.normal_forms.resonances import strong_resonance, uncertainties
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+_START = 0.2  # of the scale of the states, where the search for the amplitude starts
+
+
+@dataclass(frozen=True)
+class NormalForm:
+    """Leading coefficients of the full-period map on the critical space.
+
+    With a the amplitude along the unit critical mode: real multiplier +1, a -> a + quadratic a^2 + cubic a^3. A
+    multiplier -1 of the return map: the same, of the first map that has +1 again: the full period's where that is an
+    even number of returns, else that of two periods. Neimark-Sacker (state = 2 Re(a mode)): |a| -> |a| + cubic |a|^3,
+    while the phase of a advances by that of the multiplier + rotation |a|^2.
+
+    A mode that is k times as long (because a unit is) has amplitudes that are 1/k of these, and so coefficients that
+    are k (quadratic) and k^2 times as large (cubic, rotation).
+
+    Attributes
+    ----------
+    status
+        Whether the numbers mean anything. Where it is neither FOUND nor LINEAR they are NaN, their errors infinite;
+        except at the resonances 1:3 and 1:4, where they are those of Kuznetsov's normal form but decide nothing alone.
+    quadratic, cubic
+        Coefficients. A negative ``cubic`` bounds the growth: supercritical.
+    rotation
+        rad per period; 0 unless the critical multipliers are complex.
+    quadratic_error, cubic_error, rotation_error
+        Bounds on how far they may be off: noise of the map, truncation, and an orbit that is not exact.
+    amplitude
+        Largest amplitude at which the map was sampled for these numbers.
+    quintic, quintic_error
+        Coefficient of a^5 where it was asked for and the multiplier is real, a being such that the map has no a^2 and
+        a^4 (at -1); it decides where ``cubic`` is zero within its error and ``quadratic`` (at +1) too.
+    resonance
+        k where the pair is exp(+-2 pi i / k) within its uncertainty, k = 1 ... 4; else None.
+    resonant, resonant_error
+        At 1:3 and 1:4: coefficient of conj(a)^2, or conj(a)^3, of one return; turning the mode by an angle turns it.
+    ratio
+        At 1:4: A = -i C / |D| of Kuznetsov, section 9.5.3, with C and D the coefficients of a |a|^2 and conj(a)^3.
+    """
+
+    status: Status
+    quadratic: float = np.nan
+    quadratic_error: float = np.inf
+    cubic: float = np.nan
+    cubic_error: float = np.inf
+    rotation: float = 0.0
+    rotation_error: float = 0.0
+    amplitude: float = np.nan
+    quintic: float | None = None
+    quintic_error: float | None = None
+    resonance: int | None = None
+    resonant: complex | None = None
+    resonant_error: float | None = None
+    ratio: complex | None = None
+
+
+def normal_form(
+    mapped: ReturnedStates,
+    at: CriticalOrbit,
+    *,
+    noise: float = 0.0,
+    uncertainty: float = 0.0,
+    scale: ArrayLike | None = None,
+    orbit_error: float | None = None,
+    fifth: bool = False,
+) -> NormalForm:
+    """Normal form on the centre manifold of a critical orbit.
+
+    Parameters
+    ----------
+    mapped
+        The return map, of states of shape (k, n) at once.
+    at
+        The critical orbit.
+    noise
+        Relative error of the map: an image's entries are off by at most ``noise`` of the largest value they take
+        near the orbit. What is seen in the samples, and round-off, is allowed for anyway.
+    uncertainty
+        Relative error of the jacobian: how near to a root of unity, or to the unit circle, a multiplier is on it.
+    scale
+        Sizes of the states, shape (n,), in their units: where the search for an amplitude starts. Without it, it
+        starts from the size of the orbit, if that has one.
+    orbit_error
+        How far off ``at.state`` may be along the mode (in the amplitude's unit); 0 where it is exact. Without it, what
+        its residual and the noise allow: beside a singular H - 1 that is much.
+    fifth
+        Whether to find the quintic coefficient as well, at a real multiplier.
+
+    Returns
+    -------
+    The normal form, with a status that says why where there is none.
+    """
+    values, errors = uncertainties(at.jacobian, max(uncertainty, noise, 16.0 * np.finfo(float).eps))
+    own = [int(np.abs(values - one).argmin()) for one in (at.multiplier, at.multiplier.conjugate())]
+    others = np.delete(np.arange(values.size), own)
+    if (np.abs(np.abs(values[others]) - 1.0) <= errors[others]).any():
+        return NormalForm(Status.SEVERAL_CRITICAL)
+    resonance = None if at.real else strong_resonance(at.multiplier, float(errors[own[0]]))
+    if resonance in (1, 2):
+        return NormalForm(Status.STRONG_RESONANCE, resonance=resonance)
+    # Far out, where nobody knows what is there, an overflow is an answer.
+    with np.errstate(all="ignore"):
+        fit = Search(mapped, at, noise, resonance).run(_start(at, scale))
+    if fit is None:
+        return NormalForm(Status.OUT_OF_REACH, resonance=resonance)
+    if at.real:
+        form = _of_full_period(fit, mapped, at, noise, orbit_error)
+        return _with_fifth_order(form, fit, mapped, at, noise) if fifth else form
+    cubic = at.returns * np.conj(at.multiplier) * fit.cubic
+    error = at.returns * fit.cubic_error
+    form = NormalForm(
+        fit.status,
+        0.0,
+        0.0,
+        float(cubic.real),
+        error,
+        float(cubic.imag),
+        error,
+        fit.sampled.radius,
+        resonance=resonance,
+    )
+    return form if resonance is None else _with_resonant_terms(form, fit, at, resonance)
+
+
+def _start(at: CriticalOrbit, scale: ArrayLike | None) -> float:
+    """An amplitude to start the search from; what comes out does not depend on it."""
+    mode = np.abs(at.right)
+    if scale is not None:
+        known = mode > 0.0
+        return _START * float((np.abs(np.asarray(scale, dtype=np.float64))[known] / mode[known]).min())
+    orbit = float(np.abs(at.state).max())
+    # Nothing is known of an orbit at the origin: the search has all the way to go then, up or down.
+    return orbit / float(mode.max()) if orbit > 0.0 else _START
+
+
+def _loose_by(mapped: ReturnedStates, at: CriticalOrbit, noise: float, quadratic: float, cubic: float) -> float:
+    """How far along the mode an orbit may be off that returns as nearly as this one does, where H - 1 is singular.
+
+    Off by d from the symmetric orbit of a pitchfork it misses itself by at least cubic d^3, and looks as if there were
+    a quadratic term 3 cubic d; beside a transcritical point it misses by quadratic d^2.
+    """
+    image = None if at.multiplier.real < 0.0 else images(mapped, at, np.zeros((1, at.state.size)))
+    if image is None:
+        return 0.0
+    rounding = max(noise, 2.0 * np.finfo(float).eps) * np.abs(at.state)
+    missed = float(abs(image[0] @ at.left)) + float(np.abs(at.left) @ rounding)
+    if missed == 0.0:
+        return 0.0
+    by_cubic = float(1.5 * np.cbrt(missed / cubic)) if cubic > 0.0 else np.inf
+    # A quadratic term that no pitchfork beside this orbit explains holds the orbit closer.
+    return min(by_cubic, 2.0 * float(np.sqrt(missed / quadratic))) if quadratic > 6.0 * cubic * by_cubic else by_cubic
+
+
+def _of_full_period(
+    fit: Fit, mapped: ReturnedStates, at: CriticalOrbit, noise: float, orbit_error: float | None
+) -> NormalForm:
+    """From one return at a real multiplier to the map whose multiplier is +1."""
+    quadratic, quadratic_error = fit.term((2, 0))
+    cubic, cubic_error = fit.cubic.real, fit.cubic_error
+    fourth, fourth_error = fit.term((4, 0))
+    off = orbit_error
+    if off is None:
+        off = _loose_by(mapped, at, noise, abs(quadratic), abs(cubic) + cubic_error)
+    if off > 0.0:
+        quadratic_error += 3.0 * (abs(cubic) + cubic_error) * off
+        cubic_error += 4.0 * (abs(fourth) + fourth_error) * off
+    k = at.returns
+    if at.multiplier.real < 0.0:
+        # a -> -a + c a^3 twice: a -> a - 2 c a^3.
+        times = k if k % 2 == 0 else 2 * k
+        return NormalForm(fit.status, 0.0, 0.0, -times * cubic, times * cubic_error, amplitude=fit.sampled.radius)
+    return NormalForm(
+        fit.status,
+        k * quadratic.real,
+        k * quadratic_error,
+        k * cubic + k * (k - 1) * quadratic.real**2,
+        k * cubic_error + k * (k - 1) * (2.0 * abs(quadratic) + quadratic_error) * quadratic_error,
+        amplitude=fit.sampled.radius,
+    )
+
+
+def _with_fifth_order(
+    form: NormalForm, fit: Fit, mapped: ReturnedStates, at: CriticalOrbit, noise: float
+) -> NormalForm:
+    with np.errstate(all="ignore"):
+        quintic, error = quintic_term(mapped, at, fit, noise)
+    cubic, cubic_error, times = fit.cubic.real, fit.cubic_error, at.returns
+    if at.multiplier.real < 0.0:
+        # a -> -a + c a^3 + e a^5 twice: a -> a - 2 c a^3 + (3 c^2 - 2 e) a^5.
+        quintic, error = 3.0 * cubic**2 - 2.0 * quintic, 2.0 * error + 6.0 * abs(cubic) * cubic_error
+        cubic, cubic_error = -2.0 * cubic, 2.0 * cubic_error
+        times = times // 2 if times % 2 == 0 else times
+    # a -> a + c a^3 + e a^5 so many times.
+    pairs = 3.0 * times * (times - 1) / 2.0
+    return replace(
+        form,
+        quintic=times * quintic + pairs * cubic**2,
+        quintic_error=times * error + 2.0 * pairs * abs(cubic) * cubic_error,
+    )
+
+
+def _with_resonant_terms(form: NormalForm, fit: Fit, at: CriticalOrbit, resonance: int) -> NormalForm:
+    """The terms conj(a)^2 and conj(a)^3 of one return."""
+    resonant, error = fit.term((0, resonance - 1))
+    ratio = None
+    if resonance == 4 and abs(resonant) > error:
+        ratio = complex(-1j * fit.cubic / abs(resonant))
+    return replace(
+        form,
+        status=Status.STRONG_RESONANCE,
+        resonant=complex(resonant),
+        resonant_error=float(error),
+        ratio=ratio,
+    )

@@ -1,0 +1,307 @@
+"""Finite groups of matrices: the spatial symmetries P f(t, x) = f(t, P x) of a system.
+
+An orbit that is invariant under a group, P x(t) = x(t), has a return map whose derivative commutes with every P of it;
+:mod:`.isotypic` makes blocks of that. The matrices need not be orthogonal: the mean of P^T P over the
+group is a metric in which they are (Golubitsky, Stewart & Schaeffer, Singularities and Groups in Bifurcation Theory II,
+Springer 1988, proposition XII.1.3).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.frozen import ReadOnlyArrays, read_only
+from chilopod.stability.arguments import finite_array
+from chilopod.stability.symmetry.group_closure import SAME, factors, generating
+from chilopod.stability.symmetry.group_scales import coordinate_scales
+
+Array = NDArray[np.float64]
+
+LARGEST_ORDER = 10_000
+"""A group of more elements is refused."""
+
+_MOST_GENERATORS = 500
+
+_MOST_ENTRIES = 2**25
+"""Numbers in the matrices of all elements: 256 MiB."""
+
+_RETURNED = 1e-9
+"""So close to one are the diagonal entries of a power that is the identity; a rotation by 2 pi / 10 000 has 1 - 2e-7
+there."""
+
+_MIXED = 1e-11
+"""Coordinates are mixed by elements, of order one, with larger entries than this between them."""
+
+_ROUND_OFF = 64.0 * float(np.finfo(float).eps)
+
+
+@dataclass(frozen=True)
+class Group(ReadOnlyArrays):
+    """A finite group of matrices; :func:`finite_group` makes one.
+
+    Attributes
+    ----------
+    generators
+        Elements whose products are the group, those given that are needed, shape (generators, n, n).
+    elements
+        All elements, the identity first, shape (order, n, n).
+    to_orthogonal, from_orthogonal
+        Coordinates y = to_orthogonal x in which every element is an orthogonal matrix, and back, shape (n, n) both.
+    scales
+        Of the coordinates x, as the elements tell them, shape (n,): entry (i, j) of an element is of the order of
+        ``scales[i] / scales[j]`` at most. Between coordinates that no element mixes they say nothing.
+    component
+        Number of the set of coordinates that each one belongs to, shape (n,): elements mix only coordinates of one set,
+        such as one kind of state over all cells of a ring. ``to_orthogonal`` does not mix the sets either, so that
+        their units do not matter to each other.
+    """
+
+    generators: Array
+    elements: Array
+    to_orthogonal: Array
+    from_orthogonal: Array
+    scales: Array
+    component: NDArray[np.intp]
+
+    @property
+    def order(self) -> int:
+        """Number of elements."""
+        return len(self.elements)
+
+    @property
+    def dimension(self) -> int:
+        """Number n of states."""
+        return int(self.elements.shape[1])
+
+    @property
+    def invariant_metric(self) -> Array:
+        """Symmetric positive definite matrix G with P^T G P = G for every element, shape (n, n)."""
+        return np.asarray(self.to_orthogonal.T @ self.to_orthogonal)
+
+    @cached_property
+    def orthogonal(self) -> Array:
+        """The elements as orthogonal matrices, in the coordinates y, shape (order, n, n)."""
+        return read_only(np.asarray(self.to_orthogonal @ self.elements @ self.from_orthogonal))
+
+
+def finite_group(generators: ArrayLike) -> Group:
+    """The group of all products of some matrices.
+
+    Parameters
+    ----------
+    generators
+        Real matrices, shape (n, n) each, such as the cyclic shift and the reversal of a ring, in any units.
+
+    Raises
+    ------
+    ParameterError
+        The generators are no finite square matrices of one shape, not invertible, or have more products than
+        ``LARGEST_ORDER``, or than fit into 256 MiB.
+    """
+    given = _checked(generators)
+    n = given.shape[1]
+    most = max(1, min(LARGEST_ORDER, _MOST_ENTRIES // n**2))
+    returns = [_powers(matrix, most) for matrix in given]
+    scales = coordinate_scales(np.asarray(np.max([envelope for envelope, _ in returns], axis=0)))
+    for matrix, (_, residual) in zip(given, returns, strict=True):
+        if np.abs(_scaled(residual, scales)).max() > SAME:
+            raise _infinite(matrix, most)
+    found = factors(_scaled(given, scales), most)
+    if found is None:
+        raise ParameterError(
+            "generate an infinite group, or too large a one",
+            field="generators",
+            allowed=f"{most} elements or fewer in dimension {n}",
+        )
+    by, of = found
+    elements = np.empty((len(by), n, n))
+    elements[0] = np.eye(n)
+    for i in range(1, len(by)):
+        elements[i] = given[by[i]] @ elements[of[i]]
+    needed = np.unique(by[1:]) if len(by) > 1 else by
+    return _with_metric(given[needed], elements, scales)
+
+
+def isotropy(group: Group, x: ArrayLike, error: ArrayLike = 0.0) -> Group:
+    """The isotropy subgroup of a state: all P of a group with P x = x.
+
+    Parameters
+    ----------
+    group
+        The symmetries of the system.
+    x
+        State on the orbit, shape (n,). With symmetries that hold at every instant one state decides: by uniqueness of
+        the flow its whole orbit is invariant.
+    error
+        Bound on the absolute error of x, one for all or shape (n,). A coordinate that is zero but for the error of a
+        computation needs it.
+    """
+    state = finite_array(x, (group.dimension,), "x")
+    bound = _bound(error, (group.dimension,))
+    moved = np.abs(group.elements @ state - state)
+    allowed = (np.abs(group.elements) + np.eye(group.dimension)) @ (bound + SAME * np.abs(state))
+    return _subgroup(group, np.all(moved <= allowed, axis=1), "x")
+
+
+def centraliser(group: Group, gamma: ArrayLike) -> Group:
+    """The subgroup of all P that commute with a matrix: what blocks of a return map gamma ∘ flow(T/k) are made from.
+
+    Where the whole group leaves an orbit invariant, the derivative M = gamma Phi of that map has P M = M P exactly if
+    P gamma = gamma P, because P commutes with the derivative Phi of the flow.
+
+    Parameters
+    ----------
+    group
+        The spatial symmetries of the orbit.
+    gamma
+        Spatial part of a symmetry in space and time, gamma f(t, x) = f(t + T/k, gamma x), shape (n, n); it must
+        normalise the group, that is, gamma P gamma^-1 is an element wherever P is one.
+    """
+    n = group.dimension
+    matrix = _scaled(finite_array(gamma, (n, n), "gamma"), group.scales)
+    own = _scaled(group.elements, group.scales)
+    left, right = matrix @ own, own @ matrix
+    size = np.abs(matrix).max()
+    if size == 0.0 or np.linalg.matrix_rank(matrix) < n:
+        raise ParameterError("is not invertible", field="gamma")
+    for image in matrix @ _scaled(group.generators, group.scales):  # which is P gamma for some element P
+        if not np.abs(right - image).max(axis=(1, 2)).min() <= SAME * size:
+            raise ParameterError(
+                "does not normalise the group", field="gamma", allowed="gamma P gamma^-1 in the group for every P of it"
+            )
+    return _subgroup(group, np.all(np.abs(left - right) <= SAME * size, axis=(1, 2)), "gamma")
+
+
+def commutes(group: Group, matrix: ArrayLike, error: ArrayLike = 0.0) -> float:
+    """How far a matrix is from commuting with a group, in units of what its error explains: at most 1 if it does.
+
+    Parameters
+    ----------
+    group
+        The symmetries.
+    matrix
+        Derivative M of a return map, shape (n, n).
+    error
+        Bound on the absolute error of the entries of M, one for all or shape (n, n); round-off is added to it.
+    """
+    n = group.dimension
+    m = finite_array(matrix, (n, n), "matrix")
+    sizes = group.scales[:, None] / group.scales
+    pairs = group.component[:, None], group.component[None, :]
+    largest = np.full((n, n), np.finfo(float).tiny)
+    np.maximum.at(largest, pairs, np.abs(m / sizes))
+    bound = _bound(error, (n, n)) + _ROUND_OFF * n * largest[pairs] * sizes
+    p = group.generators
+    explained = np.abs(p) @ bound + bound @ np.abs(p)
+    return float((np.abs(p @ m - m @ p) / explained).max())
+
+
+def _checked(generators: ArrayLike) -> Array:
+    try:
+        raw = np.asarray(generators)
+    except ValueError:  # matrices of several shapes
+        raise ParameterError("must be matrices of one shape", field="generators", allowed="(n, n) each") from None
+    if raw.dtype.kind not in "biuf":
+        raise ParameterError("must be real numbers", field="generators", value=generators)
+    if raw.ndim != 3 or raw.shape[0] < 1 or raw.shape[1] != raw.shape[2] or raw.shape[1] < 1:
+        raise ParameterError(
+            "must be square matrices", field="generators", value=raw.shape, allowed="one or more of shape (n, n)"
+        )
+    if len(raw) > _MOST_GENERATORS:
+        raise ParameterError("are too many", field="generators", value=len(raw), allowed=f"{_MOST_GENERATORS} or fewer")
+    return finite_array(raw, raw.shape, "generators")
+
+
+def _powers(matrix: Array, most: int) -> tuple[Array, Array]:
+    """Largest absolute value of each entry over the powers, shape (n, n), and what the last one differs by from the
+    identity, which it is but for round-off if the matrix generates a finite group."""
+    n = len(matrix)
+    power, envelope = matrix, np.maximum(np.abs(matrix), np.eye(n))
+    with np.errstate(over="ignore", invalid="ignore"):
+        for _ in range(most):
+            diagonal = np.diag(power)
+            # Whatever the units: the diagonal is free of them.
+            if np.abs(diagonal - 1.0).max() < _RETURNED:
+                return envelope, power - np.eye(n)
+            if not abs(diagonal.sum()) < n + 1.0:  # of finite order, its eigenvalues lie on the unit circle
+                break
+            power = power @ matrix
+            envelope = np.maximum(envelope, np.abs(power))
+    raise _infinite(matrix, most)
+
+
+def _infinite(matrix: Array, most: int) -> ParameterError:
+    if np.linalg.slogdet(matrix)[1] < -1.0:  # ±1 in a finite group
+        return ParameterError("is not invertible, or shrinks volumes", field="generators", allowed="determinant ±1")
+    return ParameterError(
+        "generate an infinite group, or too large a one",
+        field="generators",
+        allowed=f"matrices of which a power up to {most} is the identity, to 9 digits",
+    )
+
+
+def _scaled(matrices: Array, scales: Array) -> Array:
+    return np.asarray(matrices * (scales / scales[:, None]))
+
+
+def _bound(error: ArrayLike, shape: tuple[int, ...]) -> Array:
+    try:
+        bound = np.broadcast_to(np.asarray(error, dtype=np.float64), shape)
+    except (TypeError, ValueError):
+        raise ParameterError(
+            "must be a number, or one for each", field="error", value=error, allowed=str(shape)
+        ) from None
+    if not (bound >= 0.0).all():
+        raise ParameterError("must not be negative", field="error", value=error)
+    return bound
+
+
+def _subgroup(group: Group, members: NDArray[np.bool_], field: str) -> Group:
+    chosen = np.flatnonzero(members)
+    generators = generating(_scaled(group.elements, group.scales), chosen)
+    if generators is None:
+        raise AnalysisError(
+            "is kept by elements that form no group: its error is at the edge of what tells them apart", field=field
+        )
+    return _with_metric(group.elements[generators], group.elements[chosen], group.scales)
+
+
+def _with_metric(generators: Array, elements: Array, scales: Array) -> Group:
+    n = elements.shape[1]
+    # In scaled coordinates: in those of the user the entries may differ by more than double precision has.
+    scaled = _scaled(elements, scales)
+    component = _components(np.abs(scaled).max(axis=0) > _MIXED)
+    stacked = scaled.reshape(-1, n)
+    metric = np.where(component[:, None] == component, stacked.T @ stacked / len(elements), 0.0)
+    try:
+        root = np.linalg.cholesky(metric).T
+        inverse = np.linalg.inv(root)
+    except np.linalg.LinAlgError:
+        raise AnalysisError(
+            "have no invariant metric in double precision",
+            field="generators",
+            allowed="coordinates less oblique to each other",
+        ) from None
+    group = Group(generators, elements, root / scales, scales[:, None] * inverse, scales, component)
+    q = group.orthogonal
+    if not np.abs(np.swapaxes(q, 1, 2) @ q - np.eye(n)).max() < SAME:
+        raise AnalysisError(
+            "are no exact symmetries, or too oblique", field="generators", allowed="matrices exact to 1e-9 or better"
+        )
+    return group
+
+
+def _components(linked: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Numbers of the connected sets, shape (n,), of links shape (n, n)."""
+    linked = linked | linked.T
+    number = np.arange(len(linked))
+    while True:  # ends: numbers only fall
+        lowest = np.where(linked, number, len(linked)).min(axis=1)
+        if (lowest == number).all():
+            return np.asarray(np.unique(number, return_inverse=True)[1])
+        number = lowest[lowest]

@@ -1,0 +1,158 @@
+"""Everything a Python function depends on besides its arguments: told apart by kind, and put back traced.
+
+The floats among a function's arguments, defaults, closure and globals become parameters of the tape; whole numbers,
+strings and the code itself are part of the key under which the tape is kept. So a family of lambdas over a parameter is
+traced once, and a changed global is not overlooked.
+"""
+
+from __future__ import annotations
+
+import builtins
+import functools
+import types
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from chilopod.stability.taylor.standins import stand_in
+from chilopod.stability.taylor.traced import as_traced
+
+_PLAIN = (int, bool, str, bytes, complex, type(None), np.integer, np.bool_)
+_OUTSIDE = ("numpy", "scipy", "math", "builtins", "numba")
+
+
+class Opaque(Exception):
+    """Holds an object whose contents may change unnoticed: a tape cannot be kept for another time."""
+
+
+def python_function(value: Any) -> Any:
+    """The Python function behind a compiled one; the value itself if it is none."""
+    inner = getattr(value, "py_func", None)
+    return inner if isinstance(inner, types.FunctionType) else value
+
+
+def _own(value: Any) -> bool:
+    return isinstance(value, types.FunctionType) and (value.__module__ or "").partition(".")[0] not in _OUTSIDE
+
+
+@functools.lru_cache(maxsize=1024)
+def _names(code: types.CodeType) -> tuple[str, ...]:
+    """Names that code may look up among the globals, in order."""
+    names = dict.fromkeys(code.co_names)
+    for constant in code.co_consts:
+        if isinstance(constant, types.CodeType):
+            names.update(dict.fromkeys(_names(constant)))
+    return tuple(names)
+
+
+def describe(value: Any, floats: list[float], seen: dict[int, int]) -> Any:
+    """A hashable description of a value, and all floats in it appended to a list.
+
+    Raises
+    ------
+    Opaque
+        If it holds objects of unknown kinds.
+    """
+    value = python_function(value)
+    if isinstance(value, float | np.floating):  # np.float64 is a float
+        floats.append(float(value))
+        return "f"
+    if isinstance(value, _PLAIN):
+        return type(value).__name__, value
+    if isinstance(value, np.ndarray):
+        if value.dtype.kind == "f":
+            floats += value.ravel().tolist()
+            return "a", value.shape
+        return "b", value.shape, value.dtype.str, value.tobytes()
+    if isinstance(value, tuple | list):
+        return type(value).__name__, tuple(describe(part, floats, seen) for part in value)
+    if isinstance(value, dict):
+        return "d", tuple((describe(key, floats, seen), describe(part, floats, seen)) for key, part in value.items())
+    if _own(value):
+        if id(value) in seen:
+            return "again", seen[id(value)]
+        seen[id(value)] = len(seen)
+        return (
+            "function",
+            value.__code__,
+            *(describe(cell.cell_contents, floats, seen) for cell in value.__closure__ or ()),
+            describe(value.__defaults__, floats, seen),
+            describe(value.__kwdefaults__, floats, seen),
+            *(
+                (name, describe(value.__globals__[name], floats, seen))
+                for name in _names(value.__code__)
+                if name in value.__globals__
+            ),
+        )
+    if isinstance(value, functools.partial):
+        return "partial", *(describe(part, floats, seen) for part in (value.func, value.args, value.keywords))
+    if isinstance(value, types.MethodType | types.ModuleType | types.BuiltinFunctionType | type | np.ufunc) or (
+        callable(value) and (getattr(value, "__module__", None) or "").partition(".")[0] in _OUTSIDE
+    ):
+        if isinstance(value, types.MethodType):
+            raise Opaque
+        return "id", id(value)
+    raise Opaque
+
+
+def rebuild(value: Any, source: Iterator[Any] | None, seen: dict[int, Any]) -> Any:
+    """The value with its floats replaced by those of an iterator, in the order of :func:`describe`, and numpy and math
+    by versions that take traced numbers; with no iterator, floats stay."""
+    value = python_function(value)
+    if isinstance(value, float | np.floating):
+        return value if source is None else next(source)
+    if isinstance(value, _PLAIN):
+        return value
+    if isinstance(value, np.ndarray):
+        if value.dtype.kind != "f" or source is None:
+            return value
+        array = np.empty(value.size, dtype=object)
+        for i in range(value.size):
+            array[i] = next(source)
+        if all(isinstance(part, float) for part in array):
+            return value
+        return as_traced(array).reshape(value.shape)
+    if isinstance(value, tuple | list):
+        return type(value)([rebuild(part, source, seen) for part in value])
+    if isinstance(value, dict):
+        return {rebuild(key, source, seen): rebuild(part, source, seen) for key, part in value.items()}
+    if _own(value):
+        return _rebuilt_function(value, source, seen)
+    if isinstance(value, functools.partial):
+        function, args, keywords = (rebuild(part, source, seen) for part in (value.func, value.args, value.keywords))
+        return functools.partial(function, *args, **keywords)
+    if isinstance(value, types.MethodType):
+        inner = python_function(value.__func__)
+        if isinstance(inner, types.FunctionType) and _own(inner):
+            return types.MethodType(_rebuilt_function(inner, None, seen), value.__self__)
+    call = vars(type(value)).get("__call__")
+    if isinstance(call, types.FunctionType) and _own(call):  # an object that is called like a function
+        return types.MethodType(_rebuilt_function(call, None, seen), value)
+    return stand_in(value)
+
+
+def _rebuilt_function(
+    value: types.FunctionType, source: Iterator[Any] | None, seen: dict[int, Any]
+) -> Callable[..., Any]:
+    if id(value) in seen:
+        return seen[id(value)]
+    outer: dict[str, Any] = {"__builtins__": _BUILTINS, "__name__": value.__module__}
+    cells = tuple(types.CellType() for _ in value.__closure__ or ())
+    function = types.FunctionType(value.__code__, outer, value.__name__, None, cells)
+    seen[id(value)] = function
+    for cell, old in zip(cells, value.__closure__ or (), strict=True):
+        cell.cell_contents = rebuild(old.cell_contents, source, seen)
+    function.__defaults__ = rebuild(value.__defaults__, source, seen)
+    function.__kwdefaults__ = rebuild(value.__kwdefaults__, source, seen)
+    for name in _names(value.__code__):
+        if name in value.__globals__:
+            outer[name] = rebuild(value.__globals__[name], source, seen)
+    return function
+
+
+def _import(name: str, *args: Any, **options: Any) -> Any:
+    return stand_in(builtins.__import__(name, *args, **options))
+
+
+_BUILTINS = {name: stand_in(value) for name, value in vars(builtins).items()} | {"__import__": _import}

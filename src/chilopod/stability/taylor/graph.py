@@ -1,0 +1,315 @@
+"""Operations under construction: common subexpressions shared, numbers folded, sums gathered."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from chilopod.stability.taylor.tape import (
+    ASIN,
+    ATAN,
+    CONSTANT,
+    COS,
+    COSH,
+    EXP,
+    FLOOR,
+    LINEAR,
+    LOG,
+    MOVING,
+    NUMBER,
+    PARAMETER,
+    POWER,
+    PRODUCT,
+    QUOTIENT,
+    SELECT,
+    SIN,
+    SINH,
+    SQRT,
+    SQUARE,
+    STATE,
+    STEP,
+    TAN,
+    TANH,
+    TIME,
+    TIMED,
+)
+
+Node = tuple[int, tuple[int, ...]]
+
+_FUNCTIONS = {
+    EXP: math.exp,
+    SIN: math.sin,
+    COS: math.cos,
+    TAN: math.tan,
+    SINH: math.sinh,
+    COSH: math.cosh,
+    TANH: math.tanh,
+    LOG: math.log,
+    SQRT: math.sqrt,
+    ATAN: math.atan,
+    ASIN: math.asin,
+}
+
+
+class Graph:
+    """Operations under construction; nodes are numbers, in the order in which they came."""
+
+    def __init__(self, dimension: int, parameters: int) -> None:
+        self.nodes: list[Node] = []
+        self.depends: list[int] = []
+        self.weights: dict[int, int] = {}  # w of every function node
+        self._known: dict[Node, int] = {}
+        self.states = [self._new(STATE, (i,)) for i in range(dimension)]
+        self.time = self._new(TIME, ())
+        self.parameters = [self._new(PARAMETER, (i,)) for i in range(parameters)]
+        self._values: list[float] = []
+
+    def _new(self, code: int, operands: tuple[int, ...]) -> int:
+        node = (code, operands)
+        found = self._known.get(node)
+        if found is not None:
+            return found
+        if code == STATE:
+            depends = MOVING
+        elif code == TIME:
+            depends = TIMED
+        elif code in (PARAMETER, NUMBER):
+            depends = CONSTANT
+        else:
+            depends = max((self.depends[i] for i in operands), default=CONSTANT)
+        self.nodes.append(node)
+        self.depends.append(depends)
+        self._known[node] = len(self.nodes) - 1
+        return len(self.nodes) - 1
+
+    def number(self, value: float) -> int:
+        """The node of a number."""
+        value = float(value)
+        # The bits, because NaN equals nothing and 0.0 equals -0.0.
+        bits = int(np.float64(value).view(np.int64))
+        known = len(self.nodes)
+        node = self._new(NUMBER, (bits,))
+        if node == known:
+            self._values.append(value)
+        return node
+
+    def value(self, node: int) -> float | None:
+        """The value of a number node, None of any other."""
+        code, operands = self.nodes[node]
+        return float(np.int64(operands[0]).view(np.float64)) if code == NUMBER else None
+
+    def terms(self, node: int) -> list[tuple[int, int]]:
+        """A node as a sum: pairs of weight and node."""
+        code, operands = self.nodes[node]
+        if code == LINEAR:
+            return list(zip(operands[::2], operands[1::2], strict=True))
+        return [(self.number(1.0), node)]
+
+    def linear(self, terms: Sequence[tuple[int, int]]) -> int:
+        """A sum of nodes with constant weights."""
+        constant = 0.0
+        kept: dict[int, int] = {}
+        for weight, node in terms:
+            w, v = self.value(weight), self.value(node)
+            if w == 0.0:
+                continue
+            if w is not None and v is not None:
+                constant += w * v
+                continue
+            if v is not None:
+                weight, node, w, v = node, weight, v, w  # a number times a parameter
+                if w == 0.0:
+                    continue
+            if node in kept:
+                other = self.value(kept[node])
+                if w is not None and other is not None:
+                    if w + other == 0.0:
+                        del kept[node]
+                    else:
+                        kept[node] = self.number(w + other)
+                    continue
+                weight = self.linear([(self.number(1.0), kept[node]), (self.number(1.0), weight)])
+            kept[node] = weight
+        one = self.number(1.0)
+        if constant != 0.0 or not kept:
+            if not kept:
+                return self.number(constant)
+            kept[self.number(constant)] = one
+        if len(kept) == 1:
+            ((node, weight),) = kept.items()
+            if weight == one:
+                return node
+        return self._new(LINEAR, tuple(i for node in sorted(kept) for i in (kept[node], node)))
+
+    def add(self, a: int, b: int, sign: float = 1.0) -> int:
+        """a + sign b."""
+        return self.linear([(self.number(1.0), a), (self.number(sign), b)])
+
+    def multiply(self, a: int, b: int) -> int:
+        """a b."""
+        if self.depends[a] > self.depends[b] or (self.depends[a] == self.depends[b] and a > b):
+            a, b = b, a
+        va, vb = self.value(a), self.value(b)
+        if vb is not None:
+            a, b, va, vb = b, a, vb, va
+        if va is not None:
+            if vb is not None:
+                return self.number(va * vb)
+            if va == 0.0:
+                return self.number(0.0)
+            if va == 1.0:
+                return b
+            if self.nodes[b][0] == LINEAR and len(self.nodes[b][1]) == 2:
+                weight, node = self.nodes[b][1]
+                return self.linear([(self.multiply(a, weight), node)])
+        if self.depends[a] == CONSTANT and self.depends[b] != CONSTANT:
+            return self.linear([(a, b)])
+        if va is not None:
+            return self.linear([(a, b)])
+        if a == b:
+            return self._new(SQUARE, (a,))
+        # Numbers in front of a factor go in front of the product, where they cost nothing.
+        for one, other in ((a, b), (b, a)):
+            code, operands = self.nodes[one]
+            if code == LINEAR and len(operands) == 2 and self.depends[other] != CONSTANT:
+                return self.linear([(operands[0], self.multiply(operands[1], other))])
+        return self._new(PRODUCT, (a, b))
+
+    def divide(self, a: int, b: int) -> int:
+        """a / b."""
+        va, vb = self.value(a), self.value(b)
+        if vb is not None and vb != 0.0:
+            if va is not None:
+                return self.number(va / vb)
+            if math.frexp(vb)[0] in (0.5, -0.5):
+                return self.multiply(self.number(1.0 / vb), a)  # exact
+        if va == 0.0 and vb is None:
+            return self.number(0.0)
+        if self.depends[b] == CONSTANT and self.depends[a] != CONSTANT:
+            return self.multiply(self._new(QUOTIENT, (self.number(1.0), b)), a)
+        return self._new(QUOTIENT, (a, b))
+
+    def power(self, a: int, exponent: int) -> int:
+        """a to the power of another node."""
+        number = self.value(exponent)
+        if number is None:
+            if self.depends[exponent] == CONSTANT:
+                return self._general_power(a, exponent)
+            return self.function(EXP, self.multiply(exponent, self.function(LOG, a)))
+        if number == 0.0:
+            return self.number(1.0)
+        twice = 2.0 * number
+        if twice != round(twice) or abs(number) > 64:
+            return self._general_power(a, exponent)
+        if number < 0:
+            return self.divide(self.number(1.0), self.power(a, self.number(-number)))
+        result = None if number == math.floor(number) else self.function(SQRT, a)
+        whole = int(number)
+        while whole:
+            if whole & 1:
+                result = a if result is None else self.multiply(result, a)
+            whole >>= 1
+            if whole:
+                a = self.multiply(a, a)
+        assert result is not None
+        return result
+
+    def _general_power(self, a: int, exponent: int) -> int:
+        va, ve = self.value(a), self.value(exponent)
+        if va is not None and ve is not None and va > 0:
+            return self.number(va**ve)
+        node = self._new(POWER, (a, exponent))
+        if node not in self.weights:
+            self.weights[node] = -1
+            self.weights[node] = self.multiply(exponent, self.divide(node, a))
+        return node
+
+    def function(self, code: int, a: int) -> int:
+        """A function of one node."""
+        value = self.value(a)
+        if value is not None:
+            try:
+                return self.number(_FUNCTIONS[code](value))
+            except (ValueError, OverflowError):
+                return self.number(math.nan)
+        node = self._new(code, (a,))
+        if node in self.weights:
+            return node
+        one = self.number(1.0)
+        self.weights[node] = -1  # w may be made of the node itself
+        if code == EXP:
+            weight = node
+        elif code in (SIN, COS):
+            weight = self.function(COS if code == SIN else SIN, a)
+        elif code in (SINH, COSH):
+            weight = self.function(COSH if code == SINH else SINH, a)
+        elif code == TAN:
+            weight = self.add(one, self.multiply(node, node))
+        elif code == TANH:
+            weight = self.add(one, self.multiply(node, node), -1.0)
+        elif code == LOG:
+            weight = self.divide(one, a)
+        elif code == SQRT:
+            weight = self.divide(self.number(0.5), node)
+        elif code == ATAN:
+            weight = self.divide(one, self.add(one, self.multiply(a, a)))
+        else:  # ASIN
+            weight = self.divide(one, self.function(SQRT, self.add(one, self.multiply(a, a), -1.0)))
+        self.weights[node] = weight
+        return node
+
+    def step(self, a: int) -> int:
+        """The sign of a node: 1 or -1."""
+        value = self.value(a)
+        if value is not None:
+            return self.number(math.copysign(1.0, value) if value else 0.0)
+        code, operands = self.nodes[a]
+        if code == STEP:
+            return a
+        if code == LINEAR and len(operands) == 2:  # one switch for every multiple of a switching function
+            weight = self.value(operands[0])
+            if weight is not None:
+                return self.multiply(self.number(math.copysign(1.0, weight)), self.step(operands[1]))
+        if code == LINEAR:
+            weight = self.value(operands[0])
+            if weight is not None and weight < 0:
+                minus = self.number(-1.0)
+                turned = self.linear([(self.multiply(minus, weight), node) for weight, node in self.terms(a)])
+                return self.multiply(minus, self.step(turned))
+        return self._new(STEP, (a,))
+
+    def floor(self, a: int) -> int:
+        """The largest whole number below a node."""
+        value = self.value(a)
+        return self._new(FLOOR, (a,)) if value is None else self.number(math.floor(value))
+
+    def select(self, switch: int, above: int, below: int) -> int:
+        """One node where another is positive, else a third."""
+        sign = self.step(switch)
+        value = self.value(sign)
+        if above == below:
+            return above
+        if value is not None:
+            return above if value > 0 else below
+        code, operands = self.nodes[sign]
+        if code == LINEAR:  # minus a step
+            return self._new(SELECT, (operands[1], below, above))
+        return self._new(SELECT, (sign, above, below))
+
+    def operands(self, node: int) -> list[int]:
+        """The nodes a node is computed from, weights included."""
+        code, operands = self.nodes[node]
+        return [] if code in (STATE, TIME, PARAMETER, NUMBER) else list(operands)
+
+    def parameters_below(self, node: int) -> frozenset[int]:
+        """Numbers of the parameters that a node depends on."""
+        seen: set[int] = set()
+        ahead = [node]
+        while ahead:
+            node = ahead.pop()
+            if node not in seen:
+                seen.add(node)
+                ahead += self.operands(node)
+        return frozenset(self.nodes[i][1][0] for i in seen if self.nodes[i][0] == PARAMETER)

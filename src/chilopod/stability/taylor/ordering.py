@@ -1,0 +1,175 @@
+"""Ordering of the operations of a graph into a tape."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from chilopod.stability.taylor.graph import Graph
+from chilopod.stability.taylor.tape import (
+    CONSTANT,
+    COS,
+    FLOOR,
+    GUARD,
+    LINEAR,
+    MOVING,
+    NUMBER,
+    PARAMETER,
+    PRODUCT,
+    SELECT,
+    SIN,
+    SQUARE,
+    STATE,
+    STEP,
+    TIME,
+    TIMED,
+    Tape,
+)
+
+Terms = dict[int, list[tuple[int, int]]]
+"""Weight and node of every term of the sums."""
+
+
+def ordered(
+    graph: Graph,
+    slopes: Sequence[int],
+    guards: Sequence[int] = (),
+    resets: Sequence[Sequence[int]] = (),
+) -> Tape:
+    """The tape of the operations that some results need: dx/dt, the guards and the resets of events."""
+    flat = _flattened(graph, [*slopes, *guards, *(node for reset in resets for node in reset)])
+    flow = _reached(graph, [*slopes, *guards], flat)
+    every = _reached(graph, [*flow, *(node for reset in resets for node in reset)], flat)
+    leaves = (STATE, TIME, PARAMETER)
+    numbers = [i for i in every if graph.nodes[i][0] == NUMBER]
+    operations = [i for i in every if graph.nodes[i][0] not in (*leaves, NUMBER)]
+    constant = [i for i in operations if graph.depends[i] == CONSTANT]
+    moving = [i for i in operations if graph.depends[i] != CONSTANT and i in set(flow)]
+    later = [i for i in operations if graph.depends[i] != CONSTANT and i not in set(flow)]
+    order = [*graph.states, graph.time, *graph.parameters, *numbers, *constant, *moving, *later]
+    place = {node: i for i, node in enumerate(order)}
+    live = _live(graph, [*slopes, *guards, *(node for reset in resets for node in reset)], every, flat)
+    program = np.zeros((5, len(order)), dtype=np.int64)
+    terms: list[tuple[int, int]] = []
+    switches: list[tuple[int, int, int]] = []
+    for i, node in enumerate(order):
+        code, operands = graph.nodes[node]
+        program[0, i] = code
+        program[4, i] = node in live
+        if code == LINEAR:
+            program[1, i] = len(terms)
+            terms += [(place[weight], place[term]) for weight, term in flat[node]]
+            program[2, i] = len(terms)
+        elif code in (STEP, FLOOR):
+            program[1, i], program[2, i] = place[operands[0]], len(switches)
+            switches.append((code, place[operands[0]], i))
+        elif code not in (*leaves, NUMBER):
+            program[1 : 1 + len(operands), i] = [place[operand] for operand in operands]
+            if node in graph.weights and graph.depends[node] != CONSTANT:
+                program[3, i] = place[graph.weights[node]]
+    switches += [(GUARD, place[guard], k) for k, guard in enumerate(guards)]
+    first = len(order) - len(constant) - len(moving) - len(later)
+    layout = [
+        len(graph.states),
+        len(graph.parameters),
+        first,
+        first + len(constant),
+        len(order) - len(later),
+        len(order),
+    ]
+    return Tape(
+        program=program,
+        terms=np.array(terms, dtype=np.int64).reshape(-1, 2).T.copy(),
+        numbers=np.array([graph.value(i) for i in numbers], dtype=np.float64),
+        layout=np.array(layout, dtype=np.int64),
+        slopes=np.array([place[i] for i in slopes], dtype=np.int64),
+        switches=np.array(switches, dtype=np.int64).reshape(-1, 3).T.copy(),
+        resets=np.array([[place[i] for i in reset] for reset in resets], dtype=np.int64).reshape(-1, len(slopes)),
+        clocks=np.array([place[i] for i in _clocks(graph, every, flat)], dtype=np.int64),
+    )
+
+
+def _operands(graph: Graph, node: int, flat: Terms) -> list[int]:
+    return [i for term in flat[node] for i in term] if node in flat else graph.operands(node)
+
+
+def _reached(graph: Graph, roots: Sequence[int], flat: Terms) -> list[int]:
+    """All nodes that some nodes need, in the order in which they came: every one after its operands."""
+    seen: set[int] = set()
+    ahead = list(roots)
+    while ahead:
+        node = ahead.pop()
+        if node in seen:
+            continue
+        seen.add(node)
+        ahead += _operands(graph, node, flat)
+        if node in graph.weights and graph.depends[node] != CONSTANT:
+            ahead.append(graph.weights[node])
+    return sorted(seen)
+
+
+def _flattened(graph: Graph, roots: Sequence[int]) -> Terms:
+    """The terms of the sums, those of a sum that only one other uses taken into that one."""
+    reached = _reached(graph, roots, {})
+    uses = dict.fromkeys(reached, 0)
+    for node in roots:
+        uses[node] += 1
+    for node in reached:
+        for operand in _operands(graph, node, {}):
+            uses[operand] += 1
+        if node in graph.weights and graph.depends[node] != CONSTANT:
+            uses[graph.weights[node]] += 1
+    flat: Terms = {}
+    for node in reached:
+        if graph.nodes[node][0] != LINEAR:
+            continue
+        flat[node] = []
+        for weight, term in graph.terms(node):
+            if graph.nodes[term][0] == LINEAR and uses[term] == 1 and graph.depends[term] != CONSTANT:
+                flat[node] += [(graph.multiply(weight, inner), part) for inner, part in flat[term]]
+            else:
+                flat[node].append((weight, term))
+    # Weights made here may be sums themselves.
+    for node in _reached(graph, [weight for terms in flat.values() for weight, _ in terms], flat):
+        if graph.nodes[node][0] == LINEAR and node not in flat:
+            flat[node] = graph.terms(node)
+    return flat
+
+
+def _live(graph: Graph, roots: Sequence[int], every: Sequence[int], flat: Terms) -> set[int]:
+    """The nodes whose tangents are needed: not those that only serve as the w of a function."""
+    surfaces = [graph.nodes[i][1][0] for i in every if graph.nodes[i][0] in (STEP, FLOOR)]
+    ahead, live = [*roots, *surfaces], set[int]()
+    while ahead:
+        node = ahead.pop()
+        if node in live or graph.depends[node] != MOVING or graph.nodes[node][0] in (STEP, FLOOR):
+            continue
+        live.add(node)
+        ahead += _operands(graph, node, flat)
+    return live
+
+
+def _clocks(graph: Graph, every: Sequence[int], flat: Terms) -> list[int]:
+    plain: set[int] = set()  # what a Taylor series sees from everywhere
+    for node in every:
+        code, operands = graph.nodes[node]
+        if code == TIME:
+            plain.add(node)
+        elif graph.depends[node] == TIMED:
+            parts = _operands(graph, node, flat)
+            if code in (LINEAR, PRODUCT, SQUARE, SELECT):
+                simple = all(part in plain or graph.depends[part] == CONSTANT for part in parts)
+            elif code in (SIN, COS):
+                inner = operands[0]
+                simple = inner == graph.time or (
+                    graph.nodes[inner][0] == LINEAR
+                    and all(graph.depends[term] == CONSTANT or term == graph.time for _, term in flat[inner])
+                )
+            else:
+                simple = code in (STEP, FLOOR) and operands[0] in plain
+            if simple:
+                plain.add(node)
+    # Sums and products of these show what they show, but drown a small tail in a large constant.
+    combined = (LINEAR, PRODUCT, SQUARE, SELECT, STEP, FLOOR)
+    return [i for i in every if graph.depends[i] == TIMED and i not in plain and graph.nodes[i][0] not in combined]

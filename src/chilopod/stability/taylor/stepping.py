@@ -1,0 +1,351 @@
+"""The solution of dx/dt = f(t, x) over an interval, with its derivative, through switches and events, in compiled code.
+
+Steps are as long as the Taylor series allows: the last coefficients of every state, every entry of the derivative and
+every switching function are below the tolerance relative to the largest of its own, so that units do not matter
+(compare Jorba and Zou, *Experimental Mathematics* 14, 99, 2005). A step ends where a switching function leaves its
+branch. There the derivative is multiplied by the saltation matrix (Leine and Nijmeijer, *Dynamics and Bifurcations of
+Non-Smooth Mechanical Systems*, Springer 2004, ch. 7)
+
+    S = Dr + (f+ - r') grad g / g',        r' = r_t + Dr f-,  g' = g_t + grad g f-,
+
+with the state r(t, x) after the event, r = x where only f switches; both r' and g' are first Taylor coefficients.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from chilopod.compiled import fused_njit
+from chilopod.stability.taylor import tape as ops
+from chilopod.stability.taylor.exits import first_exit
+from chilopod.stability.taylor.series import LANES, expand, load
+from chilopod.stability.taylor.switching import (
+    BUDGET,
+    CHATTERS,
+    DONE,
+    GRAZES,
+    NOT_FINITE,
+    STALLED,
+    cross,
+    settle,
+    start,
+)
+
+_ROUNDING = 2.0**-53
+_BLOCK = 64
+_UNDERFLOW = 1e-290
+"""Numbers below have no full precision: their round-off looks like a singularity."""
+_SAME = 3e-13
+"""Round-off in a pulse of a thousandth of the period; a narrower one costs a step at every point of the grid in it."""
+
+
+@fused_njit(error_model="numpy")
+def _allowed(coefficients: Any, order: int, h: float, epsilon: float) -> float:
+    """The largest step up to h at which the last two terms are below epsilon times the largest of the first half."""
+    for q in range(order, order - 2, -1):
+        last = abs(coefficients[q])
+        if last < _UNDERFLOW:
+            continue
+        power = 1.0
+        biggest = 0.0
+        first = -1
+        for k in range(q // 2 + 1):
+            size = abs(coefficients[k])
+            if first < 0 and size > 0.0:
+                first = k
+            biggest = max(biggest, size * power)
+            power *= h
+        for _ in range(q // 2 + 1, q):
+            power *= h
+        # What starts with a high power (the far end of a chain) is small within a step, and no matter of accuracy.
+        if first < 0 or first > 2 or last * power <= 2.0 * epsilon * biggest:
+            continue
+        best = 0.0
+        for k in range(first, q // 2 + 1):
+            size = abs(coefficients[k])
+            if size > 0.0:
+                best = max(best, (epsilon * size / last) ** (1.0 / (q - k)))
+        h = min(h, best)
+    return h
+
+
+@fused_njit(error_model="numpy")
+def _step_size(layout: Any, switches: Any, order: int, h: float, epsilon: float, values: Any, tangents: Any) -> float:
+    for i in range(layout[0]):
+        h = _allowed(values[i], order, h, epsilon)
+    for s in range(switches.shape[1]):
+        h = _allowed(values[switches[1, s]], order, h, epsilon)
+    if tangents.shape[2] > 0:
+        for i in range(layout[0]):
+            for j in range(layout[0]):
+                h = _allowed(tangents[i, :, j], order, h, epsilon)
+    return h
+
+
+@fused_njit(error_model="numpy")
+def _first_crossing(
+    switches: Any, order: int, h: float, values: Any, branches: Any, work: Any
+) -> tuple[float, int, float]:
+    """When the first switch leaves its branch, which, and with which sign of the slope; number -1 if none does."""
+    found, crossing, direction = h, -1, 0.0
+    for s in range(switches.shape[1]):
+        g = values[switches[1, s]]
+        ends = 2 if switches[0, s] == ops.FLOOR else 1
+        for end in range(ends):
+            # What stays positive on the branch: g, -g, g - floor or floor + 1 - g.
+            sign = (1.0 - 2.0 * end) if switches[0, s] == ops.FLOOR else branches[s]
+            for k in range(order + 1):
+                work[k] = sign * g[k]
+            if switches[0, s] == ops.FLOOR:
+                work[0] -= sign * (branches[s] + end)
+            z = first_exit(work, order, found)
+            if z >= 0.0 and (crossing < 0 or z < found):
+                found, crossing, direction = z, s, -sign
+    return found, crossing, direction
+
+
+@fused_njit(error_model="numpy")
+def _agrees(clocks: Any, table: Any, period: float, t: float, h: float, unit: float, order: int, values: Any) -> float:
+    """A step within which the series of functions of time agree with their values on a grid over the period."""
+    if clocks.size == 0 or table.shape[1] < 2:
+        return h
+    spacing = period / (table.shape[1] - 1)
+    at = math.floor(t / spacing) + 1
+    while True:
+        u = at * spacing - t
+        if u >= h * unit * (1.0 - 1e-9):
+            return h
+        if u > 1e-9 * spacing:
+            z = u / unit
+            row = int(at % (table.shape[1] - 1))
+            for c in range(clocks.size):
+                s = 0.0
+                size = 0.0
+                for k in range(order, -1, -1):
+                    s = s * z + values[clocks[c], k]
+                    size = size * z + abs(values[clocks[c], k])
+                value = table[c, row]
+                # Nothing but this part of the largest value may be passed over.
+                if not abs(s - value) <= _SAME * abs(value) + 1e-15 * size + 1e-17 * table[c, table.shape[1] - 1]:
+                    before = (u - spacing) / unit
+                    return before if before > 0.1 * z else 0.5 * min(h, z)
+        at += 1
+
+
+@fused_njit(error_model="numpy")
+def _absorb(factors: Any, errors: Any, count: int, total: Any, bound: Any) -> None:
+    """Multiply the derivative by the factors of a block of steps, and carry the bound of its error.
+
+    A step that errs by e_s contributes |P_s| e_s |D_s|, D_s what came before it and P_s what came after it.
+    """
+    n = total.shape[0]
+    before = np.empty((count + 1, n, n))
+    before[0] = np.eye(n)
+    for s in range(count):
+        before[s + 1] = factors[s] @ before[s]
+    after = np.eye(n)
+    fresh = np.zeros((n, n))
+    for s in range(count - 1, -1, -1):
+        fresh += np.abs(after) @ errors[s] @ np.abs(before[s])
+        after = after @ factors[s]
+    bound[:] = np.abs(before[count]) @ bound + fresh @ np.abs(total)
+    total[:] = before[count] @ total
+
+
+@fused_njit(error_model="numpy", nogil=True)
+def advance(
+    tape: Any,
+    clock: Any,
+    params: Any,
+    x: Any,
+    t0: float,
+    t1: float,
+    epsilon: float,
+    order: int,
+    most_steps: int,
+    shake: float,
+    derivative: Any,
+    bound: Any,
+    events: Any,
+    report: Any,
+) -> int:
+    """Carry a state from t0 to t1 > t0 in place.
+
+    Parameters
+    ----------
+    tape
+        program, terms, numbers, layout, slopes, switches, resets, clocks of the tape, and the directions of its events.
+    clock
+        Values of the functions of time on a grid over the period, the last of each the largest modulus, and the period.
+    shake
+        Relative error made in every state after every step, and in the time before it: round-off, enlarged.
+    derivative, bound
+        Shape (n, n), multiplied by the derivative and carried along; shape (0, 0) for none.
+    events
+        Shape (most, 2): filled with time and number of the events.
+    report
+        Shape (4,): filled with the number of steps, of crossings, of events, and the time reached.
+    """
+    program, terms, numbers, layout, slopes, switches, resets, clocks, directions = tape
+    table, period = clock
+    n = layout[0]
+    with_tangents = derivative.shape[0] > 0
+    lanes = (n + LANES - 1) // LANES * LANES if with_tangents else 0
+    values = np.zeros((layout[5], order + 1))
+    tangents = np.zeros((layout[5], order + 1, lanes))
+    count_switches = switches.shape[1]
+    branches = np.zeros(count_switches)
+    scales = np.zeros(count_switches)
+    work = np.empty(order + 1)
+    size = n if with_tangents else 0
+    factor = np.empty((size, size))
+    with_bound = bound.shape[0] > 0
+    factors = np.empty((_BLOCK if with_bound else 0, size, size))
+    errors = np.empty((_BLOCK if with_bound else 0, size, size))
+    in_block = 0
+    load(program, terms, numbers, layout, params, values)
+    t = t0
+    unit = (t1 - t0) / 8.0
+    status = DONE
+    steps = 0
+    crossings = 0
+    passed = 0
+    in_place = 0
+    last = t0 - (t1 - t0)
+    noise = 1
+    if count_switches > 0:
+        start(layout, x, t, values, tangents)
+        status = settle(program, terms, layout, slopes, switches, unit, values, tangents, branches, scales)
+    while t < t1 and status == DONE:
+        steps += 1
+        if steps > most_steps:
+            status = BUDGET
+            break
+        finite = False
+        for _ in range(24):
+            start(layout, x, t, values, tangents)
+            if shake > 0.0:
+                values[n, 0] = t * (1.0 + (0.5 * shake if steps % 3 else -shake))
+            expand(program, terms, layout, slopes, order, values, tangents, branches, layout[4], unit)
+            s = 0.0
+            for i in range(n):
+                s += abs(values[i, order]) + abs(values[i, 1])
+                for j in range(size):
+                    s += abs(tangents[i, order, j])
+            finite = s < math.inf
+            if finite:
+                break
+            unit *= 1e-3  # the powers of a unit of time that is far too long overflow
+        if not finite:
+            status = NOT_FINITE
+            break
+        remaining = (t1 - t) / unit
+        h = _step_size(layout, switches, order, remaining, epsilon, values, tangents)
+        if h < remaining and h > 0.5 * remaining:
+            h = 0.5 * remaining
+        crossing = -1
+        direction = 0.0
+        if count_switches > 0:
+            h, crossing, direction = _first_crossing(switches, order, h, values, branches, work)
+        shorter = _agrees(clocks, table, period, t, h, unit, order, values)
+        while shorter < h:
+            h = shorter
+            crossing = -1
+            shorter = _agrees(clocks, table, period, t, h, unit, order, values)
+        ends = h >= remaining
+        reached = t1 if ends else t + h * unit
+        if reached > t1:
+            reached = t1
+        if reached == t:
+            in_place += 1
+            if crossing < 0:
+                status = STALLED
+                break
+            if in_place > 2 * count_switches + 8:
+                status = CHATTERS
+                break
+        else:
+            in_place = 0
+        h = (reached - t) / unit
+        for s in range(count_switches):
+            power = 1.0
+            for k in range(order + 1):
+                scales[s] = max(scales[s], abs(values[switches[1, s], k]) * power)
+                power *= h
+        for i in range(n):
+            s = 0.0
+            for k in range(order, -1, -1):
+                s = s * h + values[i, k]
+            if shake > 0.0:
+                noise = (noise * 1103515245 + 12345) % 2147483648
+                s *= 1.0 + (shake if noise >= 1073741824 else -shake)
+            x[i] = s
+            for j in range(size):
+                s = 0.0
+                for k in range(order, -1, -1):
+                    s = s * h + tangents[i, k, j]
+                factor[i, j] = s
+        if with_bound:
+            for i in range(n):
+                for j in range(n):
+                    s = 0.0
+                    for k in range(order, 0, -1):
+                        s = (s + abs(tangents[i, k, j])) * h
+                    errors[in_block, i, j] = 4.0 * _ROUNDING * s + abs(tangents[i, order, j]) * h**order
+                    factors[in_block, i, j] = factor[i, j]
+                errors[in_block, i, i] += 2.0 * _ROUNDING
+            in_block += 1
+            if in_block == _BLOCK:
+                _absorb(factors, errors, in_block, derivative, bound)
+                in_block = 0
+        elif with_tangents:
+            derivative[:] = factor @ derivative
+        t = reached
+        unit *= min(max(h, 1e-3), 1e3) if h > 0.0 else 1.0
+        if crossing >= 0:
+            crossings += 1
+            status, event = cross(
+                program,
+                terms,
+                layout,
+                slopes,
+                switches,
+                resets,
+                directions,
+                crossing,
+                direction,
+                unit,
+                x,
+                t,
+                values,
+                tangents,
+                branches,
+                scales,
+                factor,
+            )
+            if status == GRAZES and t - last <= 1e-6 * (t - t0):
+                status = CHATTERS
+            last = t
+            if event >= 0:
+                if passed < events.shape[0]:
+                    events[passed, 0] = t
+                    events[passed, 1] = event
+                passed += 1
+            if with_bound:
+                for i in range(n):
+                    for j in range(n):
+                        factors[in_block, i, j] = factor[i, j]
+                        errors[in_block, i, j] = 16.0 * _ROUNDING * abs(factor[i, j])
+                in_block += 1
+                if in_block == _BLOCK:
+                    _absorb(factors, errors, in_block, derivative, bound)
+                    in_block = 0
+            elif with_tangents:
+                derivative[:] = factor @ derivative
+    if with_bound and in_block > 0:
+        _absorb(factors, errors, in_block, derivative, bound)
+    report[0], report[1], report[2], report[3] = steps, crossings, passed, t
+    return status

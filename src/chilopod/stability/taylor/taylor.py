@@ -1,0 +1,278 @@
+"""Flows of taped right-hand sides, by Taylor series in compiled code that is the same for all of them.
+
+A :class:`TaylorFlow` holds a tape (:func:`chilopod.stability.trace.trace`) and what steps must respect; the values of
+its parameters are an argument of every call, so one object serves a whole family::
+
+    traced = trace(rhs, n, args, events=[(guard, reset)])
+    flow = TaylorFlow(traced.tape, edges=(0.0, T), period=T, directions=(-1.0,))
+    passage = flow.advance(x, t0, t1, traced.params, bounded=True)
+    passage.state, passage.derivative, passage.bound, passage.events
+
+* Switches of the right-hand side (sign, abs, where, floor, %, ...) are found and crossed exactly, in time and state.
+* Event k happens where its guard g_k(t, x) passes zero, rising if its direction is 1, falling if -1, either way if 0;
+  the state jumps to r_k(t, x). The derivative gets the saltation matrix. A guard at zero at the start counts as on the
+  side to which it moves. ``passage.events`` has their times and numbers.
+* :meth:`TaylorFlow.advance` raises ``AnalysisError`` where the motion cannot go on (see ``_REASONS``), with the time.
+* :meth:`TaylorFlow.states` carries many states without derivatives, on all cores; each with parameters of its own if
+  there is a row for each.
+
+All of it is free of scales: multiply states, times or parameters by powers of ten, and the digits stay.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.cores import cores
+from chilopod.errors import AnalysisError
+from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.taylor.evaluation import evaluate
+from chilopod.stability.taylor.tape import Tape
+
+Array = NDArray[np.float64]
+
+RESOLUTION = 4096
+"""A pulse in time has to be seen on a grid of so many points over the period; then it is resolved exactly."""
+
+_MOST_WORK = 1e7
+_FEWEST_STEPS = 5000
+_MOST_EVENTS = 4096
+_FEWEST_PER_THREAD = 16
+_LEAST_TOLERANCE = 1.2e-16
+_OTHER_ORDER = 4
+_OWN = 10.0  # two independent errors differ by less than a tenth of them rarely enough
+_COMMON = 20.0  # the usual difference of all entries, for those that agree by chance
+_SHAKE = 4.0 * 2.0**-53
+_UNDERFLOW = 1e-290  # numbers below have no full precision
+_NOTHING = np.empty((0, 0))
+
+_REASONS = {
+    1: ("the motion diverges, or the right-hand side is not finite, at t = {t:g}", None),
+    2: (
+        "takes too many steps, and came to t = {t:g} only",
+        "a right-hand side that is less stiff, or a shorter interval",
+    ),
+    3: ("cannot be continued beyond t = {t:.17g}: a singularity, or rates beyond the resolution of time", None),
+    4: (
+        "slides along a switching surface from t = {t:g} on: the motion is pushed back from both sides",
+        "a right-hand side that says how it slides",
+    ),
+    5: ("chatters (Zeno): crossings accumulate at t = {t:g}", "a guard or a reset that ends it"),
+    6: ("grazes a switching surface at t = {t:g}: there the flow has no derivative", None),
+}
+
+
+@dataclass(frozen=True)
+class Passage(ReadOnlyArrays):
+    """What a flow does over an interval.
+
+    Attributes
+    ----------
+    state
+        At the end, shape (n,).
+    derivative
+        With respect to the state at the start, shape (n, n).
+    bound
+        Bound on the error of each entry of ``derivative``, shape (n, n); empty if it was not asked for.
+    events
+        Time and number of each event, shape (events, 2).
+    steps
+        Steps taken.
+    """
+
+    state: Array
+    derivative: Array
+    bound: Array
+    events: Array
+    steps: int
+
+
+@dataclass(frozen=True)
+class TaylorFlow(ReadOnlyArrays):
+    """The flow of a tape.
+
+    Attributes
+    ----------
+    tape
+        The right-hand side, with guards and resets.
+    edges
+        Times from 0 to the period that no step may straddle; empty for none.
+    period
+        T of an explicit dependence on time; infinite if there is none.
+    directions
+        Of the events: 1, -1 or 0.
+    tolerance
+        Truncation error of a step relative to the size of each state and entry of the derivative; never more exact
+        than round-off.
+    """
+
+    tape: Tape
+    edges: tuple[float, ...] = ()
+    period: float = math.inf
+    directions: tuple[float, ...] = ()
+    tolerance: float = _LEAST_TOLERANCE
+    _arrays: tuple[Any, ...] = field(init=False, repr=False, compare=False)
+    _clocks: list[tuple[bytes | None, Array]] = field(
+        init=False, repr=False, compare=False, default_factory=lambda: [(None, _NOTHING)]
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        t = self.tape
+        directions = np.array(self.directions, dtype=np.float64)
+        arrays = (t.program, t.terms, t.numbers, t.layout, t.slopes, t.switches, t.resets, t.clocks, directions)
+        object.__setattr__(self, "_arrays", arrays)
+
+    @property
+    def order(self) -> int:
+        """Order of the series, near the one of least work for its tolerance."""
+        return max(8, math.ceil(-0.65 * math.log(self._epsilon)))
+
+    @property
+    def most_steps(self) -> int:
+        """Budget of an integration: a few seconds."""
+        nodes = self.tape.program.shape[1]
+        return max(_FEWEST_STEPS, int(_MOST_WORK / (nodes * (1 + self.tape.dimension))))
+
+    @property
+    def _epsilon(self) -> float:
+        return max(self.tolerance, _LEAST_TOLERANCE)
+
+    def advance(
+        self, x: Array, t0: float, t1: float, params: Array, *, derived: bool = True, bounded: bool = False
+    ) -> Passage:
+        """Carry one state from t0 to t1 >= t0, with its derivative unless ``derived`` is False.
+
+        The bound of the error is round-off and the last terms of each step, carried along by the steps' own
+        derivatives, and the difference to a second computation of another order, with other steps, at the start
+        and after every step off by several times round-off. Entries err alike relative to the first part, so that is
+        stretched to many times what is usual among them; an entry that passes through zero differs by more, and has
+        several times its own difference on top.
+
+        Raises
+        ------
+        AnalysisError
+            If the motion does not reach t1: it diverges, slides, chatters, grazes, or takes too many steps.
+        """
+        n = self.tape.dimension
+        # Copies, because compiled code is compiled anew for arrays that are read-only.
+        x, params = np.array(x, dtype=np.float64), np.array(params, dtype=np.float64)
+        if not bounded:
+            size = n if derived else 0
+            derivative = np.eye(size)
+            events, steps = self._run(x, t0, t1, params, derivative, _NOTHING, self.order, 0.0)
+            return Passage(x, derivative, _NOTHING, events, steps)
+        other_x = x * (1.0 + _SHAKE * np.sign(np.cos(3.0 * np.arange(n) + 1.0)))
+        derivative, bound, other = np.eye(n), np.zeros((n, n)), np.eye(n)
+        events, steps = self._run(x, t0, t1, params, derivative, bound, self.order, 0.0)
+        self._run(other_x, t0, t1, params, other, _NOTHING, self.order - _OTHER_ORDER, _SHAKE)
+        difference = np.abs(other - derivative)
+        known = bound > _UNDERFLOW
+        usual = float(np.median(difference[known] / bound[known])) if known.any() else 0.0
+        bound = bound * (1.0 + _COMMON * usual) + _OWN * difference
+        return Passage(x, derivative, bound, events, steps)
+
+    def states(self, states: Array, t0: float, t1: float, params: Array) -> Array:
+        """Carry many states, shape (states, n); ``params`` has shape (parameters,) or (states, parameters)."""
+        states = np.array(states, dtype=np.float64, order="C")
+        params = np.asarray(params, dtype=np.float64)
+        rows = np.array(np.broadcast_to(params, (states.shape[0], params.shape[-1])))
+
+        def carry(numbers: range) -> None:
+            for i in numbers:
+                self._run(states[i], t0, t1, rows[i], _NOTHING, _NOTHING, self.order, 0.0)
+
+        threads = min(cores(), states.shape[0] // _FEWEST_PER_THREAD)
+        if threads > 1:
+            with ThreadPoolExecutor(threads) as pool:
+                list(pool.map(carry, (range(i, states.shape[0], threads) for i in range(threads))))
+        else:
+            carry(range(states.shape[0]))
+        return states
+
+    def _run(
+        self, x: Array, t0: float, t1: float, params: Array, derivative: Array, bound: Array, order: int, shake: float
+    ) -> tuple[Array, int]:
+        events = np.empty((_MOST_EVENTS if self.directions else 0, 2))
+        report = np.zeros(4)
+        seen = []
+        steps = 0
+        clock = self._clock(params)
+        for a, b in self._pieces(t0, t1):
+            status = _compiled().advance(
+                self._arrays,
+                clock,
+                params,
+                x,
+                a,
+                b,
+                self._epsilon,
+                order,
+                self.most_steps,
+                shake,
+                derivative,
+                bound,
+                events,
+                report,
+            )
+            if status:
+                raise _failure(status, report[3])
+            steps += int(report[0])
+            if report[2]:
+                seen.append(events[: int(report[2])].copy())
+        return (np.concatenate(seen) if seen else np.empty((0, 2))), steps
+
+    def _clock(self, params: Array) -> tuple[Array, float]:
+        if self.tape.clocks.size == 0:
+            return _NO_CLOCK
+        key, (known, table) = params.tobytes(), self._clocks[0]
+        if known != key:
+            table = _clock_table(self.tape, self.period, params)
+            self._clocks[0] = key, table
+        return table, self.period
+
+    def _pieces(self, t0: float, t1: float) -> list[tuple[float, float]]:
+        """[t0, t1] cut at the edges."""
+        t0, t1 = float(t0), float(t1)
+        if len(self.edges) == 0:
+            return [(t0, t1)] if t1 > t0 else []
+        return pieces(np.asarray(self.edges), self.period, t0, t1)
+
+
+_NO_CLOCK = (np.zeros((0, 0)), 1.0)
+
+
+def _clock_table(tape: Tape, period: float, params: Array) -> Array:
+    times = period * np.arange(RESOLUTION) / RESOLUTION
+    values = evaluate(tape, times, np.zeros((tape.dimension, 1)), params)[tape.clocks]
+    values = np.where(np.isfinite(values), values, 0.0)
+    return np.ascontiguousarray(np.column_stack([values, np.abs(values).max(axis=1)]))
+
+
+def pieces(edges: Array, period: float, t0: float, t1: float) -> list[tuple[float, float]]:
+    """Cut [t0, t1] at times that come again every period; ``edges`` run from 0 to the period."""
+    first, last = int(np.floor(t0 / period)), int(np.ceil(t1 / period))
+    switches = [float(k * period + e) for k in range(first, last + 1) for e in edges[:-1]]
+    inside = [t for t in switches if t0 + 1e-12 * period < t < t1 - 1e-12 * period]
+    cuts = [t0, *inside, t1]
+    return [(a, b) for a, b in zip(cuts, cuts[1:], strict=False) if b > a]
+
+
+def _failure(status: int, t: float) -> AnalysisError:
+    reason, advice = _REASONS[status]
+    return AnalysisError(reason.format(t=t), field="rhs", allowed=advice)
+
+
+@functools.cache
+def _compiled() -> Any:
+    # numba takes half a second to import, and only who integrates needs it.
+    from chilopod.stability.taylor import stepping
+
+    return stepping

@@ -1,0 +1,206 @@
+"""Tapes of right-hand sides: traced, verified, and kept."""
+
+from __future__ import annotations
+
+import itertools
+import types
+import weakref
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chilopod.stability.taylor.environment import Opaque, describe, python_function, rebuild
+from chilopod.stability.taylor.evaluation import evaluate
+from chilopod.stability.taylor.graph import Graph
+from chilopod.stability.taylor.ordering import ordered
+from chilopod.stability.taylor.tape import Tape
+from chilopod.stability.taylor.traced import Concrete, Traced, Untraceable, as_traced, node_of, states
+
+Array = NDArray[np.float64]
+
+_MOST_NODES = 200_000
+_MOST_KEPT = 64
+_AGREES = 1e-9
+_NEAR = 1e-13
+
+
+@dataclass(frozen=True)
+class Trace:
+    """A tape and the values of its parameters for one function with its arguments.
+
+    Attributes
+    ----------
+    tape
+        The operations, shared by all functions that differ in floats only.
+    params
+        Values of the parameters, shape (parameters,).
+    fresh
+        Whether the tape was made just now, so that checks of the function are due.
+    """
+
+    tape: Tape
+    params: Array
+    fresh: bool
+
+
+_Kept = dict[Any, tuple[tuple[int, ...], dict[tuple[float, ...], Tape]]]
+_KEPT: weakref.WeakKeyDictionary[types.CodeType, _Kept] = weakref.WeakKeyDictionary()
+
+
+def trace(
+    rhs: Callable[..., ArrayLike],
+    dimension: int,
+    args: tuple[Any, ...] = (),
+    *,
+    times: Sequence[float] = (0.0, 1.0),
+    base: ArrayLike | None = None,
+    events: Sequence[tuple[Callable[..., Any], Callable[..., ArrayLike] | None]] = (),
+) -> Trace:
+    """Record what a right-hand side does, once for all values of the floats it depends on.
+
+    Parameters
+    ----------
+    rhs
+        ``rhs(t, x, *args)`` -> dx/dt, shape (n,). Python code of arithmetic and elementary functions, with numpy, math
+        or neither, also one that numba has compiled.
+    dimension
+        n.
+    args
+        Its parameters. Floats, arrays of floats, and those inside tuples and lists are parameters of the tape.
+    times, base
+        Between which times and around which state the tape is compared with the function.
+    events
+        Pairs of a guard g(t, x, *args) and a reset r(t, x, *args) -> state, None for none.
+
+    Raises
+    ------
+    Untraceable
+        If it is no fixed sequence of known operations, or the tape and the function do not agree.
+    """
+    functions = (rhs, *(part for event in events for part in event))
+    floats: list[float] = []
+    seen: dict[int, int] = {}
+    code = getattr(python_function(rhs), "__code__", None)
+    key: Any = None
+    try:
+        key = (dimension, describe(functions, floats, seen), describe(args, floats, seen))
+        kept = _KEPT.setdefault(code, {}) if code is not None else {}
+        baked, tapes = kept.get(key, ((), {}))
+    except (Opaque, TypeError, ValueError):  # not hashable, an empty cell
+        key, floats, baked, tapes, kept = None, [], (), {}, {}
+    values = np.array(floats)
+    known = tapes.get(tuple(floats[i] for i in baked))
+    fresh = known is None
+    if known is None:
+        before = baked
+        known, baked = _traced(functions, dimension, args, floats, key is not None, baked)
+        _verify(known, _open(values, baked), rhs, args, times, base)
+        if key is not None:
+            if len(kept) >= _MOST_KEPT:
+                kept.clear()
+            if baked != before or len(tapes) >= _MOST_KEPT:
+                tapes = {}
+            tapes[tuple(floats[i] for i in baked)] = known
+            kept[key] = (baked, tapes)
+    return Trace(known, _open(values, baked), fresh)
+
+
+def _open(values: Array, baked: tuple[int, ...]) -> Array:
+    return np.delete(values, baked) if baked else values
+
+
+def _traced(
+    functions: tuple[Any, ...],
+    dimension: int,
+    args: tuple[Any, ...],
+    floats: list[float],
+    symbolic: bool,
+    baked: tuple[int, ...],
+) -> tuple[Tape, tuple[int, ...]]:
+    """Trace with all floats as parameters, then with those as numbers whose values turn out to be needed."""
+    everything = tuple(range(len(floats)))
+    while True:
+        graph = Graph(dimension, len(floats) - len(baked) if symbolic else 0)
+        unbaked = iter(graph.parameters)
+        source = [floats[i] if i in baked else Traced(graph, next(unbaked)) for i in everything]
+        try:
+            return _record(graph, functions, dimension, args, iter(source) if symbolic else None), baked
+        except Concrete as needed:
+            places = [i for i in everything if i not in baked]
+            baked = tuple(sorted({*baked, *(places[i] for i in needed.parameters)}))
+        except Untraceable:
+            if not symbolic or baked == everything:
+                raise
+            baked = everything
+        except RecursionError:
+            raise Untraceable("it is too deeply nested") from None
+        except Exception as error:  # whatever a user's function raises means the same
+            if not symbolic or baked == everything:
+                raise Untraceable(f"{type(error).__name__}: {error}") from None
+            baked = everything
+
+
+def _record(
+    graph: Graph, functions: tuple[Any, ...], dimension: int, args: tuple[Any, ...], source: Iterator[Any] | None
+) -> Tape:
+    seen: dict[int, Any] = {}
+    rhs, *event_functions = rebuild(functions, source, seen)
+    args = rebuild(args, source, seen)
+    time = Traced(graph, graph.time)
+
+    def results(function: Any, count: int | None) -> list[int]:
+        with np.errstate(all="ignore"):
+            result = function(time, states(graph, dimension), *args)
+        array = as_traced(result)
+        if count is not None and array.shape != (count,):
+            raise Untraceable(f"returns the shape {array.shape}")
+        if count is None and array.size != 1:
+            raise Untraceable("a guard is no number")
+        if len(graph.nodes) > _MOST_NODES:
+            raise Untraceable("it takes too many operations")
+        return [node_of(graph, value) for value in array.ravel()]
+
+    slopes = results(rhs, dimension)
+    guards = [results(guard, None)[0] for guard in event_functions[::2]]
+    resets = [graph.states if reset is None else results(reset, dimension) for reset in event_functions[1::2]]
+    return ordered(graph, slopes, guards, resets)
+
+
+def _verify(
+    tape: Tape, params: Array, rhs: Callable[..., ArrayLike], args: tuple[Any, ...], times: Sequence[float], base: Any
+) -> None:
+    """Compare the tape with the function at states of various sizes."""
+    n = tape.dimension
+    around = np.zeros(n) if base is None else np.asarray(base, dtype=np.float64)
+    size = float(np.abs(around).max()) or 1.0
+    low, high = float(min(times)), float(max(times))
+    pairs = []
+    for i, (spread, turn) in enumerate(itertools.product((0.01, 0.3, 1.0), (0.3, 1.7, 4.1))):
+        t = low + (high - low) * ((0.6180339887 * (i + 1)) % 1.0)
+        x = around + spread * np.where(around == 0.0, size, np.abs(around)) * np.cos(3.0 * np.arange(n) + turn)
+        try:
+            with np.errstate(all="ignore"):
+                real = np.asarray(rhs(t, x.copy(), *args), dtype=np.float64)
+        except Exception:  # not defined at this state
+            continue
+        own = evaluate(tape, t, x, params)[tape.slopes]
+        near = evaluate(tape, t * (1 + _NEAR), x * (1 + _NEAR * np.cos(np.arange(n))), params * (1 - _NEAR))[
+            tape.slopes
+        ]
+        pairs.append((real, own, np.abs(near - own)))
+    if not pairs:
+        raise Untraceable("it could not be evaluated at any state it was tried at")
+    real, own, rounding = (np.array(part) for part in zip(*pairs, strict=True))
+    if real.shape != own.shape:
+        raise Untraceable(f"returns the shape {real.shape[1:]}")
+    both = np.isfinite(real) & np.isfinite(own)
+    size_of = np.abs(np.where(both, real, 0.0)).max(axis=0)
+    # The order of sums is another: where the function is sensitive to that, as sin is of large numbers, so is this.
+    allowed = _AGREES * size_of + np.where(both, rounding, 0.0)
+    if (np.abs(np.where(both, real - own, 0.0)) > allowed).any() or (
+        np.isfinite(real).all(axis=1) & ~np.isfinite(own).all(axis=1)
+    ).any():
+        raise Untraceable("it gives other values when called again: it has a memory, or chance in it")

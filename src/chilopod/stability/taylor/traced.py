@@ -1,0 +1,336 @@
+"""Numbers and arrays that record what is done with them.
+
+A function that is called with these records its operations in a :class:`chilopod.stability.tape.Graph`. Whatever needs
+the value of a traced number (a branch, an index, a foreign library) raises :class:`Untraceable`; where that value
+depends on the parameters only, :class:`Concrete`, and the function can be traced anew with those as plain numbers.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.stability.taylor.elementary import BUILDS
+from chilopod.stability.taylor.graph import Graph
+from chilopod.stability.taylor.tape import CONSTANT
+
+
+class Untraceable(Exception):
+    """A right-hand side that is no fixed sequence of known operations; the message says what stands against it."""
+
+
+class Concrete(Exception):
+    """The value of an expression of these parameters alone is needed."""
+
+    def __init__(self, parameters: frozenset[int]) -> None:
+        super().__init__()
+        self.parameters = parameters
+
+
+Number = Any
+"""A float or a :class:`Traced`."""
+
+
+class Traced:
+    """One number under tracing: a node of a graph."""
+
+    __slots__ = ("graph", "node")
+
+    def __init__(self, graph: Graph, node: int) -> None:
+        self.graph = graph
+        self.node = node
+
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
+        return _apply(ufunc, method, inputs, options)
+
+    def __array_function__(self, function: Any, kinds: Any, args: Any, options: Any) -> Any:
+        return _call(function, args, options)
+
+    # Whoever asks for the value needs it.
+
+    def _value(self, *_: Any) -> Any:
+        if self.graph.depends[self.node] == CONSTANT:
+            raise Concrete(self.graph.parameters_below(self.node))
+        raise Untraceable("it asks for the value of a number: a branch, an index, or a function of another library")
+
+    __bool__ = __float__ = __int__ = __index__ = __complex__ = __hash__ = __round__ = _value
+
+    # Arithmetic
+
+    def __add__(self, other: Any) -> Any:
+        return _binary(np.add, self, other)
+
+    def __radd__(self, other: Any) -> Any:
+        return _binary(np.add, other, self)
+
+    def __sub__(self, other: Any) -> Any:
+        return _binary(np.subtract, self, other)
+
+    def __rsub__(self, other: Any) -> Any:
+        return _binary(np.subtract, other, self)
+
+    def __mul__(self, other: Any) -> Any:
+        return _binary(np.multiply, self, other)
+
+    def __rmul__(self, other: Any) -> Any:
+        return _binary(np.multiply, other, self)
+
+    def __truediv__(self, other: Any) -> Any:
+        return _binary(np.divide, self, other)
+
+    def __rtruediv__(self, other: Any) -> Any:
+        return _binary(np.divide, other, self)
+
+    def __pow__(self, other: Any) -> Any:
+        return _binary(np.power, self, other)
+
+    def __rpow__(self, other: Any) -> Any:
+        return _binary(np.power, other, self)
+
+    def __mod__(self, other: Any) -> Any:
+        return _binary(np.remainder, self, other)
+
+    def __rmod__(self, other: Any) -> Any:
+        return _binary(np.remainder, other, self)
+
+    def __floordiv__(self, other: Any) -> Any:
+        return _binary(np.floor_divide, self, other)
+
+    def __rfloordiv__(self, other: Any) -> Any:
+        return _binary(np.floor_divide, other, self)
+
+    def __neg__(self) -> Any:
+        return SCALAR["negative"](self)
+
+    def __pos__(self) -> Any:
+        return self
+
+    def __abs__(self) -> Any:
+        return SCALAR["absolute"](self)
+
+    def __floor__(self) -> Any:
+        return SCALAR["floor"](self)
+
+    def __ceil__(self) -> Any:
+        return SCALAR["ceil"](self)
+
+    def __lt__(self, other: Any) -> Any:
+        return _binary(np.less, self, other)
+
+    def __le__(self, other: Any) -> Any:
+        return _binary(np.less_equal, self, other)
+
+    def __gt__(self, other: Any) -> Any:
+        return _binary(np.greater, self, other)
+
+    def __ge__(self, other: Any) -> Any:
+        return _binary(np.greater_equal, self, other)
+
+    def __and__(self, other: Any) -> Any:
+        return _binary(np.logical_and, self, other)
+
+    __rand__ = __and__
+
+    def __or__(self, other: Any) -> Any:
+        return _binary(np.logical_or, self, other)
+
+    __ror__ = __or__
+
+    def __invert__(self) -> Any:
+        return SCALAR["logical_not"](self)
+
+    # A number is an array of no dimension.
+
+    @property
+    def real(self) -> Traced:
+        """The number itself."""
+        return self
+
+    @property
+    def imag(self) -> float:
+        """Zero."""
+        return 0.0
+
+    @property
+    def shape(self) -> tuple[()]:
+        """That of a number."""
+        return ()
+
+    ndim = 0
+    size = 1
+    dtype = np.dtype(np.float64)
+
+    def conjugate(self) -> Traced:
+        """The number itself."""
+        return self
+
+    def copy(self) -> Traced:
+        """The number itself."""
+        return self
+
+    def item(self) -> Traced:
+        """The number itself."""
+        return self
+
+
+def node_of(graph: Graph, value: Any) -> int:
+    """The node of a traced or plain real number."""
+    if isinstance(value, Traced):
+        return value.node
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        return node_of(graph, value.item())
+    if isinstance(value, complex | np.complexfloating):
+        if value.imag != 0.0:
+            raise Untraceable("it computes with complex numbers")
+        value = value.real
+    if not isinstance(value, int | float | bool | np.floating | np.integer | np.bool_):
+        raise Untraceable(f"it computes with a {type(value).__name__}")
+    return graph.number(float(value))
+
+
+def number_of(graph: Graph, node: int) -> Any:
+    """A node as a traced number, or as a plain one if it is known."""
+    value = graph.value(node)
+    return Traced(graph, node) if value is None else value
+
+
+def _graph_of(values: Any) -> Graph | None:
+    return next((value.graph for value in values if isinstance(value, Traced)), None)
+
+
+def _scalar(name: str, build: Callable[..., int]) -> Callable[..., Any]:
+    def apply(*values: Any) -> Any:
+        graph = _graph_of(values)
+        if graph is None:
+            return getattr(np, name)(*values)
+        return number_of(graph, build(graph, *(node_of(graph, value) for value in values)))
+
+    return apply
+
+
+SCALAR: dict[str, Callable[..., Any]] = {name: _scalar(name, build) for name, build in BUILDS.items()}
+"""Functions of single numbers, which may be traced or not, by the name of their ufunc."""
+
+REPLACED: dict[Any, Callable[..., Any]] = {}
+"""Functions of numpy that have a version of their own for traced arrays (see :mod:`.standins`)."""
+
+
+def _binary(ufunc: np.ufunc, a: Any, b: Any) -> Any:
+    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray) or isinstance(a, list) or isinstance(b, list):
+        return ufunc(as_traced(a), b)
+    return SCALAR[ufunc.__name__](a, b)
+
+
+class TracedArray(np.ndarray[Any, np.dtype[Any]]):
+    """An array of traced and plain numbers."""
+
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
+        return _apply(ufunc, method, inputs, options)
+
+    def __array_function__(self, function: Any, kinds: Any, args: Any, options: Any) -> Any:
+        return _call(function, args, options)
+
+    def astype(self, *_: Any, **__: Any) -> Any:
+        """A copy."""
+        return self.copy()
+
+    @property  # type: ignore[misc]
+    def real(self) -> Any:
+        """The array itself."""
+        return self
+
+    @property  # type: ignore[misc]
+    def imag(self) -> Any:
+        """Zeros."""
+        return np.zeros(self.shape)
+
+    def max(self, axis: Any = None, **_: Any) -> Any:  # type: ignore[override]
+        """The largest."""
+        return np.maximum.reduce(self, axis=axis)
+
+    def min(self, axis: Any = None, **_: Any) -> Any:  # type: ignore[override]
+        """The smallest."""
+        return np.minimum.reduce(self, axis=axis)
+
+    def mean(self, axis: Any = None, **_: Any) -> Any:  # type: ignore[override]
+        """The arithmetic mean."""
+        return REPLACED[np.mean](self, axis)
+
+    def clip(self, low: Any = None, high: Any = None, **_: Any) -> Any:  # type: ignore[override]
+        """Between bounds."""
+        return REPLACED[np.clip](self, low, high)
+
+
+def as_traced(value: Any) -> Any:
+    """Anything like an array as one that may hold traced numbers."""
+    if isinstance(value, TracedArray):
+        return value
+    if isinstance(value, Traced):
+        array = np.empty((), dtype=object)
+        array[()] = value
+        return array.view(TracedArray)
+    return np.array(value, dtype=object).view(TracedArray)
+
+
+def plain(value: Any) -> Any:
+    """A traced array as an ordinary array of objects."""
+    return value.view(np.ndarray) if isinstance(value, TracedArray) else value
+
+
+def wrapped(value: Any) -> Any:
+    """The reverse of :func:`plain`; an array of no dimension becomes the number in it."""
+    if isinstance(value, np.ndarray) and value.dtype == object:
+        return value.view(TracedArray) if value.ndim else value[()]
+    return value
+
+
+@functools.cache
+def _elementwise(name: str, operands: int) -> Any:
+    return np.frompyfunc(SCALAR[name], operands, 1)
+
+
+def _apply(ufunc: np.ufunc, method: str, inputs: tuple[Any, ...], options: dict[str, Any]) -> Any:
+    out = options.pop("out", None)
+    options = {key: value for key, value in options.items() if key not in ("dtype", "casting", "subok", "order")}
+    if options.pop("where", True) is not True:
+        raise Untraceable(f"it calls numpy.{ufunc.__name__} with where=")
+    operands = [plain(value if isinstance(value, np.ndarray) else as_traced(value)) for value in inputs]
+    if ufunc is np.matmul and method == "__call__":
+        result = _matmul(operands[0], operands[1])
+    elif ufunc.__name__ not in SCALAR:
+        raise Untraceable(f"it calls numpy.{ufunc.__name__}")
+    else:
+        result = getattr(_elementwise(ufunc.__name__, ufunc.nin), method)(*operands, **options)
+    if out is not None:
+        if not isinstance(out[0], TracedArray):
+            raise Untraceable("it writes into an array of plain numbers")
+        plain(out[0])[...] = result
+        return out[0]
+    return wrapped(result)
+
+
+def _matmul(a: Any, b: Any) -> Any:
+    return np.dot(a.astype(object), b.astype(object)) if b.ndim <= 2 else np.matmul(a, b)
+
+
+def _call(function: Any, args: tuple[Any, ...], options: dict[str, Any]) -> Any:
+    own = REPLACED.get(function)
+    if own is not None:
+        return own(*args, **options)
+
+    def bare(value: Any) -> Any:
+        if isinstance(value, tuple | list):
+            return type(value)(bare(part) for part in value)
+        return plain(as_traced(value)) if isinstance(value, Traced) else plain(value)
+
+    result = function(*bare(args), **{key: bare(value) for key, value in options.items()})
+    return type(result)(wrapped(part) for part in result) if isinstance(result, tuple | list) else wrapped(result)
+
+
+def states(graph: Graph, dimension: int) -> NDArray[Any]:
+    """The states of a graph as an array."""
+    return as_traced([Traced(graph, i) for i in range(dimension)])

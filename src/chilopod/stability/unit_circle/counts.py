@@ -1,0 +1,351 @@
+"""Whether the number of multipliers outside the unit circle changes by what crosses it, and what crosses where it does
+not."""
+
+from __future__ import annotations
+
+import bisect
+import itertools
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from chilopod.stability.unit_circle.critical import Critical, Group, Point, Root
+from chilopod.stability.unit_circle.spectra import Event, Spectra
+from chilopod.stability.unit_circle.zeros import Interval
+
+Array = NDArray[np.float64]
+
+_CLEARLY = 1e-5  # a multiplier this far from the circle is decided, if errors elsewhere are far smaller
+_ROOM = 1e3
+_GREY = 32.0  # a multiplier between one and this many errors from the circle may have left it or not
+_ROUNDS = 200
+_GROWTH = 8.0
+_JUMP = 0.5
+_SHADOW = 1.5  # widths of a touch within which a crossing explains it
+_WIDER = 100.0
+_EPSILON = float(np.finfo(float).eps)
+
+
+class Accounts:
+    """The numbers of multipliers outside the circle along a family, and the roots that explain their changes.
+
+    Parameters
+    ----------
+    spectra
+        Eigenvalues; all values at which they are known are used.
+    ends
+        The interval.
+    idle
+        For each event, how many factors of its function vanish throughout.
+    resting
+        How many multipliers are +1 or -1 throughout.
+    conservative
+        Whether multipliers may stay on the circle.
+    parameter
+        The parameter at a place, for remarks.
+    """
+
+    def __init__(
+        self,
+        spectra: Spectra,
+        ends: Interval,
+        idle: dict[Event, int],
+        resting: int,
+        conservative: bool,
+        parameter: Callable[[float], float],
+    ) -> None:
+        self.remarks: list[str] = []
+        self.spent = False
+        self.open = False
+        self._spectra = spectra
+        self._ends = ends
+        self._idle = idle
+        self._resting = resting
+        self._conservative = conservative
+        self._critical = Critical(spectra, idle, conservative)
+        self._parameter = parameter
+        self._counts: dict[float, int | None] = {}
+        self._settled: set[Interval] = set()  # gaps about which a remark was made
+        probes = [spectra.values[0], spectra.values[len(spectra.values) // 2], spectra.values[-1]]
+        self._clearly = max(_CLEARLY, _ROOM * max(float(spectra.margin_errors(u).max()) for u in probes))
+
+    def balance(self, roots: list[Root]) -> list[Point]:
+        """Points that explain the counts, in order."""
+        self._spectra.at(np.array(self._ends))
+        roots = [root for root in roots if self._is_critical(root)]
+        for _ in range(_ROUNDS):
+            roots, points, again = self._walk(sorted(_without_shadows(roots), key=lambda root: root.place))
+            if not again:
+                break
+        else:
+            self.open = True
+            self.remarks.append("the counts of multipliers outside did not settle")
+        return points
+
+    def count(self, place: float) -> int | None:
+        """Number of multipliers outside the circle; None where one of them is too near to say."""
+        if place not in self._counts:
+            self._counts[place] = self._counted(place)
+        return self._counts[place]
+
+    def _counted(self, place: float) -> int | None:
+        margins = self._spectra.margins(place)
+        if not self._resting and not self._conservative and np.abs(margins).min() > self._clearly:
+            return int((margins > 0.0).sum())
+        errors = self._spectra.margin_errors(place)
+        outside = int((margins > errors).sum())
+        if self._conservative:
+            sizes = np.abs(margins) / errors
+            for event in Event:
+                # Those that meet may have left the circle or not.
+                distances, uncertain = self._spectra.distances(place, event)
+                idle = self._idle[event]
+                if (distances[idle:] <= _GREY * uncertain[idle:]).any():
+                    return None
+            return None if ((sizes > 1.0) & (sizes <= _GREY)).any() else outside
+        return outside if int((np.abs(margins) <= errors).sum()) <= self._resting else None
+
+    def _walk(self, roots: list[Root]) -> tuple[list[Root], list[Point], bool]:
+        """Compare counts along all gaps between decided places; the roots after that, the points, and whether to do
+        it again."""
+        decided = self._decided(roots)
+        points: list[Point] = []
+        kept: list[Root] = []
+        again = False
+        if not decided:
+            self._remark("the multipliers are nowhere clear of the circle", self._ends)
+            return roots, [self._point(root, 0, None, None) for root in roots], False
+        for root in roots:
+            if root.place < decided[0][0] or root.place > decided[-1][0]:
+                kept.append(root)
+                points.append(self._at_end(root, decided))
+        for place in self._ends:
+            outer = place < decided[0][0] or place > decided[-1][0]
+            if (
+                outer
+                and place in self._spectra.values
+                and not any(
+                    (root.place < decided[0][0]) == (place < decided[0][0])
+                    and (root.place > decided[-1][0]) == (place > decided[-1][0])
+                    for root in kept
+                )
+            ):
+                end = Root(place, place, place, None, True)
+                if self._is_critical(end):
+                    kept.append(end)
+                    points.append(self._at_end(end, decided))
+        index = 0
+        for (x, before), (y, after) in itertools.pairwise(decided):
+            inside = []
+            while index < len(roots) and roots[index].place < y:
+                if roots[index].place > x:
+                    inside.append(roots[index])
+                index += 1
+            if (not inside and before == after) or (x, y) in self._settled:
+                if inside:
+                    kept += inside
+                    points += [self._point(root, 0, None, None) for root in inside]
+                continue
+            if self._spectra.left <= 0 and (len(inside) != 1 or not self._explains(inside[0], after - before)):
+                self.spent = True
+                kept += inside
+                points += [self._point(root, 0, None, None) for root in inside]
+                continue
+            if not inside:
+                kept += self._followed(x, y, before, after)
+                again = True
+            elif len(inside) > 1:
+                kept += self._separated(inside)
+                again = True
+            elif self._explains(inside[0], after - before):
+                kept += inside
+                points.append(self._point(inside[0], after - before, x, y))
+            elif inside[0].touch and after != before:
+                kept += self._followed(x, y, before, after)
+                again = True
+            elif self._tightened(inside[0], x, y):
+                kept += inside
+                again = True
+            elif self._conservative and before == after:  # a collision whose ends are too near each other
+                kept += inside
+                points.append(self._point(inside[0], 0, x, y))
+            else:
+                critical = sum(group.multiplicity for group in self._critical.groups(inside[0]))
+                self._remark(f"{after - before:+d} multipliers outside where {critical} are on the circle", (x, y))
+                kept += inside
+                points.append(self._point(inside[0], after - before, x, y))
+        return kept, sorted(points, key=lambda point: point.place), again
+
+    def _decided(self, roots: list[Root]) -> list[tuple[float, int]]:
+        """Places with a count, those within the brackets of roots left out."""
+        values = self._spectra.values
+        within: set[float] = set()
+        for root in roots:
+            left, right = (root.place, root.place) if root.touch else (root.left, root.right)
+            within.update(values[bisect.bisect_left(values, left) : bisect.bisect_right(values, right)])
+        return [(v, count) for v in values if v not in within and (count := self.count(v)) is not None]
+
+    def _remark(self, remark: str, gap: Interval) -> None:
+        self.open = True
+        self._settled.add(gap)
+        self.remarks.append(f"{remark}, between {self._parameter(gap[0]):.9g} and {self._parameter(gap[1]):.9g}")
+
+    # ---- whether a root explains a change ---------------------------------------------------------------------------
+
+    def _is_critical(self, root: Root) -> bool:
+        return self._spectra.exists(root.place) and bool(self._critical.groups(root))
+
+    def _explains(self, root: Root, change: int) -> bool:
+        """Whether a change of the count is what the critical multipliers at a root may do."""
+        groups = self._critical.groups(root)
+        number = sum(group.multiplicity for group in groups)
+        if self._conservative and all(group.collision for group in groups):
+            return 2 * abs(change) <= number and (root.touch or change != 0)
+        if root.touch:
+            return change == 0
+        alone = len(groups) == 1 and number == (2 if groups[0].event is Event.PAIR else 1)
+        return abs(change) == number if alone else abs(change) <= number and (change - number) % 2 == 0
+
+    def _point(self, root: Root, change: int, x: float | None, y: float | None) -> Point:
+        groups = self._critical.groups(root)
+        if len(groups) > 1 and x is not None and y is not None:
+            changes = [self._critical.outside_near(g, y) - self._critical.outside_near(g, x) for g in groups]
+        else:
+            changes = [change] * len(groups)
+        return Point(
+            root.place,
+            root.left,
+            root.right,
+            tuple(
+                Group(g.event, g.multiplicity, c, g.multiplier, g.collision)
+                for g, c in zip(groups, changes, strict=True)
+            ),
+        )
+
+    def _at_end(self, root: Root, decided: list[tuple[float, int]]) -> Point:
+        """A root beyond the last decided place: as if the multipliers went on as they come."""
+        first = root.place < decided[0][0]
+        count = decided[0 if first else -1][1]
+        number = sum(group.multiplicity for group in self._critical.groups(root))
+        surely = int((self._spectra.margins(root.place) > self._critical.tolerances(root)).sum())
+        outside = count - surely
+        change = (2 * outside - number) * (1 if first else -1)
+        return self._point(root, change if 0 <= outside <= number else 0, None, None)
+
+    # ---- refinement ------------------------------------------------------------------------------------------------
+
+    def _followed(self, x: float, y: float, before: int, after: int) -> list[Root]:
+        """Roots of the multipliers of those ranks that are inside the circle at one end of a gap and outside at the
+        other."""
+        if self._spectra.holes(x, y):
+            self._remark(f"{after - before:+d} multipliers outside, and no matrices in between", (x, y))
+            return []
+        if self._conservative:
+            return self._bisected(x, y, before, after)
+        roots: list[Root] = []
+        for rank in range(min(before, after), max(before, after)):
+            if self._spectra.left <= 0:
+                self.spent = True
+                break
+
+            def margin(place: float, rank: int = rank) -> float:
+                # Those that rest on the circle are of any rank in between, and add nothing.
+                found = float(self._spectra.margins(place)[rank : rank + self._resting + 1].sum())
+                return found if np.isfinite(found) else 0.0
+
+            if margin(x) * margin(y) >= 0.0:
+                break  # errors were not what they were said to be
+            most = min(200, max(self._spectra.left, 1))
+            place = float(brentq(margin, x, y, xtol=5e-324, rtol=4 * _EPSILON, maxiter=most, disp=False))
+            reach = 4.0 * _EPSILON * abs(place)
+            root = Root(place, max(place - reach, x), min(place + reach, y), None, False)
+            if self._jumps(place, rank):
+                values = self._spectra.values
+                here = int(np.searchsorted(values, place))
+                near = [v for v in values[max(here - 6, 0) : here + 7] if self.count(v) is not None]
+                left = max((v for v in near if v <= place and (margin(v) > 0) == (margin(x) > 0)), default=x)
+                right = min((v for v in near if v >= place and (margin(v) > 0) == (margin(y) > 0)), default=y)
+                self._remark(f"a multiplier jumps across the circle at {self._parameter(place):.9g}", (left, right))
+                continue
+            if all(abs(place - other.place) > 4.0 * reach for other in roots) and self._is_critical(root):
+                roots.append(root)
+        if not roots and not self._settled & set(self._gaps(x, y)):
+            self._remark(f"{after - before:+d} multipliers outside, and none found on the circle", (x, y))
+        return roots
+
+    def _bisected(self, x: float, y: float, before: int, after: int) -> list[Root]:
+        """The root of a conservative family where the count changes: found by halving, as far as counts are certain."""
+        gap = (x, y)
+        while x < (middle := 0.5 * x + 0.5 * y) < y and self._spectra.left > 0:
+            if not self._spectra.exists(middle) or (count := self.count(middle)) is None:
+                break
+            x, y = (middle, y) if count == before else (x, middle)
+        for event in (Event.MINUS, Event.PLUS, Event.PAIR):
+            root = Root(0.5 * x + 0.5 * y, x, y, event, False)
+            if (x, y) != gap and self._is_critical(root) and self._explains(root, after - before):
+                return [root]
+        self._remark("multipliers leave the circle, or come back, and none were found to meet", (x, y))
+        return []
+
+    def _gaps(self, x: float, y: float) -> list[Interval]:
+        inside = [v for v in self._spectra.values if x <= v <= y and self.count(v) is not None]
+        return list(itertools.pairwise(inside))
+
+    def _jumps(self, place: float, rank: int) -> bool:
+        """Whether the multiplier of a rank is not continuous at a place: its change does not fall with the width."""
+        values = self._spectra.values
+        here = int(np.searchsorted(values, place))
+        left = values[here - 1] if here > 0 else place
+        right = next((v for v in values[here:] if v > place), place)
+        width = max(right - left, 4.0 * float(np.spacing(abs(place))))
+        wide_left = next((v for v in reversed(values[:here]) if place - v >= _WIDER * width), values[0])
+        wide_right = next((v for v in values[here:] if v - place >= _WIDER * width), values[-1])
+        small = abs(self._spectra.margins(right)[rank] - self._spectra.margins(left)[rank])
+        large = abs(self._spectra.margins(wide_right)[rank] - self._spectra.margins(wide_left)[rank])
+        errors = self._spectra.margin_errors(left)[rank] + self._spectra.margin_errors(right)[rank]
+        return bool(small > _JUMP * large and small > _WIDER * errors)
+
+    def _separated(self, inside: list[Root]) -> list[Root]:
+        """Roots with a decided place between them; those without one made a single root."""
+        roots = [inside[0]]
+        for root in inside[1:]:
+            last = roots[-1]
+            middle = 0.5 * last.place + 0.5 * root.place
+            if last.place < middle < root.place and self._spectra.exists(middle) and self.count(middle) is not None:
+                roots.append(root)
+                continue
+            if last.touch != root.touch:
+                roots[-1] = last if root.touch else root
+            else:
+                roots[-1] = Root(
+                    last.place, min(last.left, root.left), max(last.right, root.right), last.event, last.touch
+                )
+        return roots
+
+    def _tightened(self, root: Root, x: float, y: float) -> bool:
+        """Whether places nearer to a root could be decided."""
+        found = False
+        for side, end in ((-1.0, x), (1.0, y)):
+            reach = max(8.0 * float(np.spacing(abs(root.place))), root.right - root.left)
+            while True:
+                place = root.place + side * reach
+                if not x < place < y or self._spectra.left <= 0 or abs(place - end) < 0.1 * reach:
+                    break
+                if self._spectra.exists(place) and self.count(place) is not None:
+                    found = True
+                    break
+                reach *= _GROWTH
+        return found
+
+
+def _without_shadows(roots: list[Root]) -> list[Root]:
+    """Roots without the touches that are but the uncertain surroundings of a crossing."""
+    crossings = [root.place for root in roots if not root.touch]
+    return [
+        root
+        for root in roots
+        if not root.touch
+        or not any(abs(place - root.place) <= _SHADOW * (root.right - root.left) for place in crossings)
+    ]
