@@ -9,7 +9,7 @@ import pytest
 
 DOCS = Path(__file__).parent.parent / "docs"
 BLOCK = re.compile(r"```python\n(.*?)```", re.DOTALL)
-PAGES = ["stability.md"]
+PAGES = ["stability.md", "hybrid-systems.md"]
 
 
 def blocks():

@@ -252,3 +252,11 @@ def test_random_expressions(data):
         rtol=1e-10,
         atol=1e-10,
     )
+
+
+def test_functions_without_a_module():
+    """Such as those of code that was executed from a string."""
+    names = {}
+    exec("def double(x):\n    return 2.0 * x\n\ndef rhs(t, x):\n    return [double(x[0])]\n", names)
+    traced = trace(names["rhs"], 1)
+    assert evaluate(traced.tape, np.zeros(1), np.full((1, 1), 3.0), traced.params).max() == 6.0

@@ -27,7 +27,7 @@ def assert_multipliers(found, known, least=1e-15):
 
 
 class VibratingTable:
-    """A ball bounces once a period T on a table at A sin(w t), with restitution e.
+    """A ball bounces once a period T on a table at A sin(w t + 2), with restitution e.
 
     It takes off and lands at the same height, at speeds g T / 2, so that the table has the velocity V = q g T / 2 then,
     q = (1 - e) / (1 + e). With P the table's phase at the impact, A w cos P = V; its acceleration is a = -A w^2 sin P.
@@ -47,8 +47,8 @@ class VibratingTable:
     def system(self, amplitude):
         e, g, w = self.e, self.g, self.w
         impact = Event(
-            lambda t, x, a: x[0] - a * np.sin(w * t),
-            lambda t, x, a: [x[0], -e * x[1] + (1.0 + e) * a * w * np.cos(w * t)],
+            lambda t, x, a: x[0] - a * np.sin(w * t + 2.0),
+            lambda t, x, a: [x[0], -e * x[1] + (1.0 + e) * a * w * np.cos(w * t + 2.0)],
             -1,
         )
         return from_rhs(lambda t, x, a: [x[1], -g], 2, self.period, args=(amplitude,), events=[impact])
@@ -58,7 +58,7 @@ class VibratingTable:
 
     def state(self, amplitude):
         phase = self.phase(amplitude)
-        flown = self.period - phase / self.w
+        flown = (2.0 - phase) / self.w  # at time 0
         speed = 0.5 * self.g * self.period
         return np.array([amplitude * math.sin(phase) + speed * flown - 0.5 * self.g * flown**2, speed - self.g * flown])
 
@@ -90,6 +90,18 @@ def test_where_the_period_of_bounces_doubles(restitution, metre, second):
     (doubling,) = found
     assert doubling.kind is Kind.PERIOD_DOUBLING
     assert abs(doubling.value - table.doubles) <= doubling.error_bound < 1e-10 * table.doubles
+
+
+@pytest.mark.parametrize(("restitution", "metre", "second"), [*TABLES[:2], (0.5, 1e-6, 1e-2)])
+def test_where_bounces_begin(restitution, metre, second):
+    table = VibratingTable(restitution, metre, second)
+    start = 0.5 * (table.first + table.doubles)
+    downwards = locate(
+        lambda value: table.system(-value), (-start, -0.9 * table.first), orbit=table.state(start), normal_form=False
+    )
+    fold = downwards[-1]
+    assert fold.kind is Kind.FOLD
+    assert abs(-fold.value - table.first) <= fold.error_bound < 1e-8 * table.first
 
 
 # A mass that hits a wall

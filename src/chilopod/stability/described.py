@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
@@ -19,6 +18,7 @@ from chilopod.stability.points import BifurcationPoint, Kind, kind_at_plus_one, 
 from chilopod.stability.returns import returned_states
 from chilopod.stability.samples import Samples
 from chilopod.stability.scales import sizes
+from chilopod.stability.singular import past_singular
 from chilopod.stability.symmetry.equivariants import Critical, SymmetricCrossing, symmetric_crossing
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.crossings import Crossing
@@ -30,8 +30,6 @@ ComplexArray = NDArray[np.complex128]
 _SAFETY = 1.5
 _SLOPE_STEP = 1e-6  # of the interval
 _TOUCH_STEP = 1e-3
-_NODES = np.array([-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0]) / 4.0
-_REACH, _LEAST_REACH = 0.02, 1e-5  # of the interval, to either side of a singular point, where orbits are taken instead
 _DRAWS = 8
 _EPSILON = float(np.finfo(float).eps)
 
@@ -53,7 +51,8 @@ def describe(samples: Samples, crossing: Crossing, block: Block | None, with_nor
     with_normal_form
         Whether to compute coefficients and a verdict.
     """
-    regular = _past_singular(samples, crossing)
+    # A mode that breaks a symmetry is no part of the orbit, which is regular among those that have it.
+    regular = past_singular(samples, crossing) if block is None or block.trivial else None
     if regular is None:
         value, bound = crossing.value, 0.0
         orbit = _orbit(samples, value)
@@ -128,66 +127,6 @@ def _orbit(samples: Samples, value: float) -> Orbit:
     if samples.known:
         return from_known(system, sample.orbit)
     return bounded(system, sample.orbit, sample.image)
-
-
-def _past_singular(samples: Samples, crossing: Crossing) -> tuple[float, float, Orbit] | None:
-    """Value, its error bound and the orbit at a multiplier +1 of an orbit that is followed.
-
-    There H - 1 is singular, and Newton's method stops anywhere along the mode where the residual is round-off; so the
-    orbit and its critical multiplier are interpolated from places to both sides where that is not so. None where it is
-    not singular, or there is no room.
-    """
-    if samples.known or crossing.event is not Event.PLUS or crossing.multiplicity > 1 or crossing.collision:
-        return None
-    low, high = samples.low, samples.end
-    reach = min(_REACH * samples.width, crossing.value - low, high - crossing.value)
-    if reach < _LEAST_REACH * samples.width:
-        return None
-    try:
-        beside = samples.at(crossing.value + reach * _NODES)
-    except AnalysisError:
-        return None
-    spectra = [spectrum(each.image) for each in beside]
-    # The multiplier nearest +1 in the middle, followed outward by how much it moves from node to node.
-    values = np.empty(_NODES.size)
-    for side in (range(3, -1, -1), range(4, 8)):
-        expected = 1.0
-        for i in side:
-            real = spectra[i].values[np.abs(spectra[i].values.imag) < 1e-3]
-            if not real.size:
-                return None
-            values[i] = real[np.abs(real - expected).argmin()].real
-            expected = values[i] + (values[i] - 1.0) / max(abs(_NODES[i]), 0.25) * 0.25
-    fine, coarse = (Polynomial.fit(_NODES[part], values[part] - 1.0, part.sum() - 1) for part in _parts())
-    roots = [_root_near_zero(each) for each in (fine, coarse)]
-    if roots[0] is None or roots[1] is None:
-        return None
-    place = roots[0]
-    value = crossing.value + reach * place
-    orbits = np.array([each.orbit for each in beside])
-    fits = [
-        np.array([Polynomial.fit(_NODES[part], column[part], part.sum() - 1)(place) for column in orbits.T])
-        for part in _parts()
-    ]
-    x = fits[0]
-    system = samples.family(value)
-    orbit = bounded(system, x, beside[3].image, error=np.abs(fits[0] - fits[1]))
-    slope = abs(float(fine.deriv()(place))) / reach
-    uncertain = float(spectrum(orbit.image).error[_nearest(spectrum(orbit.image), Event.PLUS, 1.0 + 0.0j, 1)[0]])
-    bound = abs(roots[0] - roots[1]) * reach + _SAFETY * uncertain / slope
-    return value, bound, orbit
-
-
-def _parts() -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """All nodes, and all but the outermost."""
-    return np.ones(_NODES.size, dtype=bool), np.abs(_NODES) < 1.0
-
-
-def _root_near_zero(polynomial: Polynomial) -> float | None:
-    roots = polynomial.roots()
-    real = roots[np.abs(roots.imag) < 1e-9].real
-    near = real[np.abs(real) < 0.25]
-    return float(near[np.abs(near).argmin()]) if near.size else None
 
 
 def _nearest(spec: Spectrum, event: Event, multiplier: complex, count: int) -> NDArray[np.intp]:

@@ -212,6 +212,10 @@ def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
     n = start.orbit.size
     units = curve.units(n)
     matrix = curve.matrix(image.jacobian, derivative, np.zeros(n + 1))[:-1]
+    if not np.isfinite(matrix).all():
+        raise AnalysisError(
+            "the flow is not finite at values of the parameter beside it", field="start", allowed="another value"
+        )
     if start.mode is None:
         tangent = _along(matrix, start.rising)
     elif start.crossing:
