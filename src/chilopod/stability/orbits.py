@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.arguments import finite_array
+from chilopod.stability.asked import ReturnBudget, SpentError
 from chilopod.stability.capabilities import Autonomous, SystemLike, is_autonomous, known_orbit, returns_per_period
 from chilopod.stability.returns import (
     ReturnMap,
@@ -41,6 +42,7 @@ _FARTHEST_STRETCH = 0.3  # likewise of the period
 _CLOSED = 1e-6  # of the same: a motion that about closes
 _ONWARD = 0.382  # of the guessed return, where a guess is of no use
 _LONGEST_SETTLING = 300  # returns
+_SETTLING = 100  # return maps that letting the motion settle is counted as: without derivatives it costs less
 _BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
 _MARCHED, _MARCHES = 48, 8  # steps a guessed period, and guessed periods, in which a motion is to come back
 _COMES_BACK = 0.1  # of its size
@@ -100,6 +102,7 @@ def find_orbit(
     with_error: bool = True,
     section: Section | None = None,
     settle: bool = True,
+    budget: ReturnBudget | None = None,
 ) -> Orbit:
     """A periodic orbit: a fixed point of the return map, by Newton's method.
 
@@ -118,7 +121,10 @@ def find_orbit(
         Of a system that does not depend on time: where its orbit is looked for. By default across the motion in the
         guess; the orbit that is found has the section across its own motion.
     settle
-        Whether to let the motion settle where Newton's method fails.
+        Whether to let the motion settle where Newton's method fails: up to 330 returns, or 83 guessed periods.
+    budget
+        Return maps that may be evaluated, which are taken from it: up to 30 for every start of Newton's method, and 100
+        for letting the motion settle.
 
     Raises
     ------
@@ -126,33 +132,41 @@ def find_orbit(
         If neither helps.
     """
     if guess is None:
-        return from_known(system, known_state(system), with_error)
+        return from_known(system, known_state(system), with_error, budget=budget)
     x = finite_array(guess, (system.dimension,), "orbit")
     try:
-        return _newton(system, x, with_error, section)
+        return _newton(system, x, with_error, section, budget)
     except AnalysisError as failed:
-        if not settle:
+        if not settle or isinstance(failed, SpentError):
             raise
+        if budget is not None:
+            budget.take(_SETTLING)
         for nearer, after in _nearer(system, x):
             try:
-                return _newton(system, nearer, with_error, after)
+                return _newton(system, nearer, with_error, after, budget)
             except AnalysisError:
                 continue
         raise failed
 
 
-def from_known(system: SystemLike, x: Array, with_error: bool = True, image: ReturnMap | None = None) -> Orbit:
+def from_known(
+    system: SystemLike,
+    x: Array,
+    with_error: bool = True,
+    image: ReturnMap | None = None,
+    budget: ReturnBudget | None = None,
+) -> Orbit:
     """The orbit through a state that is on it, by what the system says of itself; improved if not to the last digit.
 
     Parameters
     ----------
-    system, x, with_error
+    system, x, with_error, budget
         As for :func:`find_orbit`.
     image
         The return map at ``x``, if it was computed already.
     """
     if is_autonomous(system):
-        return find_orbit(system, x, with_error)
+        return find_orbit(system, x, with_error, budget=budget)
     image = return_map(system, x, with_error) if image is None else image
     moved = np.abs(image.state - x)
     if not moved.any():
@@ -162,7 +176,7 @@ def from_known(system: SystemLike, x: Array, with_error: bool = True, image: Ret
     if off <= _RETURNED * max(1.0, float(np.abs(image.jacobian * size / size[:, None]).max())):
         return Orbit(x, image, np.zeros(x.size))
     if off <= _KNOWN:
-        return _newton(system, x, with_error, None)
+        return _newton(system, x, with_error, None, budget)
     raise AnalysisError(
         f"is no periodic orbit: one return later the state is {float(moved.max()):.1e} away",
         field="orbit",
@@ -174,11 +188,15 @@ def _relative(values: Array, size: Array) -> float:
     return float((np.abs(values) / size).max())
 
 
-def _newton(system: SystemLike, x: Array, with_error: bool, section: Section | None) -> Orbit:
+def _newton(
+    system: SystemLike, x: Array, with_error: bool, section: Section | None, budget: ReturnBudget | None
+) -> Orbit:
     size = sizes(system, x, return_duration(system) if section is None else section.duration)
     section = section_at(system, x, size) if section is None else section
     best, before, cutoff = np.inf, x, _SINGULAR
     for rounds in range(_ROUNDS):
+        if budget is not None:
+            budget.take()
         image = return_map(system, x, with_error=False, section=section)
         size = np.maximum(size, np.maximum(np.abs(x), np.abs(image.state)) if x.any() else 0.0)
         residual = image.state - x
