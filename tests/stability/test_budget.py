@@ -94,9 +94,9 @@ def test_exceptions_of_the_family(raised):
     said = next(remark for remark in found.remarks if type(raised).__name__ in remark)
     assert "the family raised" in said
     assert "\n" not in said
-    followed = locate(lambda p: line(p, raised), (-1.0, 1.0), [0.0, 0.0])
+    followed = locate(lambda p: line(p, raised, (0.2, 1.0)), (-1.0, 1.0), [0.0, 0.0])
     assert [point.value for point in followed] == [pytest.approx(0.0, abs=1e-12)]
-    assert "beyond 0.249" in followed.remarks[0]
+    assert "cannot be followed beyond 0.199" in followed.remarks[0]
     branch = follow(lambda p: line(p, raised), [0.0, 0.0], (-1.0, 1.0), points=40)
     assert branch.ending is Ending.LOST
     assert type(raised).__name__ in branch.reason
