@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
+from scipy.optimize import brentq
 
 from chilopod.errors import AnalysisError
 from chilopod.stability import Criticality, Event, Kind, find_orbit, from_rhs, locate, multipliers
@@ -416,3 +417,47 @@ def test_a_wall_that_is_never_reached_does_nothing():
     known = np.exp(2.0 * math.pi / w * np.roots([1.0, 2.0 * z, 1.0]))
     for system in (plain, walled):
         assert_multipliers(multipliers(system, [0.0, 0.0]), known)
+
+
+# Kicks, and impacts at the start
+
+
+@pytest.mark.parametrize("period", [1.0, 2.0 * math.pi, 1e-5])
+@pytest.mark.parametrize("direction", [0, 1])
+def test_kicks_at_the_border_of_periods_happen_once(period, direction):
+    """The standard map (Chirikov 1979): p' = p + K sin q, q' = q + p', its kicks at times that are multiples of T."""
+    strength = 0.7
+    rate = math.pi / period if direction == 0 else 2.0 * math.pi / period
+    kick = Event(lambda t, x: np.sin(rate * t), lambda t, x: [x[0], x[1] + strength * np.sin(x[0]) / period], direction)
+    rotor = from_rhs(lambda t, x: [x[1], 0.0], 2, period, events=[kick])
+    for first, last in ((0.0, 1.0), (0.0, 0.5), (0.5, 1.0), (1.0, 2.0), (0.0, 10.0)):
+        q, p, at = 1.0, 0.3, first
+        for kicked in range(math.ceil(first), math.ceil(last)):
+            q, at = q + p * (kicked - at), float(kicked)
+            p += strength * math.sin(q)
+        q += p * (last - at)
+        state, derivative = rotor.flow(np.array([1.0, 0.3 / period]), first * period, last * period)
+        assert state * [1.0, period] == pytest.approx([q, p], rel=1e-13)
+        assert np.linalg.det(derivative) == pytest.approx(1.0, rel=1e-13)
+    trace = 2.0 + strength  # at the unstable point q = p = 0
+    assert_multipliers(multipliers(rotor, [0.1, 0.01 / period]), np.roots([1.0, -trace, 1.0]))
+
+
+def test_an_orbit_may_be_given_where_an_impact_is_due_or_just_was():
+    """x'' - 2 d x' + x = 0 with a wall at -1: the return from impact to impact by the closed solution of a flight."""
+    d, restitution = 0.15, 0.6
+    wall = Event(lambda t, x: x[0] + 1.0, lambda t, x: [x[0], -restitution * x[1]], -1)
+    oscillator = from_rhs(lambda t, x: [x[1], -x[0] + 2.0 * d * x[1]], 2, None, events=[wall], guess_period=4.0)
+    flow = np.array([[0.0, 1.0], [-1.0, 2.0 * d]])
+
+    def flight(speed):  # from the wall, with a speed away from it, to the wall
+        duration = brentq(lambda t: (expm(flow * t) @ [-1.0, speed])[0] + 1.0, 1.5, 5.0, xtol=1e-15)
+        return duration, restitution * -(expm(flow * duration) @ [-1.0, speed])[1]
+
+    away = brentq(lambda v: flight(v)[1] - v, 5.0, 30.0, xtol=1e-14)
+    slope = (flight(away + 1e-5)[1] - flight(away - 1e-5)[1]) / 2e-5
+    for state in ([0.2, 1.0], [-1.0, away], [-1.0, -away / restitution], [-1.0 + 1e-14, -away / restitution]):
+        found = multipliers(oscillator, state)
+        assert found.period == pytest.approx(flight(away)[0], rel=1e-12)
+        assert found.values == pytest.approx([slope], rel=1e-8)
+        assert found.error_bound < 1e-12

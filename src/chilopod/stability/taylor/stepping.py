@@ -29,7 +29,9 @@ from chilopod.stability.taylor.switching import (
     GRAZES,
     NOT_FINITE,
     STALLED,
+    await_events,
     cross,
+    is_timed,
     settle,
     start,
 )
@@ -38,6 +40,8 @@ _ROUNDING = 2.0**-53
 _BLOCK = 64
 _UNDERFLOW = 1e-290
 """Numbers below have no full precision: their round-off looks like a singularity."""
+_AT_ONCE = 1e-13
+"""Of the time: an event so close to the border of an interval is on it."""
 _SAME = 3e-13
 """Round-off in a pulse of a thousandth of the period; a narrower one costs a step at every point of the grid in it."""
 
@@ -87,9 +91,19 @@ def _step_size(layout: Any, switches: Any, order: int, h: float, epsilon: float,
 
 @fused_njit(error_model="numpy")
 def _first_crossing(
-    switches: Any, order: int, h: float, values: Any, branches: Any, work: Any
+    program: Any,
+    switches: Any,
+    order: int,
+    h: float,
+    late: float,
+    values: Any,
+    branches: Any,
+    work: Any,
 ) -> tuple[float, int, float]:
-    """When the first switch leaves its branch, which, and with which sign of the slope; number -1 if none does."""
+    """When the first switch leaves its branch, which, and with which sign of the slope; number -1 if none does.
+
+    Events of guards that know only time are left to the next interval where they happen after ``late``.
+    """
     found, crossing, direction = h, -1, 0.0
     for s in range(switches.shape[1]):
         g = values[switches[1, s]]
@@ -102,6 +116,8 @@ def _first_crossing(
             if switches[0, s] == ops.FLOOR:
                 work[0] -= sign * (branches[s] + end)
             z = first_exit(work, order, found)
+            if z > late and is_timed(program, switches, s):
+                continue
             if z >= 0.0 and (crossing < 0 or z < found):
                 found, crossing, direction = z, s, -sign
     return found, crossing, direction
@@ -216,9 +232,27 @@ def advance(
     in_place = 0
     last = t0 - (t1 - t0)
     noise = 1
+    at_once = _AT_ONCE * max(abs(t0), abs(t1))
     if count_switches > 0:
         start(layout, x, t, values, tangents)
         status = settle(program, terms, layout, slopes, switches, unit, values, tangents, branches, scales)
+        await_events(
+            program,
+            terms,
+            layout,
+            slopes,
+            switches,
+            resets,
+            directions,
+            unit,
+            at_once / unit,
+            x,
+            t,
+            values,
+            tangents,
+            branches,
+            scales,
+        )
     while t < t1 and status == DONE:
         steps += 1
         if steps > most_steps:
@@ -235,6 +269,8 @@ def advance(
                 s += abs(values[i, order]) + abs(values[i, 1])
                 for j in range(size):
                     s += abs(tangents[i, order, j])
+            for k in range(count_switches):
+                s += abs(values[switches[1, k], 0]) + abs(values[switches[1, k], order])
             finite = s < math.inf
             if finite:
                 break
@@ -249,7 +285,8 @@ def advance(
         crossing = -1
         direction = 0.0
         if count_switches > 0:
-            h, crossing, direction = _first_crossing(switches, order, h, values, branches, work)
+            late = remaining - at_once / unit
+            h, crossing, direction = _first_crossing(program, switches, order, h, late, values, branches, work)
         shorter = _agrees(clocks, table, period, t, h, unit, order, values)
         while shorter < h:
             h = shorter

@@ -68,6 +68,12 @@ def settle(
 
 
 @fused_njit(error_model="numpy")
+def is_timed(program: Any, switches: Any, s: int) -> bool:
+    """Whether a switch is a guard that knows only time."""
+    return bool(switches[0, s] == GUARD and program[4, switches[1, s]] == 0)
+
+
+@fused_njit(error_model="numpy")
 def start(layout: Any, x: Any, t: float, values: Any, tangents: Any) -> None:
     """Set the state and the time from which a series starts; the tangents are those with respect to that state."""
     n = layout[0]
@@ -202,3 +208,65 @@ def cross(
                 for j in range(n):
                     jump[i, j] += f * gradient[j]
     return DONE, event
+
+
+@fused_njit(error_model="numpy")
+def await_events(
+    program: Any,
+    terms: Any,
+    layout: Any,
+    slopes: Any,
+    switches: Any,
+    resets: Any,
+    directions: Any,
+    unit: float,
+    soon: float,
+    x: Any,
+    t: float,
+    values: Any,
+    tangents: Any,
+    branches: Any,
+    scales: Any,
+) -> None:
+    """Set the guards that pass zero within a time ``soon`` of the start of an interval to before it, if the event is
+    still to come, else to after it.
+
+    That is so of guards that know only time: an event at the border of two intervals belongs to the second. A state on
+    a guard that moves as if to fire is one before the event if the event leaves it moving away (an impact); else, as
+    where legs change places, it may as well be the state after it, and is taken for that.
+    """
+    n = layout[0]
+    for s in range(switches.shape[1]):
+        if switches[0, s] != GUARD:
+            continue
+        value, slope = values[switches[1, s], 0], values[switches[1, s], 1]
+        scales[s] = soon * abs(slope) / _ZERO
+        if not (slope != 0.0 and abs(value) <= soon * abs(slope)):
+            continue
+        direction = 1.0 if slope > 0.0 else -1.0
+        ahead = is_timed(program, switches, s)
+        if not ahead and directions[switches[2, s]] * direction > 0.0:
+            after, then, jump = x.copy(), branches.copy(), np.empty((n, n))
+            cross(
+                program,
+                terms,
+                layout,
+                slopes,
+                switches,
+                resets,
+                directions,
+                s,
+                direction,
+                unit,
+                after,
+                t,
+                values,
+                tangents,
+                then,
+                scales,
+                jump,
+            )
+            ahead = values[switches[1, s], 1] * direction < 0.0
+            start(layout, x, t, values, tangents)
+            settle(program, terms, layout, slopes, switches, unit, values, tangents, then, scales)
+        branches[s] = -direction if ahead else direction

@@ -10,8 +10,8 @@ its parameters are an argument of every call, so one object serves a whole famil
 
 * Switches of the right-hand side (sign, abs, where, floor, %, ...) are found and crossed exactly, in time and state.
 * Event k happens where its guard g_k(t, x) passes zero, rising if its direction is 1, falling if -1, either way if 0;
-  the state jumps to r_k(t, x). The derivative gets the saltation matrix. A guard at zero at the start counts as on the
-  side to which it moves. ``passage.events`` has their times and numbers.
+  the state jumps to r_k(t, x). The derivative gets the saltation matrix. ``passage.events`` has their
+  times and numbers. What happens at the start: :func:`chilopod.stability.taylor.switching.await_events`.
 * :meth:`TaylorFlow.advance` raises ``AnalysisError`` where the motion cannot go on (see ``_REASONS``), with the time.
 * :meth:`TaylorFlow.states` carries many states without derivatives, on all cores; each with parameters of its own if
   there is a row for each.
