@@ -178,8 +178,8 @@ def halfway(value):
         (None, "no array of numbers but None"),
         ([1.0, [2.0]], r"no array of numbers but \[1.0, \[2.0\]\]"),
         ({"x": 1.0}, "no array of numbers but {'x': 1.0}"),
-        ([1.0], r"returns the shape \(1,\); allowed: the shape \(2,\)"),
-        (3.0, r"returns the shape \(\); allowed: the shape \(2,\)"),
+        ([1.0], r"returns an array of shape \(1,\); allowed: an array of shape \(2,\)"),
+        (3.0, r"returns an array of shape \(\); allowed: an array of shape \(2,\)"),
     ],
 )
 @pytest.mark.filterwarnings("ignore::UserWarning")

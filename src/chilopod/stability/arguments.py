@@ -69,11 +69,12 @@ def numbers(result: Any, shape: tuple[int, ...], field: str) -> Array:
         array = None if result is None else np.asarray(result, dtype=np.float64)
     except (TypeError, ValueError):
         array = None
+    wanted = f"an array of shape {shape}" if shape else "one number"
     if array is None:
-        said = f"an array of numbers of shape {shape}"
-        raise ParameterError(f"returns no array of numbers but {_kind_of(result)}", field=field, allowed=said)
+        what = "array of numbers" if shape else "number"
+        raise ParameterError(f"returns no {what} but {_kind_of(result)}", field=field, allowed=wanted)
     if array.shape != shape:
-        raise ParameterError(f"returns the shape {array.shape}", field=field, allowed=f"the shape {shape}")
+        raise ParameterError(f"returns an array of shape {array.shape}", field=field, allowed=wanted)
     return array
 
 
