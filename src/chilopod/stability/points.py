@@ -100,8 +100,8 @@ class BifurcationPoint(ReadOnlyArrays):
         otherwise.
     criticality, coefficient, coefficient_error
         Verdict and cubic coefficient a -> a + coefficient a^3 of the map over one period of the orbit, at a period
-        doubling over two; a is the amplitude along the unit ``mode`` (Neimark-Sacker: state = 2 Re(a mode)). None where it has no meaning (fold, transcritical, branch
-        point) or where there is no normal form.
+        doubling over two; a is the amplitude along the unit ``mode`` (Neimark-Sacker: state = 2 Re(a mode)). None where
+        it has no meaning (fold, transcritical, branch point) or where there is no normal form.
     rotation, rotation_error
         Where the mode turns (Neimark-Sacker), the phase per period that an amplitude adds, rad per amplitude^2.
     period

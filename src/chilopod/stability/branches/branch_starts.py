@@ -93,7 +93,8 @@ def begin(
     with Asking("family", value):
         system = family(value)
         guess = known_state(system) if orbit is None else orbit
-        found = find_orbit(system if symmetric else whole_period(system, periods), guess, with_error=False)
+        studied = system if symmetric else whole_period(system, periods)
+        found = find_orbit(studied, guess, with_error=False, shortest=periods == 1)
     period = found.period if is_autonomous(system) else None
     return Start(float(value), found.state, rising, periods=periods, period=period)
 
@@ -142,7 +143,7 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
     system = family(point.value)
     period = None
     if is_autonomous(system):
-        period = find_orbit(whole_period(system, periods), point.orbit, with_error=False).period
+        period = find_orbit(whole_period(system, periods), point.orbit, with_error=False, shortest=periods == 1).period
     if kind is Kind.PERIOD_DOUBLING:
         twice = None if period is None else 2.0 * period
         return tuple(
