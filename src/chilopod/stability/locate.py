@@ -10,7 +10,8 @@ from typing import overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.errors import ParameterError
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.stability.asked import Asking
 from chilopod.stability.capabilities import Family, SystemLike, spatial_symmetries
 from chilopod.stability.described import describe, fold_point
 from chilopod.stability.orbits import Orbit
@@ -26,6 +27,8 @@ Array = NDArray[np.float64]
 
 BUDGET = 5000
 """Orbits that a search may compute, if not told otherwise."""
+
+_DESCRIBING = 400  # return maps to solve for the orbits beside a point
 
 _GRAVITY = (Status.COMPLETE, Status.CONSERVATIVE, Status.INCOMPLETE, Status.BUDGET)
 _FOLLOWED = 10.0  # factor on the error of the first orbit for that of those which are followed from it
@@ -96,7 +99,10 @@ def locate(
     normal_form
         Whether to compute coefficients and verdicts as well.
     budget
-        Orbits that may be computed for the search; describing what was found comes on top.
+        Orbits that may be computed to follow the first one through the interval, and once more for the search; either
+        ends as well when twice as many return maps were evaluated, by Newton's method too and for orbits that are not
+        there. What comes on top has bounds of its own: the first orbit, where the motion is given time to settle, and
+        every point that is found, 400 return maps and its normal form.
 
     Returns
     -------
@@ -107,12 +113,13 @@ def locate(
     ParameterError
         If the interval is empty, reversed or not finite.
     AnalysisError
-        If there is no orbit at the lower end of the interval.
+        If there is no orbit at the lower end of the interval, or ``family`` raises an exception there. At any other
+        value that is as if there were no orbit, and a remark.
     """
     low, high = _interval(between)
     samples = Samples(family, orbit, low, high, budget)
     remarks = [samples.ending] if samples.ending else []
-    status = Status.INCOMPLETE if samples.ending else Status.COMPLETE
+    status = Status.BUDGET if samples.spent else Status.INCOMPLETE if samples.ending else Status.COMPLETE
     points: list[BifurcationPoint] = []
     if low < samples.end:
         searched, more = _searched(samples, low, budget)
@@ -120,11 +127,20 @@ def locate(
         for block, found in searched:
             status = max(status, found.status, key=_GRAVITY.index)
             remarks += found.remarks
-            points += [describe(samples, crossing, block, normal_form) for crossing in found.crossings]
+            for crossing in found.crossings:
+                samples.allow(_DESCRIBING)
+                try:
+                    with Asking("family", crossing.value):
+                        points.append(describe(samples, crossing, block, normal_form))
+                except AnalysisError as error:
+                    status = max(status, Status.INCOMPLETE, key=_GRAVITY.index)
+                    remarks.append(f"what crosses at {crossing.value:.9g} could not be described: {error}")
     if samples.fold is not None:
         points.append(fold_point(samples.fold, samples, normal_form))
+    if samples.remarks:
+        status = max(status, Status.INCOMPLETE, key=_GRAVITY.index)
     ordered = tuple(sorted(points, key=lambda point: point.value))
-    return Located(ordered, status, tuple(dict.fromkeys(remarks)), samples.count)
+    return Located(ordered, status, tuple(dict.fromkeys([*remarks, *samples.remarks])), samples.count)
 
 
 def _interval(between: tuple[float, float]) -> tuple[float, float]:
@@ -158,7 +174,9 @@ def _searched(samples: Samples, low: float, budget: int) -> tuple[list[tuple[Blo
                 return np.stack([np.real(block.reduced(matrix)) for matrix in matrices]), errors
             return block.dual @ matrices @ block.basis, errors
 
-        searched.append((block, find_crossings(reduced, low, samples.end, budget=budget)))
+        searched.append(
+            (block, find_crossings(reduced, low, samples.end, budget=budget, affordable=samples.affordable))
+        )
     return searched, remarks
 
 

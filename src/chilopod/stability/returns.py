@@ -288,7 +288,7 @@ def _time_to_section(system: Autonomous, before: Array, section: Section, rest: 
     get there, or has passed it."""
     best = np.inf
     for _ in range(_CROSSING_ROUNDS):
-        state = _turned(system, _carried(system, before[None], rest))[0]
+        state = turned(system, carried(system, before[None], rest))[0]
         speed = float(section.normal @ _velocity(system, state))
         off = float(section.normal @ (state - section.point))
         if speed == 0.0 or not np.isfinite(off):
@@ -303,15 +303,16 @@ def _time_to_section(system: Autonomous, before: Array, section: Section, rest: 
     return None
 
 
-def _carried(system: SystemLike, states: Array, duration: float) -> Array:
+def carried(system: SystemLike, states: Array, duration: float) -> Array:
+    """States, shape (states, n), so long after time 0."""
     if isinstance(system, FlowsStates):
         return np.asarray(system.flow_states(states, 0.0, duration))
     return np.array([system.flow(np.array(x), 0.0, duration)[0] for x in states])
 
 
-def _turned(system: SystemLike, states: Array) -> Array:
-    turned: Array = states if system.symmetry is None else states @ system.symmetry.T
-    return turned
+def turned(system: SystemLike, states: Array) -> Array:
+    """S of states, shape (states, n), where the system has that symmetry; else as they are."""
+    return states if system.symmetry is None else np.asarray(states @ system.symmetry.T)
 
 
 def returned_states(system: SystemLike, states: Array, section: Section | None = None) -> Array:
@@ -326,10 +327,10 @@ def returned_states(system: SystemLike, states: Array, section: Section | None =
     """
     states = np.array(states)  # a system may write into what it is given
     if section is None:
-        return _turned(system, _carried(system, states, return_duration(system)))
+        return turned(system, carried(system, states, return_duration(system)))
     assert is_autonomous(system)
     approach = _APPROACHES[0]
-    before = _carried(system, states, (1.0 - approach) * section.duration)
+    before = carried(system, states, (1.0 - approach) * section.duration)
     rests = [_time_to_section(system, x, section, approach * section.duration) for x in before]
     result = np.empty_like(states)
     for i, rest in enumerate(rests):
@@ -337,7 +338,7 @@ def returned_states(system: SystemLike, states: Array, section: Section | None =
             _, rest, (state, _) = _crossing(system, states[i], section)
         else:
             state = before[i]
-        result[i] = _turned(system, _carried(system, state[None], rest))[0]
+        result[i] = turned(system, carried(system, state[None], rest))[0]
     return result
 
 

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import bisect
+import contextlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.errors import AnalysisError, ParameterError
+from chilopod.errors import AnalysisError, ParameterError, in_words
 from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.asked import Asking, ReturnBudget, SpentError, UserError
 from chilopod.stability.branches.fold import Fold, find_fold
 from chilopod.stability.capabilities import Family, SystemLike, is_autonomous
-from chilopod.stability.orbits import find_orbit, from_known, known_state
+from chilopod.stability.orbits import Orbit, find_orbit, from_known, known_state
 from chilopod.stability.returns import ReturnMap, return_maps, section_at
 from chilopod.stability.scales import sizes
 
@@ -20,6 +23,9 @@ Array = NDArray[np.float64]
 
 _FIRST_STEPS = 8
 _SHORTEST = 2.0**-10  # step of an orbit that is followed, relative to the first
+_RETURNS = 2  # return maps for every orbit of the budget, to follow the orbit and again to search
+_DEAREST = 8.0  # return maps for an orbit
+_ATTEMPTS = 24  # steps to a value from the sample beside it: ten halvings, and on from there
 _KEPT = 64  # systems: around a point the same one is asked for again and again
 _BEFORE = 1e-6  # of the interval: so far from a fold other crossings are looked for
 _AT_REST = 0.03  # of the motion of the first orbit
@@ -48,7 +54,8 @@ class Samples:
     low, high
         The interval.
     budget
-        Orbits that may be computed until the upper end is reached.
+        Orbits that may be computed until the upper end is reached, by twice as many return maps, and as many return
+        maps once more for those in between.
 
     Attributes
     ----------
@@ -64,6 +71,8 @@ class Samples:
         The fold it ends in, if it does.
     ending
         A sentence where it ends otherwise; else empty.
+    spent
+        Whether it ends there because the budget was spent.
     """
 
     def __init__(self, family: Family, guess: ArrayLike | None, low: float, high: float, budget: int) -> None:
@@ -74,26 +83,35 @@ class Samples:
         self._by_value: dict[float, Sample] = {}
         self._values: list[float] = []
         self._budget = budget
+        self._allowed = _RETURNS * budget
+        self._returns = ReturnBudget(self._allowed)
+        self._refused: dict[str, tuple[str, set[float]]] = {}
         self._dimension, self._timed = 0, True
-        self.count = 0
-        self.ending = ""
+        self.count = self._counted = 0
+        self.ending, self.spent = "", False
         self.end, self.fold = high, None
-        self.first = find_orbit(self.family(low), guess)
-        self._size = sizes(self.family(low), self.first.state, self.first.period / self.first.image.returns)
+        with Asking("family", low):
+            self.first = find_orbit(self.family(low), guess)
+            self._size = sizes(self.family(low), self.first.state, self.first.period / self.first.image.returns)
+        if not (self.known and self._timed):
+            self._keep(_sample(low, self.first))
         if guess is not None:
             self.end, self.fold = self._followed(low, high)
+        self.allow(self._allowed)
 
     def family(self, value: float) -> SystemLike:
         """The system at a value of the parameter, once it is seen to be of the same kind as the others."""
         if value in self._systems:
             return self._systems[value]
-        system = self._family(value)
+        with self._asking(value):
+            system = self._family(value)
         timed = not is_autonomous(system)
         if self._dimension == 0:
             self._dimension, self._timed = system.dimension, timed
         if system.dimension != self._dimension or timed is not self._timed:
             what = "dimension" if system.dimension != self._dimension else "kind of period"
-            raise ParameterError(f"changes its {what} at {value:g}", field="family", allowed="systems of one kind")
+            self._refuse(value, what, f"the family changes its {what}")
+            raise AnalysisError(f"changes its {what} at {value:g}", field="family", allowed="systems of one kind")
         if len(self._systems) >= _KEPT:
             self._systems.pop(next(iter(self._systems)))
         self._systems[value] = system
@@ -103,29 +121,91 @@ class Samples:
         """Samples at some values within the interval; together where the systems allow it."""
         wanted = [float(value) for value in values]
         missing = sorted({value for value in wanted if value not in self._by_value})
-        if missing and self.known:
+        if missing and self.known and self._timed:
             systems = [self.family(value) for value in missing]
-            states = [known_state(system) for system in systems]
-            images = return_maps(systems, states) if self._timed else [None] * len(systems)
+            for _ in systems:
+                self._returns.take()
+            # Of several, which one it was shows when each is asked for alone.
+            with self._asking(missing[0]) if len(missing) == 1 else Asking("family", missing[0]):
+                states = [known_state(system) for system in systems]
+                images = return_maps(systems, states)
             for value, system, state, image in zip(missing, systems, states, images, strict=True):
-                orbit = from_known(system, state, image=image)
+                orbit = from_known(system, state, image=image, budget=self._returns)
                 self._keep(Sample(value, orbit.state, orbit.image))
         else:
             for value in missing:
-                self._keep(self._between(value))
+                self._keep(self._of_itself(value) if self.known else self._between(value))
         return [self._by_value[value] for value in wanted]
+
+    def allow(self, returns: int) -> None:
+        """From now on, at most so many return maps."""
+        self._allowed, self._counted = returns, self.count
+        self._returns.left = returns
+
+    def affordable(self) -> int:
+        """How many more orbits there may be, at the price of those since :meth:`allow`."""
+        price = (self._allowed - self._returns.left) / max(self.count - self._counted, 1)
+        # Those that were not found say nothing of the next ones.
+        return int(self._returns.left / min(max(price, 1.0), _DEAREST))
+
+    @property
+    def remarks(self) -> list[str]:
+        """Where there was no system, and why, a sentence each."""
+        return [
+            said + (f", and at {len(values) - 1} more values" if len(values) > 1 else "")
+            for said, values in self._refused.values()
+        ]
+
+    def _refuse(self, value: float, kind: str, why: str) -> None:
+        self._refused.setdefault(kind, (f"{why} at {value:.9g}", set()))[1].add(value)
+
+    @contextlib.contextmanager
+    def _asking(self, value: float) -> Iterator[None]:
+        """Around calls of the user's functions: exceptions of theirs mean that there is no system."""
+        try:
+            with Asking("family", value):
+                yield
+        except (UserError, ParameterError) as error:
+            if not self._dimension:
+                raise
+            cause = error.__cause__ if isinstance(error, UserError) else error
+            assert cause is not None
+            self._refuse(value, type(cause).__name__, f"the family raised {in_words(cause)}")
+            raise UserError(error.problem, field=error.field, value=error.value, allowed=error.allowed) from cause
 
     def _keep(self, sample: Sample) -> None:
         self.count += 1
         self._by_value[sample.value] = sample
         bisect.insort(self._values, sample.value)
 
+    def _of_itself(self, value: float) -> Sample:
+        """A sample of a system that tells a state on its orbit, or near it, or from the orbit beside."""
+        system = self.family(value)
+        try:
+            with self._asking(value):
+                return _sample(value, find_orbit(system, known_state(system), settle=False, budget=self._returns))
+        except SpentError:
+            raise
+        except AnalysisError:
+            index = bisect.bisect(self._values, value)
+            beside = self._by_value[min(self._values[max(index - 1, 0) : index + 1], key=lambda v: abs(v - value))]
+        try:
+            return self._sampled(value, beside.orbit, beside)
+        except SpentError:
+            raise
+        except AnalysisError:
+            with self._asking(value):
+                return _sample(value, find_orbit(system, known_state(system), budget=self._returns))
+
     def _sampled(self, value: float, near: Array, beside: Sample) -> Sample:
         system = self.family(value)
-        # The orbit beside tells how long an orbit takes, where it is the orbit's to say.
-        section = section_at(system, near, self._size, beside.image.period / beside.image.returns)
-        orbit = find_orbit(system, near, with_error=False, section=section, settle=False)
-        return Sample(value, orbit.state, orbit.image)
+        with self._asking(value):
+            # The orbit beside tells how long an orbit takes, where it is the orbit's to say.
+            section = section_at(system, near, self._size, beside.image.period / beside.image.returns)
+            return _sample(
+                value,
+                find_orbit(system, near, with_error=self.known, section=section, settle=False, budget=self._returns),
+            )
 
     def _between(self, value: float) -> Sample:
         """A sample between two that are there, from their orbits."""
@@ -134,22 +214,30 @@ class Samples:
         t = (value - a.value) / (b.value - a.value)
         try:
             return self._sampled(value, (1 - t) * a.orbit + t * b.orbit, a)
+        except SpentError:
+            raise
         except AnalysisError:
-            reached = self._follow([a], value)
+            reached = self._follow([a], value, _ATTEMPTS)
+            for sample in reached:
+                if sample.value != value:
+                    self._keep(sample)
             if not reached or reached[-1].value != value:
                 raise
             return reached[-1]
 
     def _followed(self, low: float, high: float) -> tuple[float, Fold | None]:
         """Follow the orbit from the lower end; where it gets to, and the fold it ends in before the upper end."""
-        samples = [Sample(low, self.first.state, self.first.image)]
-        self._keep(samples[0])
+        samples = [self._by_value[low]]
         for value in np.linspace(low, high, _FIRST_STEPS + 1)[1:].tolist():
             reached = self._follow(samples, value)
             for sample in reached:
                 self._keep(sample)
             samples += reached
             last = samples[-1]
+            if last.value != value and (self._returns.left <= 0 or self.count >= self._budget):
+                self.spent = True
+                self.ending = f"the budget was spent before the orbit was followed beyond {last.value:.9g}"
+                return last.value, None
             if last.value != value:
                 fold = find_fold(self.family, last.value, last.orbit, high - low)
                 if fold is not None and not self._ends_in(last, fold):
@@ -181,17 +269,18 @@ class Samples:
             path.append(system.flow(path[-1], 0.0, image.period / image.returns / _PARTS)[0])
         return float((np.ptp(np.array(path), axis=0) / self._size).max())
 
-    def _follow(self, behind: list[Sample], value: float) -> list[Sample]:
+    def _follow(self, behind: list[Sample], value: float, attempts: float = np.inf) -> list[Sample]:
         """Samples from the last one behind to ``value``, by smaller steps where Newton's method does not carry that
         far.
 
-        They end early where the orbit does, or the budget.
+        They end early where the orbit does, the budget, or the attempts.
         """
         behind = behind[-2:]
         reached: list[Sample] = []
         smallest = _SHORTEST * abs(value - behind[-1].value)
         target = value
-        while self.count + len(reached) < self._budget:
+        while attempts > 0 and (np.isfinite(attempts) or self.count + len(reached) < self._budget):
+            attempts -= 1
             last = behind[-1]
             guess = last.orbit
             if len(behind) > 1:
@@ -199,6 +288,8 @@ class Samples:
                 guess = guess + (target - last.value) * slope
             try:
                 found = self._sampled(target, guess, last)
+            except SpentError:
+                return reached
             except AnalysisError:
                 found = None
             # A large jump means that Newton's method has found another orbit.
@@ -225,3 +316,7 @@ class Samples:
 
     def _jumped(self, orbit: Array, guess: Array) -> bool:
         return bool((np.abs(orbit - guess) > _JUMP * np.maximum(self._size, np.abs(guess))).any())
+
+
+def _sample(value: float, orbit: Orbit) -> Sample:
+    return Sample(value, orbit.state, orbit.image)

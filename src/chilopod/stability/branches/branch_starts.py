@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.asked import Asking
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.capabilities import Family, given_scale, is_autonomous, known_orbit
@@ -87,11 +88,13 @@ def begin(
     Raises
     ------
     AnalysisError
-        If there is no orbit near the guess.
+        If there is no orbit near the guess, or ``family`` raises an exception.
     """
-    system = family(value)
-    guess = known_state(system) if orbit is None else orbit
-    found = find_orbit(system if symmetric else whole_period(system, periods), guess, with_error=False)
+    with Asking("family", value):
+        system = family(value)
+        guess = known_state(system) if orbit is None else orbit
+        studied = system if symmetric else whole_period(system, periods)
+        found = find_orbit(studied, guess, with_error=False, shortest=periods == 1)
     period = found.period if is_autonomous(system) else None
     return Start(float(value), found.state, rising, periods=periods, period=period)
 
@@ -140,7 +143,7 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
     system = family(point.value)
     period = None
     if is_autonomous(system):
-        period = find_orbit(whole_period(system, periods), point.orbit, with_error=False).period
+        period = find_orbit(whole_period(system, periods), point.orbit, with_error=False, shortest=periods == 1).period
     if kind is Kind.PERIOD_DOUBLING:
         twice = None if period is None else 2.0 * period
         return tuple(

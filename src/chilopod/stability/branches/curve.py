@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import read_only
+from chilopod.stability.asked import Asking
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, Step
 from chilopod.stability.capabilities import Family, FlowsEach, SystemLike, is_autonomous, returns_per_period
 from chilopod.stability.floquet import across
@@ -34,7 +35,6 @@ _MOST_CORRECTIONS = 12
 _PARAMETER_STEP = 1e-6  # of the difference, in units of the scale
 _SHARPEST_TURN = 0.5  # cosine between two tangents: beyond it the step may have landed on another curve
 _KEPT = 8  # systems: making one may cost more than a flow
-_USER_ERRORS = (ArithmeticError, ValueError, np.linalg.LinAlgError)
 
 
 class Curve:
@@ -86,6 +86,7 @@ class Curve:
         self.relative_error: float | None = None
         self._known: dict[float, tuple[SystemLike, SystemLike]] = {}
         self._each: dict[type, bool] = {}
+        self._dimension = 0
 
     def system(self, value: float) -> SystemLike:
         """What is studied: over the full period, or as many as the orbits take."""
@@ -95,10 +96,13 @@ class Curve:
         """The family's system, and what is studied of it."""
         known = self._known.get(value)
         if known is None:
-            try:
+            with Asking("family", value):
                 own = self._family(value)
-            except _USER_ERRORS as error:
-                raise AnalysisError(f"has no system here ({error})", field="family", value=value) from error
+            self._dimension = self._dimension or own.dimension
+            if own.dimension != self._dimension:
+                raise AnalysisError(
+                    "changes its dimension", field="family", value=value, allowed=f"{self._dimension} states"
+                )
             whole = self.symmetric or (own.symmetry is None and self.periods == 1)
             known = own, own if whole else whole_period(own, self.periods)
             if len(self._known) >= _KEPT:
@@ -114,12 +118,10 @@ class Curve:
         """The return map and its derivative."""
         system = self.system(value)
         self.left -= 1
-        try:
+        with Asking("flow", value):
             if section is None and system.period is None:
                 section = section_at(system, x, self.sizes)
             return return_map(system, x, with_error, section)
-        except _USER_ERRORS as error:
-            raise AnalysisError(f"cannot be evaluated ({error})", field="flow", value=value) from error
 
     def parameter_derivative(self, x: Array, value: float, section: Section | None = None) -> Array:
         """dH/dp at a state, per scale, shape (n,)."""
@@ -316,7 +318,7 @@ class Curve:
         """H at a state, and at a neighbouring value of the parameter if that costs no time."""
         self.left -= 1
         own, system = self._systems(value)
-        try:
+        with Asking("flow", value):
             period = own.period
             if section is None and period is not None and not self.symmetric and self.periods == 1:
                 beside = self._systems(value + self._parameter_step(value))[0] if self._flows_each(own) else own
@@ -325,10 +327,7 @@ class Curve:
                     both: Sequence[FlowsEach] = [own, beside]
                     mapped, moved = own.flow_each(both, np.array([x, x]), 0.0, period)
                     return (mapped, moved) if same else (mapped, None)
-            mapped = returned_states(system, x[None], section)[0]
-        except _USER_ERRORS as error:
-            raise AnalysisError(f"cannot be evaluated ({error})", field="flow", value=value) from error
-        return mapped, None
+            return returned_states(system, x[None], section)[0], None
 
     def _flows_each(self, system: SystemLike) -> TypeGuard[FlowsEach]:
         """Whether a system flows each; asked once for each class, for the answer takes longer than some flows."""
@@ -348,10 +347,8 @@ class Curve:
         step = self._parameter_step(value)
         if beside is None:
             self.left -= 1
-            try:
+            with Asking("flow", value + step):
                 beside = returned_states(self.system(value + step), x[None], section)[0]
-            except _USER_ERRORS as error:
-                raise AnalysisError(f"cannot be evaluated ({error})", field="flow", value=value) from error
         difference: Array = (beside - mapped) / (step / self.scale)
         return difference
 

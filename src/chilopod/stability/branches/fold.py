@@ -18,6 +18,7 @@ from chilopod.stability.returns import ReturnMap, return_map, section_at
 Array = NDArray[np.float64]
 
 _STEPS = 40
+_FLOWS = 2000  # a step
 _STEP = 0.01  # along the curve, in units of the states' sizes and the parameter's scale
 
 
@@ -55,9 +56,9 @@ def find_fold(family: Family, value: float, orbit: Array, scale: float) -> Fold 
     between = value - scale, value + scale
     try:
         start = begin(family, value, orbit, symmetric=True)
-        branch = follow(family, start, between, points=1, step=_STEP, closely=False, symmetric=True)
+        branch = follow(family, start, between, points=1, step=_STEP, closely=False, symmetric=True, budget=_FLOWS)
         while not _folds(branch) and branch.ending is Ending.ENOUGH_POINTS and len(branch.points) < _STEPS:
-            branch = proceed(family, branch, between, points=1, closely=False)
+            branch = proceed(family, branch, between, points=1, closely=False, budget=_FLOWS)
         fold = next(iter(_folds(branch)), None)
         if fold is None or fold.bifurcation is None:
             return None

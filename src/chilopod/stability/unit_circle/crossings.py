@@ -106,7 +106,14 @@ class Crossings:
     evaluations: int
 
 
-def find_crossings(matrices: Matrices, low: float, high: float, *, budget: int = BUDGET) -> Crossings:
+def find_crossings(
+    matrices: Matrices,
+    low: float,
+    high: float,
+    *,
+    budget: int = BUDGET,
+    affordable: Callable[[], int] | None = None,
+) -> Crossings:
     """Find every value of a parameter at which eigenvalues of real matrices cross the unit circle.
 
     Parameters
@@ -119,6 +126,8 @@ def find_crossings(matrices: Matrices, low: float, high: float, *, budget: int =
         The interval.
     budget
         At how many values matrices may be asked for.
+    affordable
+        How many more matrices can be had, where that is for their cost to say: the search ends when it says none.
 
     Raises
     ------
@@ -139,7 +148,7 @@ def find_crossings(matrices: Matrices, low: float, high: float, *, budget: int =
         inner = np.clip(outward(places), low, high)
         return np.where(places <= a, low, np.where(places >= b, high, inner))
 
-    spectra = Spectra(lambda places: matrices(parameter(places)), budget)
+    spectra = Spectra(lambda places: matrices(parameter(places)), budget, affordable)
     return _Finder(spectra, a, b, lambda place: float(parameter(place))).found()
 
 
@@ -271,12 +280,13 @@ class _Finder:
         )
 
     def _roots(self, event: Event, idle: int, found: Zeros) -> list[Root]:
-        self.spent |= found.spent
+        self.spent |= found.spent or self.spectra.left <= 0
         if not found.spent:
             for piece in found.unresolved:
                 self._leave(f"the multipliers do not depend smoothly on the parameter {self._between(piece)}")
-        for piece in found.missing:
-            self._leave(f"there are no matrices {self._between(piece)}, or only in part")
+        if not self.spent:  # or they were not looked for
+            for piece in found.missing:
+                self._leave(f"there are no matrices {self._between(piece)}, or only in part")
         roots = []
         for left, right in found.changes:
             if self.spectra.left <= 0:
