@@ -259,6 +259,11 @@ class Accounts:
                 break  # errors were not what they were said to be
             most = min(200, max(self._spectra.left, 1))
             place = float(brentq(margin, x, y, xtol=5e-324, rtol=4 * _EPSILON, maxiter=most, disp=False))
+            if not self._spectra.exists(place):
+                self.spent |= self._spectra.left <= 0
+                if not self.spent:
+                    self._remark(f"{after - before:+d} multipliers outside, and no matrices in between", (x, y))
+                break
             reach = 4.0 * _EPSILON * abs(place)
             root = Root(place, max(place - reach, x), min(place + reach, y), None, False)
             if self._jumps(place, rank):
@@ -271,7 +276,7 @@ class Accounts:
                 continue
             if all(abs(place - other.place) > 4.0 * reach for other in roots) and self._is_critical(root):
                 roots.append(root)
-        if not roots and not self._settled & set(self._gaps(x, y)):
+        if not roots and not self.spent and not self._settled & set(self._gaps(x, y)):
             self._remark(f"{after - before:+d} multipliers outside, and none found on the circle", (x, y))
         return roots
 
