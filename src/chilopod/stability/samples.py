@@ -10,10 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.branches.curve import return_multipliers
 from chilopod.stability.branches.fold import Fold, find_fold
 from chilopod.stability.capabilities import Family, SystemLike, is_autonomous
 from chilopod.stability.orbits import find_orbit, from_known, known_state
-from chilopod.stability.returns import ReturnMap, return_maps, section_at
+from chilopod.stability.returns import ReturnMap, return_map, return_maps, section_at
 from chilopod.stability.scales import sizes
 
 Array = NDArray[np.float64]
@@ -22,6 +23,12 @@ _FIRST_STEPS = 8
 _SHORTEST = 2.0**-10  # step of an orbit that is followed, relative to the first
 _KEPT = 64  # systems: around a point the same one is asked for again and again
 _BEFORE = 1e-6  # of the interval: so far from a fold other crossings are looked for
+_NEAR_FOLD = 0.02  # distance of a multiplier from +1: a fold may be within ``_BEFORE``
+_CLEAR_OF_FOLD = 1e-3  # likewise: so far off a fold is passed by a curve that starts there
+_COMES = 1e-5, 1e-3  # of the interval before a fold, where the multiplier is looked at
+_BETWEEN_POWERS = 0.75  # of one half and one
+_SURE = 1e-4  # singular value of H - 1, in units, above which the orbit is as good as the flow
+_BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
 _AT_REST = 0.03  # of the motion of the first orbit
 _PARTS = 5  # of a return, to see how far the motion goes
 _JUMP = 0.3  # of the orbit between prediction and correction, relative to its size
@@ -54,14 +61,16 @@ class Samples:
     ----------
     low, width
         Of the interval.
+    start
+        From where on orbits can be told apart: ``low``, or just past the fold that is there.
     first
         The orbit at the lower end, with its error bounds.
     known
         Whether the systems know their orbits.
     end
         Where the orbit ends, at most ``high``.
-    fold
-        The fold it ends in, if it does.
+    folds
+        Those it begins and ends in, if it does.
     ending
         A sentence where it ends otherwise; else empty.
     """
@@ -73,15 +82,17 @@ class Samples:
         self._systems: dict[float, SystemLike] = {}
         self._by_value: dict[float, Sample] = {}
         self._values: list[float] = []
+        self._bends: dict[float, float] = {}
         self._budget = budget
         self._dimension, self._timed = 0, True
         self.count = 0
         self.ending = ""
-        self.end, self.fold = high, None
+        self.start, self.end = low, high
+        self.folds: tuple[Fold, ...] = ()
         self.first = find_orbit(self.family(low), guess)
         self._size = sizes(self.family(low), self.first.state, self.first.period / self.first.image.returns)
         if guess is not None:
-            self.end, self.fold = self._followed(low, high)
+            self._followed(low, high)
 
     def family(self, value: float) -> SystemLike:
         """The system at a value of the parameter, once it is seen to be of the same kind as the others."""
@@ -115,6 +126,42 @@ class Samples:
                 self._keep(self._between(value))
         return [self._by_value[value] for value in wanted]
 
+    def error(self, sample: Sample, of_flow: float) -> float:
+        """Relative error of the derivative at a sample of an orbit that is followed: that of the flow, and what comes of
+        the orbit's own, which is the flow's times what H - 1 makes of it.
+
+        Parameters
+        ----------
+        sample
+            From :meth:`at`.
+        of_flow
+            Relative error of the flow and of its derivative.
+        """
+        scaled = sample.image.jacobian * self._size / self._size[:, None]
+        _, values, rows = np.linalg.svd(scaled - np.eye(self._size.size))
+        if values[-1] > _SURE:
+            return of_flow
+        if sample.value not in self._bends:
+            beside = sample.orbit + _BESIDE * self._size * rows[-1]
+            section = section_at(
+                self.family(sample.value), sample.orbit, self._size, sample.image.period / sample.image.returns
+            )
+            change = return_map(self.family(sample.value), beside, False, section).jacobian - sample.image.jacobian
+            self._bends[sample.value] = float(np.linalg.norm(change * self._size / self._size[:, None])) / _BESIDE
+        # Where H - 1 vanishes along a direction, what is left there is of third order at most in all but odd cases.
+        off = min(of_flow / max(float(values[-1]), of_flow), of_flow ** (1.0 / 3.0))
+        return min(1.0, of_flow + self._bends[sample.value] * off)
+
+    def in_fold(self, value: float) -> bool:
+        """Whether a value is so near a fold the orbit begins or ends in that its multiplier +1 is that of the fold."""
+        return any(abs(value - fold.value) <= 2.0 * _BEFORE * self.width for fold in self.folds)
+
+    def of_flow(self) -> ReturnMap:
+        """The return map at the first orbit, with the error of the flow alone."""
+        if _off_plus_one(Sample(self.low, self.first.state, self.first.image)) > _NEAR_FOLD:
+            return self.first.image  # the orbit is as good as the flow
+        return return_map(self.family(self.low), self.first.state, True, self.first.section)
+
     def _keep(self, sample: Sample) -> None:
         self.count += 1
         self._by_value[sample.value] = sample
@@ -140,8 +187,8 @@ class Samples:
                 raise
             return reached[-1]
 
-    def _followed(self, low: float, high: float) -> tuple[float, Fold | None]:
-        """Follow the orbit from the lower end; where it gets to, and the fold it ends in before the upper end."""
+    def _followed(self, low: float, high: float) -> None:
+        """Follow the orbit from the lower end; where it gets to, and the folds it begins and ends in."""
         samples = [Sample(low, self.first.state, self.first.image)]
         self._keep(samples[0])
         for value in np.linspace(low, high, _FIRST_STEPS + 1)[1:].tolist():
@@ -149,22 +196,49 @@ class Samples:
             for sample in reached:
                 self._keep(sample)
             samples += reached
-            last = samples[-1]
-            if last.value != value:
-                fold = find_fold(self.family, last.value, last.orbit, high - low)
-                if fold is not None and not self._ends_in(last, fold):
-                    fold = None
-                here = last if fold is None else Sample(fold.value, fold.image.state, fold.image)
-                if self._at_rest(here):
-                    self.ending = f"the orbit shrinks into an equilibrium near {here.value:.9g}: a Hopf point"
-                    return last.value, None
-                if fold is None:
-                    self.ending = f"the orbit cannot be followed beyond {last.value:.9g}"
-                if fold is None or not low <= fold.value <= high:
-                    return last.value, None
-                # In the fold itself multipliers move as a root of the distance, which no search sees through.
-                return max(low, min(last.value, fold.value - _BEFORE * (high - low))), fold
-        return high, None
+            if samples[-1].value != value:
+                break
+        self._begun(samples)
+        self._ended(samples, high)
+
+    def _begun(self, samples: list[Sample]) -> None:
+        """Whether the orbit begins in a fold."""
+        if _off_plus_one(samples[0]) > _NEAR_FOLD:
+            return
+        fold = self._fold_beside(samples[0], samples[1:], rising=False)
+        if fold is None or fold.value + _BEFORE * self.width < self.low:
+            return
+        self.start = min(self.low + _BEFORE * self.width, samples[-1].value)
+        if fold.value >= self.low - fold.error_bound:
+            self.folds += (fold,)
+
+    def _ended(self, samples: list[Sample], high: float) -> None:
+        """Where the orbit ends, and the fold it ends in, which may be the very end of the interval."""
+        last = samples[-1]
+        if last.value == high and _off_plus_one(last) > _NEAR_FOLD:
+            return
+        fold = self._fold_beside(last, samples[-2::-1], rising=True)
+        here = last if fold is None else Sample(fold.value, fold.image.state, fold.image)
+        if last.value != high and self._at_rest(here):
+            self.ending = f"the orbit shrinks into an equilibrium near {here.value:.9g}: a Hopf point"
+            self.end = last.value
+        elif fold is not None:
+            # In the fold itself multipliers move as a root of the distance, which no search sees through.
+            self.end = max(self.low, min(last.value, fold.value - _BEFORE * self.width))
+            if fold.value <= high + fold.error_bound:
+                self.folds += (fold,)
+        elif last.value != high:
+            self.ending = f"the orbit cannot be followed beyond {last.value:.9g}"
+            self.end = last.value
+
+    def _fold_beside(self, sample: Sample, others: list[Sample], rising: bool) -> Fold | None:
+        """The fold that a sample is next to or in, from the nearest of the others that is clear of it."""
+        off = np.array([_off_plus_one(each) for each in [sample, *others]])
+        clear = [sample, *others][int(np.argmax(off > min(_CLEAR_OF_FOLD, off.max() / 2.0)))]
+        fold = find_fold(self.family, clear.value, clear.orbit, self.width, rising)
+        if fold is None or not self._next_to(sample, fold, rising):
+            return None
+        return fold if self._ends_as_a_root(fold, rising) else None
 
     def _at_rest(self, last: Sample) -> bool:
         """Whether hardly anything of the motion is left where an orbit ends: beyond there is none, and what looks like
@@ -214,14 +288,27 @@ class Samples:
             behind, target = [last, found], longer if abs(value - longer) > smallest and longer < value else value
         return reached
 
-    def _ends_in(self, last: Sample, fold: Fold) -> bool:
-        """Whether a fold is just past the last sample, on the same orbit; others may be anywhere."""
-        further = fold.value - last.value
+    def _ends_as_a_root(self, fold: Fold, rising: bool) -> bool:
+        """Whether the multiplier comes to +1 as the root of the distance, as it does in a fold; where another branch
+        only passes it comes evenly."""
+        away = np.array(_COMES) * (-self.width if rising else self.width)
+        near, far = (_off_plus_one(each) for each in self.at(fold.value + away))
+        return far < near * (_COMES[1] / _COMES[0]) ** _BETWEEN_POWERS
+
+    def _next_to(self, sample: Sample, fold: Fold, rising: bool) -> bool:
+        """Whether a fold is just past a sample at either end, on the same orbit; others may be anywhere."""
+        further = fold.value - sample.value if rising else sample.value - fold.value
         return (
             bool(np.isfinite(fold.error_bound))
-            and -fold.error_bound <= further <= self.width / _FIRST_STEPS
-            and not self._jumped(fold.image.state, last.orbit)
+            # In a fold Newton's method also finds orbits that are none any more.
+            and -max(fold.error_bound, _BEFORE * self.width) <= further <= self.width / _FIRST_STEPS
+            and not self._jumped(fold.image.state, sample.orbit)
         )
 
     def _jumped(self, orbit: Array, guess: Array) -> bool:
         return bool((np.abs(orbit - guess) > _JUMP * np.maximum(self._size, np.abs(guess))).any())
+
+
+def _off_plus_one(sample: Sample) -> float:
+    """Distance of the return map's multipliers from +1, that along the motion left aside."""
+    return float(np.abs(return_multipliers(sample.image) - 1.0).min(initial=np.inf))

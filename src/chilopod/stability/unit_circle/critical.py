@@ -97,6 +97,8 @@ class Critical:
             )
             # A real multiplier on the circle is nowhere else.
             near = near | ((rest.imag == 0.0) & (rest.real * target > 0.0))
+            # However large errors are, what is critical is so at the nearer of the two.
+            near = near & (rest.real * target > 0.0)
             number = int(near.sum()) - self._idle[event]
             if number > 0 and (not self._conservative or root.event in (event, None)):
                 best = complex(rest[near][np.abs(rest[near] - target).argmin()])
