@@ -34,6 +34,7 @@ _MOST_CORRECTIONS = 12
 _STRAYS = 0.1  # of a step: so far beyond the interval a curve is sought that ends within it
 _PARAMETER_STEP = 1e-6  # of the difference, in units of the scale
 _SHARPEST_TURN = 0.5  # cosine between two tangents: beyond it the step may have landed on another curve
+_SHRUNK = 1e-4  # of the largest motion so far: smaller ones are none
 _KEPT = 8  # systems: making one may cost more than a flow
 _USER_ERRORS = (ArithmeticError, ValueError, np.linalg.LinAlgError)
 
@@ -85,6 +86,7 @@ class Curve:
         self.precision = precision
         self.left = budget
         self.relative_error: float | None = None
+        self._motion = 0.0  # the largest within a period so far
         self._known: dict[float, tuple[SystemLike, SystemLike]] = {}
         self._each: dict[type, bool] = {}
 
@@ -289,8 +291,10 @@ class Curve:
             assert section is not None
             assert is_autonomous(system)
             velocity = np.asarray(system.velocity(x))
+            motion = float(np.linalg.norm(velocity / self.units(x.size)[:-1])) * image.period
+            self._motion = max(self._motion, motion)
             # Past an equilibrium come the same orbits again, half a period later.
-            if not float(anchor.section.normal @ velocity) > 0.0:
+            if motion < _SHRUNK * self._motion or not float(anchor.section.normal @ velocity) > 0.0:
                 raise AnalysisError("the orbit shrinks into an equilibrium: a Hopf point", field="orbit")
             along = self._projection(velocity, section)
             tangent, matrix = np.array(tangent), np.array(matrix)
