@@ -124,7 +124,7 @@ def locate(
             points += [
                 describe(samples, crossing, block, normal_form)
                 for crossing in found.crossings
-                if crossing.event is not Event.PLUS or not samples.in_fold(crossing.value)
+                if crossing.event is not Event.PLUS or not samples.in_end(crossing.value)
             ]
     points += [fold_point(fold, samples, normal_form) for fold in samples.folds]
     ordered = tuple(sorted(points, key=lambda point: point.value))

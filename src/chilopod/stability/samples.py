@@ -87,6 +87,7 @@ class Samples:
         self._dimension, self._timed = 0, True
         self.count = 0
         self.ending = ""
+        self._shrinks = False
         self.start, self.end = low, high
         self.folds: tuple[Fold, ...] = ()
         self.first = find_orbit(self.family(low), guess)
@@ -152,9 +153,11 @@ class Samples:
         off = min(of_flow / max(float(values[-1]), of_flow), of_flow ** (1.0 / 3.0))
         return min(1.0, of_flow + self._bends[sample.value] * off)
 
-    def in_fold(self, value: float) -> bool:
-        """Whether a value is so near a fold the orbit begins or ends in that its multiplier +1 is that of the fold."""
-        return any(abs(value - fold.value) <= 2.0 * _BEFORE * self.width for fold in self.folds)
+    def in_end(self, value: float) -> bool:
+        """Whether a value is so near a fold that the orbit begins or ends in, or an equilibrium that it shrinks into,
+        that a multiplier +1 is what comes of that."""
+        ends = [fold.value for fold in self.folds] + [self.end] * self._shrinks
+        return any(abs(value - end) <= 2.0 * _BEFORE * self.width for end in ends)
 
     def of_flow(self) -> ReturnMap:
         """The return map at the first orbit, with the error of the flow alone."""
@@ -221,7 +224,7 @@ class Samples:
         here = last if fold is None else Sample(fold.value, fold.image.state, fold.image)
         if last.value != high and self._at_rest(here):
             self.ending = f"the orbit shrinks into an equilibrium near {here.value:.9g}: a Hopf point"
-            self.end = last.value
+            self.end, self._shrinks = last.value, True
         elif fold is not None:
             # In the fold itself multipliers move as a root of the distance, which no search sees through.
             self.end = max(self.low, min(last.value, fold.value - _BEFORE * self.width))

@@ -11,6 +11,11 @@ from chilopod.stability.unit_circle.spectra import Event, Spectra
 
 Array = NDArray[np.float64]
 
+UNKNOWN = 0.5
+"""Error of a multiplier's margin that tells nothing of where it is."""
+
+LOST = "multipliers are so large that those near the circle are lost in round-off"
+
 _ULPS = 64.0
 
 
@@ -87,6 +92,9 @@ class Critical:
         nu = self._spectra.at(np.array([root.place]))[0]
         margins, tolerances = self._spectra.margins(root.place), self.tolerances(root)
         critical = nu[np.abs(margins) <= tolerances]
+        if root.event is None:
+            # No function vanishes here: what may be anywhere is not on the circle for that.
+            critical = nu[(np.abs(margins) <= tolerances) & (tolerances <= UNKNOWN)]
         groups = []
         rest = critical
         for event, target in ((Event.MINUS, -1.0), (Event.PLUS, 1.0)):
