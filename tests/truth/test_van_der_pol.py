@@ -74,9 +74,9 @@ def test_a_multiplier_of_minus_seven_thousand_powers_of_e():
 
     found = exponents(oscillator(mu, 85.0), [2.0, 0.0])
     period, start = found.multipliers.period, found.multipliers.orbit
-    known = solve_ivp(
-        with_liouville, (0.0, period), [*start, 0.0], "Radau", rtol=1e-10, atol=1e-12, jac=derivative
-    ).y[:, -1]
+    known = solve_ivp(with_liouville, (0.0, period), [*start, 0.0], "Radau", rtol=1e-10, atol=1e-12, jac=derivative).y[
+        :, -1
+    ]
     assert known[:2] == pytest.approx(start, abs=1e-9)
     assert abs(found.values[0] - known[2] / period) <= found.error_bound[0] + 1e-8
     assert found.error_bound[0] < 1e-6

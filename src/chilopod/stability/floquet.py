@@ -271,7 +271,7 @@ def exponents(system: SystemLike, orbit: ArrayLike | None = None) -> Exponents:
 
 @dataclass(frozen=True)
 class _Part:
-    """The derivative of the flow over a part of the return, with the bound on its error, in units; and where it ends."""
+    """The derivative of the flow over a part of the return, with the bound on its error, in units; and its end."""
 
     start: float
     end: float

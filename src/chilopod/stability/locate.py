@@ -149,7 +149,12 @@ def _searched(samples: Samples, budget: int) -> tuple[list[tuple[Block | None, C
 
     def whole(values: Array) -> tuple[Array, Array]:
         found = samples.at(values)
-        errors = [_relative(each.image) if samples.known else samples.error(each, uncertain) for each in found]
+        if samples.known:
+            errors = [_relative(each.image) for each in found]
+        elif blocks == (None,):
+            errors = [samples.error(each, uncertain) for each in found]
+        else:  # a mode that breaks a symmetry leaves the orbit as sure as it is
+            errors = [uncertain] * len(found)
         return np.stack([each.image.jacobian for each in found]), np.array(errors)
 
     searched: list[tuple[Block | None, Crossings]] = []

@@ -24,13 +24,16 @@ _SHORTEST = 2.0**-10  # step of an orbit that is followed, relative to the first
 _KEPT = 64  # systems: around a point the same one is asked for again and again
 _BEFORE = 1e-6  # of the interval: so far from a fold other crossings are looked for
 _NEAR_FOLD = 0.02  # distance of a multiplier from +1: a fold may be within ``_BEFORE``
+_TRIES = 3  # starts of curves round a fold
 _CLEAR_OF_FOLD = 1e-3  # likewise: so far off a fold is passed by a curve that starts there
-_COMES = 1e-5, 1e-3  # of the interval before a fold, where the multiplier is looked at
+_COMES, _FARTHER = 1e-5, 100.0  # of the interval before a fold, and times that: where the multiplier is looked at
 _BETWEEN_POWERS = 0.75  # of one half and one
 _SURE = 1e-4  # singular value of H - 1, in units, above which the orbit is as good as the flow
 _BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
 _AT_REST = 0.03  # of the motion of the first orbit
 _PARTS = 5  # of a return, to see how far the motion goes
+_FORESEEN, _SMALL = 0.3, 0.01  # of a change of the orbit, and of the sizes: what a prediction may miss
+_HALFWAY = 0.25  # of a change: an orbit halfway between two is as near as that to their mean
 _JUMP = 0.3  # of the orbit between prediction and correction, relative to its size
 
 
@@ -128,8 +131,8 @@ class Samples:
         return [self._by_value[value] for value in wanted]
 
     def error(self, sample: Sample, of_flow: float) -> float:
-        """Relative error of the derivative at a sample of an orbit that is followed: that of the flow, and what comes of
-        the orbit's own, which is the flow's times what H - 1 makes of it.
+        """Relative error of the derivative at a sample of an orbit that is followed: that of the flow, and what comes
+        of the orbit's own, which is the flow's times what H - 1 makes of it.
 
         Parameters
         ----------
@@ -237,11 +240,13 @@ class Samples:
     def _fold_beside(self, sample: Sample, others: list[Sample], rising: bool) -> Fold | None:
         """The fold that a sample is next to or in, from the nearest of the others that is clear of it."""
         off = np.array([_off_plus_one(each) for each in [sample, *others]])
-        clear = [sample, *others][int(np.argmax(off > min(_CLEAR_OF_FOLD, off.max() / 2.0)))]
-        fold = find_fold(self.family, clear.value, clear.orbit, self.width, rising)
-        if fold is None or not self._next_to(sample, fold, rising):
-            return None
-        return fold if self._ends_as_a_root(fold, rising) else None
+        clear = np.flatnonzero(off > min(_CLEAR_OF_FOLD, off.max() / 2.0))
+        for each in [[sample, *others][i] for i in clear[:_TRIES]]:
+            fold = find_fold(self.family, each.value, each.orbit, self.width, rising)
+            # Right beside it a step may land on another curve, which has a fold of its own.
+            if fold is not None and self._next_to(sample, fold, rising) and self._ends_as_a_root(sample, fold, rising):
+                return fold
+        return None
 
     def _at_rest(self, last: Sample) -> bool:
         """Whether hardly anything of the motion is left where an orbit ends: beyond there is none, and what looks like
@@ -279,7 +284,7 @@ class Samples:
             except AnalysisError:
                 found = None
             # A large jump means that Newton's method has found another orbit.
-            if found is None or self._jumped(found.orbit, guess):
+            if found is None or self._jumped(found.orbit, guess) or not self._connected(last, guess, found):
                 target = 0.5 * (last.value + target)
                 if abs(target - last.value) < smallest:
                     return reached
@@ -291,12 +296,27 @@ class Samples:
             behind, target = [last, found], longer if abs(value - longer) > smallest and longer < value else value
         return reached
 
-    def _ends_as_a_root(self, fold: Fold, rising: bool) -> bool:
+    def _ends_as_a_root(self, sample: Sample, fold: Fold, rising: bool) -> bool:
         """Whether the multiplier comes to +1 as the root of the distance, as it does in a fold; where another branch
         only passes it comes evenly."""
-        away = np.array(_COMES) * (-self.width if rising else self.width)
-        near, far = (_off_plus_one(each) for each in self.at(fold.value + away))
-        return far < near * (_COMES[1] / _COMES[0]) ** _BETWEEN_POWERS
+        near = max(_COMES * self.width, abs(fold.value - sample.value))
+        away = np.array([near, min(_FARTHER * near, 0.5 * self.width)])
+        beside = self.at(fold.value + (-away if rising else away))
+        off = [_off_plus_one(each) for each in beside]
+        return off[1] < off[0] * (away[1] / away[0]) ** _BETWEEN_POWERS
+
+    def _connected(self, last: Sample, guess: Array, found: Sample) -> bool:
+        """Whether an orbit that was not foreseen is on the branch of the last one: then there is one about halfway
+        between them, in a fold at the square root of a half; to another orbit it is a jump at any place."""
+        change = found.orbit - last.orbit
+        size = self._size * float((np.abs(change) / self._size).max())
+        if (np.abs(found.orbit - guess) <= np.maximum(_FORESEEN * size, _SMALL * self._size)).all():
+            return True
+        try:
+            middle = self._sampled(0.5 * (last.value + found.value), last.orbit + 0.5 * change, last)
+        except AnalysisError:
+            return False
+        return bool((np.abs(middle.orbit - last.orbit - 0.5 * change) <= _HALFWAY * size).all())
 
     def _next_to(self, sample: Sample, fold: Fold, rising: bool) -> bool:
         """Whether a fold is just past a sample at either end, on the same orbit; others may be anywhere."""
