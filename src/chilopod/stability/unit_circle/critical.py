@@ -11,8 +11,8 @@ from chilopod.stability.unit_circle.spectra import Event, Spectra
 
 Array = NDArray[np.float64]
 
-UNKNOWN = 0.5
-"""Error of a multiplier's margin that tells nothing of where it is."""
+UNKNOWN = 1.0
+"""Error of a multiplier's margin that reaches from zero to the circle, and so tells nothing of where it is."""
 
 LOST = "multipliers are so large that those near the circle are lost in round-off"
 
