@@ -22,6 +22,7 @@ from chilopod.stability.scales import numerical_balance
 from chilopod.stability.symmetry.groups import centraliser, commutes, finite_group, isotropy
 from chilopod.stability.symmetry.isotypic import Block, Type, isotypic
 from chilopod.stability.unit_circle.crossings import Crossings, Status, find_crossings
+from chilopod.stability.unit_circle.spectra import Event
 
 Array = NDArray[np.float64]
 
@@ -121,13 +122,15 @@ def locate(
     remarks = [samples.ending] if samples.ending else []
     status = Status.BUDGET if samples.spent else Status.INCOMPLETE if samples.ending else Status.COMPLETE
     points: list[BifurcationPoint] = []
-    if low < samples.end:
-        searched, more = _searched(samples, low, budget)
+    if samples.start < samples.end:
+        searched, more = _searched(samples, budget)
         remarks += more
         for block, found in searched:
             status = max(status, found.status, key=_GRAVITY.index)
             remarks += found.remarks
             for crossing in found.crossings:
+                if crossing.event is Event.PLUS and samples.in_end(crossing.value):
+                    continue
                 samples.allow(_DESCRIBING)
                 try:
                     with Asking("family", crossing.value):
@@ -135,8 +138,7 @@ def locate(
                 except AnalysisError as error:
                     status = max(status, Status.INCOMPLETE, key=_GRAVITY.index)
                     remarks.append(f"what crosses at {crossing.value:.9g} could not be described: {error}")
-    if samples.fold is not None:
-        points.append(fold_point(samples.fold, samples, normal_form))
+    points += [fold_point(fold, samples, normal_form) for fold in samples.folds]
     if samples.remarks:
         status = max(status, Status.INCOMPLETE, key=_GRAVITY.index)
     ordered = tuple(sorted(points, key=lambda point: point.value))
@@ -153,14 +155,20 @@ def _interval(between: tuple[float, float]) -> tuple[float, float]:
     return low, high
 
 
-def _searched(samples: Samples, low: float, budget: int) -> tuple[list[tuple[Block | None, Crossings]], list[str]]:
+def _searched(samples: Samples, budget: int) -> tuple[list[tuple[Block | None, Crossings]], list[str]]:
     """The crossings in every block of the return map, and what is to be said of the blocks."""
-    blocks, remarks = _blocks(samples.family(low), samples.first)
-    uncertain = _relative(samples.first.image)
+    blocks, remarks = _blocks(samples.family(samples.low), samples.first)
+    # Of the first orbit hardly a trace may be left after a return; of those that are followed from it there is more.
+    uncertain = _FOLLOWED * _relative(samples.of_flow(), at_least=1.0)
 
     def whole(values: Array) -> tuple[Array, Array]:
         found = samples.at(values)
-        errors = [_relative(each.image) if samples.known else _FOLLOWED * uncertain for each in found]
+        if samples.known:
+            errors = [_relative(each.image) for each in found]
+        elif blocks == (None,):
+            errors = [samples.error(each, uncertain) for each in found]
+        else:  # a mode that breaks a symmetry leaves the orbit as sure as it is
+            errors = [uncertain] * len(found)
         return np.stack([each.image.jacobian for each in found]), np.array(errors)
 
     searched: list[tuple[Block | None, Crossings]] = []
@@ -175,7 +183,7 @@ def _searched(samples: Samples, low: float, budget: int) -> tuple[list[tuple[Blo
             return block.dual @ matrices @ block.basis, errors
 
         searched.append(
-            (block, find_crossings(reduced, low, samples.end, budget=budget, affordable=samples.affordable))
+            (block, find_crossings(reduced, samples.start, samples.end, budget=budget, affordable=samples.affordable))
         )
     return searched, remarks
 
@@ -196,11 +204,12 @@ def _blocks(system: SystemLike, orbit: Orbit) -> tuple[tuple[Block | None, ...],
     return isotypic(group), []
 
 
-def _relative(image: ReturnMap) -> float:
-    """Error of the derivative, of its largest entry, the states being in units that balance it."""
+def _relative(image: ReturnMap, at_least: float = 0.0) -> float:
+    """Error of the derivative, of its largest entry or of what that is at least, the states being in units that balance
+    it."""
     # An entry that is nothing but round-off says nothing of the units.
     units = numerical_balance(np.abs(image.jacobian) + np.nan_to_num(image.error))
-    largest = float(np.abs(image.jacobian * units / units[:, None]).max())
+    largest = max(at_least, float(np.abs(image.jacobian * units / units[:, None]).max()))
     if not largest > 0.0:
         return _LEAST_ERROR
     return max(_LEAST_ERROR, float(np.max(image.error * units / units[:, None])) / largest)

@@ -32,8 +32,10 @@ _COUNTED = 1e-10  # residuals above it count as corrections, by which steps grow
 _SETTLED = 1e-8  # residual below which it may stop falling
 _FALLING = 0.5
 _MOST_CORRECTIONS = 12
+_STRAYS = 0.1  # of a step: so far beyond the interval a curve is sought that ends within it
 _PARAMETER_STEP = 1e-6  # of the difference, in units of the scale
 _SHARPEST_TURN = 0.5  # cosine between two tangents: beyond it the step may have landed on another curve
+_SHRUNK = 1e-4  # of the largest motion so far: smaller ones are none
 _KEPT = 8  # systems: making one may cost more than a flow
 
 
@@ -84,6 +86,7 @@ class Curve:
         self.precision = precision
         self.left = budget
         self.relative_error: float | None = None
+        self._motion = 0.0  # the largest within a period so far
         self._known: dict[float, tuple[SystemLike, SystemLike]] = {}
         self._each: dict[type, bool] = {}
         self._dimension = 0
@@ -227,6 +230,7 @@ class Curve:
         units = self.units(n)
         moved, matrix = np.array(guess), np.array(matrix)
         matrix[-1] = row
+        by_parameter = matrix[:n, n]
         try:
             inverse = np.linalg.inv(matrix)
         except np.linalg.LinAlgError:
@@ -236,11 +240,14 @@ class Curve:
         rounds = corrections = 0
         while True:
             x = last.orbit + units[:n] * moved[:n]
-            here = last.value + self.scale * float(moved[n]) if value is None else value
-            if not self.between[0] <= here <= self.between[1]:
-                raise OutsideIntervalError("leaves the interval", field="parameter", value=here)
+            wanted = last.value + self.scale * float(moved[n]) if value is None else value
+            here = min(max(wanted, self.between[0]), self.between[1])
+            # A curve that turns back at the end of the interval is sought beyond it on the way there.
+            strays = (wanted - here) / self.scale
+            if abs(strays) > _STRAYS * float(np.linalg.norm(guess)):
+                raise OutsideIntervalError("leaves the interval", field="parameter", value=wanted)
             mapped, beside = self._mapped(x, here, section)
-            residual = np.append((mapped - x) / units[:n], row @ moved - target)
+            residual = np.append((mapped - x) / units[:n] + strays * by_parameter, row @ moved - target)
             now = float(np.abs(residual).max())
             if not np.isfinite(now) or (now > 10.0 * largest and now > _SETTLED):
                 raise AnalysisError("corrections diverge", field="step")
@@ -262,6 +269,8 @@ class Curve:
             moved = moved + move
             rounds += 1
             corrections += now > _COUNTED * size
+        if abs(strays) > self.precision:
+            raise OutsideIntervalError("leaves the interval", field="parameter", value=wanted)
         image = self.image(x, here, section)
         derivative = self._difference(x, here, section, mapped, beside)
         bordered = self.matrix(image.jacobian, derivative, last.tangent)
@@ -283,7 +292,13 @@ class Curve:
             section = section_at(system, x, self.sizes, image.period / image.returns)
             assert section is not None
             assert is_autonomous(system)
-            along = self._projection(np.asarray(system.velocity(x)), section)
+            velocity = np.asarray(system.velocity(x))
+            motion = float(np.linalg.norm(velocity / self.units(x.size)[:-1])) * image.period
+            self._motion = max(self._motion, motion)
+            # Past an equilibrium come the same orbits again, half a period later.
+            if motion < _SHRUNK * self._motion or not float(anchor.section.normal @ velocity) > 0.0:
+                raise AnalysisError("the orbit shrinks into an equilibrium: a Hopf point", field="orbit")
+            along = self._projection(velocity, section)
             tangent, matrix = np.array(tangent), np.array(matrix)
             tangent[:-1] = along @ tangent[:-1]
             tangent /= np.linalg.norm(tangent)
