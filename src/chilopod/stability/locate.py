@@ -234,15 +234,10 @@ def _formed(samples: Samples, value: float, orbit: Orbit) -> Formed:
     system = samples.family(value)
     scale = sizes(system, orbit.state, orbit.period / orbit.image.returns)
 
-    def formed(critical: CriticalOrbit, uncertainty: float) -> NormalForm:
-        return normal_form_of(
-            lambda states: returned_states(system, states, orbit.section),
-            critical,
-            uncertainty=uncertainty,
-            scale=scale,
-        )
+    def mapped(states: Array) -> Array:
+        return returned_states(system, states, orbit.section)
 
-    return formed
+    return lambda critical, uncertainty: normal_form_of(mapped, critical, uncertainty=uncertainty, scale=scale)
 
 
 def _relative(image: ReturnMap, at_least: float = 0.0) -> float:
