@@ -18,9 +18,17 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import read_only
 from chilopod.stability.asked import Asking
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, Step
-from chilopod.stability.capabilities import Family, FlowsEach, SystemLike, is_autonomous, returns_per_period
-from chilopod.stability.floquet import across
+from chilopod.stability.capabilities import (
+    Family,
+    FlowsEach,
+    SystemLike,
+    is_autonomous,
+    returns_per_period,
+    spatial_symmetries,
+)
+from chilopod.stability.floquet import return_multipliers
 from chilopod.stability.returns import ReturnMap, Section, return_map, returned_states, section_at, whole_period
+from chilopod.stability.symmetry.mirrored import symmetric_states
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -230,6 +238,8 @@ class Curve:
         units = self.units(n)
         moved, matrix = np.array(guess), np.array(matrix)
         matrix[-1] = row
+        fixed = self._fixed(anchor)
+        matrix = _within(fixed, matrix)
         by_parameter = matrix[:n, n]
         try:
             inverse = np.linalg.inv(matrix)
@@ -247,7 +257,8 @@ class Curve:
             if abs(strays) > _STRAYS * float(np.linalg.norm(guess)):
                 raise OutsideIntervalError("leaves the interval", field="parameter", value=wanted)
             mapped, beside = self._mapped(x, here, section)
-            residual = np.append((mapped - x) / units[:n] + strays * by_parameter, row @ moved - target)
+            off = (mapped - x) / units[:n]
+            residual = np.append((off if fixed is None else fixed @ off) + strays * by_parameter, row @ moved - target)
             now = float(np.abs(residual).max())
             if not np.isfinite(now) or (now > 10.0 * largest and now > _SETTLED):
                 raise AnalysisError("corrections diverge", field="step")
@@ -274,13 +285,22 @@ class Curve:
         image = self.image(x, here, section)
         derivative = self._difference(x, here, section, mapped, beside)
         bordered = self.matrix(image.jacobian, derivative, last.tangent)
-        tangent = _null_vector(bordered)
+        tangent = _null_vector(_within(fixed, bordered))
         if not tangent @ last.tangent >= _SHARPEST_TURN:
             raise AnalysisError("the curve turns too sharply", field="step")
         bordered[n] = tangent
         end = self._end(anchor, x, here, image, tangent, bordered)
         missed = float(np.linalg.norm(moved - guess))
         return Step(anchor, end, float(last.tangent @ moved), moved, tangent, bordered, image, corrections, missed)
+
+    def _fixed(self, anchor: Anchor) -> Array | None:
+        """Projection, in units, onto the states with the spatial symmetries of the orbit that a step starts from, shape
+        (n, n): among them its branch is regular where others leave it and break these. None if it has none."""
+        x, system = anchor.last.orbit, self.system(anchor.last.value)
+        if anchor.leaving or system.symmetry is not None or not spatial_symmetries(system):
+            return None
+        basis = symmetric_states(system, x, self.units(x.size)[:-1])
+        return basis @ basis.T if basis.shape[1] < x.size else None
 
     def _end(self, anchor: Anchor, x: Array, value: float, image: ReturnMap, tangent: Array, matrix: Array) -> Anchor:
         """Where the next step starts."""
@@ -372,14 +392,15 @@ class OutsideIntervalError(AnalysisError):
     """A step asked for a value of the parameter outside the interval."""
 
 
-def return_multipliers(image: ReturnMap) -> ComplexArray:
-    """Eigenvalues of a return map by falling modulus, without the zero that stands for the motion itself."""
-    jacobian = image.jacobian
-    if image.normal is not None:
-        into, out_of = across(image)
-        jacobian = out_of @ jacobian @ into
-    values = np.linalg.eigvals(jacobian).astype(np.complex128)
-    return values[np.lexsort((-values.imag, -np.abs(values)))]
+def _within(fixed: Array | None, matrix: Array) -> Array:
+    """The matrix of a curve, in units, within a space of states; across it that of a contraction."""
+    if fixed is None:
+        return matrix
+    n = len(fixed)
+    result = np.array(matrix)
+    result[:n] = fixed @ result[:n]
+    result[:n, :n] += (fixed - np.eye(n)) - result[:n, :n] @ (np.eye(n) - fixed)
+    return result
 
 
 def _null_vector(bordered: Array) -> Array:

@@ -50,6 +50,7 @@ _ERROR = 1e-10  # relative, of the return map's derivative at an orbit that was 
 _CLOSE = 1e-9  # of a step: how closely a point is located along the curve
 _SIDE = 1e-3  # of a step: how far beside a crossing the curve's sides are looked at
 _BRANCHING = 1e-4  # smallest singular value of [H' - 1, dH/dp], in units, where branches meet
+_COMPLEX = 1e-5  # imaginary part from which a multiplier on the circle is one of a pair
 _EVENTS = (Event.MINUS, Event.PLUS, Event.PAIR)
 
 Bracket = tuple[Event, float, float]
@@ -126,14 +127,14 @@ def _places(within: Within, brackets: list[Bracket] | None, turned: bool) -> tup
     step = within.step
     remarks: tuple[str, ...] = ()
     roots: list[tuple[Crossing, Block | None]] = []
-    if brackets is None:
+    single = None if brackets is None else [_root(within, *bracket) for bracket in brackets]
+    if single is None or None in single:
         for block, found in _searched(within):
             if found.status in (Status.BUDGET, Status.INCOMPLETE):
                 remarks += tuple(f"near {step.end.last.value:.6g}: {remark}" for remark in found.remarks)
             roots += [(crossing, block) for crossing in found.crossings]
     else:
-        for event, a, b in brackets:
-            crossing = _root(within, event, a, b)
+        for crossing in filter(None, single):
             matrix = within.at(crossing.value).image.jacobian
             roots.append((crossing, block_of(within.blocks, matrix, crossing.multiplier)))
     places = [_placed(within, crossing, block) for crossing, block in roots if crossing.value > _CLOSE * step.size]
@@ -192,8 +193,9 @@ def _searched(within: Within) -> list[tuple[Block | None, Crossings]]:
     return [(block, crossings_in(block, matrices, search)) for block in within.blocks]
 
 
-def _root(within: Within, event: Event, a: float, b: float) -> Crossing:
-    """Where one multiplier, or one pair, crosses between two places at which a test function has opposite signs."""
+def _root(within: Within, event: Event, a: float, b: float) -> Crossing | None:
+    """Where one multiplier, or one pair, crosses between two places at which a test function has opposite signs; None
+    where two real ones cross as one, which the function of a pair does not tell from a pair."""
 
     def spectrum(place: float) -> ComplexArray:
         jacobian = _start_jacobian(within) if place == 0.0 else within.at(place).image.jacobian
@@ -206,9 +208,13 @@ def _root(within: Within, event: Event, a: float, b: float) -> Crossing:
         raise AnalysisError("the curve is not smooth within the step", field="step")
     root = float(brentq(test, a, b, xtol=1e-3 * _CLOSE * within.step.size))
     nu = spectrum(root)
-    target = TARGETS.get(event)
-    # Of a pair the one that turns with positive frequency; real ones with product 1 are none.
-    away = np.abs(np.abs(nu) - 1.0) + np.where(nu.imag > 0.0, 0.0, 1.0) if target is None else np.abs(nu - target)
+    if event is Event.PAIR:
+        nu = nu[nu.imag > _COMPLEX]
+        if not nu.size:
+            return None
+        away = np.abs(np.abs(nu) - 1.0)
+    else:
+        away = np.abs(nu - TARGETS[event])
     multiplier = complex(nu[away.argmin()])
     return Crossing(root, (root, root), event, 2 if event is Event.PAIR else 1, 1, multiplier)
 
