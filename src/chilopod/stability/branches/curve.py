@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from chilopod.errors import AnalysisError
 from chilopod.frozen import read_only
 from chilopod.stability.asked import Asking
+from chilopod.stability.branches.bordered_matrices import null_vector, symmetric_space, within_space
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, Step
 from chilopod.stability.capabilities import (
     Family,
@@ -24,11 +25,9 @@ from chilopod.stability.capabilities import (
     SystemLike,
     is_autonomous,
     returns_per_period,
-    spatial_symmetries,
 )
 from chilopod.stability.floquet import return_multipliers
 from chilopod.stability.returns import ReturnMap, Section, return_map, returned_states, section_at, whole_period
-from chilopod.stability.symmetry.mirrored import symmetric_states
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -238,8 +237,8 @@ class Curve:
         units = self.units(n)
         moved, matrix = np.array(guess), np.array(matrix)
         matrix[-1] = row
-        fixed = self._fixed(anchor)
-        matrix = _within(fixed, matrix)
+        fixed = symmetric_space(self.system(last.value), anchor, units[:n])
+        matrix = within_space(fixed, matrix)
         by_parameter = matrix[:n, n]
         try:
             inverse = np.linalg.inv(matrix)
@@ -250,6 +249,8 @@ class Curve:
         rounds = corrections = 0
         while True:
             x = last.orbit + units[:n] * moved[:n]
+            if fixed is not None:
+                x = units[:n] * (fixed @ (x / units[:n]))
             wanted = last.value + self.scale * float(moved[n]) if value is None else value
             here = min(max(wanted, self.between[0]), self.between[1])
             # A curve that turns back at the end of the interval is sought beyond it on the way there.
@@ -285,22 +286,13 @@ class Curve:
         image = self.image(x, here, section)
         derivative = self._difference(x, here, section, mapped, beside)
         bordered = self.matrix(image.jacobian, derivative, last.tangent)
-        tangent = _null_vector(_within(fixed, bordered))
+        tangent = null_vector(within_space(fixed, bordered))
         if not tangent @ last.tangent >= _SHARPEST_TURN:
             raise AnalysisError("the curve turns too sharply", field="step")
         bordered[n] = tangent
         end = self._end(anchor, x, here, image, tangent, bordered)
         missed = float(np.linalg.norm(moved - guess))
         return Step(anchor, end, float(last.tangent @ moved), moved, tangent, bordered, image, corrections, missed)
-
-    def _fixed(self, anchor: Anchor) -> Array | None:
-        """Projection, in units, onto the states with the spatial symmetries of the orbit that a step starts from, shape
-        (n, n): among them its branch is regular where others leave it and break these. None if it has none."""
-        x, system = anchor.last.orbit, self.system(anchor.last.value)
-        if anchor.leaving or system.symmetry is not None or not spatial_symmetries(system):
-            return None
-        basis = symmetric_states(system, x, self.units(x.size)[:-1])
-        return basis @ basis.T if basis.shape[1] < x.size else None
 
     def _end(self, anchor: Anchor, x: Array, value: float, image: ReturnMap, tangent: Array, matrix: Array) -> Anchor:
         """Where the next step starts."""
@@ -390,26 +382,3 @@ class Curve:
 
 class OutsideIntervalError(AnalysisError):
     """A step asked for a value of the parameter outside the interval."""
-
-
-def _within(fixed: Array | None, matrix: Array) -> Array:
-    """The matrix of a curve, in units, within a space of states; across it that of a contraction."""
-    if fixed is None:
-        return matrix
-    n = len(fixed)
-    result = np.array(matrix)
-    result[:n] = fixed @ result[:n]
-    result[:n, :n] += (fixed - np.eye(n)) - result[:n, :n] @ (np.eye(n) - fixed)
-    return result
-
-
-def _null_vector(bordered: Array) -> Array:
-    """Unit vector that all but the last row of a matrix map to zero, on the side of the last row.
-
-    Exactly at a branch point the matrix is singular; of its solutions the shortest strays least.
-    """
-    n = len(bordered) - 1
-    if not np.isfinite(bordered).all():
-        raise AnalysisError("the return map is not finite", field="flow")
-    tangent: Array = np.linalg.lstsq(bordered, np.append(np.zeros(n), 1.0))[0]
-    return tangent / np.linalg.norm(tangent)

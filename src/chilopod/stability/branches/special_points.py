@@ -102,6 +102,7 @@ def blocks_along(curve: Curve, step: Step) -> Blocks:
     last = step.end.last
     system = curve.system(last.value)
     image = curve.image(last.orbit, last.value, curve.section(last), with_error=True)
+    # On a branch orbits are not solved for to the last digit.
     return orbit_blocks(system, Orbit(last.orbit, image, _SAME * curve.units(last.orbit.size)[:-1]))[0]
 
 
