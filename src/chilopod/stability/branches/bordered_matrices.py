@@ -6,29 +6,42 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.stability.branches.branch_points import Anchor
 from chilopod.stability.capabilities import SystemLike, spatial_symmetries
 from chilopod.stability.symmetry.mirrored import symmetric_states
 
 Array = NDArray[np.float64]
 
 
-def symmetric_space(system: SystemLike, anchor: Anchor, sizes: Array) -> Array | None:
-    """Projection onto the states with the spatial symmetries of the orbit that a step starts from, in units of the
-    states' ``sizes``, shape (n, n): among them its branch is regular where others leave it that break these
-    (Golubitsky, Stewart & Schaeffer, *Singularities and Groups in Bifurcation Theory* II, 1988, section XIII.3). None
-    if it has none."""
+def symmetric_space(system: SystemLike, state: Array, sizes: Array, mode: Array | None = None) -> Array | None:
+    """Projection onto the states with the spatial symmetries of an orbit, in units of the states' ``sizes``.
+
+    Among these its branch is regular where others leave it that break the symmetries (Golubitsky, Stewart & Schaeffer,
+    *Singularities and Groups in Bifurcation Theory* II, 1988, section XIII.3).
+
+    Parameters
+    ----------
+    system, state
+        The system and a state on the orbit, shape (n,).
+    sizes
+        Of the states, shape (n,).
+    mode
+        In units, shape (n,): the symmetries are those that it has as well, which are those of what branches off along
+        it.
+
+    Returns
+    -------
+    Shape (n, n); None if there are no symmetries.
+    """
     if system.symmetry is not None or not spatial_symmetries(system):
         return None
-    last = anchor.last
-    # What branches off has the symmetries of the mode along which it does.
-    x = last.orbit + sizes * last.tangent[:-1] if anchor.leaving else last.orbit
+    x = state if mode is None else state + sizes * mode / np.linalg.norm(mode)
     basis = symmetric_states(system, x, sizes)
     return basis @ basis.T if basis.shape[1] < x.size else None
 
 
 def within_space(space: Array | None, matrix: Array) -> Array:
-    """The matrix of a curve, shape (n+1, n+1), within a space of states; across it that of a contraction."""
+    """The matrix of a curve, shape (n, n+1) or with its tangent (n+1, n+1), within a space of states; across it that of
+    a contraction."""
     if space is None:
         return matrix
     n = len(space)

@@ -237,7 +237,8 @@ class Curve:
         units = self.units(n)
         moved, matrix = np.array(guess), np.array(matrix)
         matrix[-1] = row
-        fixed = symmetric_space(self.system(last.value), anchor, units[:n])
+        mode = last.tangent[:n] if anchor.leaving else None
+        fixed = symmetric_space(self.system(last.value), last.orbit, units[:n], mode)
         matrix = within_space(fixed, matrix)
         by_parameter = matrix[:n, n]
         try:
