@@ -144,6 +144,8 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
             field="point",
             value=point.value,
         )
+    if kind is Kind.KREIN_COLLISION:
+        raise ParameterError("is a Krein collision: no periodic orbits leave it", field="point", value=point.value)
     modes = point.mode.real[None] if point.modes is None else point.modes.real.T
     system = family(point.value)
     period = None

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from chilopod.errors import AnalysisError
 from chilopod.stability.branches.branch_points import BranchPoint, Step
 from chilopod.stability.branches.curve import Curve
-from chilopod.stability.course import SAFETY, Course, place_error
+from chilopod.stability.course import SAFETY, TARGETS, Course, place_error
 from chilopod.stability.described import described
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import NormalForm, normal_form
@@ -90,9 +90,8 @@ def special_point(
         kind=Kind.FOLD if place.fold else None,
     )
     nu = found.multiplier
-    off = abs(abs(nu) - 1.0) if crossing.event is Event.PAIR else abs(nu.real - np.sign(nu.real)) + abs(nu.imag)
-    real = crossing.event is Event.PAIR and abs(nu.imag) <= _CRITICAL
-    if not crossing.collision and (off > _CRITICAL or real):
+    off = abs(abs(nu) - 1.0) if crossing.event is Event.PAIR else abs(nu - TARGETS[crossing.event])
+    if off > _CRITICAL and not crossing.collision:
         return None
     return replace(point, orbit=orbit.state, special=found.kind, bifurcation=found)
 
