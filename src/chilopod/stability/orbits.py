@@ -12,7 +12,16 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.arguments import finite_array
-from chilopod.stability.capabilities import Autonomous, SystemLike, is_autonomous, known_orbit, returns_per_period
+from chilopod.stability.capabilities import (
+    Autonomous,
+    FlowsTangents,
+    SystemLike,
+    is_autonomous,
+    known_orbit,
+    returns_per_period,
+)
+from chilopod.stability.krylov.closing import LARGE, closed_orbit
+from chilopod.stability.krylov.tangent_map import TangentMap, tangent_map, tangent_sizes
 from chilopod.stability.returns import (
     ReturnMap,
     Section,
@@ -141,6 +150,19 @@ def find_orbit(
         raise failed
 
 
+def find_large_orbit(system: FlowsTangents, guess: ArrayLike | None = None) -> tuple[TangentMap, Array]:
+    """As :func:`find_orbit`, of a large system: the return map on the orbit without its derivative as a matrix, and the
+    sizes of the states, shape (n,). Where the method for these fails, :func:`find_orbit` is asked."""
+    x = known_state(system) if guess is None else finite_array(guess, (system.dimension,), "orbit")
+    exact = guess is None and not is_autonomous(system)
+    try:
+        return closed_orbit(system, x, farthest=_KNOWN if exact else np.inf)
+    except AnalysisError:
+        found = find_orbit(system, guess, with_error=False)
+        size = tangent_sizes(system, found.state, found.period / found.image.returns)
+        return tangent_map(system, found.state, found.section), size
+
+
 def from_known(system: SystemLike, x: Array, with_error: bool = True, image: ReturnMap | None = None) -> Orbit:
     """The orbit through a state that is on it, by what the system says of itself; improved if not to the last digit.
 
@@ -177,7 +199,12 @@ def _relative(values: Array, size: Array) -> float:
 def _newton(system: SystemLike, x: Array, with_error: bool, section: Section | None) -> Orbit:
     size = sizes(system, x, return_duration(system) if section is None else section.duration)
     section = section_at(system, x, size) if section is None else section
-    best, before, cutoff = np.inf, x, _SINGULAR
+    best = np.inf
+    if system.dimension >= LARGE and isinstance(system, FlowsTangents):
+        with contextlib.suppress(AnalysisError):
+            x = closed_orbit(system, x, section)[0].point
+            best = 0.0  # nothing is left to improve
+    before, cutoff = x, _SINGULAR
     for rounds in range(_ROUNDS):
         image = return_map(system, x, with_error=False, section=section)
         size = np.maximum(size, np.maximum(np.abs(x), np.abs(image.state)) if x.any() else 0.0)

@@ -52,7 +52,7 @@ class PeriodicSystem(ReadOnlyArrays):
         ``velocity(x)`` -> dx/dt, shape (n,), of a system that does not depend on time.
     guess_period
         About how long an orbit of such a system takes.
-    flow_with_error, flow_states
+    flow_with_error, flow_states, flow_tangents
         See :mod:`chilopod.stability.capabilities`.
     concurrent
         Whether flows may run in several threads at once, which :func:`chilopod.stability.sweep` then does.
@@ -71,6 +71,7 @@ class PeriodicSystem(ReadOnlyArrays):
         default=None, repr=False
     )
     flow_states: Callable[[Array, float, float], Array] | None = field(default=None, repr=False)
+    flow_tangents: Callable[[Array, Array, float, float], tuple[Array, Array]] | None = field(default=None, repr=False)
     concurrent: bool = field(default=False, repr=False)
     symmetry_order: int = field(init=False, default=1, repr=False)
 
