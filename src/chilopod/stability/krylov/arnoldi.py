@@ -22,6 +22,7 @@ _ROUND_OFF = 1e-14
 """Of the largest image: what is left of one outside the subspace that is that small is round-off."""
 
 _GROWTH = 1.125
+_SINGULAR = 1e-13  # singular values of A - 1 that count as zero, A or the unit matrix being one
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,10 @@ class KrylovSubspace(ReadOnlyArrays):
         m = self.matrix.shape[0]
         whole = np.concatenate([self.matrix - np.eye(m), self.coupling])
         inside = np.concatenate([self.basis.T @ right, np.zeros(len(self.coupling))])
-        found = np.linalg.lstsq(whole, inside, rcond=None)[0]
+        left, values, right_vectors = np.linalg.svd(whole, full_matrices=False)
+        # A - 1 may be nothing but round-off: its largest singular value is not what the others are to be compared with.
+        kept = values > _SINGULAR * max(1.0, float(np.linalg.norm(self.matrix)))
+        found = right_vectors[kept].T @ (left[:, kept].T @ inside / values[kept])
         return self.basis @ found, float(np.linalg.norm(whole @ found - inside) / np.linalg.norm(inside))
 
 

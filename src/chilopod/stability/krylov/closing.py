@@ -30,6 +30,7 @@ _SETTLED = 1e-10  # residual, of the sizes of the states, below which it may sto
 _WORSE = 10.0  # residuals may grow by so much
 _RESTS = 1e-8  # of the sizes: a motion that short is none
 _BLOCK = 4  # columns: as many as the compiled code carries at once
+_UNSOLVED = 0.5  # of a residual, in the whole space: no step of Newton's method
 _COARSE, _FINE = 1e-2, 1e-6  # of a residual: how accurately linear systems are solved
 
 
@@ -91,6 +92,8 @@ def _move(image: TangentMap, residual: Array, size: Array, slowest: Array, accur
         move, left = subspace.solve_shifted(residual)
         if left <= accuracy:
             break
+    if left > _UNSOLVED:
+        raise AnalysisError("no move closes the motion: one return later all states near the guess are off alike")
     values, vectors = np.linalg.eig(subspace.matrix)
     largest = vectors[:, np.argsort(-np.abs(values))[: _BLOCK - 1]]
     return move, subspace.basis @ np.where(largest.imag.any(axis=0), largest.imag + largest.real, largest.real)
