@@ -152,3 +152,17 @@ def test_a_ring_of_van_der_pol_oscillators_in_step():
     known = [pairs[0, 1 - trivial], *np.repeat(pairs[1:], 2, axis=0).ravel()]
     assert_leading(found, known, 1e-9, 1e-12)
     assert found.stable
+
+
+def test_a_guess_of_twice_the_period():
+    """Of a large system, too, the orbit has its own period."""
+    cells = 60
+
+    def rhs(t, y):
+        x, v = y[:cells], y[cells:]
+        return np.concatenate([v, (1.0 - x * x) * v - x + 4.0 * (np.roll(v, 1) - 2.0 * v + np.roll(v, -1))])
+
+    guess = np.concatenate([np.full(cells, 2.0), np.zeros(cells)])
+    found = multipliers(from_rhs(rhs, 2 * cells, None, guess_period=13.4), guess, leading=1)
+    assert found.period == pytest.approx(6.663286859323130, rel=1e-12)
+    assert found.stable

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -17,9 +18,9 @@ from chilopod.stability.arguments import checked_count
 from chilopod.stability.capabilities import FlowsTangents, SystemLike, is_autonomous
 from chilopod.stability.krylov.closing import LARGE
 from chilopod.stability.krylov.leading import leading_multipliers, whole_pairs
-from chilopod.stability.matrix_errors import FIRST_ORDER, eigenvalues_moved
+from chilopod.stability.matrix_errors import DRAWN, FIRST_ORDER, eigenvalues_moved
 from chilopod.stability.orbits import Orbit, find_large_orbit, find_orbit, from_known, known_state
-from chilopod.stability.returns import ReturnMap, return_maps
+from chilopod.stability.returns import ReturnMap, flow_with_error, return_maps
 from chilopod.stability.scales import numerical_balance, sizes
 from chilopod.stability.splitting import split_product
 from chilopod.stability.system import PeriodicSystem
@@ -32,7 +33,7 @@ RESOLVED = 1e-6
 anything."""
 
 _WORST_CONDITION = 1e6
-_FEWEST_FACTORS, _MOST_FACTORS = 8, 4096
+_FEWEST_FACTORS, _MOST_FACTORS = 8, 32768
 _COMPOSED = 1e-6  # by so much the parts of a flow may miss the whole
 _SAME_ANGLE = 1e-12
 
@@ -54,7 +55,7 @@ class Multipliers(ReadOnlyArrays):
     error_bound
         Bound on the absolute error of every multiplier of modulus above 1e-6.
     error_bounds
-        Bound on the absolute error of each, shape as of ``values``; above 1e-6 they mean what they say.
+        Bounds on the absolute errors of all, shape as of ``values``; of no meaning for those below 1e-6.
     orbit
         State on the orbit at time 0.
     period
@@ -92,11 +93,15 @@ class Exponents(ReadOnlyArrays):
         that does not depend on time, those of its Poincare map on the section across the motion.
     multipliers
         The multipliers of the same orbit.
+    error_bound
+        Bound on the absolute error (1/s) of each of ``values``, of the same shape: how far they move when the flows
+        between parts of the period change by their errors.
     """
 
     values: ComplexArray
     modes: ComplexArray
     multipliers: Multipliers
+    error_bound: Array
 
 
 @dataclass(frozen=True)
@@ -226,7 +231,7 @@ def multipliers(system: SystemLike, orbit: ArrayLike | None = None, leading: int
     """
     if leading is None:
         return _multipliers(find_orbit(system, orbit))
-    count = checked_count("leading", leading, system.dimension)
+    count = checked_count("leading", leading, system.dimension - (system.period is None))
     if isinstance(system, FlowsTangents) and system.dimension >= LARGE:
         image, size = find_large_orbit(system, orbit)
         found = leading_multipliers(image, size, count)
@@ -278,8 +283,12 @@ def exponents(system: SystemLike, orbit: ArrayLike | None = None) -> Exponents:
     """
     found = find_orbit(system, orbit)
     image = found.image
-    factors, units = _factors(system, found)
+    factors, errors, units = _factors(system, found)
     log_nu, modes = split_product(factors)
+    random = np.random.default_rng(0)
+    disturbed = [f + e * random.choice([-1.0, 1.0], f.shape) for f, e in zip(factors, errors, strict=True)]
+    moved = np.abs(log_nu[:, None] - split_product(disturbed)[0]).min(axis=1)
+    bound = image.returns * (DRAWN * moved + 4.0 * np.finfo(float).eps * np.abs(log_nu)) / image.period
     # Principal logarithm of nu^k: the imaginary part back into (-pi, pi].
     angle = np.angle(np.exp(1j * image.returns * log_nu.imag))
     angle[np.abs(angle) < _SAME_ANGLE] = 0.0
@@ -290,44 +299,78 @@ def exponents(system: SystemLike, orbit: ArrayLike | None = None) -> Exponents:
     modes = units @ modes
     modes = modes / np.linalg.norm(modes, axis=0)
     peaks = modes[np.abs(modes).argmax(axis=0), range(modes.shape[1])]
-    return Exponents(values[order], (modes * (np.abs(peaks) / peaks))[:, order], _multipliers(found))
+    return Exponents(values[order], (modes * (np.abs(peaks) / peaks))[:, order], _multipliers(found), bound[order])
 
 
-def _factors(system: SystemLike, orbit: Orbit) -> tuple[list[Array], Array]:
-    """Derivatives of the flow over equal parts of the return, each of moderate condition, in units in which the entries
-    of their product are alike; and these units as a matrix.
+@dataclass(frozen=True)
+class _Part:
+    """The derivative of the flow over a part of the return, with the bound on its error, in units; and its end."""
 
-    Of a system that does not depend on time, the derivatives between sections across the motion.
+    start: float
+    end: float
+    state: Array
+    factor: Array
+    error: Array
+
+
+def _factors(system: SystemLike, orbit: Orbit) -> tuple[list[Array], list[Array], Array]:
+    """Derivatives of the flow over parts of the return, each of moderate condition, in units in which the entries of
+    their product are alike, with bounds on their errors; and these units as a matrix.
+
+    The parts that contract too strongly are halved, and only these: of a relaxation oscillation a few short ones. Of a
+    system that does not depend on time, the derivatives are those between sections across the motion.
     """
     x, image = orbit.state, orbit.image
     duration = image.period / image.returns
     # The derivative on a section may be nothing but round-off; an orbit that moves has sizes of its own.
     units = sizes(system, x, duration) if is_autonomous(system) else numerical_balance(image.jacobian)
-    count = _FEWEST_FACTORS
-    while True:
-        times = np.linspace(0.0, duration, count + 1)
-        states, factors = [x], []
-        for t0, t1 in zip(times, times[1:], strict=False):
-            state, factor = system.flow(states[-1].copy(), float(t0), float(t1))
-            states.append(state)
-            factors.append(factor * units / units[:, None])
-        if system.symmetry is not None:
-            factors[-1] = (system.symmetry * units / units[:, None]) @ factors[-1]
-        basis, worst = np.diag(units), max(float(np.linalg.cond(factor)) for factor in factors)
-        if is_autonomous(system):
-            sections = [_normal_basis(system.velocity(at) / units) for at in states[:-1]]
-            sections.append(sections[0])
-            factors = [after.T @ f @ before for f, before, after in zip(factors, sections, sections[1:], strict=False)]
-            basis = basis @ sections[0]
-        elif count == _FEWEST_FACTORS:
-            whole = image.jacobian * units / units[:, None]
-            if np.abs(functools.reduce(lambda m, f: f @ m, factors) - whole).max() > _COMPOSED * np.abs(whole).max():
-                return [whole], basis  # a map, which has no parts
-        if worst < _WORST_CONDITION:
-            return factors, basis
-        count *= 2
-        if count > _MOST_FACTORS:
+    times = np.linspace(0.0, duration, _FEWEST_FACTORS + 1).tolist()
+    parts: list[_Part] = []
+    for t0, t1 in itertools.pairwise(times):
+        parts.append(_part(system, parts[-1].state if parts else x, t0, t1, units))
+    turn = np.eye(x.size) if system.symmetry is None else system.symmetry * units / units[:, None]
+    if not is_autonomous(system):
+        whole = image.jacobian * units / units[:, None]
+        product = turn @ functools.reduce(lambda m, part: part.factor @ m, parts, np.eye(x.size))
+        if np.abs(product - whole).max() > _COMPOSED * np.abs(whole).max():  # a map, which has no parts
+            wrong = np.broadcast_to(image.error, whole.shape) * units / units[:, None]
+            return [whole], [np.nan_to_num(wrong)], np.diag(units)
+    parts = _of_moderate_condition(system, x, parts, units)
+    factors, errors = [part.factor for part in parts], [part.error for part in parts]
+    factors[-1], errors[-1] = turn @ factors[-1], np.abs(turn) @ errors[-1]
+    basis = np.diag(units)
+    if is_autonomous(system):
+        states = [x, *(part.state for part in parts[:-1])]
+        sections = [_normal_basis(system.velocity(at) / units) for at in states]
+        ends = [*sections[1:], sections[0]]
+        factors = [after.T @ f @ before for f, before, after in zip(factors, sections, ends, strict=True)]
+        errors = [np.abs(after.T) @ e @ np.abs(before) for e, before, after in zip(errors, sections, ends, strict=True)]
+        basis = basis @ sections[0]
+    return factors, errors, basis
+
+
+def _part(system: SystemLike, x: Array, start: float, end: float, units: Array) -> _Part:
+    state, derivative, error = flow_with_error(system, x.copy(), start, end)
+    factor = derivative * units / units[:, None]
+    return _Part(start, end, state, factor, np.broadcast_to(error, factor.shape) * units / units[:, None])
+
+
+def _of_moderate_condition(system: SystemLike, x: Array, parts: list[_Part], units: Array) -> list[_Part]:
+    """Parts of a return, those that contract too strongly cut in halves until they do not."""
+    done: list[_Part] = []
+    left, asked = parts[::-1], len(parts)
+    while left:
+        part = left.pop()
+        if float(np.linalg.cond(part.factor)) < _WORST_CONDITION:
+            done.append(part)
+            continue
+        middle = 0.5 * (part.start + part.end)
+        asked += 2
+        if asked > _MOST_FACTORS or not part.start < middle < part.end:
             raise AnalysisError("the flow contracts too strongly to be resolved", field="flow")
+        first = _part(system, done[-1].state if done else x, part.start, middle, units)
+        left += [_part(system, first.state, middle, part.end, units), first]
+    return done
 
 
 def _normal_basis(direction: Array) -> Array:

@@ -10,7 +10,10 @@ Array = NDArray[np.float64]
 FIRST_ORDER = 1e-6
 """Of the largest eigenvalue: errors up to here are those of first-order perturbations."""
 
-_DRAWS, _DRAWN = 8, 10.0  # changes of a matrix, and how much farther than by the worst of them eigenvalues may move
+DRAWN = 10.0
+"""How much farther eigenvalues may move than by the worst of some changes at random."""
+
+_DRAWS = 8
 
 
 def eigenvalues_moved(values: NDArray[np.complex128], matrix: Array, error: Array) -> Array:
@@ -25,4 +28,4 @@ def eigenvalues_moved(values: NDArray[np.complex128], matrix: Array, error: Arra
         others = np.linalg.eigvals(matrix + error * random.choice([-1.0, 1.0], matrix.shape))
         moved = np.maximum(moved, np.abs(values[:, None] - others).min(axis=1))
         moved = np.maximum(moved, np.abs(values[:, None] - others).min(axis=0).max())
-    return _DRAWN * moved
+    return DRAWN * moved

@@ -308,7 +308,7 @@ def _time_to_section(system: Autonomous, before: Array, section: Section, rest: 
     get there, or has passed it."""
     best = np.inf
     for _ in range(_CROSSING_ROUNDS):
-        state = _turned(system, carried(system, before[None], 0.0, rest))[0]
+        state = turned(system, carried(system, before[None], 0.0, rest))[0]
         speed = float(section.normal @ _velocity(system, state))
         off = float(section.normal @ (state - section.point))
         if speed == 0.0 or not np.isfinite(off):
@@ -332,9 +332,9 @@ def carried(system: SystemLike, states: Array, t0: float, t1: float) -> Array:
     return np.array([system.flow(np.array(x), t0, t1)[0] for x in states])
 
 
-def _turned(system: SystemLike, states: Array) -> Array:
-    turned: Array = states if system.symmetry is None else states @ system.symmetry.T
-    return turned
+def turned(system: SystemLike, states: Array) -> Array:
+    """S of states, shape (states, n), where the system has that symmetry; else as they are."""
+    return states if system.symmetry is None else np.asarray(states @ system.symmetry.T)
 
 
 def returned_states(system: SystemLike, states: Array, section: Section | None = None) -> Array:
@@ -349,7 +349,7 @@ def returned_states(system: SystemLike, states: Array, section: Section | None =
     """
     states = np.array(states)  # a system may write into what it is given
     if section is None:
-        return _turned(system, carried(system, states, 0.0, return_duration(system)))
+        return turned(system, carried(system, states, 0.0, return_duration(system)))
     assert is_autonomous(system)
     approach = _APPROACHES[0]
     before = carried(system, states, 0.0, (1.0 - approach) * section.duration)
@@ -360,7 +360,7 @@ def returned_states(system: SystemLike, states: Array, section: Section | None =
             _, rest, (state, _) = _crossing(system, states[i], section, system.flow)
         else:
             state = before[i]
-        result[i] = _turned(system, carried(system, state[None], 0.0, rest))[0]
+        result[i] = turned(system, carried(system, state[None], 0.0, rest))[0]
     return result
 
 

@@ -21,7 +21,7 @@ from chilopod.stability.arguments import (
 )
 from chilopod.stability.called import CalledFlow
 from chilopod.stability.capabilities import spatial_symmetries
-from chilopod.stability.events import Event, checked_events
+from chilopod.stability.events import Event, check_events, checked_events
 from chilopod.stability.jumps import fast_parts, warn_of_jumps
 from chilopod.stability.system import PeriodicSystem
 from chilopod.stability.taylor.evaluation import evaluate, evaluate_jacobian
@@ -110,11 +110,13 @@ def from_rhs(
     times = np.asarray(edges[:-1] + 0.4142 * np.diff(edges))  # one inside every interval
     flows: dict[str, Any]
     slopes: Slopes
+    check_events(happening, args, times, start, dimension)
     try:
         pairs = [(event.guard, event.reset) for event in happening]
         traced = trace(rhs, dimension, args, times=(0.0, length), base=base, events=pairs)
     except Untraceable as reason:
         if happening:
+            check_shape(rhs, args, times, base, (dimension,), "rhs")
             raise ParameterError(
                 f"need functions that can be traced: {reason}",
                 field="events",

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import ParameterError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.arguments import finite_array
+from chilopod.stability.scales import numerical_balance
 
 Array = NDArray[np.float64]
 
@@ -20,6 +21,9 @@ Flow = Callable[[Array, float, float], tuple[Array, Array]]
 
 _HIGHEST_ORDER = 1000
 _SAME = 1e-8  # of the size of a matrix
+_ROUND_OFF = (
+    1e-7  # of the largest entry, in units that balance the matrix: with the above, a few units in the last place
+)
 
 
 @dataclass(frozen=True)
@@ -51,7 +55,8 @@ class PeriodicSystem(ReadOnlyArrays):
     velocity
         ``velocity(x)`` -> dx/dt, shape (n,), of a system that does not depend on time.
     guess_period
-        About how long an orbit of such a system takes.
+        About how long an orbit of such a system takes; orbits have their own, shortest period, also where this is
+        nearer to a multiple of it.
     flow_with_error, flow_states, flow_tangents
         See :mod:`chilopod.stability.capabilities`.
     concurrent
@@ -142,8 +147,12 @@ def _order_of(entries: bytes, n: int) -> int:
     if not np.isfinite(matrix).all():
         return 0
     one = np.eye(len(matrix))
-    # Entries between states of different units are large and small in pairs, so the bound is entry by entry.
+    # Entries between states of different units are large and small in pairs, so the bound is entry by entry; those that
+    # are nothing but round-off of the others (the cosine of a right angle) count as zero.
     sizes = np.abs(matrix)
+    units = numerical_balance(matrix)
+    balanced = float((sizes * units / units[:, None]).max())
+    sizes = np.maximum(sizes, _ROUND_OFF * balanced * units[:, None] / units)
     power, reach = matrix, sizes
     for k in range(1, _HIGHEST_ORDER + 1):
         if (np.abs(power - one) <= _SAME * np.maximum(reach, one)).all():

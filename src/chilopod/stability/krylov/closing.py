@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
+from chilopod.stability.asked import ReturnBudget
 from chilopod.stability.capabilities import FlowsTangents
 from chilopod.stability.krylov.arnoldi import krylov_subspaces
 from chilopod.stability.krylov.tangent_map import TangentMap, tangent_map, tangent_sizes
@@ -35,7 +36,11 @@ _COARSE, _FINE = 1e-2, 1e-6  # of a residual: how accurately linear systems are 
 
 
 def closed_orbit(
-    system: FlowsTangents, x: Array, section: Section | None = None, farthest: float = np.inf
+    system: FlowsTangents,
+    x: Array,
+    section: Section | None = None,
+    farthest: float = np.inf,
+    budget: ReturnBudget | None = None,
 ) -> tuple[TangentMap, Array]:
     """The return map in a state on a periodic orbit near a guess, and the sizes of the states, shape (n,).
 
@@ -47,6 +52,8 @@ def closed_orbit(
         Of a system that does not depend on time; by default, across the motion in the guess.
     farthest
         How much the guess may miss itself, relative to the sizes of the states.
+    budget
+        Return maps that may be evaluated, of which each round takes one.
 
     Raises
     ------
@@ -58,6 +65,8 @@ def closed_orbit(
     best = np.inf
     slowest = np.random.default_rng(0).standard_normal((x.size, _BLOCK - 1))
     for rounds in range(_ROUNDS):
+        if budget is not None:
+            budget.take()
         image = tangent_map(system, x, section)
         size = np.maximum(size, np.maximum(np.abs(x), np.abs(image.state)) if x.any() else 0.0)
         residual = (image.state - x) / size

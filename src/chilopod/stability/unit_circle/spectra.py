@@ -56,11 +56,14 @@ class Spectra:
         raises AnalysisError, or gives NaN, where there is none. Asked twice for the same value where errors matter.
     budget
         At how many values M may be asked for.
+    affordable
+        How many more matrices can be had, where that is for their cost to say.
     """
 
-    def __init__(self, matrices: Matrices, budget: int) -> None:
+    def __init__(self, matrices: Matrices, budget: int, affordable: Callable[[], int] | None = None) -> None:
         self._matrices = matrices
         self._budget = budget
+        self._affordable = affordable
         self._known: dict[float, ComplexArray] = {}
         self._stretch: dict[float, float] = {}
         self._disturbed: dict[float, ComplexArray] = {}
@@ -76,7 +79,8 @@ class Spectra:
     @property
     def left(self) -> int:
         """How many more values may be asked for."""
-        return self._budget - len(self._known)
+        left = self._budget - len(self._known)
+        return left if self._affordable is None else min(left, self._affordable())
 
     @property
     def size(self) -> int:
