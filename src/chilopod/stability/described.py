@@ -84,7 +84,7 @@ def describe(samples: Samples, crossing: Crossing, block: Block | None, with_nor
         form = _form(samples, value, orbit, exact, mode, left)
     symmetry = None if block is None else symmetric_crossing(block, _CRITICAL[crossing.event])
     # Where an orbit is lost the point may be the fold that it ends in.
-    lost = bool(samples.ending) and value + bound >= samples.end
+    lost = samples.end < samples.low + samples.width and value + bound >= samples.end
     point = BifurcationPoint(
         _kind(crossing, k, None if lost else form, block, symmetry),
         value,

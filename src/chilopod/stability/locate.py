@@ -14,6 +14,7 @@ from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability.asked import Asking
 from chilopod.stability.capabilities import Family, SystemLike, spatial_symmetries
 from chilopod.stability.described import describe, fold_point
+from chilopod.stability.extent import Extent, extent
 from chilopod.stability.orbits import Orbit
 from chilopod.stability.points import BifurcationPoint
 from chilopod.stability.returns import ReturnMap
@@ -119,17 +120,18 @@ def locate(
     """
     low, high = _interval(between)
     samples = Samples(family, orbit, low, high, budget)
-    remarks = [samples.ending] if samples.ending else []
-    status = Status.BUDGET if samples.spent else Status.INCOMPLETE if samples.ending else Status.COMPLETE
+    here = extent(samples)
+    remarks = [here.ending] if here.ending else []
+    status = Status.BUDGET if samples.spent else Status.INCOMPLETE if here.ending else Status.COMPLETE
     points: list[BifurcationPoint] = []
-    if samples.start < samples.end:
-        searched, more = _searched(samples, budget)
+    if here.start < here.end:
+        searched, more = _searched(samples, here, budget)
         remarks += more
         for block, found in searched:
             status = max(status, found.status, key=_GRAVITY.index)
             remarks += found.remarks
             for crossing in found.crossings:
-                if crossing.event is Event.PLUS and samples.in_end(crossing.value):
+                if crossing.event is Event.PLUS and here.explains(crossing.value):
                     continue
                 samples.allow(_DESCRIBING)
                 try:
@@ -138,7 +140,7 @@ def locate(
                 except AnalysisError as error:
                     status = max(status, Status.INCOMPLETE, key=_GRAVITY.index)
                     remarks.append(f"what crosses at {crossing.value:.9g} could not be described: {error}")
-    points += [fold_point(fold, samples, normal_form) for fold in samples.folds]
+    points += [fold_point(fold, samples, normal_form) for fold in here.folds]
     if samples.remarks:
         status = max(status, Status.INCOMPLETE, key=_GRAVITY.index)
     ordered = tuple(sorted(points, key=lambda point: point.value))
@@ -155,7 +157,7 @@ def _interval(between: tuple[float, float]) -> tuple[float, float]:
     return low, high
 
 
-def _searched(samples: Samples, budget: int) -> tuple[list[tuple[Block | None, Crossings]], list[str]]:
+def _searched(samples: Samples, here: Extent, budget: int) -> tuple[list[tuple[Block | None, Crossings]], list[str]]:
     """The crossings in every block of the return map, and what is to be said of the blocks."""
     blocks, remarks = _blocks(samples.family(samples.low), samples.first)
     # Of the first orbit hardly a trace may be left after a return; of those that are followed from it there is more.
@@ -183,7 +185,7 @@ def _searched(samples: Samples, budget: int) -> tuple[list[tuple[Block | None, C
             return block.dual @ matrices @ block.basis, errors
 
         searched.append(
-            (block, find_crossings(reduced, samples.start, samples.end, budget=budget, affordable=samples.affordable))
+            (block, find_crossings(reduced, here.start, here.end, budget=budget, affordable=samples.affordable))
         )
     return searched, remarks
 

@@ -14,7 +14,6 @@ from chilopod.errors import AnalysisError, ParameterError, in_words
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.asked import Asking, ReturnBudget, SpentError, UserError
 from chilopod.stability.branches.curve import return_multipliers
-from chilopod.stability.branches.fold import Fold, find_fold
 from chilopod.stability.capabilities import Family, SystemLike, is_autonomous
 from chilopod.stability.orbits import Orbit, find_orbit, from_known, known_state
 from chilopod.stability.returns import ReturnMap, return_map, return_maps, section_at
@@ -22,22 +21,17 @@ from chilopod.stability.scales import sizes
 
 Array = NDArray[np.float64]
 
-_FIRST_STEPS = 8
+FIRST_STEPS = 8
+"""Steps in which an orbit is followed through the interval, if it takes no shorter ones."""
 _SHORTEST = 2.0**-10  # step of an orbit that is followed, relative to the first
 _RETURNS = 2  # return maps for every orbit of the budget, to follow the orbit and again to search
 _DEAREST = 8.0  # return maps for an orbit
 _ATTEMPTS = 24  # steps to a value from the sample beside it: ten halvings, and on from there
 _KEPT = 64  # systems: around a point the same one is asked for again and again
-_BEFORE = 1e-6  # of the interval: so far from a fold other crossings are looked for
-_NEAR_FOLD = 0.02  # distance of a multiplier from +1: a fold may be within ``_BEFORE``
-_TRIES = 2  # starts of curves round a fold
-_CLEAR_OF_FOLD = 1e-3  # likewise: so far off a fold is passed by a curve that starts there
-_COMES, _FARTHER = 1e-5, 100.0  # of the interval before a fold, and times that: where the multiplier is looked at
-_BETWEEN_POWERS = 0.75  # of one half and one
+NEAR_FOLD = 0.02
+"""Distance of a multiplier from +1 within which a fold may be so near that the search does not tell it."""
 _SURE = 1e-4  # singular value of H - 1, in units, above which the orbit is as good as the flow
 _BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
-_AT_REST = 0.03  # of the motion of the first orbit
-_PARTS = 5  # of a return, to see how far the motion goes
 _FORESEEN, _SMALL = 0.3, 0.01  # of a change of the orbit, and of the sizes: what a prediction may miss
 _HALFWAY = 0.25  # of a change: an orbit halfway between two is as near as that to their mean
 _JUMP = 0.3  # of the orbit between prediction and correction, relative to its size
@@ -50,6 +44,11 @@ class Sample(ReadOnlyArrays):
     value: float
     orbit: Array
     image: ReturnMap
+
+    @property
+    def off_plus_one(self) -> float:
+        """Distance of the return map's multipliers from +1, that along the motion left aside."""
+        return float(np.abs(return_multipliers(self.image) - 1.0).min(initial=np.inf))
 
 
 class Samples:
@@ -71,20 +70,20 @@ class Samples:
     ----------
     low, width
         Of the interval.
-    start
-        From where on orbits can be told apart: ``low``, or just past the fold that is there.
     first
         The orbit at the lower end, with its error bounds.
     known
         Whether the systems know their orbits.
+    timed
+        Whether the systems depend on time.
+    size
+        Of the states on the first orbit, shape (n,).
+    path
+        The samples by which an orbit that is not known was followed from ``low``, as far as it goes.
     end
         Where the orbit ends, at most ``high``.
-    folds
-        Those it begins and ends in, if it does.
-    ending
-        A sentence where it ends otherwise; else empty.
     spent
-        Whether it ends there because the budget was spent.
+        Whether the path ends because the budget was spent.
     """
 
     def __init__(self, family: Family, guess: ArrayLike | None, low: float, high: float, budget: int) -> None:
@@ -99,19 +98,16 @@ class Samples:
         self._allowed = _RETURNS * budget
         self._returns = ReturnBudget(self._allowed)
         self._refused: dict[str, tuple[str, set[float]]] = {}
-        self._dimension, self._timed = 0, True
+        self._dimension, self.timed = 0, True
         self.count = self._counted = 0
-        self.ending, self.spent = "", False
-        self._shrinks = False
-        self.start, self.end = low, high
-        self.folds: tuple[Fold, ...] = ()
         with Asking("family", low):
             self.first = find_orbit(self.family(low), guess)
-            self._size = sizes(self.family(low), self.first.state, self.first.period / self.first.image.returns)
-        if not (self.known and self._timed):
+            self.size = sizes(self.family(low), self.first.state, self.first.period / self.first.image.returns)
+        if not (self.known and self.timed):
             self._keep(_sample(low, self.first))
-        if guess is not None:
-            self._followed(low, high)
+        self.spent = False
+        self.path = [] if guess is None else self._followed(low, high)
+        self.end = self.path[-1].value if self.path else high
         self.allow(self._allowed)
 
     def family(self, value: float) -> SystemLike:
@@ -122,8 +118,8 @@ class Samples:
             system = self._family(value)
         timed = not is_autonomous(system)
         if self._dimension == 0:
-            self._dimension, self._timed = system.dimension, timed
-        if system.dimension != self._dimension or timed is not self._timed:
+            self._dimension, self.timed = system.dimension, timed
+        if system.dimension != self._dimension or timed is not self.timed:
             what = "dimension" if system.dimension != self._dimension else "kind of period"
             self._refuse(value, what, f"the family changes its {what}")
             raise AnalysisError(f"changes its {what} at {value:g}", field="family", allowed="systems of one kind")
@@ -136,7 +132,7 @@ class Samples:
         """Samples at some values within the interval; together where the systems allow it."""
         wanted = [float(value) for value in values]
         missing = sorted({value for value in wanted if value not in self._by_value})
-        if missing and self.known and self._timed:
+        if missing and self.known and self.timed:
             systems = [self.family(value) for value in missing]
             for _ in systems:
                 self._returns.take()
@@ -199,30 +195,24 @@ class Samples:
         of_flow
             Relative error of the flow and of its derivative.
         """
-        scaled = sample.image.jacobian * self._size / self._size[:, None]
-        _, values, rows = np.linalg.svd(scaled - np.eye(self._size.size))
+        scaled = sample.image.jacobian * self.size / self.size[:, None]
+        _, values, rows = np.linalg.svd(scaled - np.eye(self.size.size))
         if values[-1] > _SURE:
             return of_flow
         if sample.value not in self._bends:
-            beside = sample.orbit + _BESIDE * self._size * rows[-1]
+            beside = sample.orbit + _BESIDE * self.size * rows[-1]
             section = section_at(
-                self.family(sample.value), sample.orbit, self._size, sample.image.period / sample.image.returns
+                self.family(sample.value), sample.orbit, self.size, sample.image.period / sample.image.returns
             )
             change = return_map(self.family(sample.value), beside, False, section).jacobian - sample.image.jacobian
-            self._bends[sample.value] = float(np.linalg.norm(change * self._size / self._size[:, None])) / _BESIDE
+            self._bends[sample.value] = float(np.linalg.norm(change * self.size / self.size[:, None])) / _BESIDE
         # Where H - 1 vanishes along a direction, what is left there is of third order at most in all but odd cases.
         off = min(of_flow / max(float(values[-1]), of_flow), of_flow ** (1.0 / 3.0))
         return min(1.0, of_flow + self._bends[sample.value] * off)
 
-    def in_end(self, value: float) -> bool:
-        """Whether a value is so near a fold that the orbit begins or ends in, or an equilibrium that it shrinks into,
-        that a multiplier +1 is what comes of that."""
-        ends = [fold.value for fold in self.folds] + [self.end] * self._shrinks
-        return any(abs(value - end) <= 2.0 * _BEFORE * self.width for end in ends)
-
     def of_flow(self) -> ReturnMap:
         """The return map at the first orbit, with the error of the flow alone."""
-        if _off_plus_one(Sample(self.low, self.first.state, self.first.image)) > _NEAR_FOLD:
+        if _sample(self.low, self.first).off_plus_one > NEAR_FOLD:
             return self.first.image  # the orbit is as good as the flow
         return return_map(self.family(self.low), self.first.state, True, self.first.section)
 
@@ -254,7 +244,7 @@ class Samples:
         system = self.family(value)
         with self._asking(value):
             # The orbit beside tells how long an orbit takes, where it is the orbit's to say.
-            section = section_at(system, near, self._size, beside.image.period / beside.image.returns)
+            section = section_at(system, near, self.size, beside.image.period / beside.image.returns)
             return _sample(
                 value,
                 find_orbit(system, near, with_error=self.known, section=section, settle=False, budget=self._returns),
@@ -278,79 +268,18 @@ class Samples:
                 raise
             return reached[-1]
 
-    def _followed(self, low: float, high: float) -> None:
-        """Follow the orbit from the lower end; where it gets to, and the folds it begins and ends in."""
-        samples = [self._by_value[low]]
-        for value in np.linspace(low, high, _FIRST_STEPS + 1)[1:].tolist():
-            reached = self._follow(samples, value)
+    def _followed(self, low: float, high: float) -> list[Sample]:
+        """Follow the orbit from the lower end."""
+        path = [self._by_value[low]]
+        for value in np.linspace(low, high, FIRST_STEPS + 1)[1:].tolist():
+            reached = self._follow(path, value)
             for sample in reached:
                 self._keep(sample)
-            samples += reached
-            last = samples[-1]
-            if last.value != value and (self._returns.left <= 0 or self.count >= self._budget):
-                self.spent, self.end = True, last.value
-                self.ending = f"the budget was spent before the orbit was followed beyond {last.value:.9g}"
-                return
-            if last.value != value:
+            path += reached
+            if path[-1].value != value:
+                self.spent = self._returns.left <= 0 or self.count >= self._budget
                 break
-        self._begun(samples)
-        self._ended(samples, high)
-
-    def _begun(self, samples: list[Sample]) -> None:
-        """Whether the orbit begins in a fold."""
-        if _off_plus_one(samples[0]) > _NEAR_FOLD:
-            return
-        fold = self._fold_beside(samples[0], samples[1:], rising=False)
-        if fold is None or fold.value + _BEFORE * self.width < self.low:
-            return
-        self.start = min(self.low + _BEFORE * self.width, samples[-1].value)
-        if fold.value >= self.low - fold.error_bound:
-            self.folds += (fold,)
-
-    def _ended(self, samples: list[Sample], high: float) -> None:
-        """Where the orbit ends, and the fold it ends in, which may be the very end of the interval."""
-        last = samples[-1]
-        if last.value == high and _off_plus_one(last) > _NEAR_FOLD:
-            return
-        fold = self._fold_beside(last, samples[-2::-1], rising=True)
-        here = last if fold is None else Sample(fold.value, fold.image.state, fold.image)
-        if last.value != high and self._at_rest(here):
-            self.ending = f"the orbit shrinks into an equilibrium near {here.value:.9g}: a Hopf point"
-            self.end, self._shrinks = last.value, True
-        elif fold is not None:
-            # In the fold itself multipliers move as a root of the distance, which no search sees through.
-            self.end = max(self.low, min(last.value, fold.value - _BEFORE * self.width))
-            if fold.value <= high + fold.error_bound:
-                self.folds += (fold,)
-        elif last.value != high:
-            self.ending = f"the orbit cannot be followed beyond {last.value:.9g}"
-            self.end = last.value
-
-    def _fold_beside(self, sample: Sample, others: list[Sample], rising: bool) -> Fold | None:
-        """The fold that a sample is next to or in, from the nearest of the others that is clear of it."""
-        off = np.array([_off_plus_one(each) for each in [sample, *others]])
-        clear = np.flatnonzero(off > min(_CLEAR_OF_FOLD, off.max() / 2.0))
-        for each in [[sample, *others][i] for i in clear[:_TRIES]]:
-            fold = find_fold(self.family, each.value, each.orbit, self.width, rising)
-            # Right beside it a step may land on another curve, which has a fold of its own.
-            if fold is not None and self._next_to(sample, fold, rising) and self._ends_as_a_root(sample, fold, rising):
-                return fold
-        return None
-
-    def _at_rest(self, last: Sample) -> bool:
-        """Whether hardly anything of the motion is left where an orbit ends: beyond there is none, and what looks like
-        a fold is the same orbit again, half a period later."""
-        if self._timed:
-            return False
-        first = self._moved(self.family(self.low), self.first.image)
-        return self._moved(self.family(last.value), last.image) < _AT_REST * first
-
-    def _moved(self, system: SystemLike, image: ReturnMap) -> float:
-        """How far the motion goes within a return, relative to the sizes of the states."""
-        path = [image.state]
-        for _ in range(_PARTS - 1):
-            path.append(system.flow(path[-1], 0.0, image.period / image.returns / _PARTS)[0])
-        return float((np.ptp(np.array(path), axis=0) / self._size).max())
+        return path
 
     def _follow(self, behind: list[Sample], value: float, attempts: float = np.inf) -> list[Sample]:
         """Samples from the last one behind to ``value``, by smaller steps where Newton's method does not carry that
@@ -376,7 +305,7 @@ class Samples:
             except AnalysisError:
                 found = None
             # A large jump means that Newton's method has found another orbit.
-            if found is None or self._jumped(found.orbit, guess) or not self._connected(last, guess, found):
+            if found is None or self.jumped(found.orbit, guess) or not self._connected(last, guess, found):
                 target = 0.5 * (last.value + target)
                 if abs(target - last.value) < smallest:
                     return reached
@@ -388,21 +317,12 @@ class Samples:
             behind, target = [last, found], longer if abs(value - longer) > smallest and longer < value else value
         return reached
 
-    def _ends_as_a_root(self, sample: Sample, fold: Fold, rising: bool) -> bool:
-        """Whether the multiplier comes to +1 as the root of the distance, as it does in a fold; where another branch
-        only passes it comes evenly."""
-        near = max(_COMES * self.width, abs(fold.value - sample.value))
-        away = np.array([near, min(_FARTHER * near, 0.5 * self.width)])
-        beside = self.at(fold.value + (-away if rising else away))
-        off = [_off_plus_one(each) for each in beside]
-        return off[1] < off[0] * (away[1] / away[0]) ** _BETWEEN_POWERS
-
     def _connected(self, last: Sample, guess: Array, found: Sample) -> bool:
         """Whether an orbit that was not foreseen is on the branch of the last one: then there is one about halfway
         between them, in a fold at the square root of a half; to another orbit it is a jump at any place."""
         change = found.orbit - last.orbit
-        size = self._size * float((np.abs(change) / self._size).max())
-        if (np.abs(found.orbit - guess) <= np.maximum(_FORESEEN * size, _SMALL * self._size)).all():
+        size = self.size * float((np.abs(change) / self.size).max())
+        if (np.abs(found.orbit - guess) <= np.maximum(_FORESEEN * size, _SMALL * self.size)).all():
             return True
         try:
             middle = self._sampled(0.5 * (last.value + found.value), last.orbit + 0.5 * change, last)
@@ -410,24 +330,10 @@ class Samples:
             return False
         return bool((np.abs(middle.orbit - last.orbit - 0.5 * change) <= _HALFWAY * size).all())
 
-    def _next_to(self, sample: Sample, fold: Fold, rising: bool) -> bool:
-        """Whether a fold is just past a sample at either end, on the same orbit; others may be anywhere."""
-        further = fold.value - sample.value if rising else sample.value - fold.value
-        return (
-            bool(np.isfinite(fold.error_bound))
-            # In a fold Newton's method also finds orbits that are none any more.
-            and -max(fold.error_bound, _BEFORE * self.width) <= further <= self.width / _FIRST_STEPS
-            and not self._jumped(fold.image.state, sample.orbit)
-        )
-
-    def _jumped(self, orbit: Array, guess: Array) -> bool:
-        return bool((np.abs(orbit - guess) > _JUMP * np.maximum(self._size, np.abs(guess))).any())
+    def jumped(self, orbit: Array, guess: Array) -> bool:
+        """Whether an orbit is so far from what was foreseen that it must be another one."""
+        return bool((np.abs(orbit - guess) > _JUMP * np.maximum(self.size, np.abs(guess))).any())
 
 
 def _sample(value: float, orbit: Orbit) -> Sample:
     return Sample(value, orbit.state, orbit.image)
-
-
-def _off_plus_one(sample: Sample) -> float:
-    """Distance of the return map's multipliers from +1, that along the motion left aside."""
-    return float(np.abs(return_multipliers(sample.image) - 1.0).min(initial=np.inf))
