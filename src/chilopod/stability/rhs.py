@@ -187,7 +187,16 @@ def _taylor_flows(traced: Trace, edges: Array, tolerance: float, events: tuple[E
     def flow_states(states: Array, t0: float, t1: float) -> Array:
         return taylor.states(states, t0, t1, params)
 
-    return {"flow": flow, "flow_with_error": flow_with_error, "flow_states": flow_states, "concurrent": True}
+    def flow_tangents(x: Array, directions: Array, t0: float, t1: float) -> tuple[Array, Array]:
+        return taylor.tangents(x, directions, t0, t1, params)
+
+    return {
+        "flow": flow,
+        "flow_with_error": flow_with_error,
+        "flow_states": flow_states,
+        "flow_tangents": flow_tangents,
+        "concurrent": True,
+    }
 
 
 def _check_jacobian(

@@ -57,7 +57,7 @@ class PeriodicSystem(ReadOnlyArrays):
     guess_period
         About how long an orbit of such a system takes; orbits have their own, shortest period, also where this is
         nearer to a multiple of it.
-    flow_with_error, flow_states
+    flow_with_error, flow_states, flow_tangents
         See :mod:`chilopod.stability.capabilities`.
     concurrent
         Whether flows may run in several threads at once, which :func:`chilopod.stability.sweep` then does.
@@ -76,6 +76,7 @@ class PeriodicSystem(ReadOnlyArrays):
         default=None, repr=False
     )
     flow_states: Callable[[Array, float, float], Array] | None = field(default=None, repr=False)
+    flow_tangents: Callable[[Array, Array, float, float], tuple[Array, Array]] | None = field(default=None, repr=False)
     concurrent: bool = field(default=False, repr=False)
     symmetry_order: int = field(init=False, default=1, repr=False)
 
