@@ -117,7 +117,7 @@ def test_the_power_beside_the_point_is_that_of_orbits_solved_there():
         for _ in range(30):
             state = model.flow_states(state[None], 0.0, model.period)[0]
         whole = whole_period(model)
-        orbit, _ = stability.find_orbit(whole, state, with_error=False)
+        orbit = stability.find_orbit(whole, state, with_error=False).state
         bends.append(np.abs(orbit[3:8] - (model.reflection @ model.flow_states(orbit[None], 0.0, 0.3)[0])[3:8]).sum())
     # Distances count in 1/k.
     power = np.log(bends[1] / bends[0]) / np.log((1 / 0.98 - 1.0) / (1 / 0.995 - 1.0))
