@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.cores import cores
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.capabilities import SystemLike, is_autonomous
+from chilopod.stability.capabilities import FlowsFrames, SystemLike, is_autonomous
+from chilopod.stability.factors import cut_return, split_stiff
 from chilopod.stability.orbits import Orbit, find_orbit, from_known, known_state
 from chilopod.stability.returns import ReturnMap, return_maps
 from chilopod.stability.scales import numerical_balance, sizes
@@ -29,6 +30,7 @@ anything."""
 
 _WORST_CONDITION = 1e6
 _FEWEST_FACTORS, _MOST_FACTORS = 8, 4096
+_MOST_BESIDE_FRAMES = 256  # where what decays faster is resolved in another way
 _FIRST_ORDER = 1e-6  # of the largest multiplier: errors up to here are those of first-order perturbations
 _DRAWS, _DRAWN = 8, 10.0  # changes of a matrix, and how much farther than by the worst of them eigenvalues may move
 _COMPOSED = 1e-6  # by so much the parts of a flow may miss the whole
@@ -245,8 +247,7 @@ def exponents(system: SystemLike, orbit: ArrayLike | None = None) -> Exponents:
     """
     found = find_orbit(system, orbit)
     image = found.image
-    factors, units = _factors(system, found)
-    log_nu, modes = split_product(factors)
+    log_nu, modes, units = _logarithms(system, found)
     # Principal logarithm of nu^k: the imaginary part back into (-pi, pi].
     angle = np.angle(np.exp(1j * image.returns * log_nu.imag))
     angle[np.abs(angle) < _SAME_ANGLE] = 0.0
@@ -260,43 +261,31 @@ def exponents(system: SystemLike, orbit: ArrayLike | None = None) -> Exponents:
     return Exponents(values[order], (modes * (np.abs(peaks) / peaks))[:, order], _multipliers(found))
 
 
-def _factors(system: SystemLike, orbit: Orbit) -> tuple[list[Array], Array]:
-    """Derivatives of the flow over equal parts of the return, each of moderate condition, in units in which the entries
-    of their product are alike; and these units as a matrix.
-
-    Of a system that does not depend on time, the derivatives between sections across the motion.
-    """
-    x, image = orbit.state, orbit.image
-    duration = image.period / image.returns
+def _logarithms(system: SystemLike, orbit: Orbit) -> tuple[ComplexArray, ComplexArray, Array]:
+    """Logarithms of the eigenvalues of the return map, its eigenvectors in some basis, and this basis."""
     # The derivative on a section may be nothing but round-off; an orbit that moves has sizes of its own.
-    units = sizes(system, x, duration) if is_autonomous(system) else numerical_balance(image.jacobian)
-    count = _FEWEST_FACTORS
-    while True:
-        times = np.linspace(0.0, duration, count + 1)
-        states, factors = [x], []
-        for t0, t1 in zip(times, times[1:], strict=False):
-            state, factor = system.flow(states[-1].copy(), float(t0), float(t1))
-            states.append(state)
-            factors.append(factor * units / units[:, None])
-        if system.symmetry is not None:
-            factors[-1] = (system.symmetry * units / units[:, None]) @ factors[-1]
-        basis, worst = np.diag(units), max(float(np.linalg.cond(factor)) for factor in factors)
-        if is_autonomous(system):
-            sections = [_normal_basis(system.velocity(at) / units) for at in states[:-1]]
-            sections.append(sections[0])
-            factors = [after.T @ f @ before for f, before, after in zip(factors, sections, sections[1:], strict=False)]
-            basis = basis @ sections[0]
-        elif count == _FEWEST_FACTORS:
-            whole = image.jacobian * units / units[:, None]
-            if np.abs(functools.reduce(lambda m, f: f @ m, factors) - whole).max() > _COMPOSED * np.abs(whole).max():
-                return [whole], basis  # a map, which has no parts
-        if worst < _WORST_CONDITION:
-            return factors, basis
-        count *= 2
-        if count > _MOST_FACTORS:
-            raise AnalysisError("the flow contracts too strongly to be resolved", field="flow")
+    image = orbit.image
+    if is_autonomous(system):
+        units = sizes(system, orbit.state, image.period / image.returns)
+    else:
+        units = numerical_balance(image.jacobian)
+    framed = isinstance(system, FlowsFrames)
+    if not (framed and system.is_stiff()):
+        count = _FEWEST_FACTORS
+        while count <= (_MOST_BESIDE_FRAMES if framed else _MOST_FACTORS):
+            cut = cut_return(system, orbit, units, count)
+            if count == _FEWEST_FACTORS and not is_autonomous(system) and not _composes(cut.factors, image, units):
+                cut = replace(cut, factors=[image.jacobian * units / units[:, None]])  # a map, which has no parts
+                return *split_product(cut.factors), cut.basis
+            if max(float(np.linalg.cond(factor)) for factor in cut.factors) < _WORST_CONDITION:
+                return *split_product(cut.factors), cut.basis
+            count *= 2
+    if isinstance(system, FlowsFrames):
+        return split_stiff(system, orbit, units)
+    raise AnalysisError("the flow contracts too strongly to be resolved", field="flow")
 
 
-def _normal_basis(direction: Array) -> Array:
-    """Orthonormal basis of the plane across a direction, shape (n, n-1)."""
-    return np.linalg.svd(direction[None])[2][1:].T
+def _composes(factors: Sequence[Array], image: ReturnMap, units: Array) -> bool:
+    whole = image.jacobian * units / units[:, None]
+    off = np.abs(functools.reduce(lambda m, f: f @ m, factors) - whole).max()
+    return bool(off <= _COMPOSED * np.abs(whole).max())

@@ -40,6 +40,9 @@ _FLOOR = 0.01
 _ESTIMATED = 100.0
 """Of an implicit step likewise: its estimate is far larger than its error."""
 
+_BOTH = ("flow", "flow_with_error", "flow_states")
+"""What either method offers."""
+
 Method = Literal["automatic", "taylor", "implicit"]
 
 
@@ -201,7 +204,8 @@ def _traced_flows(
         return ImplicitFlow(traced.tape, traced.params, edges, parts, _ESTIMATED * tolerance)
 
     if method == "implicit":
-        return _flows(implicit())
+        own = {name: getattr(implicit(), name) for name in (*_BOTH, "flow_frame")}
+        return {**own, "is_stiff": lambda: True, "concurrent": True}
     taylor = _taylor_flows(traced, edges, tolerance, events)
     if method == "taylor" or not can_be_implicit(traced.tape):
         return taylor
@@ -218,14 +222,12 @@ def _traced_flows(
 
         return flow
 
-    return {**taylor, **{name: either(name) for name in _NAMES}}
-
-
-_NAMES = ("flow", "flow_with_error", "flow_states")
-
-
-def _flows(flow: ImplicitFlow) -> dict[str, Any]:
-    return {**{name: getattr(flow, name) for name in _NAMES}, "concurrent": True}
+    return {
+        **taylor,
+        **{name: either(name) for name in _BOTH},
+        "flow_frame": lambda *arguments: implicit().flow_frame(*arguments),
+        "is_stiff": lambda: bool(stiff),
+    }
 
 
 def _taylor_flows(traced: Trace, edges: Array, tolerance: float, events: tuple[Event, ...]) -> dict[str, Any]:

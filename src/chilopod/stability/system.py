@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import ParameterError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.arguments import finite_array
+from chilopod.stability.capabilities import Stretched
 
 Array = NDArray[np.float64]
 
@@ -52,7 +53,7 @@ class PeriodicSystem(ReadOnlyArrays):
         ``velocity(x)`` -> dx/dt, shape (n,), of a system that does not depend on time.
     guess_period
         About how long an orbit of such a system takes.
-    flow_with_error, flow_states
+    flow_with_error, flow_states, flow_frame, is_stiff
         See :mod:`chilopod.stability.capabilities`.
     concurrent
         Whether flows may run in several threads at once, which :func:`chilopod.stability.sweep` then does.
@@ -71,6 +72,8 @@ class PeriodicSystem(ReadOnlyArrays):
         default=None, repr=False
     )
     flow_states: Callable[[Array, float, float], Array] | None = field(default=None, repr=False)
+    flow_frame: Callable[[Array, Array, Array, float, float], Stretched] | None = field(default=None, repr=False)
+    is_stiff: Callable[[], bool] | None = field(default=None, repr=False)
     concurrent: bool = field(default=False, repr=False)
     symmetry_order: int = field(init=False, default=1, repr=False)
 

@@ -297,6 +297,42 @@ def _estimated(
     return worst
 
 
+@fused_njit(error_model="numpy")
+def _turn(frame: Any, columns: Any, jacobians: Any, weights: Any, h: float, stretch: Any, turned: Any) -> None:
+    """Carry an orthonormal frame over a step: in each stage its columns span, the first k for every k, what the
+    derivative makes of those at the start, and grow at the rates on the diagonal of Q^T J Q.
+
+    How fast a direction decays is seen from J, and its turning from the derivative; so both are right in directions of
+    which the derivative itself retains nothing.
+    """
+    n = frame.shape[0]
+    s = weights.size
+    for j in range(s):
+        new = columns[j * n : (j + 1) * n] @ frame
+        for k in range(n):
+            for _ in range(2):
+                for l in range(k):
+                    dot = 0.0
+                    for i in range(n):
+                        dot += new[i, l] * new[i, k]
+                    for i in range(n):
+                        new[i, k] -= dot * new[i, l]
+                norm = math.sqrt((new[:, k] ** 2).sum())
+                for i in range(n):
+                    new[i, k] /= norm
+        rates = new.T @ (jacobians[j] @ new)
+        for k in range(n):
+            stretch[k] += h * weights[j] * rates[k, k]
+    for k in range(n):
+        along = 0.0
+        for i in range(n):
+            along += new[i, k] * frame[i, k]
+        sign = 1.0 if along >= 0.0 else -1.0
+        turned[k] = min(turned[k], abs(along))
+        for i in range(n):
+            frame[i, k] = sign * new[i, k]
+
+
 @fused_njit(error_model="numpy", nogil=True)
 def advance(
     tape: Any,
@@ -314,6 +350,9 @@ def advance(
     derivative: Any,
     largest: Any,
     extent: Any,
+    frame: Any,
+    stretch: Any,
+    turned: Any,
     report: Any,
 ) -> int:
     """Carry a state from t0 to t1 > t0 in place.
@@ -338,9 +377,13 @@ def advance(
         Shape (n, n), multiplied by the derivative; shape (0, 0) for none.
     largest, extent
         The largest moduli of the states and of the entries of the derivative up to t0, kept up to date.
+    frame
+        Shape (n, n), orthonormal, carried along (:func:`_turn`); shape (0, 0) for none.
+    stretch, turned
+        Shape (n,): of each direction of the frame, the logarithm of its growth is added, and the cosine of the largest
+        angle it turns by in a step kept.
     report
-        Shape (3,): filled with the number of steps, the time reached, and the integral of the trace of the jacobian,
-        the logarithm of the determinant of the exact derivative (Liouville's formula).
+        Shape (2,): filled with the number of steps, and the time reached.
     """
     program, terms, numbers, layout, _ = tape
     nodes, weights, start, gamma = coefficients
@@ -366,7 +409,6 @@ def advance(
     t = t0
     h = 0.0
     h_last = 0.0
-    volume = 0.0
     steps = 0
     status = DONE
     fresh = True
@@ -461,7 +503,6 @@ def advance(
         for i in range(n):
             for j in range(s):
                 largest[i] = max(largest[i], abs(x[i] + moved[j, i]))
-                volume += h * weights[s - 1, j] * jacobians[j, i, i]
                 last[j, i] = moved[j, i]
             x[i] += moved[s - 1, i]
         if size > 0:
@@ -470,9 +511,11 @@ def advance(
                     for k in range(n):
                         extent[i, k] = max(extent[i, k], abs(reached[j, i, k]))
             derivative[:] = reached[s - 1]
+        if frame.shape[0] > 0:
+            _turn(frame, columns, jacobians, weights[s - 1], h, stretch, turned)
         t = t1 if ends else t + h
         h_last = h
         h *= factor
         fresh = True
-    report[0], report[1], report[2] = steps, t, volume
+    report[0], report[1] = steps, t
     return status

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from chilopod.cores import cores
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.capabilities import Stretched
 from chilopod.stability.scales import numerical_balance
 from chilopod.stability.taylor import tape as ops
 from chilopod.stability.taylor.evaluation import evaluate, evaluate_jacobian
@@ -86,8 +87,7 @@ class ImplicitFlow(ReadOnlyArrays):
 
     def flow(self, x: Array, t0: float, t1: float) -> tuple[Array, Array]:
         """State at t1 and its derivative with respect to the state at t0."""
-        state, derivative, _ = self._run(x, t0, t1, _STAGES, self.tolerance, True)
-        return state, derivative
+        return self._run(x, t0, t1, _STAGES, self.tolerance)
 
     def flow_with_error(self, x: Array, t0: float, t1: float) -> tuple[Array, Array, Array]:
         """The same with a bound on the error of every entry of the derivative.
@@ -95,10 +95,10 @@ class ImplicitFlow(ReadOnlyArrays):
         It is a multiple of the larger difference to two other computations, of lower order and of smaller steps, from
         starts that are off by round-off. Two, because with one of them an entry may agree by chance.
         """
-        state, derivative, _ = self._run(x, t0, t1, _STAGES, self.tolerance, True)
+        state, derivative = self._run(x, t0, t1, _STAGES, self.tolerance)
         shake = _SHAKE * np.sign(np.cos(3.0 * np.arange(x.size) + 1.0))
-        _, lower, _ = self._run(x * (1.0 + shake), t0, t1, _OTHER_STAGES, self.tolerance, True)
-        _, finer, _ = self._run(x * (1.0 - shake), t0, t1, _STAGES, _FINER * self.tolerance, True)
+        _, lower = self._run(x * (1.0 + shake), t0, t1, _OTHER_STAGES, self.tolerance)
+        _, finer = self._run(x * (1.0 - shake), t0, t1, _STAGES, _FINER * self.tolerance)
         difference = np.maximum(np.abs(lower - derivative), np.abs(finer - derivative))
         return state, derivative, _OWN * difference + _ROUNDING * np.abs(derivative)
 
@@ -107,7 +107,7 @@ class ImplicitFlow(ReadOnlyArrays):
         states = np.array(states, dtype=np.float64)
 
         def carry(i: int) -> Array:
-            return self._run(states[i], t0, t1, _STAGES, self.tolerance, False)[0]
+            return self._run(states[i], t0, t1, _STAGES, self.tolerance, derived=False)[0]
 
         threads = min(cores(), len(states) // _FEWEST_PER_THREAD)
         if threads > 1:
@@ -115,26 +115,44 @@ class ImplicitFlow(ReadOnlyArrays):
                 return np.array(list(pool.map(carry, range(len(states)))))
         return np.array([carry(i) for i in range(len(states))]).reshape(states.shape)
 
-    def log_volume(self, x: Array, t0: float, t1: float) -> float:
-        """The logarithm of the determinant of the derivative: the integral of the trace of the jacobian (Liouville)."""
-        return self._run(x, t0, t1, _STAGES, self.tolerance, False)[2]
+    def flow_frame(self, x: Array, units: Array, frame: Array, t0: float, t1: float) -> Stretched:
+        """See :class:`chilopod.stability.capabilities.FlowsFrames`."""
+        other, _ = self._turned(x, units, frame, t0, t1, _OTHER_STAGES)
+        stretch, (state, end, turned) = self._turned(x, units, frame, t0, t1, _STAGES)
+        return Stretched(state, end, stretch, other, turned)
+
+    def _turned(
+        self, x: Array, units: Array, frame: Array, t0: float, t1: float, stages: int
+    ) -> tuple[Array, tuple[Array, Array, Array]]:
+        n = x.size
+        frame, stretch, turned = np.array(frame, order="C"), np.zeros(n), np.ones(n)
+        state, _ = self._run(x, t0, t1, stages, self.tolerance, units=units, carried=(frame, stretch, turned))
+        return stretch, (state, frame, turned)
 
     def _run(
-        self, x: Array, t0: float, t1: float, stages: int, tolerance: float, derived: bool
-    ) -> tuple[Array, Array, float]:
-        n = self.tape.dimension
-        t = self.tape
+        self,
+        x: Array,
+        t0: float,
+        t1: float,
+        stages: int,
+        tolerance: float,
+        derived: bool = True,
+        units: Array | None = None,
+        carried: tuple[Array, Array, Array] = (np.empty((0, 0)), np.empty(0), np.empty(0)),
+    ) -> tuple[Array, Array]:
+        """State and derivative at t1; a frame is carried in place, with the stretch and the turn of its directions."""
+        n, t = self.tape.dimension, self.tape
         # Copies, because compiled code is compiled anew for arrays that are read-only.
         x, params = np.array(x, dtype=np.float64), self.params.copy()
         if not np.isfinite(x).all():
             raise AnalysisError("the state is not finite", field="rhs")
-        units, near = self._coupling(x, 0.5 * (t0 + t1))
+        balanced, near = self._coupling(x, 0.5 * (t0 + t1))
+        units = balanced if units is None else np.array(units)
         x = x / units
         size = n if derived else 0
         derivative, extent, largest = np.eye(size), np.eye(size), np.zeros(n)
-        report = np.zeros(3)
+        report = np.zeros(2)
         budget = max(_FEWEST_STEPS, int(_MOST_WORK / (n * stages) ** 3))
-        volume = 0.0
         for a, b in pieces(self._cuts, float(self.edges[-1]), t0, t1):
             status = _compiled().advance(
                 (t.program, t.terms, t.numbers, t.layout, t.slopes),
@@ -152,14 +170,13 @@ class ImplicitFlow(ReadOnlyArrays):
                 derivative,
                 largest,
                 extent,
+                *carried,
                 report,
             )
             if status:
                 raise AnalysisError(_REASONS[status].format(t=report[1]), field="rhs")
             budget -= int(report[0])
-            volume += float(report[2])
-        ratio = units[:, None] / units if derived else 1.0
-        return x * units, derivative * ratio, volume
+        return x * units, derivative * (units[:, None] / units if derived else 1.0)
 
     def _coupling(self, x: Array, t: float) -> tuple[Array, Array]:
         """Units of the states, shape (n,), in which the jacobian is balanced, and which states are near each other."""
