@@ -9,7 +9,7 @@ Russell and Van Vleck, *SIAM Journal on Numerical Analysis* 34, 402, 1997).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,9 +31,13 @@ _UNSURE = 1e-6  # of a logarithm
 _GAP = 1.0  # between the logarithms of directions that are told apart
 _TURNED = 0.1  # cosine of an angle beyond which the sign of a direction is lost
 _SAME = 1e-9  # of the logarithms in a part: two computations agree
-_HALVINGS = 16  # of a part where they do not
+_NOISE = 1e-12  # of the largest of them, likewise
+_HALVINGS = 500  # in a pass, of parts where they do not
 _SHORTENINGS = 100
-_LEFT, _APART = 1e-12, 1e-4  # of directions that decay, over a short time: what is above round-off, and tells them apart
+_LEFT, _APART = (
+    1e-12,
+    1e-4,
+)  # of directions that decay, over a short time: what is above round-off, and tells them apart
 
 
 @dataclass(frozen=True)
@@ -124,12 +128,14 @@ def _carried(system: FlowsFrames, cut: Cut, units: Array) -> tuple[Array, Array,
     along = 1 if is_autonomous(system) else 0
     frame = np.linalg.qr(np.random.default_rng(0).standard_normal((n, n)))[0]
     before = np.full(n - along, np.inf)
-    for _ in range(_PASSES):
+    for turn in range(_PASSES):
         start = frame = _behind_motion(system, frame, cut.states[0], units)
+        left = _HALVINGS if turn else 0  # the first only turns the frame to where it belongs
         logarithms, others, turned = np.zeros((_PARTS, n)), np.zeros(n), np.ones(n)
         for k in range(_PARTS):
             t0, t1 = float(cut.times[k]), float(cut.times[k + 1])
-            part = _stretched(system, cut.states[k], units, frame, t0, t1, _HALVINGS)
+            part, halved = _stretched(system, cut.states[k], units, frame, t0, t1, left)
+            left -= halved
             frame, turned = part.frame, np.minimum(turned, part.turned)
             logarithms[k] = part.stretch
             others += part.other
@@ -148,30 +154,33 @@ def _carried(system: FlowsFrames, cut: Cut, units: Array) -> tuple[Array, Array,
 
 
 def _stretched(
-    system: FlowsFrames, state: Array, units: Array, frame: Array, t0: float, t1: float, halvings: int
-) -> Stretched:
-    """A frame over a part; halved where two computations differ: where a direction turns from a fast decay to a slow
-    one, steps have to be short for it, which they are after a start."""
-    part = system.flow_frame(state, units, _behind_motion(system, frame, state, units), t0, t1)
-    stretch, other = part.stretch.copy(), part.other.copy()
-    if is_autonomous(system):
-        # The stretch of the motion is known; the rest of that of the plane of the first two belongs to the second.
-        speeds = [float(np.linalg.norm(np.asarray(system.velocity(x)) / units)) for x in (state, part.state)]
-        for logarithms in (stretch, other):
-            logarithms[1:2] += logarithms[0] - np.log(speeds[1] / speeds[0])
-            logarithms[0] = np.log(speeds[1] / speeds[0])
-    if halvings == 0 or (np.abs(stretch - other) <= _SAME * np.maximum(1.0, np.abs(stretch))).all():
-        return replace(part, stretch=stretch, other=other)
-    middle = 0.5 * (t0 + t1)
-    first = _stretched(system, state, units, frame, t0, middle, halvings - 1)
-    second = _stretched(system, first.state, units, first.frame, middle, t1, halvings - 1)
-    return Stretched(
-        second.state,
-        second.frame,
-        first.stretch + second.stretch,
-        first.other + second.other,
-        np.minimum(first.turned, second.turned),
-    )
+    system: FlowsFrames, state: Array, units: Array, frame: Array, t0: float, t1: float, most: int
+) -> tuple[Stretched, int]:
+    """A frame over a part, and how often the part was halved, at most ``most`` times.
+
+    It is where two computations differ: where a direction turns from a fast decay to a slow one, steps have to be short
+    for it, which they are after a start.
+    """
+    n = units.size
+    sums, turned, halved = np.zeros((2, n)), np.ones(n), 0
+    ends = [t1]
+    while ends:
+        part = system.flow_frame(state, units, _behind_motion(system, frame, state, units), t0, ends[-1])
+        both = np.stack([part.stretch, part.other])
+        if is_autonomous(system):
+            # The stretch of the motion is known; the rest of that of the plane of the first two belongs to the second.
+            speeds = [float(np.linalg.norm(np.asarray(system.velocity(x)) / units)) for x in (state, part.state)]
+            known = np.log(speeds[1] / speeds[0])
+            both[:, 1:2] += both[:, :1] - known
+            both[:, 0] = known
+        size = np.abs(both[0])
+        if halved < most and (np.abs(both[1] - both[0]) > _SAME * np.maximum(1.0, size) + _NOISE * size.max()).any():
+            halved += 1
+            ends.append(0.5 * (t0 + ends[-1]))
+            continue
+        state, frame, t0 = part.state, part.frame, ends.pop()
+        sums, turned = sums + both, np.minimum(turned, part.turned)
+    return Stretched(state, frame, sums[0], sums[1], turned), halved
 
 
 def _behind_motion(system: SystemLike, frame: Array, state: Array, units: Array) -> Array:

@@ -269,17 +269,18 @@ def _logarithms(system: SystemLike, orbit: Orbit) -> tuple[ComplexArray, Complex
         units = sizes(system, orbit.state, image.period / image.returns)
     else:
         units = numerical_balance(image.jacobian)
-    framed = isinstance(system, FlowsFrames)
-    if not (framed and system.is_stiff()):
-        count = _FEWEST_FACTORS
-        while count <= (_MOST_BESIDE_FRAMES if framed else _MOST_FACTORS):
-            cut = cut_return(system, orbit, units, count)
-            if count == _FEWEST_FACTORS and not is_autonomous(system) and not _composes(cut.factors, image, units):
-                cut = replace(cut, factors=[image.jacobian * units / units[:, None]])  # a map, which has no parts
-                return *split_product(cut.factors), cut.basis
-            if max(float(np.linalg.cond(factor)) for factor in cut.factors) < _WORST_CONDITION:
-                return *split_product(cut.factors), cut.basis
-            count *= 2
+    most = _MOST_FACTORS
+    if isinstance(system, FlowsFrames):
+        most = 0 if system.is_stiff() else _MOST_BESIDE_FRAMES
+    count = _FEWEST_FACTORS
+    while count <= most:
+        cut = cut_return(system, orbit, units, count)
+        if count == _FEWEST_FACTORS and not is_autonomous(system) and not _composes(cut.factors, image, units):
+            cut = replace(cut, factors=[image.jacobian * units / units[:, None]])  # a map, which has no parts
+            return *split_product(cut.factors), cut.basis
+        if max(float(np.linalg.cond(factor)) for factor in cut.factors) < _WORST_CONDITION:
+            return *split_product(cut.factors), cut.basis
+        count *= 2
     if isinstance(system, FlowsFrames):
         return split_stiff(system, orbit, units)
     raise AnalysisError("the flow contracts too strongly to be resolved", field="flow")

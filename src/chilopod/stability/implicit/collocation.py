@@ -39,6 +39,7 @@ DONE, NOT_FINITE, BUDGET, STALLED = range(4)
 _MOST_ROUNDS = 10
 _CLOSE = 1e-7
 """A move of Newton's method after which the next one is round-off."""
+_NOISE = 2.0**-48
 _FASTEST_FALL, _FASTEST_GROWTH, _SAFETY = 0.1, 6.0, 0.9
 
 
@@ -243,7 +244,8 @@ def _estimated(
 ) -> float:
     """The error of a step over what every state and entry of the derivative is large for.
 
-    What f at the start differs by from the polynomial through its values in the stages, filtered. States are measured
+    What f at the start differs by from the polynomial through its values in the stages, filtered by the inverse of
+    1 - h gamma J. States are measured
     by the largest they have been, and by what the others make of them within the step; so are the entries of the
     derivative, ``extent``.
     """
@@ -251,7 +253,9 @@ def _estimated(
     s, n = moved.shape
     size = derivative.shape[0]
     off = np.empty((n, 1 + size))
+    terms = np.empty((n, 1 + size))
     filtering = np.empty((n, n))
+    inverse = np.eye(n)
     order = np.empty(n, np.int64)
     end = columns[(s - 1) * n :]
     factor = np.zeros((n, n))
@@ -269,9 +273,16 @@ def _estimated(
         for j in range(s):
             factor -= start[j] * (jacobians[j] @ columns[j * n : (j + 1) * n])
         off[:, 1:] = (h * gamma) * (factor @ derivative)
+    for l in range(n):
+        terms[l, 0] = abs(x[l])
+        for j in range(size):
+            terms[l, 1 + j] = abs(derivative[l, j])
     if not _decompose(filtering, order):
         return math.inf
-    _substitute(filtering, order, off)
+    _substitute(filtering, order, inverse)
+    off = inverse @ off
+    # No shorter step takes away what is round-off in it.
+    noise = (_NOISE * h * gamma) * (np.abs(inverse) @ (np.abs(jacobian) @ terms))
     worst = 0.0
     for k in range(n):
         scale = largest[k]
@@ -279,14 +290,14 @@ def _estimated(
             scale = max(scale, abs(x[k] + moved[i, k]))
         for l in range(n):
             scale = max(scale, abs(end[k, l]) * largest[l])
-        if off[k, 0] != 0.0:
+        if abs(off[k, 0]) > noise[k, 0]:
             worst = max(worst, abs(off[k, 0]) / scale)
     if size > 0:
         for i in range(s):
             reached[i] = columns[i * n : (i + 1) * n] @ derivative
         for k in range(n):
             for j in range(n):
-                if not near[k, j] or off[k, 1 + j] == 0.0:
+                if not near[k, j] or abs(off[k, 1 + j]) <= noise[k, 1 + j]:
                     continue
                 scale = extent[k, j]
                 for i in range(s):

@@ -31,7 +31,7 @@ _STEPS_IN_FAST_PART = 16
 _OWN = 10.0  # two independent errors differ by less than a tenth of them rarely enough
 _FINER = 0.2
 _SHAKE = 2.0**-52
-_ROUNDING = 2.0**-50
+_ROUNDING = 2.0**-49
 
 _REASONS = {
     1: "the motion diverges, or the right-hand side is not finite, at t = {t:g}",
@@ -93,14 +93,16 @@ class ImplicitFlow(ReadOnlyArrays):
         """The same with a bound on the error of every entry of the derivative.
 
         It is a multiple of the larger difference to two other computations, of lower order and of smaller steps, from
-        starts that are off by round-off. Two, because with one of them an entry may agree by chance.
+        starts that are off by round-off. Two, because with one of them an entry may agree by chance; and round-off of
+        the entry and of what it may be a difference of.
         """
         state, derivative = self._run(x, t0, t1, _STAGES, self.tolerance)
         shake = _SHAKE * np.sign(np.cos(3.0 * np.arange(x.size) + 1.0))
         _, lower = self._run(x * (1.0 + shake), t0, t1, _OTHER_STAGES, self.tolerance)
         _, finer = self._run(x * (1.0 - shake), t0, t1, _STAGES, _FINER * self.tolerance)
         difference = np.maximum(np.abs(lower - derivative), np.abs(finer - derivative))
-        return state, derivative, _OWN * difference + _ROUNDING * np.abs(derivative)
+        size = np.abs(derivative)
+        return state, derivative, _OWN * difference + _ROUNDING * (size + size @ size)
 
     def flow_states(self, states: Array, t0: float, t1: float) -> Array:
         """Many states, shape (states, n), without derivatives."""
@@ -178,7 +180,7 @@ class ImplicitFlow(ReadOnlyArrays):
             budget -= int(report[0])
         return x * units, derivative * (units[:, None] / units if derived else 1.0)
 
-    def _coupling(self, x: Array, t: float) -> tuple[Array, Array]:
+    def _coupling(self, x: Array, t: float) -> tuple[Array, NDArray[np.bool_]]:
         """Units of the states, shape (n,), in which the jacobian is balanced, and which states are near each other."""
         jacobian = np.abs(evaluate_jacobian(self.tape, t, x, self.params)[1])
         jacobian = np.where(np.isfinite(jacobian), jacobian, 0.0)
@@ -197,9 +199,7 @@ class ImplicitFlow(ReadOnlyArrays):
 
 def can_be_implicit(tape: Tape) -> bool:
     """Whether a right-hand side has no events, and switches in time only."""
-    return all(
-        kind != ops.GUARD and tape.program[4, node] == 0 for kind, node in zip(*tape.switches[:2], strict=True)
-    )
+    return all(kind != ops.GUARD and tape.program[4, node] == 0 for kind, node in zip(*tape.switches[:2], strict=True))
 
 
 def _branches(tape: Tape, params: Array, times: Array) -> Array:
