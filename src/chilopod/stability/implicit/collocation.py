@@ -11,8 +11,8 @@ by Newton's method with the jacobian of every stage, not that of the start for a
 
     dY_i - h sum_j a_ij J_j dY_j = 1,
 
-so one decomposition gives the exact derivative of the discrete map, all columns of it. The state and the columns of the
-derivative since the start are under step control together. A disturbance that decays fast makes short steps at the
+so one decomposition gives the exact derivative of the discrete map, all columns of it. The state and the columns of
+the derivative since the start are under step control together. A disturbance that decays fast makes short steps at the
 start, until it is gone, and long ones from there on.
 """
 
@@ -39,7 +39,7 @@ DONE, NOT_FINITE, BUDGET, STALLED = range(4)
 _MOST_ROUNDS = 10
 _CLOSE = 1e-7
 """A move of Newton's method after which the next one is round-off."""
-_NOISE = 2.0**-48
+_NOISE = 2.0**-51
 _FASTEST_FALL, _FASTEST_GROWTH, _SAFETY = 0.1, 6.0, 0.9
 
 
@@ -194,8 +194,8 @@ def _stages(
             for j in range(s):
                 f = h * weights[i, j]
                 for k in range(n):
-                    for l in range(n):
-                        matrix[i * n + k, j * n + l] = -f * jacobians[j, k, l]
+                    for m in range(n):
+                        matrix[i * n + k, j * n + m] = -f * jacobians[j, k, m]
         for i in range(s * n):
             matrix[i, i] += 1.0
         if not _decompose(matrix, order):
@@ -264,19 +264,19 @@ def _estimated(
         for j in range(s):
             total -= start[j] * slopes[j, k]
         off[k, 0] = h * gamma * total
-        for l in range(n):
-            filtering[k, l] = (1.0 if k == l else 0.0) - h * gamma * jacobian[k, l]
+        for m in range(n):
+            filtering[k, m] = (1.0 if k == m else 0.0) - h * gamma * jacobian[k, m]
     if size > 0:
         for k in range(n):
-            for l in range(n):
-                factor[k, l] = jacobian[k, l]
+            for m in range(n):
+                factor[k, m] = jacobian[k, m]
         for j in range(s):
             factor -= start[j] * (jacobians[j] @ columns[j * n : (j + 1) * n])
         off[:, 1:] = (h * gamma) * (factor @ derivative)
-    for l in range(n):
-        terms[l, 0] = abs(x[l])
+    for m in range(n):
+        terms[m, 0] = abs(x[m])
         for j in range(size):
-            terms[l, 1 + j] = abs(derivative[l, j])
+            terms[m, 1 + j] = abs(derivative[m, j])
     if not _decompose(filtering, order):
         return math.inf
     _substitute(filtering, order, inverse)
@@ -288,8 +288,8 @@ def _estimated(
         scale = largest[k]
         for i in range(s):
             scale = max(scale, abs(x[k] + moved[i, k]))
-        for l in range(n):
-            scale = max(scale, abs(end[k, l]) * largest[l])
+        for m in range(n):
+            scale = max(scale, abs(end[k, m]) * largest[m])
         if abs(off[k, 0]) > noise[k, 0]:
             worst = max(worst, abs(off[k, 0]) / scale)
     if size > 0:
@@ -302,8 +302,8 @@ def _estimated(
                 scale = extent[k, j]
                 for i in range(s):
                     scale = max(scale, abs(reached[i, k, j]))
-                for l in range(n):
-                    scale = max(scale, abs(end[k, l]) * extent[l, j])
+                for m in range(n):
+                    scale = max(scale, abs(end[k, m]) * extent[m, j])
                 worst = max(worst, abs(off[k, 1 + j]) / scale)
     return worst
 
@@ -322,12 +322,12 @@ def _turn(frame: Any, columns: Any, jacobians: Any, weights: Any, h: float, stre
         new = columns[j * n : (j + 1) * n] @ frame
         for k in range(n):
             for _ in range(2):
-                for l in range(k):
+                for m in range(k):
                     dot = 0.0
                     for i in range(n):
-                        dot += new[i, l] * new[i, k]
+                        dot += new[i, m] * new[i, k]
                     for i in range(n):
-                        new[i, k] -= dot * new[i, l]
+                        new[i, k] -= dot * new[i, m]
                 norm = math.sqrt((new[:, k] ** 2).sum())
                 for i in range(n):
                     new[i, k] /= norm
@@ -460,9 +460,9 @@ def advance(
             if 0.0 < z <= 3.0:
                 for j in range(s):
                     f = z / nodes[j]
-                    for l in range(s):
-                        if l != j:
-                            f *= (z - nodes[l]) / (nodes[j] - nodes[l])
+                    for m in range(s):
+                        if m != j:
+                            f *= (z - nodes[m]) / (nodes[j] - nodes[m])
                     for k in range(n):
                         moved[i, k] += f * last[j, k]
                 for k in range(n):
