@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from chilopod.errors import AnalysisError, ChilopodError, ParameterError
+from chilopod.errors import AnalysisError, ChilopodError
 from chilopod.stability import PeriodicSystem, locate
 
 BUDGET = 120
@@ -138,16 +138,17 @@ def test_systems_of_another_kind_halfway():
     def other_dimension(p):
         return lines(0.1) if p < 0.5 else bent(0.1)
 
-    with pytest.raises(ParameterError, match="changes its dimension"):
-        locate(other_dimension, (0.0, 1.0), orbit=[0.0, 0.0])
+    changed = locate(other_dimension, (0.0, 1.0), orbit=[0.0, 0.0])
+    assert any("changes its dimension" in remark for remark in changed.remarks)
 
     def no_period(p):
         if p < 0.5:
             return lines(-0.1)
         return PeriodicSystem(2, None, lines(-0.1).flow, velocity=lambda x: -x, guess_period=PERIOD)
 
-    with pytest.raises(ParameterError, match="kind of period"):
-        locate(no_period, (0.0, 1.0), orbit=[0.0, 0.0])
+    changed = locate(no_period, (0.0, 1.0), orbit=[0.0, 0.0])
+    assert any("kind of period" in remark for remark in changed.remarks)
+    assert not changed.complete
 
 
 def test_an_orbit_that_is_nowhere():

@@ -4,6 +4,7 @@ from math import cos, exp, pi, sin, sqrt
 
 import numpy as np
 import pytest
+from numpy.polynomial import Polynomial
 from scipy.integrate import solve_ivp
 
 from chilopod.errors import AnalysisError, ParameterError
@@ -114,6 +115,7 @@ def test_period_doublings_of_the_logistic_map():
     assert within(first, 3.0)
     assert first.bifurcation.criticality is Criticality.SUPERCRITICAL
     assert first.bifurcation.frequency == pytest.approx(pi)
+    assert first.bifurcation.coefficient == pytest.approx(-18.0, rel=1e-7)  # -a - 3 a^2, twice
     (start,) = switch(logistic, first)
     doubled = follow(logistic, start, between)
     assert doubled.periods == 2
@@ -128,6 +130,10 @@ def test_period_doublings_of_the_logistic_map():
     assert left.value == first.value
     assert second.special is Kind.PERIOD_DOUBLING
     assert within(second, 1 + sqrt(6))
+    # Where two periods map a to -a + b a^2 + d a^3, four map it to a - 2 (b^2 + d) a^3.
+    once = Polynomial([0.0, second.value, -second.value])
+    _, _, b, d, _ = once(once)(Polynomial([second.orbit[0], 1.0])).coef
+    assert second.bifurcation.coefficient == pytest.approx(-2 * (b**2 + d), rel=1e-6)
     (again,) = switch(logistic, second, periods=doubled.periods)
     fourth = follow(logistic, again, between, points=8)
     assert fourth.periods == 4

@@ -34,11 +34,44 @@ def check(found, expected, closest=1e-12):
 
 @pytest.mark.parametrize(
     ("q", "low", "high"),
-    [(0.3, -0.5, 10.0), (1.0, -0.5, 10.0), (5.0, -6.0, 10.0), (10.0, -15.0, 0.0), (20.0, -32.0, -31.0)],
+    [
+        (0.3, -0.5, 10.0),
+        (1.0, -0.5, 10.0),
+        (5.0, -6.0, 10.0),
+        (10.0, -15.0, 0.0),
+        (20.0, -32.0, -31.0),
+        (20.0, -32.0, 60.0),  # bands that are 1e-8 of the interval, between multipliers of 1e7
+        (30.0, -52.0, 60.0),
+    ],
 )
 def test_tongues_of_mathieu(q, low, high):
     values = [float(mathieu_a(n, q)) for n in range(8)] + [float(mathieu_b(n, q)) for n in range(1, 8)]
     check(locate(mathieu(q), (low, high)), sorted(value for value in values if low < value < high))
+
+
+@pytest.mark.parametrize(("q", "low", "high"), [(30.0, -52.0, -30.0), (50.0, -90.0, -50.0), (100.0, -185.0, 0.0)])
+def test_bands_of_mathieu_too_narrow_for_the_digits(q, low, high):
+    """Multipliers of 1e10 and more: their partners are lost, and the edges of a band may be the same number."""
+    values = np.array([mathieu_a(n, q) for n in range(8)] + [mathieu_b(n, q) for n in range(1, 8)])
+    found = locate(mathieu(q), (low, high), normal_form=False)
+    assert not found.complete
+    assert any("lost in round-off" in remark for remark in found.remarks)
+    for point in found:
+        assert np.abs(values - point.value).min() <= min(point.error_bound, 1e-9)
+
+
+def test_tongues_of_mathieu_in_q():
+    """Along q at a = 10: edges where a_n(q) or b_n(q) is 10, by bisection of scipy's."""
+    edges = []
+    for value in [lambda q, n=n: mathieu_a(n, q) - 10.0 for n in range(8)] + [
+        lambda q, n=n: mathieu_b(n, q) - 10.0 for n in range(1, 8)
+    ]:
+        grid = np.linspace(0.1, 30.0, 300)
+        signs = np.sign([value(q) for q in grid])
+        edges += [brentq(value, *grid[i : i + 2], xtol=1e-14) for i in np.flatnonzero(signs[1:] != signs[:-1])]
+    found = locate(lambda q: mathieu(q)(10.0), (0.1, 30.0))
+    assert found.status is Status.CONSERVATIVE
+    assert [point.value for point in found] == pytest.approx(sorted(edges), rel=1e-10)
 
 
 def test_a_tongue_as_narrow_as_a_millionth():
@@ -62,6 +95,24 @@ def test_hardly_damped(damping):
     for point, value in zip(found, expected, strict=True):
         assert abs(point.value - value) <= point.error_bound + 1e-12
         assert point.error_bound < 1e-10
+
+
+def test_damped_and_strongly_driven():
+    """As above, for both signs of the multiplier, by a scan of the undamped trace."""
+    q, damping = 20.0, 0.05
+
+    def excess(a, sign):
+        matrix = mathieu(q)(a - damping**2).flow(np.zeros(2), 0.0, pi)[1]
+        return np.trace(matrix) - sign * 2.0 * np.cosh(damping * pi)
+
+    found = locate(mathieu(q, damping), (-20.0, 30.0), normal_form=False)
+    assert found.complete
+    assert len(found) == 8
+    for point in found:
+        sign = -1.0 if point.kind is Kind.PERIOD_DOUBLING else 1.0
+        reach = 1e-10
+        assert excess(point.value - reach, sign) * excess(point.value + reach, sign) < 0.0
+        assert point.error_bound < reach
 
 
 @pytest.mark.parametrize("switches", [(), (pi / 2, 3 * pi / 2)], ids=["found", "declared"])

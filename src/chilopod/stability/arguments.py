@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 _COARSEST = 1e-3
 _SIZES = (1e-6, 1e-3, 1.0, 1e3)
 _SAME = 1e-6
+_LONGEST_SHOWN = 60
 
 
 def checked_arguments(
@@ -48,6 +49,17 @@ def checked_duration(field: str, value: object) -> float:
     return duration
 
 
+def checked_count(field: str, value: object, most: int) -> int:
+    """A number of things, of which there are not more than ``most``."""
+    try:
+        count = operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        count = 0
+    if not 1 <= count <= most:
+        raise ParameterError("must be a whole number", field=field, value=value, allowed=f"1 to {most}")
+    return count
+
+
 def finite_array(value: Any, shape: tuple[int, ...], field: str) -> Array:
     """``value`` as finite numbers in an array of the given shape."""
     try:
@@ -61,6 +73,27 @@ def finite_array(value: Any, shape: tuple[int, ...], field: str) -> Array:
     return array
 
 
+def numbers(result: Any, shape: tuple[int, ...], field: str) -> Array:
+    """What a user's function returned, as an array of the shape it should have."""
+    try:
+        # None would pass for NaN.
+        array = None if result is None else np.asarray(result, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = None
+    wanted = f"an array of shape {shape}" if shape else "one number"
+    if array is None:
+        what = "array of numbers" if shape else "number"
+        raise ParameterError(f"returns no {what} but {_kind_of(result)}", field=field, allowed=wanted)
+    if array.shape != shape:
+        raise ParameterError(f"returns an array of shape {array.shape}", field=field, allowed=wanted)
+    return array
+
+
+def _kind_of(result: object) -> str:
+    text = repr(result)
+    return text if len(text) <= _LONGEST_SHOWN else f"a {type(result).__name__}"
+
+
 def check_shape(
     function: Callable[..., ArrayLike],
     args: tuple[Any, ...],
@@ -72,7 +105,7 @@ def check_shape(
     """Evaluate a function once, and see that it gives an array of the right shape."""
     try:
         with np.errstate(all="ignore"):
-            result = np.asarray(function(float(times[0]), x.copy(), *args), dtype=np.float64)
+            result = function(float(times[0]), x.copy(), *args)
     except (ArithmeticError, ValueError) as error:
         if "shape" not in str(error) and "sequence" not in str(error):
             return  # a singularity just here: no fault of the function
@@ -81,8 +114,7 @@ def check_shape(
         raise ParameterError(
             f"cannot be evaluated at a state of shape {x.shape} ({type(error).__name__}: {error})", field=field
         ) from error
-    if result.shape != shape:
-        raise ParameterError("returns the wrong shape", field=field, value=result.shape, allowed=str(shape))
+    numbers(result, shape, field)
 
 
 Slopes = Callable[[Array, Array], Array]
@@ -134,7 +166,7 @@ def sampled(rhs: Callable[..., ArrayLike], args: tuple[Any, ...], n: int) -> Slo
         for t, x in zip(times.tolist(), states.T, strict=True):
             try:
                 with np.errstate(all="ignore"):
-                    column = np.asarray(rhs(t, x.copy(), *args), dtype=np.float64)
+                    column = numbers(rhs(t, x.copy(), *args), (n,), "rhs")
             except (ArithmeticError, ValueError):  # not defined at this state
                 column = np.full(n, np.nan)
             columns.append(column)

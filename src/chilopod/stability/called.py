@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
 from chilopod.errors import AnalysisError
+from chilopod.stability.arguments import numbers
 from chilopod.stability.jumps import UndeclaredSwitch
 from chilopod.stability.taylor.taylor import pieces
 
@@ -173,11 +174,11 @@ class CalledFlow:
         return 2.0 * max(off) / float(np.abs(direction).min())
 
     def _slope(self, t: float, x: Array) -> Array:
-        return np.asarray(self.rhs(t, x, *self.args), dtype=np.float64)
+        return numbers(self.rhs(t, x, *self.args), x.shape, "rhs")
 
     def _gradient(self, t: float, x: Array, sizes: Array) -> Array:
         if self.jacobian is not None:
-            return np.asarray(self.jacobian(t, x, *self.args), dtype=np.float64)
+            return numbers(self.jacobian(t, x, *self.args), (x.size, x.size), "jacobian")
         columns = []
         for j in range(x.size):
             if self._analytic[0]:

@@ -140,6 +140,16 @@ class FlowsStates(Protocol):
 
 
 @runtime_checkable
+class FlowsTangents(SystemLike, Protocol):
+    """Carries some directions instead of the full derivative, of which a large system needs no more."""
+
+    def flow_tangents(self, x: Array, directions: Array, t0: float, t1: float, /) -> tuple[Array, Array]:
+        """State at t1, shape (n,), and its derivative with respect to the state x at t0, times the directions, shape
+        (n, any number) as they."""
+        ...
+
+
+@runtime_checkable
 class FlowsEach(Protocol):
     """Carries every state by a system of its own: a derivative with respect to a parameter then costs next to
     nothing."""

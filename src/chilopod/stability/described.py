@@ -83,8 +83,10 @@ def describe(samples: Samples, crossing: Crossing, block: Block | None, with_nor
         exact = nu / abs(nu) if crossing.event is Event.PAIR else complex(_TARGETS[crossing.event])
         form = _form(samples, value, orbit, exact, mode, left)
     symmetry = None if block is None else symmetric_crossing(block, _CRITICAL[crossing.event])
+    # Where an orbit is lost the point may be the fold that it ends in.
+    lost = samples.end < samples.low + samples.width and value + bound >= samples.end
     point = BifurcationPoint(
-        _kind(crossing, k, form, block, symmetry),
+        _kind(crossing, k, None if lost else form, block, symmetry),
         value,
         float(bound),
         orbit.state,

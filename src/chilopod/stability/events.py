@@ -6,9 +6,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import ParameterError
+from chilopod.stability.arguments import numbers
+
+Array = NDArray[np.float64]
+
+_SIZES = (1e-6, 1e-3, 1.0, 1e3)
 
 
 @dataclass(frozen=True)
@@ -18,7 +24,8 @@ class Event:
     Parameters
     ----------
     guard
-        ``guard(t, x, *args)`` -> a number: the event is where it passes zero.
+        ``guard(t, x, *args)`` -> a number: the event is where it passes zero. Of several events at the same instant
+        only the first of the list happens, and the others only if their guards pass zero again.
     reset
         ``reset(t, x, *args)`` -> the state after it, shape (n,); None where the state goes on as it is.
     direction
@@ -44,3 +51,60 @@ def checked_events(events: object) -> tuple[Event, ...]:
     if not isinstance(events, Sequence) or not all(isinstance(event, Event) for event in events):
         raise ParameterError("must be events", field="events", value=events, allowed="[Event(guard, reset), ...]")
     return tuple(events)
+
+
+def check_events(events: tuple[Event, ...], args: tuple[Any, ...], times: Array, orbit: Array | None, n: int) -> None:
+    """See that guards give numbers that may pass zero, and resets states, at the orbit and around it.
+
+    Parameters
+    ----------
+    events, args
+        Of the system, with n states.
+    times
+        Within the period, shape (times,).
+    orbit
+        A state, shape (n,), or None.
+    """
+    base = np.zeros(n) if orbit is None else orbit
+    waves = [size * np.cos(3.0 * np.arange(n) + 1.0) for size in _SIZES]
+    places = [(t, base + wave) for t in times.tolist() for wave in [np.zeros(n), *waves]]
+    known: dict[int, Array] = {}
+    for i, event in enumerate(events):
+        name = f"events[{i}].guard"
+        asked = [_value(event.guard, t, x, args, (), name) for t, x in places]
+        values = np.array([np.nan if value is None else value for value in asked])
+        if event.reset is not None:
+            _value(event.reset, *places[0], args, (n,), f"events[{i}].reset")
+        if asked[0] is None:
+            continue  # which tracing will tell of
+        if orbit is not None and not np.isfinite(values[0]):
+            raise ParameterError("is not finite on the orbit", field=name, value=float(values[0]))
+        if not np.isfinite(values).any():
+            raise ParameterError("is finite at none of the states it was tried at", field=name)
+        if not np.nan_to_num(values).any():
+            raise ParameterError("is zero at all states", field=name, allowed="a function that passes zero")
+        for j, other in known.items():
+            if np.array_equal(values, other, equal_nan=True) and event.direction * events[j].direction != -1:
+                raise ParameterError(
+                    f"is that of events[{j}]: of events at the same instant only the first happens",
+                    field=name,
+                    allowed="one event with a reset that does both",
+                )
+        known[i] = values
+
+
+def _value(
+    function: Callable[..., Any], t: float, x: Array, args: tuple[Any, ...], shape: tuple[int, ...], name: str
+) -> Array | None:
+    """What a guard or a reset returns; None where it raises an exception."""
+    try:
+        with np.errstate(all="ignore"):
+            result = function(t, x.copy(), *args)
+    except Exception:
+        return None
+    if not shape:
+        if isinstance(result, bool | np.bool_):
+            raise ParameterError("is true or false", field=name, allowed="a number that passes zero at the event")
+        if isinstance(result, list | tuple | np.ndarray) and np.size(result) == 1:
+            result = np.ravel(result)[0]
+    return numbers(result, shape, name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -13,12 +14,16 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.cores import cores
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.capabilities import FlowsFrames, SystemLike, is_autonomous
-from chilopod.stability.factors import cut_return, split_stiff
-from chilopod.stability.orbits import Orbit, find_orbit, from_known, known_state
-from chilopod.stability.returns import ReturnMap, return_maps
+from chilopod.stability.arguments import checked_count
+from chilopod.stability.capabilities import FlowsFrames, FlowsTangents, SystemLike, is_autonomous
+from chilopod.stability.krylov.closing import LARGE
+from chilopod.stability.krylov.leading import leading_multipliers, whole_pairs
+from chilopod.stability.matrix_errors import DRAWN, FIRST_ORDER, eigenvalues_moved
+from chilopod.stability.orbits import Orbit, find_large_orbit, find_orbit, from_known, known_state
+from chilopod.stability.returns import ReturnMap, flow_with_error, return_maps
 from chilopod.stability.scales import numerical_balance, sizes
 from chilopod.stability.splitting import split_product
+from chilopod.stability.stiff import disturbed, split_stiff
 from chilopod.stability.system import PeriodicSystem
 
 Array = NDArray[np.float64]
@@ -29,10 +34,7 @@ RESOLVED = 1e-6
 anything."""
 
 _WORST_CONDITION = 1e6
-_FEWEST_FACTORS, _MOST_FACTORS = 8, 4096
-_MOST_BESIDE_FRAMES = 256  # where what decays faster is resolved in another way
-_FIRST_ORDER = 1e-6  # of the largest multiplier: errors up to here are those of first-order perturbations
-_DRAWS, _DRAWN = 8, 10.0  # changes of a matrix, and how much farther than by the worst of them eigenvalues may move
+_FEWEST_FACTORS, _MOST_FACTORS = 8, 32768
 _COMPOSED = 1e-6  # by so much the parts of a flow may miss the whole
 _SAME_ANGLE = 1e-12
 
@@ -46,27 +48,34 @@ class Multipliers(ReadOnlyArrays):
     values
         Multipliers of the full period, by falling modulus, shape (n,); n-1 of them where the system does not depend on
         time: the one along the motion, which is 1, is left out. Absolute accuracy is ``error_bound``: those smaller
-        than it are only known to be small (:func:`exponents` resolves them).
+        than it are only known to be small (:func:`exponents` resolves them). Fewer where only the leading ones were
+        asked for.
     half_period
         Multipliers nu of the return map of a system with a symmetry in time, of order k: ``values = nu^k`` in the same
         order (k is 2 unless told, hence the name); None without one.
     error_bound
         Bound on the absolute error of every multiplier of modulus above 1e-6.
+    error_bounds
+        Bounds on the absolute errors of all, shape as of ``values``; of no meaning for those below 1e-6.
     orbit
         State on the orbit at time 0.
     period
         Of the orbit.
+    remarks
+        What else is to be said, a sentence each: that these are only the leading ones.
     """
 
     values: ComplexArray
     half_period: ComplexArray | None
     error_bound: float
+    error_bounds: Array
     orbit: Array
     period: float
+    remarks: tuple[str, ...] = ()
 
     @property
     def stable(self) -> bool:
-        """Whether all multipliers lie inside the unit circle, by more than the error bound."""
+        """Whether all multipliers lie inside the unit circle, by more than the error bound: the largest decide."""
         return bool((np.abs(self.values) < 1.0 - self.error_bound).all())
 
 
@@ -85,11 +94,15 @@ class Exponents(ReadOnlyArrays):
         that does not depend on time, those of its Poincare map on the section across the motion.
     multipliers
         The multipliers of the same orbit.
+    error_bound
+        Bound on the absolute error (1/s) of each of ``values``, of the same shape: how far they move when the flows
+        between parts of the period change by their errors.
     """
 
     values: ComplexArray
     modes: ComplexArray
     multipliers: Multipliers
+    error_bound: Array
 
 
 @dataclass(frozen=True)
@@ -141,25 +154,10 @@ def spectrum(image: ReturnMap) -> Spectrum:
     else:
         error += 4.0 * image.error * np.linalg.norm(left, axis=0)
     error = np.where(np.isfinite(error), error, np.inf)
-    if (error > _FIRST_ORDER * np.abs(values).max(initial=0.0)).any():
+    if (error > FIRST_ORDER * np.abs(values).max(initial=0.0)).any():
         scaled = np.abs(out_of) @ np.broadcast_to(image.error, image.jacobian.shape) @ np.abs(into)
-        error = np.minimum(error, _moved(values, jacobian, scaled))
+        error = np.minimum(error, eigenvalues_moved(values, jacobian, scaled))
     return Spectrum(values, right, left, error)
-
-
-def _moved(values: ComplexArray, matrix: Array, error: Array) -> Array:
-    """How far eigenvalues move when a matrix changes by its error: where several nearly agree without eigenvectors of
-    their own, by its square root, which no condition number tells."""
-    random = np.random.default_rng(0)
-    error = error + 4.0 * np.finfo(float).eps * np.abs(matrix)
-    if not np.isfinite(error).all():
-        return np.full(values.size, np.inf)
-    moved = np.zeros(values.size)
-    for _ in range(_DRAWS):
-        others = np.linalg.eigvals(matrix + error * random.choice([-1.0, 1.0], matrix.shape))
-        moved = np.maximum(moved, np.abs(values[:, None] - others).min(axis=1))
-        moved = np.maximum(moved, np.abs(values[:, None] - others).min(axis=0).max())
-    return _DRAWN * moved
 
 
 def across(image: ReturnMap) -> tuple[Array, Array]:
@@ -198,17 +196,22 @@ def counts_outside(values: ComplexArray) -> tuple[int, int, int]:
 def _multipliers(orbit: Orbit) -> Multipliers:
     image = orbit.image
     spec = spectrum(image)
-    nu, k = spec.values, image.returns
+    return _of_period(spec.values, spec.error, image.returns, orbit.state, image.period)
+
+
+def _of_period(nu: ComplexArray, error: Array, k: int, state: Array, period: float) -> Multipliers:
+    """The multipliers mu = nu^k of the full period from those of the return map, with their errors."""
     resolved = np.abs(nu) > RESOLVED
-    bound = float(spec.error[resolved].max()) if resolved.any() else float(spec.error.min())
+    bound = float(error[resolved].max()) if resolved.any() else float(error.min())
     if k == 1:
-        return Multipliers(nu, None, bound, orbit.state, image.period)
-    # mu = nu^k: by the mean value theorem, d mu is at most k (|nu| + d nu)^(k-1) d nu.
+        return Multipliers(nu, None, bound, error, state, period)
+    # By the mean value theorem, d mu is at most k (|nu| + d nu)^(k-1) d nu.
     largest = max(float(np.abs(nu[0])), 0.5)
-    return Multipliers(nu**k, nu, bound * k * (largest + bound) ** (k - 1), orbit.state, image.period)
+    errors = error * k * (np.abs(nu) + error) ** (k - 1)
+    return Multipliers(nu**k, nu, bound * k * (largest + bound) ** (k - 1), errors, state, period)
 
 
-def multipliers(system: SystemLike, orbit: ArrayLike | None = None) -> Multipliers:
+def multipliers(system: SystemLike, orbit: ArrayLike | None = None, leading: int | None = None) -> Multipliers:
     """Floquet multipliers of a periodic orbit.
 
     Parameters
@@ -217,8 +220,42 @@ def multipliers(system: SystemLike, orbit: ArrayLike | None = None) -> Multiplie
         The periodic system.
     orbit
         A first guess of a state on the orbit at time 0; not needed where the system knows its orbit.
+    leading
+        How many of the largest multipliers are wanted, with their multiplicity, or one more where that would part a
+        pair; all by default. Of a system of 100 states or more that has ``flow_tangents`` (any right-hand side that can
+        be traced) they are computed in a block Krylov subspace, without the derivative of the flow as a matrix.
+
+    Raises
+    ------
+    AnalysisError
+        If no orbit is found.
     """
-    return _multipliers(find_orbit(system, orbit))
+    if leading is None:
+        return _multipliers(find_orbit(system, orbit))
+    count = checked_count("leading", leading, system.dimension - (system.period is None))
+    if isinstance(system, FlowsTangents) and system.dimension >= LARGE:
+        image, size = find_large_orbit(system, orbit)
+        found = leading_multipliers(image, size, count)
+        result = _of_period(found.values, found.error, image.returns, image.point, image.returns * image.duration)
+        of_period = found.following**image.returns
+    else:
+        result, of_period = _leading_of(_multipliers(find_orbit(system, orbit)), count)
+    if result.values.size == system.dimension - (system.period is None):
+        return result
+    remark = (
+        f"only the {result.values.size} multipliers of largest modulus were asked for, and decide whether the orbit "
+        f"is stable; the next one has a modulus of about {of_period:.3g}"
+    )
+    return replace(result, remarks=(remark,))
+
+
+def _leading_of(every: Multipliers, count: int) -> tuple[Multipliers, float]:
+    """The largest of all multipliers, and the modulus of the next one."""
+    count = whole_pairs(every.values if every.half_period is None else every.half_period, count)
+    half = None if every.half_period is None else every.half_period[:count]
+    following = float(np.abs(every.values[count])) if count < every.values.size else 0.0
+    chosen = replace(every, values=every.values[:count], half_period=half, error_bounds=every.error_bounds[:count])
+    return chosen, following
 
 
 def sweep(systems: Sequence[SystemLike]) -> list[Multipliers]:
@@ -247,7 +284,13 @@ def exponents(system: SystemLike, orbit: ArrayLike | None = None) -> Exponents:
     """
     found = find_orbit(system, orbit)
     image = found.image
-    log_nu, modes, units = _logarithms(system, found)
+    if isinstance(system, FlowsFrames) and system.is_stiff():
+        log_nu, modes, units, moved = split_stiff(system, found)
+    else:
+        factors, errors, units = _factors(system, found)
+        log_nu, modes = split_product(factors)
+        moved = np.abs(log_nu[:, None] - split_product(disturbed(factors, errors))[0]).min(axis=1)
+    bound = image.returns * (DRAWN * moved + 4.0 * np.finfo(float).eps * np.abs(log_nu)) / image.period
     # Principal logarithm of nu^k: the imaginary part back into (-pi, pi].
     angle = np.angle(np.exp(1j * image.returns * log_nu.imag))
     angle[np.abs(angle) < _SAME_ANGLE] = 0.0
@@ -258,35 +301,80 @@ def exponents(system: SystemLike, orbit: ArrayLike | None = None) -> Exponents:
     modes = units @ modes
     modes = modes / np.linalg.norm(modes, axis=0)
     peaks = modes[np.abs(modes).argmax(axis=0), range(modes.shape[1])]
-    return Exponents(values[order], (modes * (np.abs(peaks) / peaks))[:, order], _multipliers(found))
+    return Exponents(values[order], (modes * (np.abs(peaks) / peaks))[:, order], _multipliers(found), bound[order])
 
 
-def _logarithms(system: SystemLike, orbit: Orbit) -> tuple[ComplexArray, ComplexArray, Array]:
-    """Logarithms of the eigenvalues of the return map, its eigenvectors in some basis, and this basis."""
+@dataclass(frozen=True)
+class _Part:
+    """The derivative of the flow over a part of the return, with the bound on its error, in units; and its end."""
+
+    start: float
+    end: float
+    state: Array
+    factor: Array
+    error: Array
+
+
+def _factors(system: SystemLike, orbit: Orbit) -> tuple[list[Array], list[Array], Array]:
+    """Derivatives of the flow over parts of the return, each of moderate condition, in units in which the entries of
+    their product are alike, with bounds on their errors; and these units as a matrix.
+
+    The parts that contract too strongly are halved, and only these: of a relaxation oscillation a few short ones. Of a
+    system that does not depend on time, the derivatives are those between sections across the motion.
+    """
+    x, image = orbit.state, orbit.image
+    duration = image.period / image.returns
     # The derivative on a section may be nothing but round-off; an orbit that moves has sizes of its own.
-    image = orbit.image
+    units = sizes(system, x, duration) if is_autonomous(system) else numerical_balance(image.jacobian)
+    times = np.linspace(0.0, duration, _FEWEST_FACTORS + 1).tolist()
+    parts: list[_Part] = []
+    for t0, t1 in itertools.pairwise(times):
+        parts.append(_part(system, parts[-1].state if parts else x, t0, t1, units))
+    turn = np.eye(x.size) if system.symmetry is None else system.symmetry * units / units[:, None]
+    if not is_autonomous(system):
+        whole = image.jacobian * units / units[:, None]
+        product = turn @ functools.reduce(lambda m, part: part.factor @ m, parts, np.eye(x.size))
+        if np.abs(product - whole).max() > _COMPOSED * np.abs(whole).max():  # a map, which has no parts
+            wrong = np.broadcast_to(image.error, whole.shape) * units / units[:, None]
+            return [whole], [np.nan_to_num(wrong)], np.diag(units)
+    parts = _of_moderate_condition(system, x, parts, units)
+    factors, errors = [part.factor for part in parts], [part.error for part in parts]
+    factors[-1], errors[-1] = turn @ factors[-1], np.abs(turn) @ errors[-1]
+    basis = np.diag(units)
     if is_autonomous(system):
-        units = sizes(system, orbit.state, image.period / image.returns)
-    else:
-        units = numerical_balance(image.jacobian)
-    most = _MOST_FACTORS
-    if isinstance(system, FlowsFrames):
-        most = 0 if system.is_stiff() else _MOST_BESIDE_FRAMES
-    count = _FEWEST_FACTORS
-    while count <= most:
-        cut = cut_return(system, orbit, units, count)
-        if count == _FEWEST_FACTORS and not is_autonomous(system) and not _composes(cut.factors, image, units):
-            cut = replace(cut, factors=[image.jacobian * units / units[:, None]])  # a map, which has no parts
-            return *split_product(cut.factors), cut.basis
-        if max(float(np.linalg.cond(factor)) for factor in cut.factors) < _WORST_CONDITION:
-            return *split_product(cut.factors), cut.basis
-        count *= 2
-    if isinstance(system, FlowsFrames):
-        return split_stiff(system, orbit, units)
-    raise AnalysisError("the flow contracts too strongly to be resolved", field="flow")
+        states = [x, *(part.state for part in parts[:-1])]
+        sections = [_normal_basis(system.velocity(at) / units) for at in states]
+        ends = [*sections[1:], sections[0]]
+        factors = [after.T @ f @ before for f, before, after in zip(factors, sections, ends, strict=True)]
+        errors = [np.abs(after.T) @ e @ np.abs(before) for e, before, after in zip(errors, sections, ends, strict=True)]
+        basis = basis @ sections[0]
+    return factors, errors, basis
 
 
-def _composes(factors: Sequence[Array], image: ReturnMap, units: Array) -> bool:
-    whole = image.jacobian * units / units[:, None]
-    off = np.abs(functools.reduce(lambda m, f: f @ m, factors) - whole).max()
-    return bool(off <= _COMPOSED * np.abs(whole).max())
+def _part(system: SystemLike, x: Array, start: float, end: float, units: Array) -> _Part:
+    state, derivative, error = flow_with_error(system, x.copy(), start, end)
+    factor = derivative * units / units[:, None]
+    return _Part(start, end, state, factor, np.broadcast_to(error, factor.shape) * units / units[:, None])
+
+
+def _of_moderate_condition(system: SystemLike, x: Array, parts: list[_Part], units: Array) -> list[_Part]:
+    """Parts of a return, those that contract too strongly cut in halves until they do not."""
+    done: list[_Part] = []
+    left, asked = parts[::-1], len(parts)
+    while left:
+        part = left.pop()
+        if float(np.linalg.cond(part.factor)) < _WORST_CONDITION:
+            done.append(part)
+            continue
+        middle = 0.5 * (part.start + part.end)
+        asked += 2
+        if asked > _MOST_FACTORS or not part.start < middle < part.end:
+            raise AnalysisError("the flow contracts too strongly to be resolved", field="flow")
+        first = _part(system, done[-1].state if done else x, part.start, middle, units)
+        left += [_part(system, first.state, middle, part.end, units), first]
+    return done
+
+
+def _normal_basis(direction: Array) -> Array:
+    """Orthonormal basis of the plane across a direction, shape (n, n-1)."""
+    return np.linalg.svd(direction[None])[2][1:].T

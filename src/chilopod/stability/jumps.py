@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.stability.arguments import Slopes
+from chilopod.stability.arguments import Slopes, numbers
 
 Array = NDArray[np.float64]
 
@@ -65,7 +65,7 @@ def warn_of_jumps(
         for x in states:
             try:
                 with np.errstate(all="ignore"):
-                    part = np.asarray(rhs(t, x, *args), dtype=np.float64)
+                    part = numbers(rhs(t, x, *args), (n,), "rhs")
             except (ArithmeticError, ValueError):  # not defined at this state
                 part = np.zeros(n)
             parts.append(np.where(np.isfinite(part), part, 0.0))

@@ -3,6 +3,7 @@ is."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import overload
@@ -10,9 +11,11 @@ from typing import overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.errors import ParameterError
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.stability.asked import Asking
 from chilopod.stability.capabilities import Family, SystemLike, spatial_symmetries
 from chilopod.stability.described import describe, fold_point
+from chilopod.stability.extent import Extent, extent
 from chilopod.stability.orbits import Orbit
 from chilopod.stability.points import BifurcationPoint
 from chilopod.stability.returns import ReturnMap
@@ -21,11 +24,14 @@ from chilopod.stability.scales import numerical_balance
 from chilopod.stability.symmetry.groups import centraliser, commutes, finite_group, isotropy
 from chilopod.stability.symmetry.isotypic import Block, Type, isotypic
 from chilopod.stability.unit_circle.crossings import Crossings, Status, find_crossings
+from chilopod.stability.unit_circle.spectra import Event
 
 Array = NDArray[np.float64]
 
 BUDGET = 5000
 """Orbits that a search may compute, if not told otherwise."""
+
+_DESCRIBING = 400  # return maps to solve for the orbits beside a point
 
 _GRAVITY = (Status.COMPLETE, Status.CONSERVATIVE, Status.INCOMPLETE, Status.BUDGET)
 _FOLLOWED = 10.0  # factor on the error of the first orbit for that of those which are followed from it
@@ -78,6 +84,7 @@ def locate(
     orbit: ArrayLike | None = None,
     normal_form: bool = True,
     budget: int = BUDGET,
+    seconds: float = math.inf,
 ) -> Located:
     """Find every bifurcation of a periodic orbit in an interval of a parameter.
 
@@ -96,7 +103,12 @@ def locate(
     normal_form
         Whether to compute coefficients and verdicts as well.
     budget
-        Orbits that may be computed for the search; describing what was found comes on top.
+        Orbits that may be computed to follow the first one through the interval, and once more for the search; either
+        ends as well when twice as many return maps were evaluated, by Newton's method too and for orbits that are not
+        there. What comes on top has bounds of its own: the first orbit, where the motion is given time to settle, and
+        every point that is found, 400 return maps and its normal form.
+    seconds
+        Time after which the search ends with what it has, if that is before the budget is spent.
 
     Returns
     -------
@@ -107,24 +119,36 @@ def locate(
     ParameterError
         If the interval is empty, reversed or not finite.
     AnalysisError
-        If there is no orbit at the lower end of the interval.
+        If there is no orbit at the lower end of the interval, or ``family`` raises an exception there. At any other
+        value that is as if there were no orbit, and a remark.
     """
     low, high = _interval(between)
-    samples = Samples(family, orbit, low, high, budget)
-    remarks = [samples.ending] if samples.ending else []
-    status = Status.INCOMPLETE if samples.ending else Status.COMPLETE
+    samples = Samples(family, orbit, low, high, budget, seconds)
+    here = extent(samples)
+    remarks = [here.ending] if here.ending else []
+    status = Status.BUDGET if samples.spent else Status.INCOMPLETE if here.ending else Status.COMPLETE
     points: list[BifurcationPoint] = []
-    if low < samples.end:
-        searched, more = _searched(samples, low, budget)
+    if here.start < here.end:
+        searched, more = _searched(samples, here, budget)
         remarks += more
         for block, found in searched:
             status = max(status, found.status, key=_GRAVITY.index)
             remarks += found.remarks
-            points += [describe(samples, crossing, block, normal_form) for crossing in found.crossings]
-    if samples.fold is not None:
-        points.append(fold_point(samples.fold, samples, normal_form))
+            for crossing in found.crossings:
+                if crossing.event is Event.PLUS and here.explains(crossing.value):
+                    continue
+                samples.allow(_DESCRIBING)
+                try:
+                    with Asking("family", crossing.value):
+                        points.append(describe(samples, crossing, block, normal_form))
+                except AnalysisError as error:
+                    status = max(status, Status.INCOMPLETE, key=_GRAVITY.index)
+                    remarks.append(f"what crosses at {crossing.value:.9g} could not be described: {error}")
+    points += [fold_point(fold, samples, normal_form) for fold in here.folds]
+    if samples.remarks:
+        status = max(status, Status.INCOMPLETE, key=_GRAVITY.index)
     ordered = tuple(sorted(points, key=lambda point: point.value))
-    return Located(ordered, status, tuple(dict.fromkeys(remarks)), samples.count)
+    return Located(ordered, status, tuple(dict.fromkeys([*remarks, *samples.remarks])), samples.count)
 
 
 def _interval(between: tuple[float, float]) -> tuple[float, float]:
@@ -137,15 +161,22 @@ def _interval(between: tuple[float, float]) -> tuple[float, float]:
     return low, high
 
 
-def _searched(samples: Samples, low: float, budget: int) -> tuple[list[tuple[Block | None, Crossings]], list[str]]:
+def _searched(samples: Samples, here: Extent, budget: int) -> tuple[list[tuple[Block | None, Crossings]], list[str]]:
     """The crossings in every block of the return map, and what is to be said of the blocks."""
-    blocks, remarks = _blocks(samples.family(low), samples.first)
-    uncertain = _relative(samples.first.image)
+    blocks, remarks = _blocks(samples.family(samples.low), samples.first)
+    # Of the first orbit hardly a trace may be left after a return; of those that are followed from it there is more.
+    uncertain = _FOLLOWED * _relative(samples.of_flow(), at_least=1.0)
 
     def whole(values: Array) -> tuple[Array, Array]:
         found = samples.at(values)
-        errors = [_relative(each.image) if samples.known else _FOLLOWED * uncertain for each in found]
-        return np.stack([each.image.jacobian for each in found]), np.array(errors)
+        if samples.known:
+            shape = found[0].image.jacobian.shape
+            errors = np.stack([np.broadcast_to(each.image.error, shape) for each in found])
+        elif blocks == (None,):
+            errors = np.array([samples.error(each, uncertain) for each in found])
+        else:  # a mode that breaks a symmetry leaves the orbit as sure as it is
+            errors = np.full(len(found), uncertain)
+        return np.stack([each.image.jacobian for each in found]), errors
 
     searched: list[tuple[Block | None, Crossings]] = []
     for block in blocks:
@@ -154,11 +185,15 @@ def _searched(samples: Samples, low: float, budget: int) -> tuple[list[tuple[Blo
             matrices, errors = whole(values)
             if block is None:
                 return matrices, errors
+            if errors.ndim == 3:
+                errors = np.abs(block.dual) @ errors @ np.abs(block.basis)
             if block.type is Type.REAL:
                 return np.stack([np.real(block.reduced(matrix)) for matrix in matrices]), errors
             return block.dual @ matrices @ block.basis, errors
 
-        searched.append((block, find_crossings(reduced, low, samples.end, budget=budget)))
+        searched.append(
+            (block, find_crossings(reduced, here.start, here.end, budget=budget, affordable=samples.affordable))
+        )
     return searched, remarks
 
 
@@ -178,11 +213,12 @@ def _blocks(system: SystemLike, orbit: Orbit) -> tuple[tuple[Block | None, ...],
     return isotypic(group), []
 
 
-def _relative(image: ReturnMap) -> float:
-    """Error of the derivative, of its largest entry, the states being in units that balance it."""
+def _relative(image: ReturnMap, at_least: float = 0.0) -> float:
+    """Error of the derivative, of its largest entry or of what that is at least, the states being in units that balance
+    it."""
     # An entry that is nothing but round-off says nothing of the units.
     units = numerical_balance(np.abs(image.jacobian) + np.nan_to_num(image.error))
-    largest = float(np.abs(image.jacobian * units / units[:, None]).max())
+    largest = max(at_least, float(np.abs(image.jacobian * units / units[:, None]).max()))
     if not largest > 0.0:
         return _LEAST_ERROR
     return max(_LEAST_ERROR, float(np.max(image.error * units / units[:, None])) / largest)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,17 +11,26 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.arguments import finite_array
-from chilopod.stability.capabilities import Autonomous, SystemLike, is_autonomous, known_orbit, returns_per_period
+from chilopod.stability.asked import ReturnBudget, SpentError
+from chilopod.stability.capabilities import (
+    FlowsTangents,
+    SystemLike,
+    is_autonomous,
+    known_orbit,
+)
+from chilopod.stability.krylov.closing import LARGE, closed_orbit
+from chilopod.stability.krylov.tangent_map import TangentMap, tangent_map, tangent_sizes
 from chilopod.stability.returns import (
     ReturnMap,
     Section,
+    carried,
     return_duration,
     return_map,
-    returned_states,
     section_at,
-    whole_period,
+    turned,
 )
 from chilopod.stability.scales import sizes
+from chilopod.stability.settling import nearer_states
 
 Array = NDArray[np.float64]
 
@@ -35,16 +43,10 @@ _RETURNED = 1e-12  # of a known orbit: it is exact
 _SINGULAR, _FAMILY = 1e-13, 1e-8  # singular values of H - 1 that count as zero, the largest being one
 _MAGNIFIED = 1e9  # move over residual beyond which H - 1 may be singular
 _KNOWN = 1e-4  # of a known orbit: it is one, if not to the last digit
-_SHOTS, _LONGEST_SHOT = 20, 4.0  # rounds, and guessed periods
-_FARTHEST_MOVE = 0.3  # of the sizes, and of how far the motion would go at its speed, in a move of Newton's method
-_FARTHEST_STRETCH = 0.3  # likewise of the period
-_CLOSED = 1e-6  # of the same: a motion that about closes
-_ONWARD = 0.382  # of the guessed return, where a guess is of no use
-_LONGEST_SETTLING = 300  # returns
+_SETTLING = 100  # return maps that letting the motion settle is counted as: without derivatives it costs less
+_MOST_PARTS = 8  # of a return: a guess of the period may be so many times too long
+_CLOSES = 1e-8  # of the motion, and of the sizes of the states: an orbit that closes so nearly is solved for once more
 _BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
-_MARCHED, _MARCHES = 48, 8  # steps a guessed period, and guessed periods, in which a motion is to come back
-_COMES_BACK = 0.1  # of its size
-_STILL = 1e-3  # of how much the others move
 
 
 @dataclass(frozen=True)
@@ -100,8 +102,14 @@ def find_orbit(
     with_error: bool = True,
     section: Section | None = None,
     settle: bool = True,
+    budget: ReturnBudget | None = None,
+    shortest: bool = True,
 ) -> Orbit:
     """A periodic orbit: a fixed point of the return map, by Newton's method.
+
+    Of a system that does not depend on time it has its own, shortest period also where the guess is nearer to up to
+    eight times that: if the motion closes earlier, the orbit is solved for once more over that time. (An orbit of twice
+    the period that branches off at a period doubling closes no earlier.)
 
     Where it does not converge from the guess, it is tried from a state further along the motion if every state may be
     time 0, and then the motion is given time to settle on an orbit that attracts it.
@@ -118,7 +126,12 @@ def find_orbit(
         Of a system that does not depend on time: where its orbit is looked for. By default across the motion in the
         guess; the orbit that is found has the section across its own motion.
     settle
-        Whether to let the motion settle where Newton's method fails.
+        Whether to let the motion settle where Newton's method fails: up to 330 returns, or 83 guessed periods.
+    budget
+        Return maps that may be evaluated, which are taken from it: up to 30 for every start of Newton's method, and 100
+        for letting the motion settle.
+    shortest
+        Whether to look for the shortest period, where no section tells how long a return takes.
 
     Raises
     ------
@@ -126,33 +139,96 @@ def find_orbit(
         If neither helps.
     """
     if guess is None:
-        return from_known(system, known_state(system), with_error)
+        return from_known(system, known_state(system), with_error, budget=budget)
     x = finite_array(guess, (system.dimension,), "orbit")
+    shortened = shortest and section is None
     try:
-        return _newton(system, x, with_error, section)
+        found = _newton(system, x, with_error, section, budget)
+        return _shortest(system, found, with_error, budget) if shortened else found
     except AnalysisError as failed:
-        if not settle:
+        if not settle or isinstance(failed, SpentError):
             raise
-        for nearer, after in _nearer(system, x):
+        if budget is not None:
+            budget.take(_SETTLING)
+        for nearer, after in nearer_states(system, x):
             try:
-                return _newton(system, nearer, with_error, after)
+                found = _newton(system, nearer, with_error, after, budget)
+                return _shortest(system, found, with_error, budget) if shortened else found
             except AnalysisError:
                 continue
         raise failed
 
 
-def from_known(system: SystemLike, x: Array, with_error: bool = True, image: ReturnMap | None = None) -> Orbit:
+def find_large_orbit(system: FlowsTangents, guess: ArrayLike | None = None) -> tuple[TangentMap, Array]:
+    """As :func:`find_orbit`, of a large system: the return map on the orbit without its derivative as a matrix, and the
+    sizes of the states, shape (n,). Where the method for these fails, :func:`find_orbit` is asked."""
+    x = known_state(system) if guess is None else finite_array(guess, (system.dimension,), "orbit")
+    exact = guess is None and not is_autonomous(system)
+    try:
+        image, size = closed_orbit(system, x, farthest=_KNOWN if exact else np.inf)
+    except AnalysisError:
+        found = find_orbit(system, guess, with_error=False)
+        size = tangent_sizes(system, found.state, found.period / found.image.returns)
+        return tangent_map(system, found.state, found.section), size
+    with contextlib.suppress(AnalysisError):
+        while (parts := _parts(system, image.point, image.duration, size)) > 1:
+            section = section_at(system, image.point, size, image.duration / parts)
+            image, size = closed_orbit(system, image.point, section)
+    return image, size
+
+
+def _shortest(system: SystemLike, orbit: Orbit, with_error: bool, budget: ReturnBudget | None) -> Orbit:
+    """The same orbit over its shortest period, where every instant may be time 0."""
+    if not is_autonomous(system):
+        return orbit
+    duration = orbit.period / orbit.image.returns
+    while (parts := _parts(system, orbit.state, duration, sizes(system, orbit.state, duration))) > 1:
+        duration /= parts
+        section = section_at(system, orbit.state, sizes(system, orbit.state, duration), duration)
+        try:
+            orbit = _newton(system, orbit.state, with_error, section, budget)
+        except AnalysisError:
+            break
+        duration = orbit.period / orbit.image.returns
+    return orbit
+
+
+def _parts(system: SystemLike, x: Array, duration: float, size: Array) -> int:
+    """How many times a return closes within its time, where every instant may be time 0; with the sizes of the states
+    for that time."""
+    if not is_autonomous(system):
+        return 1
+    counts = np.arange(_MOST_PARTS, 1, -1)
+    states, passed = [x], 0.0
+    for time in duration / counts:
+        states.append(carried(system, states[-1][None], 0.0, time - passed)[0])
+        passed = time
+    # Over several rounds a sixteenth of the time may be half of one, where a state is zero again.
+    size = np.maximum(size, np.abs(states).max(axis=0))
+    near = _CLOSES * min(1.0, _relative(np.asarray(system.velocity(np.array(x))) * duration, size))
+    away = (np.abs(turned(system, np.array(states[1:])) - x) / size).max(axis=1)
+    closed = counts[away <= near]
+    return int(closed[0]) if closed.size else 1
+
+
+def from_known(
+    system: SystemLike,
+    x: Array,
+    with_error: bool = True,
+    image: ReturnMap | None = None,
+    budget: ReturnBudget | None = None,
+) -> Orbit:
     """The orbit through a state that is on it, by what the system says of itself; improved if not to the last digit.
 
     Parameters
     ----------
-    system, x, with_error
+    system, x, with_error, budget
         As for :func:`find_orbit`.
     image
         The return map at ``x``, if it was computed already.
     """
     if is_autonomous(system):
-        return find_orbit(system, x, with_error)
+        return find_orbit(system, x, with_error, budget=budget)
     image = return_map(system, x, with_error) if image is None else image
     moved = np.abs(image.state - x)
     if not moved.any():
@@ -162,7 +238,7 @@ def from_known(system: SystemLike, x: Array, with_error: bool = True, image: Ret
     if off <= _RETURNED * max(1.0, float(np.abs(image.jacobian * size / size[:, None]).max())):
         return Orbit(x, image, np.zeros(x.size))
     if off <= _KNOWN:
-        return _newton(system, x, with_error, None)
+        return _newton(system, x, with_error, None, budget)
     raise AnalysisError(
         f"is no periodic orbit: one return later the state is {float(moved.max()):.1e} away",
         field="orbit",
@@ -174,11 +250,21 @@ def _relative(values: Array, size: Array) -> float:
     return float((np.abs(values) / size).max())
 
 
-def _newton(system: SystemLike, x: Array, with_error: bool, section: Section | None) -> Orbit:
+def _newton(
+    system: SystemLike, x: Array, with_error: bool, section: Section | None, budget: ReturnBudget | None
+) -> Orbit:
     size = sizes(system, x, return_duration(system) if section is None else section.duration)
     section = section_at(system, x, size) if section is None else section
-    best, before, cutoff = np.inf, x, _SINGULAR
+    best = np.inf
+    if system.dimension >= LARGE and isinstance(system, FlowsTangents):
+        with contextlib.suppress(AnalysisError):
+            closed, _ = closed_orbit(system, x, section, budget=budget)
+            x, best = closed.point, 0.0  # nothing is left to improve
+            section = section and replace(section, duration=closed.duration)
+    before, cutoff = x, _SINGULAR
     for rounds in range(_ROUNDS):
+        if budget is not None:
+            budget.take()
         image = return_map(system, x, with_error=False, section=section)
         size = np.maximum(size, np.maximum(np.abs(x), np.abs(image.state)) if x.any() else 0.0)
         residual = image.state - x
@@ -279,108 +365,3 @@ def bounded(system: SystemLike, x: Array, image: ReturnMap, error: Array | None 
 def _matrix(error: float | Array, size: Array) -> Array:
     """The error of every entry of a derivative."""
     return error if isinstance(error, np.ndarray) else np.full((size.size, size.size), error)
-
-
-def _nearer(system: SystemLike, x: Array) -> Iterator[tuple[Array, Section | None]]:
-    """States nearer to an orbit than a guess, with sections across the motion."""
-    if is_autonomous(system):
-        shot = _shot(system, x)
-        if shot is not None:
-            yield shot
-    yield from _onward(system, x)
-    yield from _settled(system, x)
-
-
-def _shot(system: Autonomous, x: Array) -> tuple[Array, Section | None] | None:
-    """A state and a period at which the motion about closes, by Newton's method for both together, each move at right
-    angles to the motion (Seydel, *Practical Bifurcation and Stability Analysis*, 2010, section 7.1).
-
-    Unlike a return to a section it needs no motion that comes back from the guess: of an orbit with a strongly stable
-    direction only guesses on its stable manifold do.
-    """
-    count = returns_per_period(system)
-    turn = np.eye(x.size) if system.symmetry is None else system.symmetry
-    duration = system.guess_period / count
-    longest, best = _LONGEST_SHOT * duration, np.inf
-    try:
-        for _ in range(_SHOTS):
-            size = sizes(system, x, duration)
-            later, derivative = system.flow(x, 0.0, duration)
-            start = np.asarray(system.velocity(x)) * duration / size
-            end = turn @ np.asarray(system.velocity(later)) * duration / size
-            residual = (turn @ later - x) / size
-            moved = float(np.linalg.norm(start))
-            off = float(np.abs(residual).max())
-            if not off <= 2.0 * best or moved <= _SETTLED:
-                return None
-            if off <= _CLOSED * moved:
-                return x, section_at(system, x, size, duration)
-            best = min(best, off)
-            closing = (turn @ derivative) * size / size[:, None] - np.eye(x.size)
-            bordered = np.block([[closing, end[:, None]], [start[None] / moved, np.zeros((1, 1))]])
-            move = np.linalg.lstsq(bordered, np.append(-residual, 0.0), rcond=_SINGULAR)[0]
-            move *= min(1.0, _FARTHEST_MOVE * min(1.0, moved) / float(np.abs(move[:-1]).max(initial=0.0) or np.inf))
-            x = x + move[:-1] * size
-            duration *= 1.0 + float(np.clip(move[-1], -_FARTHEST_STRETCH, _FARTHEST_STRETCH))
-            if duration > longest:
-                return None
-    except (AnalysisError, np.linalg.LinAlgError):
-        return None
-    return None
-
-
-def _onward(system: SystemLike, x: Array) -> list[tuple[Array, Section | None]]:
-    """A state further along the motion, where every state may be time 0: in the guess itself something may just have
-    happened, such as an impact, and a motion that ends there ends before it or after it by round-off."""
-    if not isinstance(system, Autonomous):
-        return []
-    try:
-        return [(system.flow(np.array(x), 0.0, _ONWARD * return_duration(system))[0], None)]
-    except AnalysisError:
-        return []
-
-
-def _settled(system: SystemLike, x: Array) -> list[tuple[Array, Section | None]]:
-    """States on the orbit that attracts the motion from a state, if one does, with sections across it."""
-    if is_autonomous(system):
-        return _settled_autonomous(system, x)
-    found: list[tuple[Array, Section | None]] = []
-    for count in (_LONGEST_SETTLING // 10, _LONGEST_SETTLING):
-        try:
-            for _ in range(count):
-                x = returned_states(system, x[None])[0]
-        except AnalysisError:
-            break
-        if not np.isfinite(x).all():
-            break
-        found.append((x, None))
-    return found
-
-
-def _settled_autonomous(system: Autonomous, x: Array) -> list[tuple[Array, Section | None]]:
-    """As :func:`_settled`, with a new guess of the period: when the motion first comes close to where it was."""
-    step = system.guess_period / _MARCHED
-    whole = whole_period(system)
-    try:
-        for _ in range(_LONGEST_SETTLING // 4):
-            x = whole.flow(x, 0.0, system.guess_period)[0]
-        path = [x]
-        for _ in range(_MARCHES * _MARCHED):
-            path.append(whole.flow(path[-1], 0.0, step)[0])
-    except AnalysisError:
-        return []
-    states = np.array(path)
-    if not np.isfinite(states).all():
-        return []
-    # A state that hardly moves, for its size, tells nothing.
-    size = sizes(system, x, system.guess_period)
-    moves = np.ptp(states, axis=0) / size
-    size = size * np.maximum(moves, _STILL * moves.max())
-    if not size.all():
-        return []
-    away = (np.abs(states - x) / size).max(axis=1)
-    turned = np.flatnonzero((away[1:-1] <= away[:-2]) & (away[1:-1] <= away[2:]) & (away[1:-1] < _COMES_BACK)) + 1
-    if not turned.size:
-        return []
-    count = 1 if system.symmetry is None else returns_per_period(system)
-    return [(x, section_at(system, x, None, float(turned[0]) * step / count))]

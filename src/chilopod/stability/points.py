@@ -99,9 +99,9 @@ class BifurcationPoint(ReadOnlyArrays):
         Angular frequency (1/s) of the critical mode: 0 for a real multiplier +1 of the period; the principal value
         otherwise.
     criticality, coefficient, coefficient_error
-        Verdict and cubic coefficient a -> a + coefficient a^3 of the full-period map, a the amplitude along the unit
-        ``mode`` (Neimark-Sacker: state = 2 Re(a mode)); None where it has no meaning (fold, transcritical, branch
-        point) or where there is no normal form.
+        Verdict and cubic coefficient a -> a + coefficient a^3 of the map over one period of the orbit, at a period
+        doubling over two; a is the amplitude along the unit ``mode`` (Neimark-Sacker: state = 2 Re(a mode)). None where
+        it has no meaning (fold, transcritical, branch point) or where there is no normal form.
     rotation, rotation_error
         Where the mode turns (Neimark-Sacker), the phase per period that an amplitude adds, rad per amplitude^2.
     period

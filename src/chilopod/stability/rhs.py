@@ -22,7 +22,7 @@ from chilopod.stability.arguments import (
 )
 from chilopod.stability.called import CalledFlow
 from chilopod.stability.capabilities import spatial_symmetries
-from chilopod.stability.events import Event, checked_events
+from chilopod.stability.events import Event, check_events, checked_events
 from chilopod.stability.implicit.implicit import ImplicitFlow, can_be_implicit
 from chilopod.stability.jumps import fast_parts, warn_of_jumps
 from chilopod.stability.system import PeriodicSystem
@@ -131,11 +131,13 @@ def from_rhs(
     times = np.asarray(edges[:-1] + 0.4142 * np.diff(edges))  # one inside every interval
     flows: dict[str, Any]
     slopes: Slopes
+    check_events(happening, args, times, start, dimension)
     try:
         pairs = [(event.guard, event.reset) for event in happening]
         traced = trace(rhs, dimension, args, times=(0.0, length), base=base, events=pairs)
     except Untraceable as reason:
         if happening:
+            check_shape(rhs, args, times, base, (dimension,), "rhs")
             raise ParameterError(
                 f"need functions that can be traced: {reason}",
                 field="events",
@@ -253,7 +255,16 @@ def _taylor_flows(traced: Trace, edges: Array, tolerance: float, events: tuple[E
     def flow_states(states: Array, t0: float, t1: float) -> Array:
         return taylor.states(states, t0, t1, params)
 
-    return {"flow": flow, "flow_with_error": flow_with_error, "flow_states": flow_states, "concurrent": True}
+    def flow_tangents(x: Array, directions: Array, t0: float, t1: float) -> tuple[Array, Array]:
+        return taylor.tangents(x, directions, t0, t1, params)
+
+    return {
+        "flow": flow,
+        "flow_with_error": flow_with_error,
+        "flow_states": flow_states,
+        "flow_tangents": flow_tangents,
+        "concurrent": True,
+    }
 
 
 def _check_jacobian(

@@ -3,27 +3,37 @@
 from __future__ import annotations
 
 import bisect
+import contextlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.errors import AnalysisError, ParameterError
+from chilopod.errors import AnalysisError, ParameterError, in_words
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.branches.fold import Fold, find_fold
+from chilopod.stability.asked import Asking, ReturnBudget, SpentError, UserError
+from chilopod.stability.branches.curve import return_multipliers
 from chilopod.stability.capabilities import Family, SystemLike, is_autonomous
-from chilopod.stability.orbits import find_orbit, from_known, known_state
-from chilopod.stability.returns import ReturnMap, return_maps, section_at
+from chilopod.stability.orbits import Orbit, find_orbit, from_known, known_state
+from chilopod.stability.returns import ReturnMap, return_map, return_maps, section_at
 from chilopod.stability.scales import sizes
 
 Array = NDArray[np.float64]
 
-_FIRST_STEPS = 8
+FIRST_STEPS = 8
+"""Steps in which an orbit is followed through the interval, if it takes no shorter ones."""
 _SHORTEST = 2.0**-10  # step of an orbit that is followed, relative to the first
+_RETURNS = 2  # return maps for every orbit of the budget, to follow the orbit and again to search
+_DEAREST = 8.0  # return maps for an orbit
+_ATTEMPTS = 24  # steps to a value from the sample beside it: ten halvings, and on from there
 _KEPT = 64  # systems: around a point the same one is asked for again and again
-_BEFORE = 1e-6  # of the interval: so far from a fold other crossings are looked for
-_AT_REST = 0.03  # of the motion of the first orbit
-_PARTS = 5  # of a return, to see how far the motion goes
+NEAR_FOLD = 0.02
+"""Distance of a multiplier from +1 within which a fold may be so near that the search does not tell it."""
+_SURE = 1e-4  # singular value of H - 1, in units, above which the orbit is as good as the flow
+_BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
+_FORESEEN, _SMALL = 0.3, 0.01  # of a change of the orbit, and of the sizes: what a prediction may miss
+_HALFWAY = 0.25  # of a change: an orbit halfway between two is as near as that to their mean
 _JUMP = 0.3  # of the orbit between prediction and correction, relative to its size
 
 
@@ -34,6 +44,11 @@ class Sample(ReadOnlyArrays):
     value: float
     orbit: Array
     image: ReturnMap
+
+    @property
+    def off_plus_one(self) -> float:
+        """Distance of the return map's multipliers from +1, that along the motion left aside."""
+        return float(np.abs(return_multipliers(self.image) - 1.0).min(initial=np.inf))
 
 
 class Samples:
@@ -48,7 +63,10 @@ class Samples:
     low, high
         The interval.
     budget
-        Orbits that may be computed until the upper end is reached.
+        Orbits that may be computed until the upper end is reached, by twice as many return maps, and as many return
+        maps once more for those in between.
+    seconds
+        Time for all that.
 
     Attributes
     ----------
@@ -58,74 +76,213 @@ class Samples:
         The orbit at the lower end, with its error bounds.
     known
         Whether the systems know their orbits.
+    timed
+        Whether the systems depend on time.
+    size
+        Of the states on the first orbit, shape (n,).
+    path
+        The samples by which an orbit that is not known was followed from ``low``, as far as it goes.
     end
         Where the orbit ends, at most ``high``.
-    fold
-        The fold it ends in, if it does.
-    ending
-        A sentence where it ends otherwise; else empty.
+    spent
+        Whether the path ends because the budget was spent.
     """
 
-    def __init__(self, family: Family, guess: ArrayLike | None, low: float, high: float, budget: int) -> None:
+    def __init__(
+        self, family: Family, guess: ArrayLike | None, low: float, high: float, budget: int, seconds: float
+    ) -> None:
         self._family = family
         self.low, self.width = low, high - low
         self.known = guess is None
         self._systems: dict[float, SystemLike] = {}
         self._by_value: dict[float, Sample] = {}
         self._values: list[float] = []
+        self._missing: dict[float, AnalysisError] = {}
+        self._bends: dict[float, float] = {}
         self._budget = budget
-        self._dimension, self._timed = 0, True
-        self.count = 0
-        self.ending = ""
-        self.end, self.fold = high, None
-        self.first = find_orbit(self.family(low), guess)
-        self._size = sizes(self.family(low), self.first.state, self.first.period / self.first.image.returns)
-        if guess is not None:
-            self.end, self.fold = self._followed(low, high)
+        self._allowed = _RETURNS * budget
+        self._returns = ReturnBudget(self._allowed, seconds)
+        self._refused: dict[str, tuple[str, set[float]]] = {}
+        self._dimension, self.timed = 0, True
+        self.count = self._counted = 0
+        with Asking("family", low):
+            self.first = find_orbit(self.family(low), guess)
+            self.size = sizes(self.family(low), self.first.state, self.first.period / self.first.image.returns)
+        if not (self.known and self.timed):
+            self._keep(_sample(low, self.first))
+        self.spent = False
+        self.path = [] if guess is None else self._followed(low, high)
+        self.end = self.path[-1].value if self.path else high
+        self.allow(self._allowed)
 
     def family(self, value: float) -> SystemLike:
         """The system at a value of the parameter, once it is seen to be of the same kind as the others."""
         if value in self._systems:
             return self._systems[value]
-        system = self._family(value)
+        with self._asking(value):
+            system = self._family(value)
         timed = not is_autonomous(system)
         if self._dimension == 0:
-            self._dimension, self._timed = system.dimension, timed
-        if system.dimension != self._dimension or timed is not self._timed:
+            self._dimension, self.timed = system.dimension, timed
+        if system.dimension != self._dimension or timed is not self.timed:
             what = "dimension" if system.dimension != self._dimension else "kind of period"
-            raise ParameterError(f"changes its {what} at {value:g}", field="family", allowed="systems of one kind")
+            self._refuse(value, what, f"the family changes its {what}")
+            raise AnalysisError(f"changes its {what} at {value:g}", field="family", allowed="systems of one kind")
         if len(self._systems) >= _KEPT:
             self._systems.pop(next(iter(self._systems)))
         self._systems[value] = system
         return system
 
     def at(self, values: Array) -> list[Sample]:
-        """Samples at some values within the interval; together where the systems allow it."""
+        """Samples at some values within the interval; together where the systems allow it.
+
+        Raises
+        ------
+        AnalysisError
+            If there is none at one of them; those at the others are kept.
+        """
         wanted = [float(value) for value in values]
         missing = sorted({value for value in wanted if value not in self._by_value})
-        if missing and self.known:
-            systems = [self.family(value) for value in missing]
-            states = [known_state(system) for system in systems]
-            images = return_maps(systems, states) if self._timed else [None] * len(systems)
-            for value, system, state, image in zip(missing, systems, states, images, strict=True):
-                orbit = from_known(system, state, image=image)
-                self._keep(Sample(value, orbit.state, orbit.image))
-        else:
-            for value in missing:
-                self._keep(self._between(value))
+        if len(missing) > 1 and self.known and self.timed:
+            try:
+                self._keep_known(missing)
+                missing = []
+            except SpentError:
+                raise
+            except AnalysisError:
+                pass  # which one it was shows when each is asked for alone
+        for value in missing:
+            if value in self._by_value or value in self._missing:
+                continue
+            try:
+                if self.known and self.timed:
+                    self._keep_known([value])
+                else:
+                    self._keep(self._of_itself(value) if self.known else self._between(value))
+            except SpentError:
+                raise
+            except AnalysisError as error:
+                self._missing[value] = error
+        for value in wanted:
+            if value in self._missing:
+                raise self._missing[value]
         return [self._by_value[value] for value in wanted]
+
+    def _keep_known(self, values: list[float]) -> None:
+        """Samples of systems that depend on time and know their orbits."""
+        systems = [self.family(value) for value in values]
+        for _ in systems:
+            self._returns.take()
+        with self._asking(values[0]) if len(values) == 1 else Asking("family", values[0]):
+            states = [known_state(system) for system in systems]
+            images = return_maps(systems, states)
+        for value, system, state, image in zip(values, systems, states, images, strict=True):
+            orbit = from_known(system, state, image=image, budget=self._returns)
+            self._keep(Sample(value, orbit.state, orbit.image))
+
+    def allow(self, returns: int) -> None:
+        """From now on, at most so many return maps."""
+        self._allowed, self._counted = returns, self.count
+        self._returns.left = returns
+
+    def affordable(self) -> int:
+        """How many more orbits there may be, at the price of those since :meth:`allow`."""
+        if self._returns.late:
+            return 0
+        price = (self._allowed - self._returns.left) / max(self.count - self._counted, 1)
+        # Those that were not found say nothing of the next ones.
+        return int(self._returns.left / min(max(price, 1.0), _DEAREST))
+
+    @property
+    def remarks(self) -> list[str]:
+        """Where there was no system, and why, a sentence each."""
+        return [
+            said + (f", and at {len(values) - 1} more values" if len(values) > 1 else "")
+            for said, values in self._refused.values()
+        ]
+
+    def _refuse(self, value: float, kind: str, why: str) -> None:
+        self._refused.setdefault(kind, (f"{why} at {value:.9g}", set()))[1].add(value)
+
+    @contextlib.contextmanager
+    def _asking(self, value: float) -> Iterator[None]:
+        """Around calls of the user's functions: exceptions of theirs mean that there is no system."""
+        try:
+            with Asking("family", value):
+                yield
+        except (UserError, ParameterError) as error:
+            if not self._dimension:
+                raise
+            cause = error.__cause__ if isinstance(error, UserError) else error
+            assert cause is not None
+            self._refuse(value, type(cause).__name__, f"the family raised {in_words(cause)}")
+            raise UserError(error.problem, field=error.field, value=error.value, allowed=error.allowed) from cause
+
+    def error(self, sample: Sample, of_flow: float) -> float:
+        """Relative error of the derivative at a sample of an orbit that is followed: that of the flow, and what comes
+        of the orbit's own, which is the flow's times what H - 1 makes of it.
+
+        Parameters
+        ----------
+        sample
+            From :meth:`at`.
+        of_flow
+            Relative error of the flow and of its derivative.
+        """
+        scaled = sample.image.jacobian * self.size / self.size[:, None]
+        _, values, rows = np.linalg.svd(scaled - np.eye(self.size.size))
+        if values[-1] > _SURE:
+            return of_flow
+        if sample.value not in self._bends:
+            beside = sample.orbit + _BESIDE * self.size * rows[-1]
+            section = section_at(
+                self.family(sample.value), sample.orbit, self.size, sample.image.period / sample.image.returns
+            )
+            change = return_map(self.family(sample.value), beside, False, section).jacobian - sample.image.jacobian
+            self._bends[sample.value] = float(np.linalg.norm(change * self.size / self.size[:, None])) / _BESIDE
+        # Where H - 1 vanishes along a direction, what is left there is of third order at most in all but odd cases.
+        off = min(of_flow / max(float(values[-1]), of_flow), of_flow ** (1.0 / 3.0))
+        return min(1.0, of_flow + self._bends[sample.value] * off)
+
+    def of_flow(self) -> ReturnMap:
+        """The return map at the first orbit, with the error of the flow alone."""
+        if _sample(self.low, self.first).off_plus_one > NEAR_FOLD:
+            return self.first.image  # the orbit is as good as the flow
+        return return_map(self.family(self.low), self.first.state, True, self.first.section)
 
     def _keep(self, sample: Sample) -> None:
         self.count += 1
         self._by_value[sample.value] = sample
         bisect.insort(self._values, sample.value)
 
+    def _of_itself(self, value: float) -> Sample:
+        """A sample of a system that tells a state on its orbit, or near it, or from the orbit beside."""
+        system = self.family(value)
+        try:
+            with self._asking(value):
+                return _sample(value, find_orbit(system, known_state(system), settle=False, budget=self._returns))
+        except SpentError:
+            raise
+        except AnalysisError:
+            index = bisect.bisect(self._values, value)
+            beside = self._by_value[min(self._values[max(index - 1, 0) : index + 1], key=lambda v: abs(v - value))]
+        try:
+            return self._sampled(value, beside.orbit, beside)
+        except SpentError:
+            raise
+        except AnalysisError:
+            with self._asking(value):
+                return _sample(value, find_orbit(system, known_state(system), budget=self._returns))
+
     def _sampled(self, value: float, near: Array, beside: Sample) -> Sample:
         system = self.family(value)
-        # The orbit beside tells how long an orbit takes, where it is the orbit's to say.
-        section = section_at(system, near, self._size, beside.image.period / beside.image.returns)
-        orbit = find_orbit(system, near, with_error=False, section=section, settle=False)
-        return Sample(value, orbit.state, orbit.image)
+        with self._asking(value):
+            # The orbit beside tells how long an orbit takes, where it is the orbit's to say.
+            section = section_at(system, near, self.size, beside.image.period / beside.image.returns)
+            return _sample(
+                value,
+                find_orbit(system, near, with_error=self.known, section=section, settle=False, budget=self._returns),
+            )
 
     def _between(self, value: float) -> Sample:
         """A sample between two that are there, from their orbits."""
@@ -134,64 +291,42 @@ class Samples:
         t = (value - a.value) / (b.value - a.value)
         try:
             return self._sampled(value, (1 - t) * a.orbit + t * b.orbit, a)
+        except SpentError:
+            raise
         except AnalysisError:
-            reached = self._follow([a], value)
+            reached = self._follow([a], value, _ATTEMPTS)
+            for sample in reached:
+                if sample.value != value:
+                    self._keep(sample)
             if not reached or reached[-1].value != value:
                 raise
             return reached[-1]
 
-    def _followed(self, low: float, high: float) -> tuple[float, Fold | None]:
-        """Follow the orbit from the lower end; where it gets to, and the fold it ends in before the upper end."""
-        samples = [Sample(low, self.first.state, self.first.image)]
-        self._keep(samples[0])
-        for value in np.linspace(low, high, _FIRST_STEPS + 1)[1:].tolist():
-            reached = self._follow(samples, value)
+    def _followed(self, low: float, high: float) -> list[Sample]:
+        """Follow the orbit from the lower end."""
+        path = [self._by_value[low]]
+        for value in np.linspace(low, high, FIRST_STEPS + 1)[1:].tolist():
+            reached = self._follow(path, value)
             for sample in reached:
                 self._keep(sample)
-            samples += reached
-            last = samples[-1]
-            if last.value != value:
-                fold = find_fold(self.family, last.value, last.orbit, high - low)
-                if fold is not None and not self._ends_in(last, fold):
-                    fold = None
-                here = last if fold is None else Sample(fold.value, fold.image.state, fold.image)
-                if self._at_rest(here):
-                    self.ending = f"the orbit shrinks into an equilibrium near {here.value:.9g}: a Hopf point"
-                    return last.value, None
-                if fold is None:
-                    self.ending = f"the orbit cannot be followed beyond {last.value:.9g}"
-                if fold is None or not low <= fold.value <= high:
-                    return last.value, None
-                # In the fold itself multipliers move as a root of the distance, which no search sees through.
-                return max(low, min(last.value, fold.value - _BEFORE * (high - low))), fold
-        return high, None
+            path += reached
+            if path[-1].value != value:
+                self.spent = self._returns.spent or self.count >= self._budget
+                break
+        return path
 
-    def _at_rest(self, last: Sample) -> bool:
-        """Whether hardly anything of the motion is left where an orbit ends: beyond there is none, and what looks like
-        a fold is the same orbit again, half a period later."""
-        if self._timed:
-            return False
-        first = self._moved(self.family(self.low), self.first.image)
-        return self._moved(self.family(last.value), last.image) < _AT_REST * first
-
-    def _moved(self, system: SystemLike, image: ReturnMap) -> float:
-        """How far the motion goes within a return, relative to the sizes of the states."""
-        path = [image.state]
-        for _ in range(_PARTS - 1):
-            path.append(system.flow(path[-1], 0.0, image.period / image.returns / _PARTS)[0])
-        return float((np.ptp(np.array(path), axis=0) / self._size).max())
-
-    def _follow(self, behind: list[Sample], value: float) -> list[Sample]:
+    def _follow(self, behind: list[Sample], value: float, attempts: float = np.inf) -> list[Sample]:
         """Samples from the last one behind to ``value``, by smaller steps where Newton's method does not carry that
         far.
 
-        They end early where the orbit does, or the budget.
+        They end early where the orbit does, the budget, or the attempts.
         """
         behind = behind[-2:]
         reached: list[Sample] = []
         smallest = _SHORTEST * abs(value - behind[-1].value)
         target = value
-        while self.count + len(reached) < self._budget:
+        while attempts > 0 and (np.isfinite(attempts) or self.count + len(reached) < self._budget):
+            attempts -= 1
             last = behind[-1]
             guess = last.orbit
             if len(behind) > 1:
@@ -199,10 +334,12 @@ class Samples:
                 guess = guess + (target - last.value) * slope
             try:
                 found = self._sampled(target, guess, last)
+            except SpentError:
+                return reached
             except AnalysisError:
                 found = None
             # A large jump means that Newton's method has found another orbit.
-            if found is None or self._jumped(found.orbit, guess):
+            if found is None or self.jumped(found.orbit, guess) or not self._connected(last, guess, found):
                 target = 0.5 * (last.value + target)
                 if abs(target - last.value) < smallest:
                     return reached
@@ -214,14 +351,23 @@ class Samples:
             behind, target = [last, found], longer if abs(value - longer) > smallest and longer < value else value
         return reached
 
-    def _ends_in(self, last: Sample, fold: Fold) -> bool:
-        """Whether a fold is just past the last sample, on the same orbit; others may be anywhere."""
-        further = fold.value - last.value
-        return (
-            bool(np.isfinite(fold.error_bound))
-            and -fold.error_bound <= further <= self.width / _FIRST_STEPS
-            and not self._jumped(fold.image.state, last.orbit)
-        )
+    def _connected(self, last: Sample, guess: Array, found: Sample) -> bool:
+        """Whether an orbit that was not foreseen is on the branch of the last one: then there is one about halfway
+        between them, in a fold at the square root of a half; to another orbit it is a jump at any place."""
+        change = found.orbit - last.orbit
+        size = self.size * float((np.abs(change) / self.size).max())
+        if (np.abs(found.orbit - guess) <= np.maximum(_FORESEEN * size, _SMALL * self.size)).all():
+            return True
+        try:
+            middle = self._sampled(0.5 * (last.value + found.value), last.orbit + 0.5 * change, last)
+        except AnalysisError:
+            return False
+        return bool((np.abs(middle.orbit - last.orbit - 0.5 * change) <= _HALFWAY * size).all())
 
-    def _jumped(self, orbit: Array, guess: Array) -> bool:
-        return bool((np.abs(orbit - guess) > _JUMP * np.maximum(self._size, np.abs(guess))).any())
+    def jumped(self, orbit: Array, guess: Array) -> bool:
+        """Whether an orbit is so far from what was foreseen that it must be another one."""
+        return bool((np.abs(orbit - guess) > _JUMP * np.maximum(self.size, np.abs(guess))).any())
+
+
+def _sample(value: float, orbit: Orbit) -> Sample:
+    return Sample(value, orbit.state, orbit.image)

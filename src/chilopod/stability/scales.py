@@ -43,6 +43,10 @@ def sizes(system: SystemLike, x: Array, duration: float) -> Array:
         raise AnalysisError("the flow is not finite over one return", field="flow")
     size = np.maximum(np.abs(x), np.abs(later))
     if not size.any():
+        if not (derivative - np.diag(np.diag(derivative))).any():  # a map, which has no parts
+            derivative = system.flow(np.array(x), 0.0, duration)[1]
+            if not np.isfinite(derivative).all():
+                raise AnalysisError("the flow is not finite over one return", field="flow")
         return numerical_balance(derivative)
     coupling = np.abs(derivative)
     np.fill_diagonal(coupling, 0.0)

@@ -42,6 +42,10 @@ def split_product(factors: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]
         Unit eigenvectors as columns, the largest entry real and positive, shape (n, n).
     """
     n = factors[0].shape[0]
+    if n == 1:  # nothing to be split
+        values = np.array([factor[0, 0] for factor in factors])
+        angle = np.pi if (values < 0.0).sum() % 2 else 0.0
+        return np.array([np.log(np.abs(values)).sum() + 1j * angle]), np.ones((1, 1), dtype=np.complex128)
     slow, growth, slow_motion = _iterate(factors, n)
     inverses: list[Array] = [np.linalg.inv(factor).astype(np.float64, copy=False) for factor in reversed(factors)]
     fast, _, fast_motion = _iterate(inverses, n)

@@ -13,6 +13,7 @@ from chilopod.errors import ParameterError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.arguments import finite_array
 from chilopod.stability.capabilities import Stretched
+from chilopod.stability.scales import numerical_balance
 
 Array = NDArray[np.float64]
 
@@ -21,6 +22,9 @@ Flow = Callable[[Array, float, float], tuple[Array, Array]]
 
 _HIGHEST_ORDER = 1000
 _SAME = 1e-8  # of the size of a matrix
+_ROUND_OFF = (
+    1e-7  # of the largest entry, in units that balance the matrix: with the above, a few units in the last place
+)
 
 
 @dataclass(frozen=True)
@@ -52,8 +56,9 @@ class PeriodicSystem(ReadOnlyArrays):
     velocity
         ``velocity(x)`` -> dx/dt, shape (n,), of a system that does not depend on time.
     guess_period
-        About how long an orbit of such a system takes.
-    flow_with_error, flow_states, flow_frame, is_stiff
+        About how long an orbit of such a system takes; orbits have their own, shortest period, also where this is
+        nearer to a multiple of it.
+    flow_with_error, flow_states, flow_tangents, flow_frame, is_stiff
         See :mod:`chilopod.stability.capabilities`.
     concurrent
         Whether flows may run in several threads at once, which :func:`chilopod.stability.sweep` then does.
@@ -72,6 +77,7 @@ class PeriodicSystem(ReadOnlyArrays):
         default=None, repr=False
     )
     flow_states: Callable[[Array, float, float], Array] | None = field(default=None, repr=False)
+    flow_tangents: Callable[[Array, Array, float, float], tuple[Array, Array]] | None = field(default=None, repr=False)
     flow_frame: Callable[[Array, Array, Array, float, float], Stretched] | None = field(default=None, repr=False)
     is_stiff: Callable[[], bool] | None = field(default=None, repr=False)
     concurrent: bool = field(default=False, repr=False)
@@ -144,8 +150,12 @@ def _order_of(entries: bytes, n: int) -> int:
     if not np.isfinite(matrix).all():
         return 0
     one = np.eye(len(matrix))
-    # Entries between states of different units are large and small in pairs, so the bound is entry by entry.
+    # Entries between states of different units are large and small in pairs, so the bound is entry by entry; those that
+    # are nothing but round-off of the others (the cosine of a right angle) count as zero.
     sizes = np.abs(matrix)
+    units = numerical_balance(matrix)
+    balanced = float((sizes * units / units[:, None]).max())
+    sizes = np.maximum(sizes, _ROUND_OFF * balanced * units[:, None] / units)
     power, reach = matrix, sizes
     for k in range(1, _HIGHEST_ORDER + 1):
         if (np.abs(power - one) <= _SAME * np.maximum(reach, one)).all():

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, Step
-from chilopod.stability.branches.branch_starts import Start, anchored, begin, branch_sizes, switch
+from chilopod.stability.branches.branch_starts import IN_FOLD, Start, anchored, begin, branch_sizes, switch
 from chilopod.stability.branches.closure import closes
 from chilopod.stability.branches.curve import PRECISION, Curve, OutsideIntervalError
 from chilopod.stability.branches.inspection import Found, inspect
@@ -172,10 +172,10 @@ def follow(
         raise ParameterError("must be positive", field="step", value=step)
     curve = Curve(family, high - low, between=between, symmetric=symmetric, precision=precision, budget=budget)
     anchor = _anchored(family, curve, start, low, step)
-    return _followed(
-        curve, Branch((anchor.last,), Ending.ENOUGH_POINTS, step, curve.periods, symmetric), anchor, points, longest,
-        closely, progress,
-    )  # fmt: skip
+    in_fold = anchor.last.special is None and abs(float(anchor.last.tangent[-1])) <= IN_FOLD
+    remarks = ("the branch starts in a fold",) if in_fold else ()
+    branch = Branch((anchor.last,), Ending.ENOUGH_POINTS, step, curve.periods, symmetric, remarks=remarks)
+    return _followed(curve, branch, anchor, points, longest, closely, progress)
 
 
 def proceed(
@@ -350,14 +350,15 @@ def _take_error(curve: Curve, found: list[BranchPoint]) -> None:
         return
     sizes = curve.units(point.orbit.size)[:-1]
     wrong = image.error * sizes / sizes[:, None] if isinstance(image.error, np.ndarray) else image.error
-    size = float(np.linalg.norm(image.jacobian * sizes / sizes[:, None]))
-    curve.relative_error = float(np.max(wrong)) / size if size > 0.0 else 0.0
+    # Of the first orbit hardly a trace may be left after a return; of others there is more.
+    size = max(1.0, float(np.linalg.norm(image.jacobian * sizes / sizes[:, None])))
+    curve.relative_error = float(np.max(wrong)) / size
 
 
 def _taken(curve: Curve, anchor: Anchor, size: float) -> tuple[Step, bool]:
     """A step of a size, or a shorter one to the end of the interval, and whether it is that."""
     last = anchor.last
-    guess, matrix = curve.predicted(anchor, size)
+    guess = curve.predicted(anchor, size)[0]
     low, high = ((end - last.value) / curve.scale for end in curve.between)
     left = not low <= guess[-1] <= high
     step: Step | None = None
@@ -368,13 +369,11 @@ def _taken(curve: Curve, anchor: Anchor, size: float) -> tuple[Step, bool]:
             left = True
     if step is None:
         end = curve.between[0] if abs(guess[-1] - low) < abs(guess[-1] - high) else curve.between[1]
-        target = (end - last.value) / curve.scale
-        place = _reaches(curve, anchor, size, target)
-        guess, matrix = curve.predicted(anchor, place)
-        guess[-1] = target
-        step = curve.to_value(anchor, end, guess, matrix)
-        if not 0.0 < step.size <= _OVER * size:
-            raise AnalysisError("the curve does not reach the end of the interval so soon", field="step")
+        try:
+            step = _to_end(curve, anchor, size, end)
+        except AnalysisError:
+            # It may turn back just before the end, or in it.
+            step, left = curve.step(anchor, size), False
     length = float(np.linalg.norm(step.moved))
     if not step.size >= _STRAIGHT * length:
         raise AnalysisError("the step went astray", field="step")
@@ -383,6 +382,18 @@ def _taken(curve: Curve, anchor: Anchor, size: float) -> tuple[Step, bool]:
         if not float(np.linalg.norm(half.moved - step.between(half.size)[0])) <= _AWAY * length:
             raise AnalysisError("the curve is not smooth within the step", field="step")
     return step, left
+
+
+def _to_end(curve: Curve, anchor: Anchor, size: float, end: float) -> Step:
+    """A step that ends on the interval's end, about as long as it was to be."""
+    target = (end - anchor.last.value) / curve.scale
+    place = _reaches(curve, anchor, size, target)
+    guess, matrix = curve.predicted(anchor, place)
+    guess[-1] = target
+    step = curve.to_value(anchor, end, guess, matrix)
+    if not 0.0 < step.size <= _OVER * size:
+        raise AnalysisError("the curve does not reach the end of the interval so soon", field="step")
+    return step
 
 
 def _reaches(curve: Curve, anchor: Anchor, size: float, target: float) -> float:

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.asked import Asking
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.capabilities import Family, given_scale, is_autonomous, known_orbit
@@ -19,9 +20,13 @@ from chilopod.stability.scales import sizes
 
 Array = NDArray[np.float64]
 
+IN_FOLD = 1e-6
+"""Part of a unit tangent along the parameter below which a curve starts in a fold, as closely as its start is known."""
+
 _BESIDE = 1e-3  # in units: where second differences are taken
 _SINGULAR = 1e-9  # of the largest singular value: below it another curve passes
 _BENT = 0.3  # of a change of state: by so much a map departs from its linear part at the size of a state
+_PARTS = 2.0**-8, 2.0**-4  # of a return
 _DECADES, _HALVINGS = 12, 12  # of the size, on its logarithm
 
 
@@ -87,11 +92,13 @@ def begin(
     Raises
     ------
     AnalysisError
-        If there is no orbit near the guess.
+        If there is no orbit near the guess, or ``family`` raises an exception.
     """
-    system = family(value)
-    guess = known_state(system) if orbit is None else orbit
-    found = find_orbit(system if symmetric else whole_period(system, periods), guess, with_error=False)
+    with Asking("family", value):
+        system = family(value)
+        guess = known_state(system) if orbit is None else orbit
+        studied = system if symmetric else whole_period(system, periods)
+        found = find_orbit(studied, guess, with_error=False, shortest=periods == 1)
     period = found.period if is_autonomous(system) else None
     return Start(float(value), found.state, rising, periods=periods, period=period)
 
@@ -140,7 +147,7 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
     system = family(point.value)
     period = None
     if is_autonomous(system):
-        period = find_orbit(whole_period(system, periods), point.orbit, with_error=False).period
+        period = find_orbit(whole_period(system, periods), point.orbit, with_error=False, shortest=periods == 1).period
     if kind is Kind.PERIOD_DOUBLING:
         twice = None if period is None else 2.0 * period
         return tuple(
@@ -169,17 +176,27 @@ def branch_sizes(curve: Curve, x: Array, value: float, section: Section | None) 
     direction = base * direction / np.abs(direction).max()
     if image.velocity is not None and image.normal is not None:
         direction -= image.velocity * float(image.normal @ direction) / float(image.normal @ image.velocity)
-    linear = image.jacobian @ direction
-    reach = max(float(np.abs(linear / base).max()), 1.0)
+    returned = image.state, image.jacobian @ direction
+    flown = []
+    for part in _PARTS:
+        state, derivative = system.flow(np.array(x), 0.0, part * image.period / image.returns)
+        flown.append((part, (state, derivative @ direction)))
+
+    def departs(states: Array, linear: tuple[Array, Array], r: float) -> bool:
+        reach = max(float(np.abs(linear[1] / base).max()), 1.0)
+        return not float(np.abs((states - linear[0] - r * linear[1]) / base).max()) <= _BENT * r * reach
 
     def bent(r: float) -> bool:
+        # A map that contracts strongly forgets where it was taken: then the way there is bent, not its end.
         try:
             with np.errstate(all="ignore"):
-                moved = returned_states(system, (x + r * direction)[None], section)[0] - image.state
+                there = x + r * direction
+                return departs(returned_states(system, there[None], section)[0], returned, r) or any(
+                    departs(system.flow(np.array(there), 0.0, part * image.period / image.returns)[0], linear, r)
+                    for part, linear in flown
+                )
         except (AnalysisError, ArithmeticError, ValueError):
             return True
-        off = float(np.abs((moved - r * linear) / base).max())
-        return not off <= _BENT * r * reach
 
     step = 0.1 if bent(1.0) else 10.0
     low = high = 1.0
@@ -245,7 +262,7 @@ def _along(matrix: Array, rising: bool) -> Array:
         )
     tangent: Array = rows[-1]
     # At a fold neither way rises: then along the largest part of the state.
-    along = tangent[-1] if abs(tangent[-1]) > 1e-6 else tangent[np.abs(tangent).argmax()]
+    along = tangent[-1] if abs(tangent[-1]) > IN_FOLD else tangent[np.abs(tangent).argmax()]
     return tangent if bool(along > 0.0) is rising else -tangent
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import read_only
+from chilopod.stability.asked import Asking
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, Step
 from chilopod.stability.capabilities import Family, FlowsEach, SystemLike, is_autonomous, returns_per_period
 from chilopod.stability.floquet import across
@@ -31,10 +32,11 @@ _COUNTED = 1e-10  # residuals above it count as corrections, by which steps grow
 _SETTLED = 1e-8  # residual below which it may stop falling
 _FALLING = 0.5
 _MOST_CORRECTIONS = 12
+_STRAYS = 0.1  # of a step: so far beyond the interval a curve is sought that ends within it
 _PARAMETER_STEP = 1e-6  # of the difference, in units of the scale
 _SHARPEST_TURN = 0.5  # cosine between two tangents: beyond it the step may have landed on another curve
+_SHRUNK = 1e-4  # of the largest motion so far: smaller ones are none
 _KEPT = 8  # systems: making one may cost more than a flow
-_USER_ERRORS = (ArithmeticError, ValueError, np.linalg.LinAlgError)
 
 
 class Curve:
@@ -84,8 +86,10 @@ class Curve:
         self.precision = precision
         self.left = budget
         self.relative_error: float | None = None
+        self._motion = 0.0  # the largest within a period so far
         self._known: dict[float, tuple[SystemLike, SystemLike]] = {}
         self._each: dict[type, bool] = {}
+        self._dimension = 0
 
     def system(self, value: float) -> SystemLike:
         """What is studied: over the full period, or as many as the orbits take."""
@@ -95,10 +99,13 @@ class Curve:
         """The family's system, and what is studied of it."""
         known = self._known.get(value)
         if known is None:
-            try:
+            with Asking("family", value):
                 own = self._family(value)
-            except _USER_ERRORS as error:
-                raise AnalysisError(f"has no system here ({error})", field="family", value=value) from error
+            self._dimension = self._dimension or own.dimension
+            if own.dimension != self._dimension:
+                raise AnalysisError(
+                    "changes its dimension", field="family", value=value, allowed=f"{self._dimension} states"
+                )
             whole = self.symmetric or (own.symmetry is None and self.periods == 1)
             known = own, own if whole else whole_period(own, self.periods)
             if len(self._known) >= _KEPT:
@@ -114,12 +121,10 @@ class Curve:
         """The return map and its derivative."""
         system = self.system(value)
         self.left -= 1
-        try:
+        with Asking("flow", value):
             if section is None and system.period is None:
                 section = section_at(system, x, self.sizes)
             return return_map(system, x, with_error, section)
-        except _USER_ERRORS as error:
-            raise AnalysisError(f"cannot be evaluated ({error})", field="flow", value=value) from error
 
     def parameter_derivative(self, x: Array, value: float, section: Section | None = None) -> Array:
         """dH/dp at a state, per scale, shape (n,)."""
@@ -225,6 +230,7 @@ class Curve:
         units = self.units(n)
         moved, matrix = np.array(guess), np.array(matrix)
         matrix[-1] = row
+        by_parameter = matrix[:n, n]
         try:
             inverse = np.linalg.inv(matrix)
         except np.linalg.LinAlgError:
@@ -234,11 +240,14 @@ class Curve:
         rounds = corrections = 0
         while True:
             x = last.orbit + units[:n] * moved[:n]
-            here = last.value + self.scale * float(moved[n]) if value is None else value
-            if not self.between[0] <= here <= self.between[1]:
-                raise OutsideIntervalError("leaves the interval", field="parameter", value=here)
+            wanted = last.value + self.scale * float(moved[n]) if value is None else value
+            here = min(max(wanted, self.between[0]), self.between[1])
+            # A curve that turns back at the end of the interval is sought beyond it on the way there.
+            strays = (wanted - here) / self.scale
+            if abs(strays) > _STRAYS * float(np.linalg.norm(guess)):
+                raise OutsideIntervalError("leaves the interval", field="parameter", value=wanted)
             mapped, beside = self._mapped(x, here, section)
-            residual = np.append((mapped - x) / units[:n], row @ moved - target)
+            residual = np.append((mapped - x) / units[:n] + strays * by_parameter, row @ moved - target)
             now = float(np.abs(residual).max())
             if not np.isfinite(now) or (now > 10.0 * largest and now > _SETTLED):
                 raise AnalysisError("corrections diverge", field="step")
@@ -260,6 +269,8 @@ class Curve:
             moved = moved + move
             rounds += 1
             corrections += now > _COUNTED * size
+        if abs(strays) > self.precision:
+            raise OutsideIntervalError("leaves the interval", field="parameter", value=wanted)
         image = self.image(x, here, section)
         derivative = self._difference(x, here, section, mapped, beside)
         bordered = self.matrix(image.jacobian, derivative, last.tangent)
@@ -281,7 +292,13 @@ class Curve:
             section = section_at(system, x, self.sizes, image.period / image.returns)
             assert section is not None
             assert is_autonomous(system)
-            along = self._projection(np.asarray(system.velocity(x)), section)
+            velocity = np.asarray(system.velocity(x))
+            motion = float(np.linalg.norm(velocity / self.units(x.size)[:-1])) * image.period
+            self._motion = max(self._motion, motion)
+            # Past an equilibrium come the same orbits again, half a period later.
+            if motion < _SHRUNK * self._motion or not float(anchor.section.normal @ velocity) > 0.0:
+                raise AnalysisError("the orbit shrinks into an equilibrium: a Hopf point", field="orbit")
+            along = self._projection(velocity, section)
             tangent, matrix = np.array(tangent), np.array(matrix)
             tangent[:-1] = along @ tangent[:-1]
             tangent /= np.linalg.norm(tangent)
@@ -316,7 +333,7 @@ class Curve:
         """H at a state, and at a neighbouring value of the parameter if that costs no time."""
         self.left -= 1
         own, system = self._systems(value)
-        try:
+        with Asking("flow", value):
             period = own.period
             if section is None and period is not None and not self.symmetric and self.periods == 1:
                 beside = self._systems(value + self._parameter_step(value))[0] if self._flows_each(own) else own
@@ -325,10 +342,7 @@ class Curve:
                     both: Sequence[FlowsEach] = [own, beside]
                     mapped, moved = own.flow_each(both, np.array([x, x]), 0.0, period)
                     return (mapped, moved) if same else (mapped, None)
-            mapped = returned_states(system, x[None], section)[0]
-        except _USER_ERRORS as error:
-            raise AnalysisError(f"cannot be evaluated ({error})", field="flow", value=value) from error
-        return mapped, None
+            return returned_states(system, x[None], section)[0], None
 
     def _flows_each(self, system: SystemLike) -> TypeGuard[FlowsEach]:
         """Whether a system flows each; asked once for each class, for the answer takes longer than some flows."""
@@ -348,10 +362,8 @@ class Curve:
         step = self._parameter_step(value)
         if beside is None:
             self.left -= 1
-            try:
+            with Asking("flow", value + step):
                 beside = returned_states(self.system(value + step), x[None], section)[0]
-            except _USER_ERRORS as error:
-                raise AnalysisError(f"cannot be evaluated ({error})", field="flow", value=value) from error
         difference: Array = (beside - mapped) / (step / self.scale)
         return difference
 

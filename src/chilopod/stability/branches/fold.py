@@ -18,6 +18,7 @@ from chilopod.stability.returns import ReturnMap, return_map, section_at
 Array = NDArray[np.float64]
 
 _STEPS = 40
+_FLOWS = 2000  # a step
 _STEP = 0.01  # along the curve, in units of the states' sizes and the parameter's scale
 
 
@@ -40,24 +41,26 @@ class Fold:
     image: ReturnMap
 
 
-def find_fold(family: Family, value: float, orbit: Array, scale: float) -> Fold | None:
-    """Follow an orbit, towards a rising parameter, round the fold next to it; None if there is none.
+def find_fold(family: Family, value: float, orbit: Array, scale: float, rising: bool = True) -> Fold | None:
+    """Follow an orbit round the fold next to it; None if there is none.
 
     Parameters
     ----------
     family
         ``family(value)`` is the system; orbits with its symmetry in time are looked at.
     value, orbit
-        Parameter and orbit to start from, close to the fold.
+        Parameter and orbit to start from, near the fold but not in it: a curve that starts in a fold does not pass it.
     scale
         Of the parameter: the fold is looked for as far away as that.
+    rising
+        Whether it is looked for at higher values, or at lower ones.
     """
     between = value - scale, value + scale
     try:
-        start = begin(family, value, orbit, symmetric=True)
-        branch = follow(family, start, between, points=1, step=_STEP, closely=False, symmetric=True)
+        start = begin(family, value, orbit, rising, symmetric=True)
+        branch = follow(family, start, between, points=1, step=_STEP, closely=False, symmetric=True, budget=_FLOWS)
         while not _folds(branch) and branch.ending is Ending.ENOUGH_POINTS and len(branch.points) < _STEPS:
-            branch = proceed(family, branch, between, points=1, closely=False)
+            branch = proceed(family, branch, between, points=1, closely=False, budget=_FLOWS)
         fold = next(iter(_folds(branch)), None)
         if fold is None or fold.bifurcation is None:
             return None

@@ -12,7 +12,7 @@ A determinant that changes its sign where no branches meet tells of a step that 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -125,8 +125,10 @@ def _places(within: Within, brackets: list[Bracket] | None, turned: bool) -> tup
         roots = [(event, _root(within, event, a, b)) for event, a, b in brackets]
     roots = [(event, root) for event, root in roots if root > _CLOSE * step.size]
     places = [_placed(within, event, root) for event, root in roots]
-    if turned and not any(place.fold for place in places):
-        places.append(_fold(within, 0.0, step.size))
+    if turned and not any(place.fold or place.branching for place in places):
+        fold = _fold(within, 0.0, step.size)
+        # Where branches meet the tangent is uncertain, and may seem to turn.
+        places.append(replace(fold, fold=False, branching=True) if _branches_meet(within.at(fold.place)) else fold)
     return sorted(places, key=lambda place: place.place), remarks
 
 

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.asked import Asking
 from chilopod.stability.capabilities import KnowsOrbit, Scaled, SystemLike
 from chilopod.stability.codimension_two.mirrored import symmetric_states
 from chilopod.stability.orbits import from_known, known_state
@@ -200,7 +201,9 @@ class Equations:
 
     def system(self, values: Array) -> SystemLike:
         """The system at values of both parameters."""
-        return self._family2(float(values[0]), float(values[1]))
+        first, second = float(values[0]), float(values[1])
+        with Asking("family", (first, second)):
+            return self._family2(first, second)
 
     def begin(self, place: Place) -> Spot:
         """The point of the curve nearest to a place that is close to it."""
@@ -280,10 +283,11 @@ class Equations:
             raise OutOfBudget("as many return maps as were allowed have been evaluated", field="budget")
         self._left -= 1
         system = self.system(place.values)
-        if self.known:
-            orbit = from_known(system, known_state(system), with_error)
-            return replace(place, state=orbit.state), orbit.image
-        return place, return_map(system, place.state, with_error, section)
+        with Asking("flow", tuple(place.values.tolist())):
+            if self.known:
+                orbit = from_known(system, known_state(system), with_error)
+                return replace(place, state=orbit.state), orbit.image
+            return place, return_map(system, place.state, with_error, section)
 
     def _size(self, system: SystemLike, place: Place, image: ReturnMap, section: Section | None) -> Array:
         size = sizes(system, place.state, image.period / image.returns)

@@ -53,8 +53,9 @@ class Point2(ReadOnlyArrays):
     frequency
         Angular frequency (1/s) of the critical mode over the full period, as of a :class:`BifurcationPoint`.
     coefficient, coefficient_error
-        Of the normal form of the full period, with the amplitude along ``mode``: the quadratic one of a fold or a
-        transcritical point, the cubic one of all others; None where there is none or it was not asked for.
+        Of the normal form, of the map that a :class:`BifurcationPoint` has it of (of two periods at a period doubling):
+        the quadratic one of a fold or a transcritical point, the cubic one of all others; None where there is none or
+        it was not asked for.
     """
 
     values: Array

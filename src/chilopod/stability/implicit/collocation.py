@@ -6,14 +6,14 @@ sections IV.5 and IV.8). A step solves
 
     Y_i = x + h sum_j a_ij f(t + c_j h, Y_j),        x(t + h) = Y_s,
 
-by Newton's method with the jacobian of every stage, not that of the start for all of them: the matrix of its last round,
-1 - h a_ij J_j in block (i, j), is then the one in the derivative of these equations with respect to x,
+by Newton's method with the jacobian of every stage, not that of the start for all of them: the matrix of its last
+round, 1 - h a_ij J_j in block (i, j), is then the one in the derivative of these equations with respect to x,
 
     dY_i - h sum_j a_ij J_j dY_j = 1,
 
 so one decomposition gives the exact derivative of the discrete map, all columns of it. The state and the columns of
-the derivative since the start are under step control together. A disturbance that decays fast makes short steps at the
-start, until it is gone, and long ones from there on.
+the derivative since the start are under step control together. A disturbance that decays fast makes short steps at
+the start, until it is gone, and long ones from there on.
 """
 
 from __future__ import annotations
@@ -40,6 +40,7 @@ _MOST_ROUNDS = 10
 _CLOSE = 1e-7
 """A move of Newton's method after which the next one is round-off."""
 _NOISE = 2.0**-51
+"""Round-off, of the terms whose difference is the estimate of an error."""
 _FASTEST_FALL, _FASTEST_GROWTH, _SAFETY = 0.1, 6.0, 0.9
 
 

@@ -138,7 +138,7 @@ def images(mapped: ReturnedStates, at: CriticalOrbit, displaced: Array) -> Array
 
 def sample(mapped: ReturnedStates, at: CriticalOrbit, curve: Curve, radius: float, noise: float) -> Sampled | None:
     """The map on a curve up to a radius; None where it does not exist. ``noise`` is relative, see
-    :func:`chilopod.stability.normal_form.normal_form`."""
+    :func:`chilopod.stability.normal_forms.normal_form.normal_form`."""
     directions = turns(at)
     displaced = displacements(at, curve, radius * radii()[:, None] * directions)
     highest = np.power(radius, _HIGHEST)

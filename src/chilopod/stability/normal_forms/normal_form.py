@@ -26,11 +26,14 @@ _START = 0.2  # of the scale of the states, where the search for the amplitude s
 
 @dataclass(frozen=True)
 class NormalForm:
-    """Leading coefficients of the full-period map on the critical space.
+    """Leading coefficients of the map over one period of the orbit, or over two at a period doubling, on the critical
+    space.
 
     With a the amplitude along the unit critical mode: real multiplier +1, a -> a + quadratic a^2 + cubic a^3. A
-    multiplier -1 of the return map: the same, of the first map that has +1 again: the full period's where that is an
-    even number of returns, else that of two periods. Neimark-Sacker (state = 2 Re(a mode)): |a| -> |a| + cubic |a|^3,
+    multiplier -1 of the return map: the same, of the first map that has +1 again. That is the map over one period where
+    a period is an even number of returns (a pitchfork that breaks a symmetry in time). Else it is the map over two
+    periods (a period doubling): where one period maps a to -a + b a^2 + d a^3, ``cubic`` is -2 (b^2 + d), and
+    ``quadratic`` is zero. Neimark-Sacker (state = 2 Re(a mode)): |a| -> |a| + cubic |a|^3,
     while the phase of a advances by that of the multiplier + rotation |a|^2.
 
     A mode that is k times as long (because a unit is) has amplitudes that are 1/k of these, and so coefficients that

@@ -32,7 +32,7 @@ def quintic_term(mapped: ReturnedStates, at: CriticalOrbit, fit: Fit, noise: flo
 
     The manifold is W(a) = x + a q + a^2 w2 + a^3 w3 + a^4 w4, without a part along q at resonant orders; the map on it
     is g(a), and H(W(a)) = W(g(a)) gives one w after another. Arguments as for
-    :func:`chilopod.stability.normal_form.normal_form`, and the terms up to third order.
+    :func:`chilopod.stability.normal_forms.normal_form.normal_form`, and the terms up to third order.
     """
     best, best_error = np.nan, np.inf
     for times in _AMPLITUDES:

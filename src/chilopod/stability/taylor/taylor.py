@@ -13,6 +13,7 @@ its parameters are an argument of every call, so one object serves a whole famil
   the state jumps to r_k(t, x). The derivative gets the saltation matrix. ``passage.events`` has their
   times and numbers. What happens at the start: :func:`chilopod.stability.taylor.switching.await_events`.
 * :meth:`TaylorFlow.advance` raises ``AnalysisError`` where the motion cannot go on (see ``_REASONS``), with the time.
+* :meth:`TaylorFlow.tangents` carries any directions in place of the whole derivative.
 * :meth:`TaylorFlow.states` carries many states without derivatives, on all cores; each with parameters of its own if
   there is a row for each.
 
@@ -169,8 +170,7 @@ class TaylorFlow(ReadOnlyArrays):
         # Copies, because compiled code is compiled anew for arrays that are read-only.
         x, params = np.array(x, dtype=np.float64), np.array(params, dtype=np.float64)
         if not bounded:
-            size = n if derived else 0
-            derivative = np.eye(size)
+            derivative = np.eye(n) if derived else np.empty((n, 0))
             events, steps = self._run(x, t0, t1, params, derivative, _NOTHING, self.order, 0.0)
             return Passage(x, derivative, _NOTHING, events, steps)
         other_x = x * (1.0 + _SHAKE * np.sign(np.cos(3.0 * np.arange(n) + 1.0)))
@@ -183,15 +183,27 @@ class TaylorFlow(ReadOnlyArrays):
         bound = bound * (1.0 + _COMMON * usual) + _OWN * difference
         return Passage(x, derivative, bound, events, steps)
 
+    def tangents(self, x: Array, directions: Array, t0: float, t1: float, params: Array) -> tuple[Array, Array]:
+        """State at t1, and the derivative with respect to ``x`` times ``directions``, shape (n, any number).
+
+        The series of the directions themselves are carried, so that the work is that of their number, and no matrix of
+        shape (n, n) is made. Raises as :meth:`advance`.
+        """
+        x, params = np.array(x, dtype=np.float64), np.array(params, dtype=np.float64)
+        images = np.array(directions, dtype=np.float64, order="C")
+        self._run(x, t0, t1, params, images, _NOTHING, self.order, 0.0, stepwise=False)
+        return x, images
+
     def states(self, states: Array, t0: float, t1: float, params: Array) -> Array:
         """Carry many states, shape (states, n); ``params`` has shape (parameters,) or (states, parameters)."""
         states = np.array(states, dtype=np.float64, order="C")
         params = np.asarray(params, dtype=np.float64)
         rows = np.array(np.broadcast_to(params, (states.shape[0], params.shape[-1])))
+        none = np.empty((self.tape.dimension, 0))
 
         def carry(numbers: range) -> None:
             for i in numbers:
-                self._run(states[i], t0, t1, rows[i], _NOTHING, _NOTHING, self.order, 0.0)
+                self._run(states[i], t0, t1, rows[i], none, _NOTHING, self.order, 0.0)
 
         threads = min(cores(), states.shape[0] // _FEWEST_PER_THREAD)
         if threads > 1:
@@ -202,7 +214,16 @@ class TaylorFlow(ReadOnlyArrays):
         return states
 
     def _run(
-        self, x: Array, t0: float, t1: float, params: Array, derivative: Array, bound: Array, order: int, shake: float
+        self,
+        x: Array,
+        t0: float,
+        t1: float,
+        params: Array,
+        derivative: Array,
+        bound: Array,
+        order: int,
+        shake: float,
+        stepwise: bool = True,
     ) -> tuple[Array, int]:
         events = np.empty((_MOST_EVENTS if self.directions else 0, 2))
         report = np.zeros(4)
@@ -221,6 +242,7 @@ class TaylorFlow(ReadOnlyArrays):
                 order,
                 self.most_steps,
                 shake,
+                stepwise,
                 derivative,
                 bound,
                 events,

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from chilopod.stability.unit_circle.critical import Critical, Group, Point, Root
+from chilopod.stability.unit_circle.critical import LOST, UNKNOWN, Critical, Group, Point, Root
 from chilopod.stability.unit_circle.spectra import Event, Spectra
 from chilopod.stability.unit_circle.zeros import Interval
 
@@ -74,7 +74,7 @@ class Accounts:
     def balance(self, roots: list[Root]) -> list[Point]:
         """Points that explain the counts, in order."""
         self._spectra.at(np.array(self._ends))
-        roots = [root for root in roots if self._is_critical(root)]
+        roots = [root for root in roots if self._is_critical(root) or self._lost(root)]
         for _ in range(_ROUNDS):
             roots, points, again = self._walk(sorted(_without_shadows(roots), key=lambda root: root.place))
             if not again:
@@ -136,6 +136,8 @@ class Accounts:
                 if self._is_critical(end):
                     kept.append(end)
                     points.append(self._at_end(end, decided))
+                else:
+                    self._lost(end)
         index = 0
         for (x, before), (y, after) in itertools.pairwise(decided):
             inside = []
@@ -196,6 +198,14 @@ class Accounts:
 
     def _is_critical(self, root: Root) -> bool:
         return self._spectra.exists(root.place) and bool(self._critical.groups(root))
+
+    def _lost(self, root: Root) -> bool:
+        """Say so where a root is none only because the multipliers there are not known; False."""
+        if self._spectra.exists(root.place) and float(self._critical.tolerances(root).max()) > UNKNOWN:
+            gap = root.left, root.right
+            if gap not in self._settled and not (root.touch and root.event is not None):
+                self._remark(LOST, gap)
+        return False
 
     def _explains(self, root: Root, change: int) -> bool:
         """Whether a change of the count is what the critical multipliers at a root may do."""
@@ -259,6 +269,11 @@ class Accounts:
                 break  # errors were not what they were said to be
             most = min(200, max(self._spectra.left, 1))
             place = float(brentq(margin, x, y, xtol=5e-324, rtol=4 * _EPSILON, maxiter=most, disp=False))
+            if not self._spectra.exists(place):
+                self.spent |= self._spectra.left <= 0
+                if not self.spent:
+                    self._remark(f"{after - before:+d} multipliers outside, and no matrices in between", (x, y))
+                break
             reach = 4.0 * _EPSILON * abs(place)
             root = Root(place, max(place - reach, x), min(place + reach, y), None, False)
             if self._jumps(place, rank):
@@ -271,7 +286,7 @@ class Accounts:
                 continue
             if all(abs(place - other.place) > 4.0 * reach for other in roots) and self._is_critical(root):
                 roots.append(root)
-        if not roots and not self._settled & set(self._gaps(x, y)):
+        if not roots and not self.spent and not self._settled & set(self._gaps(x, y)):
             self._remark(f"{after - before:+d} multipliers outside, and none found on the circle", (x, y))
         return roots
 

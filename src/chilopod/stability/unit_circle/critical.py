@@ -11,6 +11,11 @@ from chilopod.stability.unit_circle.spectra import Event, Spectra
 
 Array = NDArray[np.float64]
 
+UNKNOWN = 1.0
+"""Error of a multiplier's margin that reaches from zero to the circle, and so tells nothing of where it is."""
+
+LOST = "multipliers are so large that those near the circle are lost in round-off"
+
 _ULPS = 64.0
 
 
@@ -87,6 +92,9 @@ class Critical:
         nu = self._spectra.at(np.array([root.place]))[0]
         margins, tolerances = self._spectra.margins(root.place), self.tolerances(root)
         critical = nu[np.abs(margins) <= tolerances]
+        if root.event is None:
+            # No function vanishes here: what may be anywhere is not on the circle for that.
+            critical = nu[(np.abs(margins) <= tolerances) & (tolerances <= UNKNOWN)]
         groups = []
         rest = critical
         for event, target in ((Event.MINUS, -1.0), (Event.PLUS, 1.0)):
@@ -97,6 +105,8 @@ class Critical:
             )
             # A real multiplier on the circle is nowhere else.
             near = near | ((rest.imag == 0.0) & (rest.real * target > 0.0))
+            # However large errors are, what is critical is so at the nearer of the two.
+            near = near & (rest.real * target > 0.0)
             number = int(near.sum()) - self._idle[event]
             if number > 0 and (not self._conservative or root.event in (event, None)):
                 best = complex(rest[near][np.abs(rest[near] - target).argmin()])

@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 
 from chilopod.errors import ParameterError
 from chilopod.stability.unit_circle.counts import Accounts
-from chilopod.stability.unit_circle.critical import Root
+from chilopod.stability.unit_circle.critical import LOST, Root
 from chilopod.stability.unit_circle.spectra import Event, Matrices, Spectra, margins
 from chilopod.stability.unit_circle.zeros import Interval, Zeros, find_zeros, first_places
 
@@ -31,6 +31,9 @@ BUDGET = 5000
 _DECADES = 4.0
 _SEARCH = 0.7  # of the budget for the zeros of the functions; the rest for counting
 _IDLE = 1e-4  # factors larger than this are not looked at closely
+_HUGE = 1e150
+_TELLING = 0.1  # error of a factor that tells whether it vanishes
+_FEWEST_TELLING = 3  # places where it does
 _MOSTLY = 0.25  # of the first places may disagree on what vanishes everywhere: errors are estimates
 _MANY = 800  # pairs of multipliers; beyond that the bialternate product has too many zeros that mean nothing
 _PROBES = 65
@@ -106,19 +109,28 @@ class Crossings:
     evaluations: int
 
 
-def find_crossings(matrices: Matrices, low: float, high: float, *, budget: int = BUDGET) -> Crossings:
+def find_crossings(
+    matrices: Matrices,
+    low: float,
+    high: float,
+    *,
+    budget: int = BUDGET,
+    affordable: Callable[[], int] | None = None,
+) -> Crossings:
     """Find every value of a parameter at which eigenvalues of real matrices cross the unit circle.
 
     Parameters
     ----------
     matrices
-        ``matrices(values)``, values of shape (k,), gives the matrices, shape (k, m, m), and bounds on the relative
-        error of their entries, shape (k,). It raises AnalysisError, or gives NaN, where there is no matrix, and may be
-        asked for the same value twice.
+        ``matrices(values)``, values of shape (k,), gives the matrices, shape (k, m, m), and bounds on the error of
+        their entries: relative, shape (k,), or each, shape (k, m, m). It raises AnalysisError, or gives NaN, where
+        there is no matrix, and may be asked for the same value twice.
     low, high
         The interval.
     budget
         At how many values matrices may be asked for.
+    affordable
+        How many more matrices can be had, where that is for their cost to say: the search ends when it says none.
 
     Raises
     ------
@@ -139,7 +151,7 @@ def find_crossings(matrices: Matrices, low: float, high: float, *, budget: int =
         inner = np.clip(outward(places), low, high)
         return np.where(places <= a, low, np.where(places >= b, high, inner))
 
-    spectra = Spectra(lambda places: matrices(parameter(places)), budget)
+    spectra = Spectra(lambda places: matrices(parameter(places)), budget, affordable)
     return _Finder(spectra, a, b, lambda place: float(parameter(place))).found()
 
 
@@ -209,13 +221,20 @@ class _Finder:
             return 0
         numbers = []
         for place in places.tolist():
-            if self.spectra.smallest(place, event) > _IDLE:
+            # Of a matrix with a large eigenvalue the small ones are uncertain, and their products with it.
+            largest = max(1.0, float(np.abs(self.spectra.at(np.array([place]))).max()))
+            largest *= min(largest, _HUGE) if event is Event.PAIR else 1.0
+            if self.spectra.smallest(place, event) > _IDLE * largest:
                 numbers.append(0)
             else:
                 sizes, errors = self.spectra.distances(place, event)
-                numbers.append(int(np.argmin(np.append(sizes <= errors, False))))
+                if errors[0] <= _TELLING:
+                    numbers.append(int(np.argmin(np.append(sizes <= errors, False))))
             if numbers.count(0) > _MOSTLY * places.size:
                 return 0
+        if len(numbers) < _FEWEST_TELLING:
+            self._leave(LOST)
+            return 0
         return int(sorted(numbers)[int(_MOSTLY * len(numbers))])
 
     def _probe(self) -> None:
@@ -271,18 +290,22 @@ class _Finder:
         )
 
     def _roots(self, event: Event, idle: int, found: Zeros) -> list[Root]:
-        self.spent |= found.spent
+        self.spent |= found.spent or self.spectra.left <= 0
         if not found.spent:
             for piece in found.unresolved:
                 self._leave(f"the multipliers do not depend smoothly on the parameter {self._between(piece)}")
-        for piece in found.missing:
-            self._leave(f"there are no matrices {self._between(piece)}, or only in part")
+        if not self.spent:  # or they were not looked for
+            for piece in found.missing:
+                self._leave(f"there are no matrices {self._between(piece)}, or only in part")
         roots = []
         for left, right in found.changes:
             if self.spectra.left <= 0:
                 self.spent = True
                 break
             if event is Event.PAIR and not self.conservative and self.spectra.without_pair(left, right):
+                continue
+            if left == right and self.spectra.distances(left, event)[1][0] > _TELLING:
+                self._leave(f"{LOST}, at {self.parameter(left):.9g}")  # zero only by rounding
                 continue
             place = left if left == right else self._root(event, idle, left, right)
             reach = 4.0 * _EPSILON * abs(place)

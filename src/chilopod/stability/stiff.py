@@ -1,4 +1,4 @@
-"""A return cut into parts, and the eigenvalues of its derivative where some directions decay beyond all resolution.
+"""Eigenvalues of the derivative of a return where some directions decay beyond all resolution.
 
 Of a direction that decays by e^-1000 within a step of an implicit method, the derivative of the flow retains nothing,
 nor does it have to for the multipliers. Its exponent is the mean of the rates at which an orthonormal frame is
@@ -8,6 +8,7 @@ Russell and Van Vleck, *SIAM Journal on Numerical Analysis* 34, 402, 1997).
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,6 +19,8 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.capabilities import FlowsFrames, Stretched, SystemLike, is_autonomous
 from chilopod.stability.orbits import Orbit
+from chilopod.stability.returns import flow_with_error
+from chilopod.stability.scales import numerical_balance, sizes
 from chilopod.stability.splitting import intersection, split_leading
 
 Array = NDArray[np.float64]
@@ -52,6 +55,8 @@ class Cut(ReadOnlyArrays):
         Orthonormal bases in the borders: of the plane across the motion where the system does not depend on time.
     factors
         Derivatives of the flow over the parts in these bases; the last one with the symmetry in time.
+    errors
+        Bounds on the errors of their entries.
     basis
         The first section in the units of the states.
     """
@@ -60,23 +65,32 @@ class Cut(ReadOnlyArrays):
     states: Array
     sections: Sequence[Array]
     factors: Sequence[Array]
+    errors: Sequence[Array]
     basis: Array
 
 
-def cut_return(system: SystemLike, orbit: Orbit, units: Array, count: int) -> Cut:
-    """Cut a return into ``count`` parts, in units of the states, shape (n,)."""
-    times = np.linspace(0.0, orbit.image.period / orbit.image.returns, count + 1)
-    states, factors = [orbit.state], []
-    for t0, t1 in zip(times, times[1:], strict=False):
-        state, factor = system.flow(states[-1].copy(), float(t0), float(t1))
+def disturbed(factors: Sequence[Array], errors: Sequence[Array]) -> list[Array]:
+    """Factors that are off by their errors, with signs by chance."""
+    random = np.random.default_rng(0)
+    return [f + e * random.choice([-1.0, 1.0], f.shape) for f, e in zip(factors, errors, strict=True)]
+
+
+def _cut(system: FlowsFrames, orbit: Orbit, units: Array) -> Cut:
+    times = np.linspace(0.0, orbit.image.period / orbit.image.returns, _PARTS + 1)
+    states, factors, errors = [orbit.state], [], []
+    for t0, t1 in itertools.pairwise(times.tolist()):
+        state, factor, error = flow_with_error(system, states[-1].copy(), t0, t1)
         states.append(state)
         factors.append(factor * units / units[:, None])
-    factors[-1] = _turn(system, units) @ factors[-1]
+        errors.append(np.broadcast_to(error, factor.shape) * units / units[:, None])
+    turn = _turn(system, units)
+    factors[-1], errors[-1] = turn @ factors[-1], np.abs(turn) @ errors[-1]
     sections = [_section(system, state, units) for state in states[:-1]]
     sections.append(sections[0])
-    if is_autonomous(system):
-        factors = [after.T @ f @ before for f, before, after in zip(factors, sections, sections[1:], strict=False)]
-    return Cut(times, np.array(states), sections, factors, units[:, None] * sections[0])
+    borders = list(itertools.pairwise(sections))
+    factors = [after.T @ f @ before for f, (before, after) in zip(factors, borders, strict=True)]
+    errors = [np.abs(after.T) @ e @ np.abs(before) for e, (before, after) in zip(errors, borders, strict=True)]
+    return Cut(times, np.array(states), sections, factors, errors, units[:, None] * sections[0])
 
 
 def _turn(system: SystemLike, units: Array) -> Array:
@@ -91,8 +105,9 @@ def _section(system: SystemLike, state: Array, units: Array) -> Array:
     return basis
 
 
-def split_stiff(system: FlowsFrames, orbit: Orbit, units: Array) -> tuple[ComplexArray, ComplexArray, Array]:
-    """Logarithms of the eigenvalues of the return map, its eigenvectors in a basis, and this basis.
+def split_stiff(system: FlowsFrames, orbit: Orbit) -> tuple[ComplexArray, ComplexArray, Array, Array]:
+    """Logarithms of the eigenvalues of the return map, its eigenvectors in a basis, this basis, and how far the
+    logarithms move with the errors.
 
     Directions that the derivative of the flow resolves are split by it; the others, which have to be real and of
     different sizes, have the stretch of the frame and its sign. The fastest has all digits, by Liouville's formula; two
@@ -103,7 +118,13 @@ def split_stiff(system: FlowsFrames, orbit: Orbit, units: Array) -> tuple[Comple
     AnalysisError
         If they are not.
     """
-    cut = cut_return(system, orbit, units, _PARTS)
+    image = orbit.image
+    # The derivative on a section may be nothing but round-off; an orbit that moves has sizes of its own.
+    if is_autonomous(system):
+        units = sizes(system, orbit.state, image.period / image.returns)
+    else:
+        units = numerical_balance(image.jacobian)
+    cut = _cut(system, orbit, units)
     frame, logarithms, signs, unsure = _carried(system, cut, units)
     total, n = logarithms.sum(axis=0), logarithms.shape[1]
     deep = np.flatnonzero((logarithms < _DEEPEST).any(axis=0))
@@ -113,13 +134,16 @@ def split_stiff(system: FlowsFrames, orbit: Orbit, units: Array) -> tuple[Comple
         raise AnalysisError("several directions decay too fast to be told apart", field="flow")
     values: list[ComplexArray] = []
     modes: list[ComplexArray] = []
+    moved = unsure.copy()
     if slow:
         leading, vectors = split_leading(cut.factors, slow)
+        others = split_leading(disturbed(cut.factors, cut.errors), slow)[0]
+        moved[:slow] = np.abs(leading[:, None] - others).min(axis=1)
         values, modes = [leading], [vectors]
     for k in range(slow, n):
         values.append(np.array([total[k] + (0.0 if signs[k] > 0 else 1j * np.pi)]))
         modes.append(intersection(frame[:, : k + 1], _fastest(system, cut, units, k), 1).astype(np.complex128))
-    return np.concatenate(values), np.hstack(modes), cut.basis
+    return np.concatenate(values), np.hstack(modes), cut.basis, moved
 
 
 def _carried(system: FlowsFrames, cut: Cut, units: Array) -> tuple[Array, Array, Array, Array]:

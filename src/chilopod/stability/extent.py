@@ -1,0 +1,140 @@
+"""How far an orbit goes within an interval of the parameter, and what it begins and ends in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from chilopod.errors import AnalysisError
+from chilopod.stability.branches.fold import Fold, find_fold
+from chilopod.stability.capabilities import SystemLike
+from chilopod.stability.returns import ReturnMap
+from chilopod.stability.samples import FIRST_STEPS, NEAR_FOLD, Sample, Samples
+
+_BEFORE = 1e-6  # of the interval: so far from a fold other crossings are looked for
+_TRIES = 2  # starts of curves round a fold
+_CLEAR_OF_FOLD = 1e-3  # distance of a multiplier from +1 from which a curve that starts there passes the fold
+_COMES, _FARTHER = 1e-5, 100.0  # of the interval before a fold, and times that: where the multiplier is looked at
+_BETWEEN_POWERS = 0.75  # of one half and one
+_AT_REST = 0.03  # of the motion of the first orbit
+_PARTS = 5  # of a return, to see how far the motion goes
+
+
+@dataclass(frozen=True)
+class Extent:
+    """How far an orbit goes.
+
+    Attributes
+    ----------
+    start, end
+        Between which orbits can be told apart: the ends of the interval, or just beside the folds that are there.
+    folds
+        Those it begins and ends in, if it does.
+    ending
+        A sentence where it ends otherwise before the end of the interval; else empty.
+    shrinks
+        Whether it ends in an equilibrium.
+    beside
+        Distance of a fold from ``start`` and ``end``.
+    """
+
+    start: float
+    end: float
+    folds: tuple[Fold, ...] = ()
+    ending: str = ""
+    shrinks: bool = False
+    beside: float = 0.0
+
+    def explains(self, value: float) -> bool:
+        """Whether a value is so near what the orbit begins or ends in that a multiplier +1 is what comes of that."""
+        ends = [fold.value for fold in self.folds] + [self.end] * self.shrinks
+        return any(abs(value - end) <= 2.0 * self.beside for end in ends)
+
+
+def extent(samples: Samples) -> Extent:
+    """How far the orbit goes that some samples are on."""
+    path, high = samples.path, samples.low + samples.width
+    if samples.known:
+        return Extent(samples.low, high)
+    first, last, beside = path[0], path[-1], _BEFORE * samples.width
+    if samples.spent:
+        ending = f"the budget was spent before the orbit was followed beyond {last.value:.9g}"
+        return Extent(first.value, last.value, ending=ending)
+    folds: tuple[Fold, ...] = ()
+    start = first.value
+    if first.off_plus_one <= NEAR_FOLD:
+        fold = _fold_beside(samples, first, path[1:], rising=False)
+        if fold is not None and fold.value + beside >= start:
+            start = min(start + beside, last.value)
+            folds = (fold,) if fold.value >= first.value - fold.error_bound else ()
+    if last.value == high and last.off_plus_one > NEAR_FOLD:
+        return Extent(start, high, folds, beside=beside)
+    fold = _fold_beside(samples, last, path[-2::-1], rising=True)
+    here = last if fold is None else Sample(fold.value, fold.image.state, fold.image)
+    if last.value != high and _at_rest(samples, here):
+        ending = f"the orbit shrinks into an equilibrium near {here.value:.9g}: a Hopf point"
+        return Extent(start, last.value, folds, ending, shrinks=True, beside=beside)
+    if fold is None:
+        ending = "" if last.value == high else f"the orbit cannot be followed beyond {last.value:.9g}"
+        return Extent(start, last.value, folds, ending, beside=beside)
+    # In the fold itself multipliers move as a root of the distance, which no search sees through.
+    end = max(first.value, min(last.value, fold.value - beside))
+    return Extent(start, end, folds + (fold,) * (fold.value <= high + fold.error_bound), beside=beside)
+
+
+def _fold_beside(samples: Samples, sample: Sample, others: list[Sample], rising: bool) -> Fold | None:
+    """The fold that a sample is next to or in, from the nearest of the others that is clear of it."""
+    off = np.array([each.off_plus_one for each in [sample, *others]])
+    clear = np.flatnonzero(off > min(_CLEAR_OF_FOLD, off.max() / 2.0))
+    for each in [[sample, *others][i] for i in clear[:_TRIES]]:
+        fold = find_fold(samples.family, each.value, each.orbit, samples.width, rising)
+        # Right beside it a step may land on another curve, which has a fold of its own.
+        if (
+            fold is not None
+            and _next_to(samples, sample, fold, rising)
+            and _comes_as_a_root(samples, sample, fold, rising)
+        ):
+            return fold
+    return None
+
+
+def _next_to(samples: Samples, sample: Sample, fold: Fold, rising: bool) -> bool:
+    """Whether a fold is just past a sample at either end, on the same orbit; others may be anywhere."""
+    further = fold.value - sample.value if rising else sample.value - fold.value
+    return (
+        bool(np.isfinite(fold.error_bound))
+        # In a fold Newton's method also finds orbits that are none any more.
+        and -max(fold.error_bound, _BEFORE * samples.width) <= further <= samples.width / FIRST_STEPS
+        and not samples.jumped(fold.image.state, sample.orbit)
+    )
+
+
+def _comes_as_a_root(samples: Samples, sample: Sample, fold: Fold, rising: bool) -> bool:
+    """Whether the multiplier comes to +1 as the root of the distance, as it does in a fold; where another branch only
+    passes it comes evenly."""
+    near = max(_COMES * samples.width, abs(fold.value - sample.value))
+    away = np.array([near, min(_FARTHER * near, 0.5 * samples.width)])
+    try:
+        beside = samples.at(fold.value + (-away if rising else away))
+    except AnalysisError:
+        return True  # nothing speaks against it
+    off = [each.off_plus_one for each in beside]
+    return off[1] < off[0] * (away[1] / away[0]) ** _BETWEEN_POWERS
+
+
+def _at_rest(samples: Samples, last: Sample) -> bool:
+    """Whether hardly anything of the motion is left where an orbit ends: beyond there is none, and what looks like a
+    fold is the same orbit again, half a period later."""
+    if samples.timed:
+        return False
+    first = _moved(samples, samples.family(samples.low), samples.first.image)
+    return _moved(samples, samples.family(last.value), last.image) < _AT_REST * first
+
+
+def _moved(samples: Samples, system: SystemLike, image: ReturnMap) -> float:
+    """How far the motion goes within a return, relative to the sizes of the states."""
+    path = [image.state]
+    for _ in range(_PARTS - 1):
+        path.append(system.flow(path[-1], 0.0, image.period / image.returns / _PARTS)[0])
+    return float((np.ptp(np.array(path), axis=0) / samples.size).max())

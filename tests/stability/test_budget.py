@@ -1,0 +1,191 @@
+"""What a search costs is bounded, also where every orbit is hard to find; exceptions of a user's functions cost what
+they touch and no more."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.stability import Ending, PeriodicSystem, follow, from_rhs, locate
+from chilopod.stability.unit_circle.crossings import Status
+
+BUDGET = 150
+FLOWS_PER_RETURN = 12  # of a system without a period: to the section, and Newton's method for when it is there
+SHAPES = {
+    "nowhere smooth": lambda k: sum(0.7**j * math.cos(math.pi * 7.0**j * k) for j in range(18)),
+    "fast": lambda k: 5.0 * math.sin(300.0 * k),
+    "ever faster": lambda k: 5.0 * math.sin(1.0 / (k - 0.53)),
+}
+
+
+def stuart_landau(amplitude, frequency, rate):
+    """r' = r (a^2 - r^2), angle' = omega, z' = rate z, in the closed form of their flow."""
+
+    def flow(x, t0, t1):
+        t, (u, v, z) = t1 - t0, x
+        grow = math.exp(2.0 * amplitude**2 * t)
+        below = 1.0 + (u * u + v * v) * (grow - 1.0) / amplitude**2
+        stretch = math.sqrt(grow / below)
+        c, s = math.cos(frequency * t), math.sin(frequency * t)
+        turn = np.array([[c, -s], [s, c]])
+        bend = np.eye(2) - np.outer([u, v], [u, v]) * (grow - 1.0) / amplitude**2 / below
+        derivative = np.zeros((3, 3))
+        derivative[:2, :2] = stretch * turn @ bend
+        derivative[2, 2] = math.exp(rate * t)
+        return np.append(stretch * turn @ x[:2], z * derivative[2, 2]), derivative
+
+    def velocity(x):
+        pull = amplitude**2 - x[0] ** 2 - x[1] ** 2
+        return np.array([pull * x[0] - frequency * x[1], pull * x[1] + frequency * x[0], rate * x[2]])
+
+    return PeriodicSystem(3, None, flow, velocity=velocity, guess_period=2.0 * math.pi)
+
+
+@pytest.mark.parametrize("knows", [False, True])
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_search_costs_no_more_than_its_budget(shape, knows):
+    flows = 0
+
+    def family(k):
+        wild = SHAPES[shape](k)
+        system = stuart_landau(1.0 + 0.02 * wild, 1.0 + 0.15 * wild, 0.2 * wild)
+
+        def counted(x, t0, t1):
+            nonlocal flows
+            flows += 1
+            return system.flow(x, t0, t1)
+
+        return replace(system, flow=counted, orbit=[1.0, 0.0, 0.0] if knows else None)
+
+    found = locate(family, (0.0, 1.0), None if knows else [1.0, 0.0, 0.0], normal_form=False, budget=BUDGET)
+    assert found.status is Status.BUDGET
+    # Twice the budget to follow, twice to search; the first orbit; and what was found.
+    first = 500 + 3 * 30 * FLOWS_PER_RETURN
+    described = len(found) * 400 * FLOWS_PER_RETURN
+    assert flows < 4 * BUDGET * FLOWS_PER_RETURN + first + described
+    assert found.evaluations <= 3 * BUDGET
+
+
+def test_a_larger_budget_finds_more():
+    def family(k):
+        return stuart_landau(1.0, 1.0 + 0.3 * math.sin(20.0 * k), math.sin(20.0 * k))
+
+    few, many = (locate(family, (0.01, 1.0), [1.0, 0.0, 0.0], False, budget) for budget in (40, 3000))
+    assert few.status is Status.BUDGET
+    assert len(few) < len(many) == 6
+    np.testing.assert_allclose([point.value for point in many], np.pi / 20.0 * np.arange(1, 7), rtol=1e-9)
+
+
+def line(p, raised=None, where=(0.25, 0.35)):
+    """x' = p x, y' = -y; something else between two values of p."""
+    if raised is not None and where[0] < p < where[1]:
+        raise raised
+    return from_rhs(lambda t, x: [p * x[0], -x[1]], 2, 1.0, orbit=[0.0, 0.0])
+
+
+@pytest.mark.parametrize("raised", [ZeroDivisionError("by hand"), KeyError("gain"), TypeError("two\nlines")])
+def test_exceptions_of_the_family(raised):
+    """They are islands without an orbit: what lies outside is found, on both sides where the orbit is known."""
+    found = locate(lambda p: line(p - 0.6, raised, (-0.25, -0.15)), (-1.0, 1.0))
+    assert [point.value for point in found] == [pytest.approx(0.6, abs=1e-12)]
+    assert found.status is Status.INCOMPLETE
+    said = next(remark for remark in found.remarks if type(raised).__name__ in remark)
+    assert "the family raised" in said
+    assert "\n" not in said
+    followed = locate(lambda p: line(p, raised, (0.2, 1.0)), (-1.0, 1.0), [0.0, 0.0])
+    assert [point.value for point in followed] == [pytest.approx(0.0, abs=1e-12)]
+    assert "cannot be followed beyond 0.199" in followed.remarks[0]
+    branch = follow(lambda p: line(p, raised), [0.0, 0.0], (-1.0, 1.0), points=40)
+    assert branch.ending is Ending.LOST
+    assert type(raised).__name__ in branch.reason
+    assert branch.special_points[0].value == pytest.approx(0.0, abs=1e-9)
+
+
+def test_exceptions_at_the_first_value():
+    def family(p):
+        return line(p, KeyError("gain"), (-2.0, 2.0))
+
+    for ask in (
+        lambda: locate(family, (-1.0, 1.0)),
+        lambda: locate(family, (-1.0, 1.0), [0.0, 0.0]),
+        lambda: follow(family, [0.0, 0.0], (-1.0, 1.0)),
+    ):
+        with pytest.raises(AnalysisError, match=r"family = -1.0: raised KeyError: 'gain'") as caught:
+            ask()
+        assert isinstance(caught.value.__cause__, KeyError)
+
+
+def test_exceptions_inside_a_flow():
+    def family(p):
+        def flow(x, t0, t1):
+            if 0.35 < p < 0.45:
+                raise LookupError("no table")
+            derivative = np.diag(np.exp(np.array([p - 0.6, -1.0]) * (t1 - t0)))
+            return derivative @ x, derivative
+
+        return PeriodicSystem(2, 1.0, flow, orbit=[0.0, 0.0])
+
+    found = locate(family, (-1.0, 1.0))
+    assert [point.value for point in found] == [pytest.approx(0.6, abs=1e-12)]
+    assert any("LookupError: no table at 0." in remark for remark in found.remarks)
+
+
+def test_parameters_that_a_system_refuses():
+    """A period that is no number from some value on."""
+
+    def family(p):
+        return from_rhs(lambda t, x: [p * x[0]], 1, 1.0 if p < 0.5 else math.nan, orbit=[0.0])
+
+    found = locate(family, (-1.0, 1.0))
+    assert [point.value for point in found] == [pytest.approx(0.0, abs=1e-12)]
+    assert any("period = nan" in remark for remark in found.remarks)
+    with pytest.raises(ParameterError, match="period = nan"):
+        locate(lambda p: family(p + 2.0), (-1.0, 1.0))
+
+
+def test_a_dimension_that_changes():
+    def family(p):
+        if p < 0.5:
+            return line(p)
+        return from_rhs(lambda t, x: -x, 3, 1.0, orbit=[0.0, 0.0, 0.0])
+
+    for guess in (None, [0.0, 0.0]):
+        found = locate(family, (-1.0, 1.0), guess)
+        assert [point.value for point in found] == [pytest.approx(0.0, abs=1e-12)]
+        assert found.status is Status.INCOMPLETE
+        assert any("changes its dimension" in remark for remark in found.remarks)
+    branch = follow(family, [0.0, 0.0], (-1.0, 1.0), points=40)
+    assert branch.ending is Ending.LOST
+    assert "changes its dimension" in branch.reason
+    assert len(branch.points) > 10
+
+
+def halfway(value):
+    """A right-hand side that changes its mind within the period."""
+
+    def rhs(t, x):
+        return value if t > 0.5 else -x
+
+    return rhs
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        ("no", "no array of numbers but 'no'"),
+        (None, "no array of numbers but None"),
+        ([1.0, [2.0]], r"no array of numbers but \[1.0, \[2.0\]\]"),
+        ({"x": 1.0}, "no array of numbers but {'x': 1.0}"),
+        ([1.0], r"returns an array of shape \(1,\); allowed: an array of shape \(2,\)"),
+        (3.0, r"returns an array of shape \(\); allowed: an array of shape \(2,\)"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_what_is_no_array_of_numbers(value, said):
+    for rhs in (lambda t, x: value, halfway(value)):
+        with pytest.raises(ParameterError, match=said) as caught:
+            from_rhs(rhs, 2, 1.0, orbit=[0.0, 0.0]).flow(np.zeros(2), 0.0, 1.0)
+        assert "rhs" in str(caught.value)
+        assert "\n" not in str(caught.value)

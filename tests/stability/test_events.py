@@ -1,0 +1,96 @@
+"""Events that are none are refused in one line that names them."""
+
+import math
+
+import numpy as np
+import pytest
+
+from chilopod.errors import ParameterError
+from chilopod.stability import Event, from_rhs
+
+
+def ball(*events):
+    return from_rhs(lambda t, x: [x[1], -9.81], 2, 1.0, events=events, orbit=[0.3, 0.5])
+
+
+def height(t, x):
+    return x[0]
+
+
+def bounced(t, x):
+    return [x[0], -0.8 * x[1]]
+
+
+def branching(t, x):
+    return 1.0 if x[0] > 0 else -1.0
+
+
+@pytest.mark.parametrize(
+    ("reset", "said"),
+    [
+        (lambda t, x: [x[0]], r"an array of shape \(1,\); allowed: an array of shape \(2,\)"),
+        (lambda t, x: [x[0], x[1], x[1]], r"an array of shape \(3,\); allowed: an array of shape \(2,\)"),
+        (lambda t, x: "up", r"no array of numbers but 'up'; allowed: an array of shape \(2,\)"),
+        (lambda t, x: None, r"no array of numbers but None; allowed: an array of shape \(2,\)"),
+    ],
+)
+def test_resets(reset, said):
+    with pytest.raises(ParameterError, match=r"^events\[1\].reset: returns " + said):
+        ball(Event(lambda t, x: x[0] - 9.0, direction=1), Event(height, reset, -1))
+
+
+@pytest.mark.parametrize(
+    ("guard", "said"),
+    [
+        (lambda t, x: "low", "returns no number but 'low'; allowed: one number"),
+        (lambda t, x: None, "returns no number but None; allowed: one number"),
+        (lambda t, x: x, r"returns an array of shape \(2,\); allowed: one number"),
+        (lambda t, x: x[0] < 0.0, "is true or false"),
+        (lambda t, x: math.nan, "is not finite on the orbit"),
+        (lambda t, x: np.sqrt(-1.0 - x[0] ** 2), "is not finite on the orbit"),
+        (lambda t, x: 0.0, "is zero at all states"),
+        (lambda t, x: x[0] - x[0], "is zero at all states"),
+    ],
+)
+def test_guards(guard, said):
+    with pytest.raises(ParameterError, match=r"events\[0\].guard( = nan)?: " + said):
+        ball(Event(guard, bounced, -1))
+
+
+def test_guards_without_an_orbit():
+    """NaN at zero is no fault where nobody said that the orbit is there."""
+    event = Event(lambda t, x: np.log(np.abs(x[0])), direction=-1)
+    assert from_rhs(lambda t, x: -x, 1, 1.0, events=[event]).dimension == 1
+    with pytest.raises(ParameterError, match=r"events\[0\].guard: is finite at none"):
+        from_rhs(lambda t, x: -x, 1, 1.0, events=[Event(lambda t, x: x[0] * math.nan)])
+
+
+def test_functions_that_cannot_be_traced():
+    with pytest.raises(ParameterError, match="need functions that can be traced: it asks for the value"):
+        ball(Event(branching, bounced))
+    with pytest.raises(ParameterError, match="need functions that can be traced: IndexError"):
+        ball(Event(lambda t, x: [][1], bounced))
+    with pytest.raises(ParameterError, match=r"^rhs: returns an array of shape \(1,\); allowed: an array of shape"):
+        from_rhs(lambda t, x: [x[1]], 2, 1.0, events=[Event(height)])
+
+
+def test_events_at_the_same_instant():
+    """The first of the list happens; where that is seen, the other is refused."""
+    for second in (Event(lambda t, x: 1.0 * x[0], bounced), Event(height, None, -1)):
+        with pytest.raises(ParameterError, match=r"events\[1\].guard: is that of events\[0\]"):
+            ball(Event(height, bounced, -1), second)
+    assert ball(Event(height, bounced, -1), Event(height, bounced, 1)).dimension == 2
+
+    def kicked(speed):
+        return lambda t, x: [x[0], x[1] + speed]
+
+    for speeds in ((1.0, 10.0), (10.0, 1.0)):
+        # x' = 1 up to x = 0 at t = 0.5, with two guards that meet there.
+        system = from_rhs(
+            lambda t, x: [1.0 + x[1], 0.0 * x[0]],
+            2,
+            1.0,
+            events=[Event(height, kicked(speeds[0])), Event(lambda t, x: 3.0 * x[0] + x[0] ** 2, kicked(speeds[1]))],
+        )
+        state, _ = system.flow(np.array([-0.5, 0.0]), 0.0, 0.95)
+        np.testing.assert_allclose(state, [(1.0 + speeds[0]) * 0.45, speeds[0]], rtol=1e-12)

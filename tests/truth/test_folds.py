@@ -1,0 +1,116 @@
+"""Folds at any place of a grid: of forced motions and of limit cycles, with the fold known in closed form."""
+
+import numpy as np
+import pytest
+
+from chilopod.stability import Ending, Kind, begin, follow, from_rhs, locate
+
+
+def forced(mu):
+    """With y = x - cos(t) / 10 it is y' = mu - y^2: orbits y^2 = mu, the fold at 0; the second state follows."""
+    return from_rhs(
+        lambda t, x, mu: [mu - (x[0] - 0.1 * np.cos(t)) ** 2 - 0.1 * np.sin(t), x[0] - x[1]],
+        2,
+        2.0 * np.pi,
+        args=(mu,),
+    )
+
+
+def forced_orbit(mu):
+    """Of x[1]' = x[0] - x[1] the periodic solution is sqrt(mu) + (cos t + sin t) / 20."""
+    return np.sqrt(mu) + np.array([0.1, 0.05])
+
+
+def cycles(mu):
+    """r' = r (mu + r^2 - r^4), turning with angular velocity 1: r^2 = 1/2 + sqrt(1/4 + mu), the fold at -1/4."""
+
+    def rhs(t, x, mu):
+        square = x[0] ** 2 + x[1] ** 2
+        growth = mu + square - square**2
+        return [growth * x[0] - x[1], growth * x[1] + x[0]]
+
+    return from_rhs(rhs, 2, None, args=(mu,), guess_period=6.0)
+
+
+def cycle(mu):
+    return np.array([np.sqrt(0.5 + np.sqrt(0.25 + mu)), 0.0])
+
+
+FAMILIES = {"forced": (forced, forced_orbit, 0.0), "cycles": (cycles, cycle, -0.25)}
+# From where and to where, relative to the fold: it is a node of the search's grid, between two, at the end, before and
+# beyond it by a little.
+REACHES = [
+    (0.75, -0.05),
+    (0.75, -0.25),
+    (0.5, -0.5),
+    (0.1, -0.7),
+    (1.0, 0.0),
+    (1.0, -1e-9),
+    (0.01, -0.01),
+    (1e-6, -1e-6),
+]
+
+
+def is_fold(point, known, closest=1e-11):
+    assert point.kind is Kind.FOLD
+    assert abs(point.value - known) <= point.error_bound < closest
+    assert point.normal_form is None or point.normal_form.quadratic != 0.0
+
+
+@pytest.mark.parametrize(("start", "end"), REACHES)
+@pytest.mark.parametrize("name", FAMILIES)
+def test_locate_finds_it(name, start, end):
+    family, orbit, fold = FAMILIES[name]
+    found = locate(lambda minus: family(-minus), (-fold - start, -fold - end), orbit=orbit(fold + start))
+    assert found.complete
+    (point,) = found
+    is_fold(point, -fold)
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_there_is_none_just_before_it(name):
+    family, orbit, fold = FAMILIES[name]
+    for end in (1e-3, 1e-9):
+        found = locate(
+            lambda minus: family(-minus), (-fold - 1.0, -fold - end), orbit=orbit(fold + 1.0), normal_form=False
+        )
+        assert found.complete
+        assert len(found) == 0
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_an_orbit_that_begins_in_it(name):
+    family, orbit, fold = FAMILIES[name]
+    found = locate(family, (fold, fold + 0.5), orbit=orbit(fold))
+    assert found.complete
+    (point,) = found
+    is_fold(point, fold)
+
+
+@pytest.mark.parametrize(("start", "end"), REACHES)
+@pytest.mark.parametrize("name", FAMILIES)
+def test_follow_passes_it(name, start, end):
+    family, orbit, fold = FAMILIES[name]
+    between = (fold + end, fold + start)
+    branch = follow(family, begin(family, between[1], orbit(between[1]), rising=False), between, points=40)
+    point = branch.special_points[0]
+    is_fold(point.bifurcation, fold)
+    assert all(between[0] <= point.value <= between[1] for point in branch.points)
+
+
+def test_a_branch_of_cycles_ends_where_they_shrink():
+    """r^2 = 1/2 - sqrt(1/4 + mu), behind the fold, is 0 at mu = 0."""
+    branch = follow(cycles, begin(cycles, 0.5, cycle(0.5), rising=False), (-0.5, 0.5), points=100)
+    (point,) = branch.special_points
+    is_fold(point.bifurcation, -0.25)
+    assert branch.ending is Ending.LOST
+    assert "a Hopf point" in branch.reason
+    assert -1e-3 < branch.points[-1].value < 0.0
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_a_branch_that_starts_in_it_says_so(name):
+    family, orbit, fold = FAMILIES[name]
+    branch = follow(family, begin(family, fold, orbit(fold)), (fold - 0.5, fold + 0.5), points=5)
+    assert "the branch starts in a fold" in branch.remarks
+    assert branch.points[-1].value > fold
