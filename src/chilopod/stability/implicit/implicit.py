@@ -232,7 +232,9 @@ def _switch_instants(tape: Tape, params: Array, period: float) -> Array:
 
 @functools.cache
 def _coefficients(stages: int) -> tuple[Any, ...]:
-    found = _compiled().radau(stages)
+    from chilopod.stability.implicit.radau import radau  # scipy.special takes its time to import
+
+    found = radau(stages)
     return found.nodes.copy(), found.matrix.copy(), found.start.copy(), found.filter
 
 
