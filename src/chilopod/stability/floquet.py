@@ -15,7 +15,7 @@ from chilopod.cores import cores
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.arguments import checked_count
-from chilopod.stability.capabilities import FlowsTangents, SystemLike, is_autonomous
+from chilopod.stability.capabilities import FlowsFrames, FlowsTangents, SystemLike, is_autonomous
 from chilopod.stability.krylov.closing import LARGE
 from chilopod.stability.krylov.leading import leading_multipliers, whole_pairs
 from chilopod.stability.matrix_errors import DRAWN, FIRST_ORDER, eigenvalues_moved
@@ -23,6 +23,7 @@ from chilopod.stability.orbits import Orbit, find_large_orbit, find_orbit, from_
 from chilopod.stability.returns import ReturnMap, flow_with_error, return_maps
 from chilopod.stability.scales import numerical_balance, sizes
 from chilopod.stability.splitting import split_product
+from chilopod.stability.stiff import disturbed, split_stiff
 from chilopod.stability.system import PeriodicSystem
 
 Array = NDArray[np.float64]
@@ -283,11 +284,12 @@ def exponents(system: SystemLike, orbit: ArrayLike | None = None) -> Exponents:
     """
     found = find_orbit(system, orbit)
     image = found.image
-    factors, errors, units = _factors(system, found)
-    log_nu, modes = split_product(factors)
-    random = np.random.default_rng(0)
-    disturbed = [f + e * random.choice([-1.0, 1.0], f.shape) for f, e in zip(factors, errors, strict=True)]
-    moved = np.abs(log_nu[:, None] - split_product(disturbed)[0]).min(axis=1)
+    if isinstance(system, FlowsFrames) and system.is_stiff():
+        log_nu, modes, units, moved = split_stiff(system, found)
+    else:
+        factors, errors, units = _factors(system, found)
+        log_nu, modes = split_product(factors)
+        moved = np.abs(log_nu[:, None] - split_product(disturbed(factors, errors))[0]).min(axis=1)
     bound = image.returns * (DRAWN * moved + 4.0 * np.finfo(float).eps * np.abs(log_nu)) / image.period
     # Principal logarithm of nu^k: the imaginary part back into (-pi, pi].
     angle = np.angle(np.exp(1j * image.returns * log_nu.imag))
