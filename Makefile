@@ -79,6 +79,7 @@ bench: $(BENCH)  ## benchmarks beside their peers; rewrites the tables in benchm
 	$(BIN)/python benchmarks/periodic_systems.py
 	$(BIN)/python benchmarks/simulation.py
 	$(BIN)/python benchmarks/stepping.py
+	$(BIN)/python benchmarks/series_term.py
 	$(BIN)/python benchmarks/twin.py
 	$(BIN)/python benchmarks/startup.py
 

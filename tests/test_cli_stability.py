@@ -147,6 +147,14 @@ def test_an_unknown_section_of_the_report_offers_the_nearest(capsys, tmp_path):
     assert not (tmp_path / "report").exists()
 
 
+def test_a_search_that_takes_too_long_ends_with_what_it_has(capsys):
+    search = ("bifurcation", PRESET, "--parameter=gait.stride", "--seconds", "1", "--between", "1 um", "1 km")
+    code, out, err = call(capsys, *search)
+    assert code == 0
+    assert "the budget was spent" in err
+    assert "pitchfork" in out
+
+
 # A hostile user: whatever stands in the arguments, one line and exit code 2, or an answer.
 _TEXTS = st.text(max_size=30)
 _QUANTITIES = st.one_of(
@@ -166,7 +174,8 @@ _PATHS = st.one_of(
 @example(parameter=K1, low="1e-12", high="1e9")
 @example(parameter="gait.stride", low="1 um", high="1 km")
 def test_random_arguments_never_end_in_a_traceback(capsys, parameter, low, high):
-    code, out, err = call(capsys, "bifurcation", PRESET, f"--parameter={parameter}", "--between", low, high)
+    search = ("bifurcation", PRESET, f"--parameter={parameter}", "--seconds", "3", "--between", low, high)
+    code, out, err = call(capsys, *search)
     assert code in (0, 2)
     assert "Traceback" not in err
     if code == 2:

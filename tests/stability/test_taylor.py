@@ -171,7 +171,7 @@ def test_sliding_is_named():
 
 
 def test_what_cannot_go_on_ends(monkeypatch):
-    monkeypatch.setattr("chilopod.stability.taylor._MOST_WORK", 1e5)
+    monkeypatch.setattr("chilopod.stability.taylor.taylor._MOST_WORK", 1e5)
     flow, params = flow_of(lambda t, x: x**2, 1)
     with pytest.raises(AnalysisError, match=r"diverges|beyond t = (1|0\.999)"):
         flow.advance(np.array([1.0]), 0.0, 2.0, params)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from chilopod.errors import ParameterError
-from chilopod.stability import BifurcationPoint, CodimensionTwo, CurveEnd, Kind, PeriodicSystem, detection, follow2
+from chilopod.stability import BifurcationPoint, CodimensionTwo, CurveEnd, Kind, PeriodicSystem, follow2
+from chilopod.stability.codimension_two import detection
 from chilopod.stability.normal_forms.amplitude import Status
 
 BOX = ((-2.0, 2.0), (-2.0, 2.0))

@@ -14,7 +14,7 @@ def zeros(function, low, high):
     return [
         a
         if a == b
-        else brentq(lambda v: function(np.array([v]))[0], a, b, 1e-300, 4 * np.finfo(float).eps, maxiter=2000)
+        else brentq(lambda v: function(np.array([v]))[0], a, b, xtol=1e-300, rtol=4 * np.finfo(float).eps, maxiter=2000)
         for a, b in find_zeros(signed_log(function), low, high).changes
     ]
 

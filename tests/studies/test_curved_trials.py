@@ -8,6 +8,7 @@ from chilopod.analysis.branch import curved_walks
 from chilopod.analysis.parameters import K1, stiffness
 from chilopod.planar import PlanarModel
 from chilopod.robot import load_robot
+from chilopod.stability.returns import whole_period
 from chilopod.studies import curved_findings, curved_rows
 from chilopod.studies.curved_trials import curved_trials, off_branch, on_branch, variant_robots
 from chilopod.trials import NONE, Disturbance, Trial, run
@@ -115,8 +116,8 @@ def test_the_power_beside_the_point_is_that_of_orbits_solved_there():
         state = np.r_[model.orbit[:3], 0.35 * np.array([1.0, 0.56, 0.75, 0.73, 0.26]), np.zeros(5)]
         for _ in range(30):
             state = model.flow_states(state[None], 0.0, model.period)[0]
-        whole = stability.system.whole_period(model)
-        orbit, _ = stability.find_orbit(whole, state, with_error=False)
+        whole = whole_period(model)
+        orbit = stability.find_orbit(whole, state, with_error=False).state
         bends.append(np.abs(orbit[3:8] - (model.reflection @ model.flow_states(orbit[None], 0.0, 0.3)[0])[3:8]).sum())
     # Distances count in 1/k.
     power = np.log(bends[1] / bends[0]) / np.log((1 / 0.98 - 1.0) / (1 / 0.995 - 1.0))

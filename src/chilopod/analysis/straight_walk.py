@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -145,6 +146,7 @@ def bifurcations(
     between: tuple[float, float],
     normal_form: bool = True,
     remark: Callable[[str], None] = _unsaid,
+    seconds: float = math.inf,
 ) -> list[WalkBifurcation]:
     """Every bifurcation of the straight walk in an interval of a parameter.
 
@@ -160,6 +162,8 @@ def bifurcations(
         Whether to compute the coefficients and verdicts.
     remark
         Called with a sentence for what leaves open whether these are all points.
+    seconds
+        Time after which the search ends with what it has; motion far from a robot's scales may be slow to follow.
 
     Returns
     -------
@@ -168,7 +172,7 @@ def bifurcations(
     make = family(robot, parameter)
     unit = robot.unit_of(parameter)
     found = []
-    located = stability.locate(make, between, normal_form=normal_form)
+    located = stability.locate(make, between, normal_form=normal_form, seconds=seconds)
     if not located.complete:
         for sentence in (located.status.sentence, *located.remarks):
             remark(sentence)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import Annotated
 
 import typer
 
@@ -53,6 +54,9 @@ def bifurcation(
     parameter: ParameterOption,
     between: BetweenOption,
     overrides: SetOption = None,
+    seconds: Annotated[
+        float, typer.Option(metavar="S", min=0.0, help="Time for the search; then it ends with what it has.")
+    ] = 60.0,
     as_json: JsonOption = False,
     out: OutOption = None,
 ) -> None:
@@ -62,7 +66,13 @@ def bifurcation(
     folder = prepared(out)
     from chilopod.analysis import bifurcations
 
-    points = bifurcations(described, parameter, (low, high), remark=lambda text: typer.echo(f"note: {text}", err=True))
+    points = bifurcations(
+        described,
+        parameter,
+        (low, high),
+        remark=lambda text: typer.echo(f"note: {text}", err=True),
+        seconds=seconds,
+    )
     result = {"points": [point.as_json() for point in points]}
     if folder:
         save_json(folder / "bifurcation.json", result)

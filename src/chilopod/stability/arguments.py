@@ -49,6 +49,17 @@ def checked_duration(field: str, value: object) -> float:
     return duration
 
 
+def checked_count(field: str, value: object, most: int) -> int:
+    """A number of things, of which there are not more than ``most``."""
+    try:
+        count = operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        count = 0
+    if not 1 <= count <= most:
+        raise ParameterError("must be a whole number", field=field, value=value, allowed=f"1 to {most}")
+    return count
+
+
 def finite_array(value: Any, shape: tuple[int, ...], field: str) -> Array:
     """``value`` as finite numbers in an array of the given shape."""
     try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from types import TracebackType
 
 from chilopod.errors import AnalysisError, ChilopodError, in_words
@@ -41,8 +42,19 @@ class ReturnBudget:
         How many; never below zero.
     """
 
-    def __init__(self, allowed: int) -> None:
+    def __init__(self, allowed: int, seconds: float) -> None:
         self.left = allowed
+        self._ends = time.monotonic() + seconds
+
+    @property
+    def late(self) -> bool:
+        """Whether the time is over."""
+        return time.monotonic() > self._ends
+
+    @property
+    def spent(self) -> bool:
+        """Whether nothing is left."""
+        return self.left <= 0 or self.late
 
     def take(self, count: int = 1) -> None:
         """Count some that are about to be evaluated.
@@ -54,4 +66,6 @@ class ReturnBudget:
         """
         if self.left <= 0:
             raise SpentError("as many return maps as were allowed were evaluated", field="budget")
+        if self.late:
+            raise SpentError("the time is over", field="seconds")
         self.left = max(self.left - count, 0)

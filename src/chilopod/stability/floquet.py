@@ -6,7 +6,7 @@ import functools
 import itertools
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,11 +14,16 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.cores import cores
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.capabilities import SystemLike, is_autonomous
-from chilopod.stability.orbits import Orbit, find_orbit, from_known, known_state
+from chilopod.stability.arguments import checked_count
+from chilopod.stability.capabilities import FlowsFrames, FlowsTangents, SystemLike, is_autonomous
+from chilopod.stability.krylov.closing import LARGE
+from chilopod.stability.krylov.leading import leading_multipliers, whole_pairs
+from chilopod.stability.matrix_errors import DRAWN, FIRST_ORDER, eigenvalues_moved
+from chilopod.stability.orbits import Orbit, find_large_orbit, find_orbit, from_known, known_state
 from chilopod.stability.returns import ReturnMap, flow_with_error, return_maps
 from chilopod.stability.scales import numerical_balance, sizes
 from chilopod.stability.splitting import split_product
+from chilopod.stability.stiff import disturbed, split_stiff
 from chilopod.stability.system import PeriodicSystem
 
 Array = NDArray[np.float64]
@@ -30,8 +35,6 @@ anything."""
 
 _WORST_CONDITION = 1e6
 _FEWEST_FACTORS, _MOST_FACTORS = 8, 32768
-_FIRST_ORDER = 1e-6  # of the largest multiplier: errors up to here are those of first-order perturbations
-_DRAWS, _DRAWN = 8, 10.0  # changes of a matrix, and how much farther than by the worst of them eigenvalues may move
 _COMPOSED = 1e-6  # by so much the parts of a flow may miss the whole
 _SAME_ANGLE = 1e-12
 
@@ -45,27 +48,34 @@ class Multipliers(ReadOnlyArrays):
     values
         Multipliers of the full period, by falling modulus, shape (n,); n-1 of them where the system does not depend on
         time: the one along the motion, which is 1, is left out. Absolute accuracy is ``error_bound``: those smaller
-        than it are only known to be small (:func:`exponents` resolves them).
+        than it are only known to be small (:func:`exponents` resolves them). Fewer where only the leading ones were
+        asked for.
     half_period
         Multipliers nu of the return map of a system with a symmetry in time, of order k: ``values = nu^k`` in the same
         order (k is 2 unless told, hence the name); None without one.
     error_bound
         Bound on the absolute error of every multiplier of modulus above 1e-6.
+    error_bounds
+        Bounds on the absolute errors of all, shape as of ``values``; of no meaning for those below 1e-6.
     orbit
         State on the orbit at time 0.
     period
         Of the orbit.
+    remarks
+        What else is to be said, a sentence each: that these are only the leading ones.
     """
 
     values: ComplexArray
     half_period: ComplexArray | None
     error_bound: float
+    error_bounds: Array
     orbit: Array
     period: float
+    remarks: tuple[str, ...] = ()
 
     @property
     def stable(self) -> bool:
-        """Whether all multipliers lie inside the unit circle, by more than the error bound."""
+        """Whether all multipliers lie inside the unit circle, by more than the error bound: the largest decide."""
         return bool((np.abs(self.values) < 1.0 - self.error_bound).all())
 
 
@@ -144,25 +154,10 @@ def spectrum(image: ReturnMap) -> Spectrum:
     else:
         error += 4.0 * image.error * np.linalg.norm(left, axis=0)
     error = np.where(np.isfinite(error), error, np.inf)
-    if (error > _FIRST_ORDER * np.abs(values).max(initial=0.0)).any():
+    if (error > FIRST_ORDER * np.abs(values).max(initial=0.0)).any():
         scaled = np.abs(out_of) @ np.broadcast_to(image.error, image.jacobian.shape) @ np.abs(into)
-        error = np.minimum(error, _moved(values, jacobian, scaled))
+        error = np.minimum(error, eigenvalues_moved(values, jacobian, scaled))
     return Spectrum(values, right, left, error)
-
-
-def _moved(values: ComplexArray, matrix: Array, error: Array) -> Array:
-    """How far eigenvalues move when a matrix changes by its error: where several nearly agree without eigenvectors of
-    their own, by its square root, which no condition number tells."""
-    random = np.random.default_rng(0)
-    error = error + 4.0 * np.finfo(float).eps * np.abs(matrix)
-    if not np.isfinite(error).all():
-        return np.full(values.size, np.inf)
-    moved = np.zeros(values.size)
-    for _ in range(_DRAWS):
-        others = np.linalg.eigvals(matrix + error * random.choice([-1.0, 1.0], matrix.shape))
-        moved = np.maximum(moved, np.abs(values[:, None] - others).min(axis=1))
-        moved = np.maximum(moved, np.abs(values[:, None] - others).min(axis=0).max())
-    return _DRAWN * moved
 
 
 def across(image: ReturnMap) -> tuple[Array, Array]:
@@ -211,17 +206,22 @@ def counts_outside(values: ComplexArray) -> tuple[int, int, int]:
 def _multipliers(orbit: Orbit) -> Multipliers:
     image = orbit.image
     spec = spectrum(image)
-    nu, k = spec.values, image.returns
+    return _of_period(spec.values, spec.error, image.returns, orbit.state, image.period)
+
+
+def _of_period(nu: ComplexArray, error: Array, k: int, state: Array, period: float) -> Multipliers:
+    """The multipliers mu = nu^k of the full period from those of the return map, with their errors."""
     resolved = np.abs(nu) > RESOLVED
-    bound = float(spec.error[resolved].max()) if resolved.any() else float(spec.error.min())
+    bound = float(error[resolved].max()) if resolved.any() else float(error.min())
     if k == 1:
-        return Multipliers(nu, None, bound, orbit.state, image.period)
-    # mu = nu^k: by the mean value theorem, d mu is at most k (|nu| + d nu)^(k-1) d nu.
+        return Multipliers(nu, None, bound, error, state, period)
+    # By the mean value theorem, d mu is at most k (|nu| + d nu)^(k-1) d nu.
     largest = max(float(np.abs(nu[0])), 0.5)
-    return Multipliers(nu**k, nu, bound * k * (largest + bound) ** (k - 1), orbit.state, image.period)
+    errors = error * k * (np.abs(nu) + error) ** (k - 1)
+    return Multipliers(nu**k, nu, bound * k * (largest + bound) ** (k - 1), errors, state, period)
 
 
-def multipliers(system: SystemLike, orbit: ArrayLike | None = None) -> Multipliers:
+def multipliers(system: SystemLike, orbit: ArrayLike | None = None, leading: int | None = None) -> Multipliers:
     """Floquet multipliers of a periodic orbit.
 
     Parameters
@@ -230,8 +230,42 @@ def multipliers(system: SystemLike, orbit: ArrayLike | None = None) -> Multiplie
         The periodic system.
     orbit
         A first guess of a state on the orbit at time 0; not needed where the system knows its orbit.
+    leading
+        How many of the largest multipliers are wanted, with their multiplicity, or one more where that would part a
+        pair; all by default. Of a system of 100 states or more that has ``flow_tangents`` (any right-hand side that can
+        be traced) they are computed in a block Krylov subspace, without the derivative of the flow as a matrix.
+
+    Raises
+    ------
+    AnalysisError
+        If no orbit is found.
     """
-    return _multipliers(find_orbit(system, orbit))
+    if leading is None:
+        return _multipliers(find_orbit(system, orbit))
+    count = checked_count("leading", leading, system.dimension - (system.period is None))
+    if isinstance(system, FlowsTangents) and system.dimension >= LARGE:
+        image, size = find_large_orbit(system, orbit)
+        found = leading_multipliers(image, size, count)
+        result = _of_period(found.values, found.error, image.returns, image.point, image.returns * image.duration)
+        of_period = found.following**image.returns
+    else:
+        result, of_period = _leading_of(_multipliers(find_orbit(system, orbit)), count)
+    if result.values.size == system.dimension - (system.period is None):
+        return result
+    remark = (
+        f"only the {result.values.size} multipliers of largest modulus were asked for, and decide whether the orbit "
+        f"is stable; the next one has a modulus of about {of_period:.3g}"
+    )
+    return replace(result, remarks=(remark,))
+
+
+def _leading_of(every: Multipliers, count: int) -> tuple[Multipliers, float]:
+    """The largest of all multipliers, and the modulus of the next one."""
+    count = whole_pairs(every.values if every.half_period is None else every.half_period, count)
+    half = None if every.half_period is None else every.half_period[:count]
+    following = float(np.abs(every.values[count])) if count < every.values.size else 0.0
+    chosen = replace(every, values=every.values[:count], half_period=half, error_bounds=every.error_bounds[:count])
+    return chosen, following
 
 
 def sweep(systems: Sequence[SystemLike]) -> list[Multipliers]:
@@ -260,12 +294,13 @@ def exponents(system: SystemLike, orbit: ArrayLike | None = None) -> Exponents:
     """
     found = find_orbit(system, orbit)
     image = found.image
-    factors, errors, units = _factors(system, found)
-    log_nu, modes = split_product(factors)
-    random = np.random.default_rng(0)
-    disturbed = [f + e * random.choice([-1.0, 1.0], f.shape) for f, e in zip(factors, errors, strict=True)]
-    moved = np.abs(log_nu[:, None] - split_product(disturbed)[0]).min(axis=1)
-    bound = image.returns * (_DRAWN * moved + 4.0 * np.finfo(float).eps * np.abs(log_nu)) / image.period
+    if isinstance(system, FlowsFrames) and system.is_stiff():
+        log_nu, modes, units, moved = split_stiff(system, found)
+    else:
+        factors, errors, units = _factors(system, found)
+        log_nu, modes = split_product(factors)
+        moved = np.abs(log_nu[:, None] - split_product(disturbed(factors, errors))[0]).min(axis=1)
+    bound = image.returns * (DRAWN * moved + 4.0 * np.finfo(float).eps * np.abs(log_nu)) / image.period
     # Principal logarithm of nu^k: the imaginary part back into (-pi, pi].
     angle = np.angle(np.exp(1j * image.returns * log_nu.imag))
     angle[np.abs(angle) < _SAME_ANGLE] = 0.0

@@ -3,6 +3,7 @@ is."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import overload
@@ -88,6 +89,7 @@ def locate(
     orbit: ArrayLike | None = None,
     normal_form: bool = True,
     budget: int = BUDGET,
+    seconds: float = math.inf,
 ) -> Located:
     """Find every bifurcation of a periodic orbit in an interval of a parameter.
 
@@ -110,6 +112,8 @@ def locate(
         ends as well when twice as many return maps were evaluated, by Newton's method too and for orbits that are not
         there. What comes on top has bounds of its own: the first orbit, where the motion is given time to settle, and
         every point that is found, 400 return maps and its normal form.
+    seconds
+        Time after which the search ends with what it has, if that is before the budget is spent.
 
     Returns
     -------
@@ -124,7 +128,7 @@ def locate(
         value that is as if there were no orbit, and a remark.
     """
     low, high = _interval(between)
-    samples = Samples(family, orbit, low, high, budget)
+    samples = Samples(family, orbit, low, high, budget, seconds)
     here = extent(samples)
     remarks = [here.ending] if here.ending else []
     status = Status.BUDGET if samples.spent else Status.INCOMPLETE if here.ending else Status.COMPLETE
@@ -171,12 +175,13 @@ def _searched(samples: Samples, here: Extent, budget: int) -> tuple[list[tuple[B
     def whole(values: Array) -> tuple[Array, Array]:
         found = samples.at(values)
         if samples.known:
-            errors = [_relative(each.image) for each in found]
+            shape = found[0].image.jacobian.shape
+            errors = np.stack([np.broadcast_to(each.image.error, shape) for each in found])
         elif blocks == (None,):
-            errors = [samples.error(each, uncertain) for each in found]
+            errors = np.array([samples.error(each, uncertain) for each in found])
         else:  # a mode that breaks a symmetry leaves the orbit as sure as it is
-            errors = [uncertain] * len(found)
-        return np.stack([each.image.jacobian for each in found]), np.array(errors)
+            errors = np.full(len(found), uncertain)
+        return np.stack([each.image.jacobian for each in found]), errors
 
     def search(matrices: Matrices) -> Crossings:
         return find_crossings(matrices, here.start, here.end, budget=budget, affordable=samples.affordable)

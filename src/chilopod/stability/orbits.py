@@ -12,7 +12,14 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.arguments import finite_array
 from chilopod.stability.asked import ReturnBudget, SpentError
-from chilopod.stability.capabilities import Autonomous, SystemLike, is_autonomous, known_orbit
+from chilopod.stability.capabilities import (
+    FlowsTangents,
+    SystemLike,
+    is_autonomous,
+    known_orbit,
+)
+from chilopod.stability.krylov.closing import LARGE, closed_orbit
+from chilopod.stability.krylov.tangent_map import TangentMap, tangent_map, tangent_sizes
 from chilopod.stability.returns import (
     ReturnMap,
     Section,
@@ -152,28 +159,52 @@ def find_orbit(
         raise failed
 
 
+def find_large_orbit(system: FlowsTangents, guess: ArrayLike | None = None) -> tuple[TangentMap, Array]:
+    """As :func:`find_orbit`, of a large system: the return map on the orbit without its derivative as a matrix, and the
+    sizes of the states, shape (n,). Where the method for these fails, :func:`find_orbit` is asked."""
+    x = known_state(system) if guess is None else finite_array(guess, (system.dimension,), "orbit")
+    exact = guess is None and not is_autonomous(system)
+    try:
+        image, size = closed_orbit(system, x, farthest=_KNOWN if exact else np.inf)
+    except AnalysisError:
+        found = find_orbit(system, guess, with_error=False)
+        size = tangent_sizes(system, found.state, found.period / found.image.returns)
+        return tangent_map(system, found.state, found.section), size
+    with contextlib.suppress(AnalysisError):
+        while (parts := _parts(system, image.point, image.duration, size)) > 1:
+            section = section_at(system, image.point, size, image.duration / parts)
+            image, size = closed_orbit(system, image.point, section)
+    return image, size
+
+
 def _shortest(system: SystemLike, orbit: Orbit, with_error: bool, budget: ReturnBudget | None) -> Orbit:
     """The same orbit over its shortest period, where every instant may be time 0."""
-    while is_autonomous(system) and (parts := _parts(system, orbit)) > 1:
-        duration = orbit.period / orbit.image.returns / parts
+    if not is_autonomous(system):
+        return orbit
+    duration = orbit.period / orbit.image.returns
+    while (parts := _parts(system, orbit.state, duration, sizes(system, orbit.state, duration))) > 1:
+        duration /= parts
         section = section_at(system, orbit.state, sizes(system, orbit.state, duration), duration)
         try:
             orbit = _newton(system, orbit.state, with_error, section, budget)
         except AnalysisError:
             break
+        duration = orbit.period / orbit.image.returns
     return orbit
 
 
-def _parts(system: Autonomous, orbit: Orbit) -> int:
-    """How many times a return closes within its time."""
-    x, duration = orbit.state, orbit.period / orbit.image.returns
+def _parts(system: SystemLike, x: Array, duration: float, size: Array) -> int:
+    """How many times a return closes within its time, where every instant may be time 0; with the sizes of the states
+    for that time."""
+    if not is_autonomous(system):
+        return 1
     counts = np.arange(_MOST_PARTS, 1, -1)
     states, passed = [x], 0.0
     for time in duration / counts:
-        states.append(carried(system, states[-1][None], time - passed)[0])
+        states.append(carried(system, states[-1][None], 0.0, time - passed)[0])
         passed = time
     # Over several rounds a sixteenth of the time may be half of one, where a state is zero again.
-    size = np.maximum(sizes(system, x, duration), np.abs(states).max(axis=0))
+    size = np.maximum(size, np.abs(states).max(axis=0))
     near = _CLOSES * min(1.0, _relative(np.asarray(system.velocity(np.array(x))) * duration, size))
     away = (np.abs(turned(system, np.array(states[1:])) - x) / size).max(axis=1)
     closed = counts[away <= near]
@@ -224,7 +255,13 @@ def _newton(
 ) -> Orbit:
     size = sizes(system, x, return_duration(system) if section is None else section.duration)
     section = section_at(system, x, size) if section is None else section
-    best, before, cutoff = np.inf, x, _SINGULAR
+    best = np.inf
+    if system.dimension >= LARGE and isinstance(system, FlowsTangents):
+        with contextlib.suppress(AnalysisError):
+            closed, _ = closed_orbit(system, x, section, budget=budget)
+            x, best = closed.point, 0.0  # nothing is left to improve
+            section = section and replace(section, duration=closed.duration)
+    before, cutoff = x, _SINGULAR
     for rounds in range(_ROUNDS):
         if budget is not None:
             budget.take()

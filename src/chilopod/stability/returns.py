@@ -8,7 +8,7 @@ ch. 2). Its derivative then maps the direction of the motion to zero, exactly, i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +20,7 @@ from chilopod.stability.capabilities import (
     Autonomous,
     FlowsMany,
     FlowsStates,
+    FlowsTangents,
     FlowsWithError,
     SystemLike,
     given_scale,
@@ -34,7 +35,10 @@ Array = NDArray[np.float64]
 _APPROACHES = (1.0 / 16.0, 0.4)  # of a return: from there on, the crossing of the section is solved for
 _FARTHEST = 0.8  # of a return: a crossing that much later is another one
 _CROSSING_ROUNDS = 30
-_CUTS = (0.0, 0.0477, 0.382)  # near the start as well, or the steps up to the cut would be the same, errors included
+
+CUTS = (0.0, 0.0477, 0.382)
+"""Of an interval that is taken in parts: near the start as well, or the steps up to the cut would be the same, errors
+included."""
 
 
 @dataclass(frozen=True)
@@ -102,6 +106,7 @@ class _WholePeriod:
         self.scale = given_scale(system)
         self.flow_with_error = system.flow_with_error if isinstance(system, FlowsWithError) else None
         self.flow_states = system.flow_states if isinstance(system, FlowsStates) else None
+        self.flow_tangents = system.flow_tangents if isinstance(system, FlowsTangents) else None
         self.velocity = None
         if is_autonomous(system):
             self.guess_period = periods * system.guess_period
@@ -171,7 +176,7 @@ def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple
     state, derivative = system.flow(x, t0, t1)
     _check_shapes(state, derivative, x.size)
     _check_finite(state, derivative)
-    times = [t0 + part * (t1 - t0) for part in _CUTS] + [t1]
+    times = [t0 + part * (t1 - t0) for part in CUTS] + [t1]
     passing, product = x, np.eye(x.size)
     for a, b in zip(times, times[1:], strict=False):
         passing, factor = system.flow(passing, a, b)
@@ -247,7 +252,7 @@ def _return_to_section(system: Autonomous, x: Array, with_error: bool, section: 
     assert section is not None
     count = returns_per_period(system)
     turn = np.eye(x.size) if system.symmetry is None else system.symmetry
-    start, rest, first = _crossing(system, x, section)
+    start, rest, first = _crossing(system, x, section, system.flow)
     error: float | Array = np.nan
     if with_error:
         state, jacobian, error = flow_with_error(system, x, 0.0, start + rest)
@@ -266,11 +271,26 @@ def _return_to_section(system: Autonomous, x: Array, with_error: bool, section: 
     return ReturnMap(state, across @ jacobian, error, count, period, velocity, section.normal)
 
 
-def _crossing(system: Autonomous, x: Array, section: Section) -> tuple[float, float, tuple[Array, Array]]:
+def return_time(system: Autonomous, x: Array, section: Section) -> float:
+    """How long a motion takes from a state, shape (n,), to where it is back at the section.
+
+    Raises
+    ------
+    AnalysisError
+        If it does not come back.
+    """
+    nothing = np.broadcast_to(0.0, (x.size, x.size))
+    start, rest, _ = _crossing(system, x, section, lambda x, t0, t1: (carried(system, x[None], t0, t1)[0], nothing))
+    return start + rest
+
+
+def _crossing(
+    system: Autonomous, x: Array, section: Section, flow: Callable[[Array, float, float], tuple[Array, Array]]
+) -> tuple[float, float, tuple[Array, Array]]:
     """When a motion is back at the section: a time shortly before, the rest of it, and the flow up to that time."""
     for approach in _APPROACHES:
         start = (1.0 - approach) * section.duration
-        before, derivative = system.flow(x, 0.0, start)
+        before, derivative = flow(x, 0.0, start)
         _check_shapes(before, derivative, x.size)
         _check_finite(before, derivative)
         rest = _time_to_section(system, before, section, approach * section.duration)
@@ -288,7 +308,7 @@ def _time_to_section(system: Autonomous, before: Array, section: Section, rest: 
     get there, or has passed it."""
     best = np.inf
     for _ in range(_CROSSING_ROUNDS):
-        state = turned(system, carried(system, before[None], rest))[0]
+        state = turned(system, carried(system, before[None], 0.0, rest))[0]
         speed = float(section.normal @ _velocity(system, state))
         off = float(section.normal @ (state - section.point))
         if speed == 0.0 or not np.isfinite(off):
@@ -303,11 +323,13 @@ def _time_to_section(system: Autonomous, before: Array, section: Section, rest: 
     return None
 
 
-def carried(system: SystemLike, states: Array, duration: float) -> Array:
-    """States, shape (states, n), so long after time 0."""
+def carried(system: SystemLike, states: Array, t0: float, t1: float) -> Array:
+    """States at t1 of those at t0, shape (states, n) both, in the cheapest way that a system has."""
     if isinstance(system, FlowsStates):
-        return np.asarray(system.flow_states(states, 0.0, duration))
-    return np.array([system.flow(np.array(x), 0.0, duration)[0] for x in states])
+        return np.asarray(system.flow_states(states, t0, t1))
+    if isinstance(system, FlowsTangents):
+        return np.array([system.flow_tangents(np.array(x), np.zeros((x.size, 1)), t0, t1)[0] for x in states])
+    return np.array([system.flow(np.array(x), t0, t1)[0] for x in states])
 
 
 def turned(system: SystemLike, states: Array) -> Array:
@@ -327,18 +349,18 @@ def returned_states(system: SystemLike, states: Array, section: Section | None =
     """
     states = np.array(states)  # a system may write into what it is given
     if section is None:
-        return turned(system, carried(system, states, return_duration(system)))
+        return turned(system, carried(system, states, 0.0, return_duration(system)))
     assert is_autonomous(system)
     approach = _APPROACHES[0]
-    before = carried(system, states, (1.0 - approach) * section.duration)
+    before = carried(system, states, 0.0, (1.0 - approach) * section.duration)
     rests = [_time_to_section(system, x, section, approach * section.duration) for x in before]
     result = np.empty_like(states)
     for i, rest in enumerate(rests):
         if rest is None:
-            _, rest, (state, _) = _crossing(system, states[i], section)
+            _, rest, (state, _) = _crossing(system, states[i], section, system.flow)
         else:
             state = before[i]
-        result[i] = turned(system, carried(system, state[None], rest))[0]
+        result[i] = turned(system, carried(system, state[None], 0.0, rest))[0]
     return result
 
 

@@ -65,6 +65,8 @@ class Samples:
     budget
         Orbits that may be computed until the upper end is reached, by twice as many return maps, and as many return
         maps once more for those in between.
+    seconds
+        Time for all that.
 
     Attributes
     ----------
@@ -86,17 +88,20 @@ class Samples:
         Whether the path ends because the budget was spent.
     """
 
-    def __init__(self, family: Family, guess: ArrayLike | None, low: float, high: float, budget: int) -> None:
+    def __init__(
+        self, family: Family, guess: ArrayLike | None, low: float, high: float, budget: int, seconds: float
+    ) -> None:
         self._family = family
         self.low, self.width = low, high - low
         self.known = guess is None
         self._systems: dict[float, SystemLike] = {}
         self._by_value: dict[float, Sample] = {}
         self._values: list[float] = []
+        self._missing: dict[float, AnalysisError] = {}
         self._bends: dict[float, float] = {}
         self._budget = budget
         self._allowed = _RETURNS * budget
-        self._returns = ReturnBudget(self._allowed)
+        self._returns = ReturnBudget(self._allowed, seconds)
         self._refused: dict[str, tuple[str, set[float]]] = {}
         self._dimension, self.timed = 0, True
         self.count = self._counted = 0
@@ -129,24 +134,51 @@ class Samples:
         return system
 
     def at(self, values: Array) -> list[Sample]:
-        """Samples at some values within the interval; together where the systems allow it."""
+        """Samples at some values within the interval; together where the systems allow it.
+
+        Raises
+        ------
+        AnalysisError
+            If there is none at one of them; those at the others are kept.
+        """
         wanted = [float(value) for value in values]
         missing = sorted({value for value in wanted if value not in self._by_value})
-        if missing and self.known and self.timed:
-            systems = [self.family(value) for value in missing]
-            for _ in systems:
-                self._returns.take()
-            # Of several, which one it was shows when each is asked for alone.
-            with self._asking(missing[0]) if len(missing) == 1 else Asking("family", missing[0]):
-                states = [known_state(system) for system in systems]
-                images = return_maps(systems, states)
-            for value, system, state, image in zip(missing, systems, states, images, strict=True):
-                orbit = from_known(system, state, image=image, budget=self._returns)
-                self._keep(Sample(value, orbit.state, orbit.image))
-        else:
-            for value in missing:
-                self._keep(self._of_itself(value) if self.known else self._between(value))
+        if len(missing) > 1 and self.known and self.timed:
+            try:
+                self._keep_known(missing)
+                missing = []
+            except SpentError:
+                raise
+            except AnalysisError:
+                pass  # which one it was shows when each is asked for alone
+        for value in missing:
+            if value in self._by_value or value in self._missing:
+                continue
+            try:
+                if self.known and self.timed:
+                    self._keep_known([value])
+                else:
+                    self._keep(self._of_itself(value) if self.known else self._between(value))
+            except SpentError:
+                raise
+            except AnalysisError as error:
+                self._missing[value] = error
+        for value in wanted:
+            if value in self._missing:
+                raise self._missing[value]
         return [self._by_value[value] for value in wanted]
+
+    def _keep_known(self, values: list[float]) -> None:
+        """Samples of systems that depend on time and know their orbits."""
+        systems = [self.family(value) for value in values]
+        for _ in systems:
+            self._returns.take()
+        with self._asking(values[0]) if len(values) == 1 else Asking("family", values[0]):
+            states = [known_state(system) for system in systems]
+            images = return_maps(systems, states)
+        for value, system, state, image in zip(values, systems, states, images, strict=True):
+            orbit = from_known(system, state, image=image, budget=self._returns)
+            self._keep(Sample(value, orbit.state, orbit.image))
 
     def allow(self, returns: int) -> None:
         """From now on, at most so many return maps."""
@@ -155,6 +187,8 @@ class Samples:
 
     def affordable(self) -> int:
         """How many more orbits there may be, at the price of those since :meth:`allow`."""
+        if self._returns.late:
+            return 0
         price = (self._allowed - self._returns.left) / max(self.count - self._counted, 1)
         # Those that were not found say nothing of the next ones.
         return int(self._returns.left / min(max(price, 1.0), _DEAREST))
@@ -277,7 +311,7 @@ class Samples:
                 self._keep(sample)
             path += reached
             if path[-1].value != value:
-                self.spent = self._returns.left <= 0 or self.count >= self._budget
+                self.spent = self._returns.spent or self.count >= self._budget
                 break
         return path
 

@@ -59,6 +59,9 @@ def crossings_in(block: Block | None, matrices: Matrices, search: Callable[[Matr
 
 
 def _reduced(block: Block | None, matrices: Array, errors: Array) -> tuple[Array, Array]:
+    if block is not None and errors.ndim == 3:
+        real = block.type is Type.REAL
+        errors = block.reduced_error(matrices, errors) if real else np.abs(block.dual) @ errors @ np.abs(block.basis)
     return in_block(block, matrices), errors
 
 

@@ -77,15 +77,16 @@ def _allowed(coefficients: Any, order: int, h: float, epsilon: float) -> float:
 
 
 @fused_njit(error_model="numpy")
-def _step_size(layout: Any, switches: Any, order: int, h: float, epsilon: float, values: Any, tangents: Any) -> float:
+def _step_size(
+    layout: Any, switches: Any, order: int, h: float, epsilon: float, values: Any, tangents: Any, columns: int
+) -> float:
     for i in range(layout[0]):
         h = _allowed(values[i], order, h, epsilon)
     for s in range(switches.shape[1]):
         h = _allowed(values[switches[1, s]], order, h, epsilon)
-    if tangents.shape[2] > 0:
-        for i in range(layout[0]):
-            for j in range(layout[0]):
-                h = _allowed(tangents[i, :, j], order, h, epsilon)
+    for i in range(layout[0]):
+        for j in range(columns):
+            h = _allowed(tangents[i, :, j], order, h, epsilon)
     return h
 
 
@@ -183,6 +184,7 @@ def advance(
     order: int,
     most_steps: int,
     shake: float,
+    stepwise: bool,
     derivative: Any,
     bound: Any,
     events: Any,
@@ -198,8 +200,12 @@ def advance(
         Values of the functions of time on a grid over the period, the last of each the largest modulus, and the period.
     shake
         Relative error made in every state after every step, and in the time before it: round-off, enlarged.
+    stepwise
+        Whether every step computes its own derivative, shape (n, n), by which ``derivative`` is then multiplied; else
+        it carries the columns of ``derivative`` along, of which there may be any number: directions.
     derivative, bound
-        Shape (n, n), multiplied by the derivative and carried along; shape (0, 0) for none.
+        Shape (n, columns), multiplied by the derivative, and (n, n), the bound of its error where ``stepwise``; shapes
+        (n, 0) and (0, 0) for none.
     events
         Shape (most, 2): filled with time and number of the events.
     report
@@ -208,19 +214,20 @@ def advance(
     program, terms, numbers, layout, slopes, switches, resets, clocks, directions = tape
     table, period = clock
     n = layout[0]
-    with_tangents = derivative.shape[0] > 0
-    lanes = (n + LANES - 1) // LANES * LANES if with_tangents else 0
+    columns = derivative.shape[1]
+    with_tangents = columns > 0
+    seeds = np.eye(n) if stepwise and with_tangents else derivative
+    lanes = (columns + LANES - 1) // LANES * LANES
     values = np.zeros((layout[5], order + 1))
     tangents = np.zeros((layout[5], order + 1, lanes))
     count_switches = switches.shape[1]
     branches = np.zeros(count_switches)
     scales = np.zeros(count_switches)
     work = np.empty(order + 1)
-    size = n if with_tangents else 0
-    factor = np.empty((size, size))
+    factor = np.empty((n, columns))
     with_bound = bound.shape[0] > 0
-    factors = np.empty((_BLOCK if with_bound else 0, size, size))
-    errors = np.empty((_BLOCK if with_bound else 0, size, size))
+    factors = np.empty((_BLOCK if with_bound else 0, n, n))
+    errors = np.empty((_BLOCK if with_bound else 0, n, n))
     in_block = 0
     load(program, terms, numbers, layout, params, values)
     t = t0
@@ -234,7 +241,7 @@ def advance(
     noise = 1
     at_once = _AT_ONCE * max(abs(t0), abs(t1))
     if count_switches > 0:
-        start(layout, x, t, values, tangents)
+        start(layout, x, t, seeds, values, tangents)
         status = settle(program, terms, layout, slopes, switches, unit, values, tangents, branches, scales)
         await_events(
             program,
@@ -248,6 +255,7 @@ def advance(
             at_once / unit,
             x,
             t,
+            seeds,
             values,
             tangents,
             branches,
@@ -260,14 +268,14 @@ def advance(
             break
         finite = False
         for _ in range(24):
-            start(layout, x, t, values, tangents)
+            start(layout, x, t, seeds, values, tangents)
             if shake > 0.0:
                 values[n, 0] = t * (1.0 + (0.5 * shake if steps % 3 else -shake))
             expand(program, terms, layout, slopes, order, values, tangents, branches, layout[4], unit)
             s = 0.0
             for i in range(n):
                 s += abs(values[i, order]) + abs(values[i, 1])
-                for j in range(size):
+                for j in range(columns):
                     s += abs(tangents[i, order, j])
             for k in range(count_switches):
                 s += abs(values[switches[1, k], 0]) + abs(values[switches[1, k], order])
@@ -279,7 +287,7 @@ def advance(
             status = NOT_FINITE
             break
         remaining = (t1 - t) / unit
-        h = _step_size(layout, switches, order, remaining, epsilon, values, tangents)
+        h = _step_size(layout, switches, order, remaining, epsilon, values, tangents, columns)
         if h < remaining and h > 0.5 * remaining:
             h = 0.5 * remaining
         crossing = -1
@@ -320,7 +328,7 @@ def advance(
                 noise = (noise * 1103515245 + 12345) % 2147483648
                 s *= 1.0 + (shake if noise >= 1073741824 else -shake)
             x[i] = s
-            for j in range(size):
+            for j in range(columns):
                 s = 0.0
                 for k in range(order, -1, -1):
                     s = s * h + tangents[i, k, j]
@@ -339,7 +347,7 @@ def advance(
                 _absorb(factors, errors, in_block, derivative, bound)
                 in_block = 0
         elif with_tangents:
-            derivative[:] = factor @ derivative
+            derivative[:] = factor @ derivative if stepwise else factor
         t = reached
         unit *= min(max(h, 1e-3), 1e3) if h > 0.0 else 1.0
         if crossing >= 0:
@@ -357,6 +365,7 @@ def advance(
                 unit,
                 x,
                 t,
+                seeds,
                 values,
                 tangents,
                 branches,
@@ -381,7 +390,7 @@ def advance(
                     _absorb(factors, errors, in_block, derivative, bound)
                     in_block = 0
             elif with_tangents:
-                derivative[:] = factor @ derivative
+                derivative[:] = factor @ derivative if stepwise else factor
     if with_bound and in_block > 0:
         _absorb(factors, errors, in_block, derivative, bound)
     report[0], report[1], report[2], report[3] = steps, crossings, passed, t

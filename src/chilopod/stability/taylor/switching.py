@@ -74,13 +74,13 @@ def is_timed(program: Any, switches: Any, s: int) -> bool:
 
 
 @fused_njit(error_model="numpy")
-def start(layout: Any, x: Any, t: float, values: Any, tangents: Any) -> None:
-    """Set the state and the time from which a series starts; the tangents are those with respect to that state."""
+def start(layout: Any, x: Any, t: float, seeds: Any, values: Any, tangents: Any) -> None:
+    """Set the state and the time from which a series starts; the tangents are those along the columns of ``seeds``."""
     n = layout[0]
     for i in range(n):
         values[i, 0] = x[i]
         for lane in range(tangents.shape[2]):
-            tangents[i, 0, lane] = 1.0 if lane == i else 0.0
+            tangents[i, 0, lane] = seeds[i, lane] if lane < seeds.shape[1] else 0.0
     values[n, 0] = t
 
 
@@ -127,13 +127,14 @@ def cross(
     unit: float,
     x: Any,
     t: float,
+    seeds: Any,
     values: Any,
     tangents: Any,
     branches: Any,
     scales: Any,
     jump: Any,
 ) -> tuple[int, int]:
-    """Go through a switch or an event: the state after it in ``x``, its derivative in ``jump``.
+    """Go through a switch or an event: the state after it in ``x``, its derivative times ``seeds`` in ``jump``.
 
     Returns the status, and the number of the event or -1.
     """
@@ -142,7 +143,7 @@ def cross(
     event = -1
     if switches[0, s] == GUARD and directions[switches[2, s]] * direction >= 0.0:
         event = switches[2, s]
-    start(layout, x, t, values, tangents)
+    start(layout, x, t, seeds, values, tangents)
     expand(
         program,
         terms,
@@ -161,9 +162,8 @@ def cross(
     before = np.empty(n)
     for i in range(n):
         before[i] = values[i, 1]
-        for j in range(tangents.shape[2]):
-            if j < n:
-                jump[i, j] = 1.0 if i == j else 0.0
+        for j in range(seeds.shape[1]):
+            jump[i, j] = seeds[i, j]
     if switches[0, s] == FLOOR:
         branches[s] += direction
     else:
@@ -176,10 +176,9 @@ def cross(
                 moves = True
             x[i] = values[node, 0]
             before[i] = values[node, 1]
-            if tangents.shape[2] > 0:
-                for j in range(n):
-                    jump[i, j] = tangents[node, 0, j]
-    start(layout, x, t, values, tangents)
+            for j in range(seeds.shape[1]):
+                jump[i, j] = tangents[node, 0, j]
+    start(layout, x, t, seeds, values, tangents)
     if moves:
         status = settle(program, terms, layout, slopes, switches, unit, values, tangents, branches, scales)
         if status != DONE:
@@ -205,7 +204,7 @@ def cross(
         if differs:
             for i in range(n):
                 f = (values[i, 1] - before[i]) / slope
-                for j in range(n):
+                for j in range(seeds.shape[1]):
                     jump[i, j] += f * gradient[j]
     return DONE, event
 
@@ -223,6 +222,7 @@ def await_events(
     soon: float,
     x: Any,
     t: float,
+    seeds: Any,
     values: Any,
     tangents: Any,
     branches: Any,
@@ -235,7 +235,6 @@ def await_events(
     a guard that moves as if to fire is one before the event if the event leaves it moving away (an impact); else, as
     where legs change places, it may as well be the state after it, and is taken for that.
     """
-    n = layout[0]
     for s in range(switches.shape[1]):
         if switches[0, s] != GUARD:
             continue
@@ -246,7 +245,7 @@ def await_events(
         direction = 1.0 if slope > 0.0 else -1.0
         ahead = is_timed(program, switches, s)
         if not ahead and directions[switches[2, s]] * direction > 0.0:
-            after, then, jump = x.copy(), branches.copy(), np.empty((n, n))
+            after, then, jump = x.copy(), branches.copy(), np.empty(seeds.shape)
             cross(
                 program,
                 terms,
@@ -260,6 +259,7 @@ def await_events(
                 unit,
                 after,
                 t,
+                seeds,
                 values,
                 tangents,
                 then,
@@ -267,6 +267,6 @@ def await_events(
                 jump,
             )
             ahead = values[switches[1, s], 1] * direction < 0.0
-            start(layout, x, t, values, tangents)
+            start(layout, x, t, seeds, values, tangents)
             settle(program, terms, layout, slopes, switches, unit, values, tangents, then, scales)
         branches[s] = -direction if ahead else direction

@@ -13,6 +13,7 @@ its parameters are an argument of every call, so one object serves a whole famil
   the state jumps to r_k(t, x). The derivative gets the saltation matrix. ``passage.events`` has their
   times and numbers. What happens at the start: :func:`chilopod.stability.taylor.switching.await_events`.
 * :meth:`TaylorFlow.advance` raises ``AnalysisError`` where the motion cannot go on (see ``_REASONS``), with the time.
+* :meth:`TaylorFlow.tangents` carries any directions in place of the whole derivative.
 * :meth:`TaylorFlow.states` carries many states without derivatives, on all cores; each with parameters of its own if
   there is a row for each.
 
@@ -57,7 +58,7 @@ _REASONS = {
     1: ("the motion diverges, or the right-hand side is not finite, at t = {t:g}", None),
     2: (
         "takes too many steps, and came to t = {t:g} only",
-        "a right-hand side that is less stiff, or a shorter interval",
+        "method='implicit' if it is stiff, or a shorter interval",
     ),
     3: ("cannot be continued beyond t = {t:.17g}: a singularity, or rates beyond the resolution of time", None),
     4: (
@@ -67,6 +68,10 @@ _REASONS = {
     5: ("chatters (Zeno): crossings accumulate at t = {t:g}", "a guard or a reset that ends it"),
     6: ("grazes a switching surface at t = {t:g}: there the flow has no derivative", None),
 }
+
+
+class TooManySteps(AnalysisError):
+    """The budget of steps did not suffice, as of a right-hand side that is stiff."""
 
 
 @dataclass(frozen=True)
@@ -165,8 +170,7 @@ class TaylorFlow(ReadOnlyArrays):
         # Copies, because compiled code is compiled anew for arrays that are read-only.
         x, params = np.array(x, dtype=np.float64), np.array(params, dtype=np.float64)
         if not bounded:
-            size = n if derived else 0
-            derivative = np.eye(size)
+            derivative = np.eye(n) if derived else np.empty((n, 0))
             events, steps = self._run(x, t0, t1, params, derivative, _NOTHING, self.order, 0.0)
             return Passage(x, derivative, _NOTHING, events, steps)
         other_x = x * (1.0 + _SHAKE * np.sign(np.cos(3.0 * np.arange(n) + 1.0)))
@@ -179,15 +183,27 @@ class TaylorFlow(ReadOnlyArrays):
         bound = bound * (1.0 + _COMMON * usual) + _OWN * difference
         return Passage(x, derivative, bound, events, steps)
 
+    def tangents(self, x: Array, directions: Array, t0: float, t1: float, params: Array) -> tuple[Array, Array]:
+        """State at t1, and the derivative with respect to ``x`` times ``directions``, shape (n, any number).
+
+        The series of the directions themselves are carried, so that the work is that of their number, and no matrix of
+        shape (n, n) is made. Raises as :meth:`advance`.
+        """
+        x, params = np.array(x, dtype=np.float64), np.array(params, dtype=np.float64)
+        images = np.array(directions, dtype=np.float64, order="C")
+        self._run(x, t0, t1, params, images, _NOTHING, self.order, 0.0, stepwise=False)
+        return x, images
+
     def states(self, states: Array, t0: float, t1: float, params: Array) -> Array:
         """Carry many states, shape (states, n); ``params`` has shape (parameters,) or (states, parameters)."""
         states = np.array(states, dtype=np.float64, order="C")
         params = np.asarray(params, dtype=np.float64)
         rows = np.array(np.broadcast_to(params, (states.shape[0], params.shape[-1])))
+        none = np.empty((self.tape.dimension, 0))
 
         def carry(numbers: range) -> None:
             for i in numbers:
-                self._run(states[i], t0, t1, rows[i], _NOTHING, _NOTHING, self.order, 0.0)
+                self._run(states[i], t0, t1, rows[i], none, _NOTHING, self.order, 0.0)
 
         threads = min(cores(), states.shape[0] // _FEWEST_PER_THREAD)
         if threads > 1:
@@ -198,7 +214,16 @@ class TaylorFlow(ReadOnlyArrays):
         return states
 
     def _run(
-        self, x: Array, t0: float, t1: float, params: Array, derivative: Array, bound: Array, order: int, shake: float
+        self,
+        x: Array,
+        t0: float,
+        t1: float,
+        params: Array,
+        derivative: Array,
+        bound: Array,
+        order: int,
+        shake: float,
+        stepwise: bool = True,
     ) -> tuple[Array, int]:
         events = np.empty((_MOST_EVENTS if self.directions else 0, 2))
         report = np.zeros(4)
@@ -217,6 +242,7 @@ class TaylorFlow(ReadOnlyArrays):
                 order,
                 self.most_steps,
                 shake,
+                stepwise,
                 derivative,
                 bound,
                 events,
@@ -267,7 +293,7 @@ def pieces(edges: Array, period: float, t0: float, t1: float) -> list[tuple[floa
 
 def _failure(status: int, t: float) -> AnalysisError:
     reason, advice = _REASONS[status]
-    return AnalysisError(reason.format(t=t), field="rhs", allowed=advice)
+    return (TooManySteps if status == 2 else AnalysisError)(reason.format(t=t), field="rhs", allowed=advice)
 
 
 @functools.cache

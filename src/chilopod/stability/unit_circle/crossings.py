@@ -122,9 +122,9 @@ def find_crossings(
     Parameters
     ----------
     matrices
-        ``matrices(values)``, values of shape (k,), gives the matrices, shape (k, m, m), and bounds on the relative
-        error of their entries, shape (k,). It raises AnalysisError, or gives NaN, where there is no matrix, and may be
-        asked for the same value twice.
+        ``matrices(values)``, values of shape (k,), gives the matrices, shape (k, m, m), and bounds on the error of
+        their entries: relative, shape (k,), or each, shape (k, m, m). It raises AnalysisError, or gives NaN, where
+        there is no matrix, and may be asked for the same value twice.
     low, high
         The interval.
     budget

@@ -44,16 +44,17 @@ class Spectra:
     """Eigenvalues of a family of matrices M, each computed once.
 
     Errors are found by changing M at random by what it may be wrong by (Kenney & Laub, SIAM J. Sci. Comput. 15, 1994):
-    that is right for simple and for defective eigenvalues alike. An entry may be wrong by the relative error times the
-    geometric mean of the largest entries of its row and its column, the states being in units that balance M: that
-    does not depend on the units the states came in, and a small multiplier beside a huge one is not lost where the
+    that is right for simple and for defective eigenvalues alike. Of a relative error, an entry may be wrong by that
+    times the geometric mean of the largest entries of its row and its column, the states being in units that balance M:
+    that does not depend on the units the states came in, and a small multiplier beside a huge one is not lost where the
     matrix keeps them apart.
 
     Parameters
     ----------
     matrices
-        ``matrices(values)`` gives M, shape (k, m, m), and bounds on its relative error, shape (k,); it
-        raises AnalysisError, or gives NaN, where there is none. Asked twice for the same value where errors matter.
+        ``matrices(values)`` gives M, shape (k, m, m), and bounds on its error: relative, shape (k,), or of every entry,
+        shape (k, m, m). It raises AnalysisError, or gives NaN, where there is none. Asked twice for the same value
+        where errors matter.
     budget
         At how many values M may be asked for.
     affordable
@@ -70,6 +71,7 @@ class Spectra:
         self._values: list[float] = []
         self._units: Array | None = None
         self._size: int | None = None
+        self._entrywise = False
 
     @property
     def evaluations(self) -> int:
@@ -126,17 +128,15 @@ class Spectra:
         except AnalysisError:
             if values.size == 1:
                 m = self.size or 1
-                return np.full((1, m, m), np.nan), np.full(1, np.nan)
+                return np.full((1, m, m), np.nan), np.full((1, m, m) if self._entrywise else 1, np.nan)
             halves = [self._ask(part) for part in np.array_split(values, 2)]
-            m = max(half[0].shape[-1] for half in halves)
-            parts = [
-                half[0] if half[0].shape[-1] == m else np.full((half[0].shape[0], m, m), np.nan) for half in halves
-            ]
-            return np.concatenate(parts), np.concatenate([half[1] for half in halves])
+            return _joined([half[0] for half in halves]), _joined([half[1] for half in halves])
         matrices = np.asarray(matrices, dtype=np.float64)
+        errors = np.asarray(errors, dtype=np.float64)
         if np.isfinite(matrices).all(axis=(1, 2)).any():
             self._size = matrices.shape[-1]
-        return matrices, np.broadcast_to(np.asarray(errors, dtype=np.float64), values.shape)
+            self._entrywise = errors.ndim == 3
+        return matrices, errors if errors.ndim == 3 else np.broadcast_to(errors, values.shape)
 
     def _balanced(self, matrices: Array) -> Array:
         """Matrices with the states in units in which rows and columns are of the same size; the same for all."""
@@ -194,8 +194,11 @@ class Spectra:
             m = matrices.shape[-1]
             balanced = self._balanced(matrices)
             rows, columns = np.abs(balanced).max(axis=2), np.abs(balanced).max(axis=1)
-            amounts = np.nan_to_num(np.abs(errors), nan=0.0, posinf=1.0) + _ROUNDING
-            wrong = amounts[:, None, None] * np.sqrt(rows)[:, :, None] * np.sqrt(columns)[:, None, :]
+            amounts = np.nan_to_num(np.abs(errors), nan=0.0, posinf=1.0)
+            relative = np.full(len(missing), _ROUNDING) + (0.0 if self._entrywise else amounts)
+            wrong = relative[:, None, None] * np.sqrt(rows)[:, :, None] * np.sqrt(columns)[:, None, :]
+            if self._entrywise:
+                wrong = wrong + self._balanced(amounts)
             signs = np.random.default_rng(m).choice(np.array([-1.0, 1.0]), size=(_COPIES, m, m))
             changed = balanced[:, None] + wrong[:, None] * signs
             for value, rows in zip(missing, changed, strict=True):
@@ -251,6 +254,14 @@ class Spectra:
                 moved = np.log(np.abs(signs * np.exp(logs - top) - other_signs * np.exp(other_logs - top)))
             largest = np.fmax(largest, moved + top)
         return np.asarray(largest - self._bounds(values, event) + np.log(_SAFETY))
+
+
+def _joined(parts: list[Array]) -> Array:
+    """Arrays of matrices, or of numbers, one behind the other; NaN of any shape among them."""
+    shape = max((part.shape[1:] for part in parts), key=len)
+    shape = max(part.shape[1:] for part in parts if part.ndim == len(shape) + 1)
+    filled = [part if part.shape[1:] == shape else np.full((len(part), *shape), np.nan) for part in parts]
+    return np.concatenate(filled)
 
 
 def margins(nu: ComplexArray) -> Array:
