@@ -175,6 +175,16 @@ def across(image: ReturnMap) -> tuple[Array, Array]:
     return into, (basis.T / units) @ along
 
 
+def return_multipliers(image: ReturnMap) -> ComplexArray:
+    """Eigenvalues of a return map by falling modulus, without the zero that stands for the motion itself."""
+    jacobian = image.jacobian
+    if image.normal is not None:
+        into, out_of = across(image)
+        jacobian = out_of @ jacobian @ into
+    values = np.linalg.eigvals(jacobian).astype(np.complex128)
+    return values[np.lexsort((-values.imag, -np.abs(values)))]
+
+
 def phased(right: ComplexArray, left: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
     """The pair with the largest entry of the right vector real and positive, left^H right = 1 kept."""
     peak = right[np.abs(right).argmax()]

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import AnalysisError, ParameterError, in_words
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.asked import Asking, ReturnBudget, SpentError, UserError
-from chilopod.stability.branches.curve import return_multipliers
 from chilopod.stability.capabilities import Family, SystemLike, is_autonomous
+from chilopod.stability.floquet import return_multipliers
 from chilopod.stability.orbits import Orbit, find_orbit, from_known, known_state
 from chilopod.stability.returns import ReturnMap, return_map, return_maps, section_at
 from chilopod.stability.scales import sizes
