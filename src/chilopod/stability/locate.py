@@ -205,7 +205,7 @@ def _described(samples: Samples, crossing: Crossing, block: Block | None, with_n
     else:
         value, bound, orbit = regular.place, regular.error_bound, regular.orbit
     # Where an orbit is lost the point may be the fold that it ends in.
-    lost = samples.end < samples.low + samples.width and value + bound >= samples.end
+    lost = samples.end < samples.high and value + bound >= samples.end
     return described(
         value,
         bound,

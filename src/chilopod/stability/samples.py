@@ -70,7 +70,7 @@ class Samples:
 
     Attributes
     ----------
-    low, width
+    low, high, width
         Of the interval.
     first
         The orbit at the lower end, with its error bounds.
@@ -92,7 +92,7 @@ class Samples:
         self, family: Family, guess: ArrayLike | None, low: float, high: float, budget: int, seconds: float
     ) -> None:
         self._family = family
-        self.low, self.width = low, high - low
+        self.low, self.high, self.width = low, high, high - low
         self.known = guess is None
         self._systems: dict[float, SystemLike] = {}
         self._by_value: dict[float, Sample] = {}
