@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from chilopod.cli import branch, doctor, reproduce, robot, stability, walk
+from chilopod.cli import branch, doctor, reproduce, robot, stability, turn, walk
 from chilopod.cli.options import new_app
 from chilopod.errors import ChilopodError, one_line
 
@@ -28,7 +28,7 @@ app.command("stability")(stability.stability)
 app.command("bifurcation")(stability.bifurcation)
 app.command("branch")(branch.branch)
 app.command("walk")(walk.walk)
-app.command("turn")(walk.turn)
+app.command("turn")(turn.turn)
 app.add_typer(reproduce.identify_app, name="identify")
 app.command("doctor")(doctor.doctor)
 

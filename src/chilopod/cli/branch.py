@@ -8,18 +8,19 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from chilopod.cli.options import (
+    ForceOption,
     JsonOption,
     OutOption,
     ParameterOption,
     RobotArg,
     SetOption,
+    free,
     interval,
-    prepared,
     print_json,
     read_robot,
+    wrote,
 )
 from chilopod.cli.progress import progress_bar
-from chilopod.errors import OutputError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,9 +57,7 @@ def branch(
         Path | None,
         typer.Option(metavar="FOLDER", help="Go on with the branch saved there; without --out it grows in its place."),
     ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Overwrite a branch that is already in the folder of --out.")
-    ] = False,
+    force: ForceOption = False,
 ) -> None:
     """Follow the curved walks from the pitchfork: radius, speed, stability, folds and what else happens on the way.
 
@@ -67,20 +66,23 @@ def branch(
     described = read_robot(robot, overrides)
     chosen = between or (None if resume else _BETWEEN)
     limits = interval(described, parameter, chosen) if chosen else None
-    folder = prepared(out)
-    # A branch that goes on where it is saved holds all it held before.
-    replace = force or (resume is not None and (folder is None or folder.resolve() == resume.resolve()))
-    if folder and not replace and (folder / "branch.nc").exists():
-        raise OutputError("exists and is not overwritten", source=str(folder / "branch.nc"), allowed="--force")
     from chilopod.analysis.branch import as_json as plain
     from chilopod.analysis.branch import curved_walks, read_walks, resumed
 
+    saved = None if resume is None else read_walks(resume / "branch.nc")
+    folder = out or resume
+    if folder:
+        from chilopod.report import files_of_branch
+
+        # A branch that goes on where it is saved holds all it held before.
+        grows = resume is not None and folder.resolve() == resume.resolve()
+        free(files_of_branch(folder), force or grows)
     with progress_bar() as show:
 
         def progress(done: float, words: str) -> None:
             show("branch", done, words)
 
-        if resume is None:
+        if saved is None:
             assert limits is not None
             data = curved_walks(
                 described,
@@ -93,7 +95,7 @@ def branch(
             )
         else:
             data = resumed(
-                read_walks(resume / "branch.nc"),
+                saved,
                 described,
                 parameter,
                 limits,
@@ -102,12 +104,10 @@ def branch(
                 side=-1 if left else None,
                 progress=progress,
             )
-            folder = folder or prepared(resume)
     if folder:
         from chilopod.report import write_branch
 
-        for path in write_branch(data, folder, replace=replace):
-            typer.echo(f"wrote {path}", err=True)
+        wrote(write_branch(data, folder))
     if as_json:
         print_json(plain(data))
         return
