@@ -105,14 +105,22 @@ ClusterOption = Annotated[
 ]
 
 
-def new_app(help_text: str) -> typer.Typer:
-    """Return an empty group of commands with the settings all groups share."""
+def new_app(help_text: str, *, completion: bool = False) -> typer.Typer:
+    """Return an empty group of commands with the settings all groups share.
+
+    Parameters
+    ----------
+    help_text
+        What it is for.
+    completion
+        Whether it has the options that make a shell complete its commands; only the outermost can.
+    """
     # Help without rich: importing it costs a third of what --help may take. Tracebacks are the business of `main`.
     return typer.Typer(
         help=help_text,
         rich_markup_mode=None,
         pretty_exceptions_enable=False,
-        add_completion=False,
+        add_completion=completion,
         no_args_is_help=False,
     )
 

@@ -21,6 +21,13 @@ from chilopod.cli.options import (
 )
 from chilopod.cli.progress import progress_bar
 
+_SECTIONS = (
+    *("mode", "exponents", "variants", "modules", "uniform", "identification", "branch", "curved", "undulation"),
+    *("turning", "movies", "robot-walks", "robot-turning", "robot-spread", "robot-numerics", "robot-structures"),
+    *("robot-why", "robot-movies"),
+)
+"""For the help, which loads nothing heavy; a test holds them to what there is."""
+
 PRESET, WHOLE = "aoi2022-planar", "aoi2022"
 
 identify_app = new_app("Find constants of a model from measured or printed numbers.")
@@ -34,17 +41,30 @@ def _group(ctx: typer.Context) -> None:
 
 def reproduce(
     only: Annotated[
-        list[str] | None, typer.Option("--only", metavar="SECTION", help="Just this section; may be repeated.")
+        list[str] | None,
+        typer.Option("--only", metavar="SECTION", help=f"Just this section; may be repeated: {', '.join(_SECTIONS)}."),
     ] = None,
-    out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Where the report goes.")] = Path("report"),
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FOLDER", help="Where the report goes; one that is there is gone on with.")
+    ] = Path("report"),
     quick: Annotated[bool, typer.Option("--quick", help="Coarser sweeps, fewer trials.")] = False,
     cluster: ClusterOption = None,
     as_json: JsonOption = False,
+    overrides: Annotated[list[str] | None, typer.Option("--set", hidden=True)] = None,
 ) -> None:
     """Repeat the paper with its planar model and with its robot in 3-D, and write a report beside its own numbers.
 
-    Trials are kept in the folder, so a run that was stopped goes on where it was.
+    Trials are kept in the folder, so a run that was stopped goes on where it was. It takes no robot and no --set: the
+    numbers beside which it puts its own are those of the paper's robot.
     """
+    if overrides:
+        from chilopod.errors import ParameterError
+
+        raise ParameterError(
+            "reproduce changes nothing about the robot: the paper's numbers are those of the paper's",
+            value=overrides[0],
+            allowed="no --set; stability, bifurcation, branch, walk and turn take any robot",
+        )
     from chilopod.output import prepare_folder
     from chilopod.studies.reproduce import SECTIONS, chosen
 
@@ -68,7 +88,8 @@ def reproduce(
     rows = [row.as_json() for row in results.all_rows]
     if as_json:
         robot_rows = [row.as_json() for row in results.all_robot_rows]
-        print_json({"report": str(page), "rows": rows, "robot_rows": robot_rows, "seconds": results.seconds})
+        robots = {"robot": results.robot.name, "whole_robot": WHOLE}
+        print_json({**robots, "report": str(page), "rows": rows, "robot_rows": robot_rows, "seconds": results.seconds})
         return
     for row in results.all_rows:
         typer.echo(f"{row.verdict:<12} {row.quantity}")
@@ -92,7 +113,7 @@ def reproduce(
         typer.echo(f"  {command}")
 
 
-@identify_app.command()
+@identify_app.command(short_help="Constants of the planar model from printed numbers.")
 def planar(
     robot: Annotated[str, typer.Argument(metavar="[ROBOT]", help="A robot file or preset.")] = PRESET,
     overrides: SetOption = None,
@@ -135,7 +156,7 @@ def planar(
     typer.echo(f"profile, figure and robot file are in {out}")
 
 
-@identify_app.command()
+@identify_app.command(short_help="Constants of the 3-D robot from the paper's walks.")
 def twin(
     robot: Annotated[str, typer.Argument(metavar="[ROBOT]", help="A robot file or preset with a [twin].")] = WHOLE,
     overrides: SetOption = None,
