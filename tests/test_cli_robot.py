@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 import chilopod
 from chilopod.cli import main
-from chilopod.robot import load_robot
+from chilopod.robot import load_robot, presets
 
 PRESET = "aoi2022-planar"
 
@@ -55,6 +55,11 @@ def test_help_names_the_commands():
         code, out, err = run(*arguments)
         assert (code, err) == (0, "")
         assert "show" in out
+
+
+def test_help_names_the_presets():
+    for command in (["robot", "show"], ["walk"]):
+        assert f"one of the presets {' and '.join(presets())}." in " ".join(run(*command, "--help")[1].split())
 
 
 def test_version():

@@ -39,12 +39,15 @@ def branch(
         ),
     ] = None,
     points: Annotated[
-        int, typer.Option(metavar="N", min=1, max=10_000, help="At most so many points (with --resume: more points).")
+        int, typer.Option(metavar="N", min=1, max=10_000, help="How many points at most; with --resume, how many more.")
     ] = 60,
     longest: Annotated[
         float,
         typer.Option(
-            metavar="STEP", min=1e-4, max=10.0, help="Largest step along the branch; halve it for more points."
+            metavar="STEP",
+            min=1e-4,
+            max=10.0,
+            help="Largest step along the branch, without a unit; halve it for points half as far apart.",
         ),
     ] = 0.15,
     left: Annotated[
@@ -59,7 +62,11 @@ def branch(
     ] = None,
     force: ForceOption = False,
 ) -> None:
-    """Follow the curved walks from the pitchfork: radius, speed, stability, folds and what else happens on the way.
+    """Follow the curved walks from the pitchfork at which the straight walk gives way: how tightly they turn, how
+    fast and stable they are, folds and what else happens on the way.
+
+    The axis radius is that of the arc into which the body is bent, as in the paper; the path radius that of the circle
+    on the floor; the cost of transport is leg power over weight times speed.
 
     With --out, draws the branch (unstable parts dashed) and writes it as netCDF and CSV; --resume goes on with it.
     """
@@ -120,12 +127,12 @@ def _print(data: xr.Dataset) -> None:
     verdict = about["criticality"]
     agrees = "confirms" if about["direction_confirms"] == "yes" else "does not confirm"
     typer.echo(f"  the normal form says {verdict}; the direction in which the branch leaves {agrees} it")
-    typer.echo(f"  {unit:<12} axis radius  path radius  speed (m/s)  cost of transport  stability")
+    typer.echo(f"  {unit:<12} axis radius (m)  path radius (m)  speed (m/s)  cost of transport  stability")
     for i in range(data.sizes["point"]):
         at = data.isel(point=i)
         special = str(at.special.values)
         stability = "stable" if bool(at.stable) else "unstable"
         typer.echo(
-            f"  {float(at.parameter):<12.6g} {float(at.axis_radius):<11.4g}  {float(at.path_radius):<11.4g}  "
+            f"  {float(at.parameter):<12.6g} {float(at.axis_radius):<15.4g}  {float(at.path_radius):<15.4g}  "
             f"{float(at.speed):<11.4g}  {float(at.cost_of_transport):<17.3g}  {special or stability}"
         )

@@ -79,8 +79,8 @@ StrategyOption = Annotated[
     str,
     typer.Option(
         metavar="pitchfork|hopf|leg-yaw|open-loop",
-        help="How it turns: a soft first spring, with the legs of module 1 yawing towards the target; all springs "
-        "alike and soft, with leg yaw; leg yaw alone; or a soft first spring alone.",
+        help="How it turns. pitchfork: a soft first spring, and the legs of module 1 yaw towards the target; hopf: all "
+        "springs alike and soft, with leg yaw; leg-yaw: leg yaw alone; open-loop: a soft first spring alone.",
         autocompletion=_strategies,
     ),
 ]

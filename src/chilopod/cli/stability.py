@@ -31,10 +31,11 @@ def stability(
     out: OutOption = None,
     force: ForceOption = False,
 ) -> None:
-    """Floquet multipliers, exponents and modes of the straight walk in the planar model.
+    """Is the straight walk stable in the planar model? Its Floquet multipliers, exponents and modes.
 
-    Exponents are the principal logarithms of the full-period multipliers over the period: their imaginary parts lie in
-    (-pi/T, pi/T].
+    A small disturbance is a sum of modes. A mode grows with its exponent, and by its multiplier from one period T of
+    the gait to the next: the walk is stable if every |multiplier| is below 1, every exponent's real part below 0.
+    Exponents are the principal logarithms of the multipliers over T: their imaginary parts lie in (-pi/T, pi/T].
     """
     described = read_robot(robot, overrides)
     file = out / "stability.json" if out else None
@@ -62,13 +63,18 @@ def bifurcation(
     between: BetweenOption,
     overrides: SetOption = None,
     seconds: Annotated[
-        float, typer.Option(metavar="S", min=0.0, help="Time for the search; then it ends with what it has.")
+        float, typer.Option(metavar="S", min=0.0, help="Time for the search, s; then it ends with what it has.")
     ] = 60.0,
     as_json: JsonOption = False,
     out: OutOption = None,
     force: ForceOption = False,
 ) -> None:
-    """Every bifurcation of the straight walk as one number of the robot varies, with its error bound and direction."""
+    """Where does the straight walk give way as one number of the robot varies, and how?
+
+    Every bifurcation in the interval, that is every value at which the straight walk gains or loses stability: its
+    kind, its error bound, the mode that grows, and whether what replaces the straight walk sets in gently
+    (supercritical) or by a jump (subcritical).
+    """
     described = read_robot(robot, overrides)
     low, high = interval(described, parameter, between)
     file = out / "bifurcation.json" if out else None

@@ -48,9 +48,9 @@ def turn(
         typer.Option(
             "--k1",
             metavar="auto|law|VALUE",
-            help="Stiffness of the springs that the strategy softens: what comes nearest to the target in undisturbed "
-            "trials; what bends the settled walk into the circle to the target (k1-hat in the paper); or one such as "
-            '"10 N*mm/deg".',
+            help="Stiffness of the springs that the strategy softens. auto: what comes nearest to the target in "
+            "undisturbed trials; law: what bends the settled walk into the circle to the target (the paper's k1-hat); "
+            'or a value such as "10 N*mm/deg".',
         ),
     ] = "auto",
     strategy: StrategyOption = "pitchfork",
