@@ -22,6 +22,7 @@ def python(*arguments, **more):
         ("chilopod turn my.toml --strat", ["--strategy"]),
         ("chilopod turn my.toml --strategy p", ["pitchfork"]),
         ("chilopod walk my.toml --engine t", ["twin"]),
+        ("chilopod reproduce --only mo", ["mode", "modules", "movies"]),
     ],
 )
 def test_a_shell_completes(typed, completed):

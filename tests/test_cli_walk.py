@@ -13,7 +13,7 @@ from chilopod.cli import main
 from chilopod.cli.options import EngineOption, StrategyOption
 from chilopod.engine import ENGINES
 from chilopod.record import RATE
-from chilopod.steering import STRATEGIES
+from chilopod.steering import ARRIVAL_RADIUS, STRATEGIES
 
 ROBOT = "aoi2022-planar"
 SOFT = ["--set", "springs.stiffness[0]=9 N*mm/deg"]
@@ -352,4 +352,6 @@ def test_choices_are_listed_and_completed(capsys):
     assert main(["turn", "--help"]) == 0
     out = capsys.readouterr().out
     assert "pitchfork|hopf|leg-yaw|open-loop" in out
-    assert f"by default {planar.traits.haste:g} (planar) or {twin.traits.haste:g} (twin) times" in " ".join(out.split())
+    out = " ".join(out.split())
+    assert f"within {ARRIVAL_RADIUS:g} m of the target" in out
+    assert f"by default {planar.traits.haste:g} (planar) or {twin.traits.haste:g} (twin) times" in out

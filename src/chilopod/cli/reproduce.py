@@ -18,6 +18,7 @@ from chilopod.cli.options import (
     read_robot,
     save_json,
     walking_on,
+    wrote,
 )
 from chilopod.cli.progress import progress_bar
 
@@ -42,7 +43,12 @@ def _group(ctx: typer.Context) -> None:
 def reproduce(
     only: Annotated[
         list[str] | None,
-        typer.Option("--only", metavar="SECTION", help=f"Just this section; may be repeated: {', '.join(_SECTIONS)}."),
+        typer.Option(
+            "--only",
+            metavar="SECTION",
+            help=f"Just this section; may be repeated: {', '.join(_SECTIONS)}.",
+            autocompletion=lambda: list(_SECTIONS),
+        ),
     ] = None,
     out: Annotated[
         Path, typer.Option("--out", metavar="FOLDER", help="Where the report goes; one that is there is gone on with.")
@@ -143,8 +149,7 @@ def planar(
             lambda done, words: show("identification", done, words),
         )
     best = found.best.with_(name="identified")
-    write_identification(found, out)
-    write_atomic(out / "identified.toml", best.to_toml())
+    wrote([*write_identification(found, out), write_atomic(out / "identified.toml", best.to_toml())])
     result = {"robot": described.name, **found.as_json()}
     save_json(out / "identification.json", result)
     if as_json:
@@ -195,7 +200,7 @@ def twin(
             fresh,
             lambda done, words: show("identification", done, words),
         )
-    write_atomic(out / "identified.toml", found.best.with_(name="identified").to_toml())
+    wrote([write_atomic(out / "identified.toml", found.best.with_(name="identified").to_toml())])
     result = {"robot": described.name, **found.as_json()}
     save_json(out / "identification.json", result)
     if as_json:

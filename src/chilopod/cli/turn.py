@@ -75,9 +75,9 @@ def turn(
 ) -> None:
     """Pick the spring that leads to a target, walk there, and say how well it went.
 
-    The robot has arrived within 0.15 m of the target. The criteria are the paper's: what is left of the distance
-    (epsilon 1) and the angle between heading and target (epsilon 2) when the first walk arrives, and until then the
-    leg yaw squared, over time (epsilon 3, what steering cost).
+    The robot arrives where it comes within 0.15 m of the target. The criteria are the paper's: what is left of the
+    distance (epsilon 1) and the angle between heading and target (epsilon 2) when the first walk arrives, and until
+    then the leg yaw squared, over time (epsilon 3, what steering cost).
 
     With --out, draws the way and writes the record, and a replay that opens in any browser.
     """
