@@ -16,7 +16,8 @@ import numba
 
 def _drop_stale() -> None:
     package = Path(__file__).parent
-    sources = [*package.glob("*.py"), *package.glob("planar/*.py"), *package.glob("stability/taylor/*.py")]
+    folders = ("", "planar/", "stability/taylor/", "stability/implicit/")
+    sources = [source for folder in folders for source in package.glob(f"{folder}*.py")]
     newest = max(source.stat().st_mtime for source in sources)
     for index in package.rglob("*.nbi"):
         with contextlib.suppress(OSError):  # another process may have been quicker, or the folder is read-only

@@ -81,14 +81,14 @@ def test_the_symmetry_need_not_be_known():
 
 
 @pytest.mark.parametrize("symmetry", [((-1, 0), (0, -1)), None])
-@pytest.mark.parametrize(("low", "high"), [(FORCE, 2.6), (2.2, FORCE)])
+@pytest.mark.parametrize(("low", "high"), [(FORCE, 2.6), (2.2, FORCE), (FORCE - 1e-9, 2.6), (2.2, FORCE + 1e-9)])
 def test_an_interval_that_begins_or_ends_in_the_pitchfork(low, high, symmetry):
-    """It is no fold, although the orbit is singular there."""
+    """Or almost: it is no fold, although the orbit is singular there."""
     (point,) = locate(
-        lambda force: duffing(force, symmetry=symmetry), (low, high), orbit=STATE if low == FORCE else [1.88, 0.64]
+        lambda force: duffing(force, symmetry=symmetry), (low, high), orbit=STATE if low > 2.3 else [1.88, 0.64]
     )
     assert point.kind is Kind.PITCHFORK
-    assert abs(point.value - FORCE) <= min(point.error_bound, 1e-9)
+    assert abs(point.value - FORCE) <= point.error_bound < 1e-9
     assert point.criticality is Criticality.SUPERCRITICAL
 
 

@@ -12,10 +12,13 @@ derivative has the derivative of state i with respect to state j at the start in
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Protocol, Self, TypeGuard, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
+
+from chilopod.frozen import ReadOnlyArrays
 
 Array = NDArray[np.float64]
 
@@ -168,6 +171,45 @@ class FlowsMany(KnowsOrbit, Protocol):
     def flow_many(self, systems: Sequence[Self], t0: float, t1: float, /) -> tuple[Array, Array]:
         """Derivatives of the flow on the known orbits, shape (systems, n, n), and bounds as in
         :class:`FlowsWithError`, shape (systems,)."""
+        ...
+
+
+@dataclass(frozen=True)
+class Stretched(ReadOnlyArrays):
+    """What a flow makes of a frame.
+
+    Attributes
+    ----------
+    state
+        At the end, shape (n,).
+    frame
+        Orthonormal, shape (n, n): for every k its first k columns span what the flow made of those at the start.
+    stretch
+        Logarithms of the growth of the columns, shape (n,): of the volume of the first k, less that of the first k-1.
+    other
+        The logarithms by another computation, which tells their error.
+    turned
+        The smallest cosine of the angles between a column and itself a step later, shape (n,): the sign of a column
+        is carried along where it is clearly positive.
+    """
+
+    state: Array
+    frame: Array
+    stretch: Array
+    other: Array
+    turned: Array
+
+
+@runtime_checkable
+class FlowsFrames(SystemLike, Protocol):
+    """Knows how fast directions decay of which nothing is left within a step of its integration."""
+
+    def is_stiff(self) -> bool:
+        """Whether derivatives of the flow have nothing to say of such directions."""
+        ...
+
+    def flow_frame(self, x: Array, units: Array, frame: Array, t0: float, t1: float, /) -> Stretched:
+        """Carry a frame, orthonormal in these units of the states, from a state at t0 to t1."""
         ...
 
 

@@ -54,7 +54,7 @@ class Extent:
 
 def extent(samples: Samples) -> Extent:
     """How far the orbit goes that some samples are on."""
-    path, high = samples.path, samples.low + samples.width
+    path, high = samples.path, samples.high
     if samples.known:
         return Extent(samples.low, high)
     first, last, beside = path[0], path[-1], _BEFORE * samples.width

@@ -15,7 +15,7 @@ from chilopod.cores import cores
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.arguments import checked_count
-from chilopod.stability.capabilities import FlowsTangents, SystemLike, is_autonomous
+from chilopod.stability.capabilities import FlowsFrames, FlowsTangents, SystemLike, is_autonomous
 from chilopod.stability.krylov.closing import LARGE
 from chilopod.stability.krylov.leading import leading_multipliers, whole_pairs
 from chilopod.stability.matrix_errors import DRAWN, FIRST_ORDER, eigenvalues_moved
@@ -23,6 +23,7 @@ from chilopod.stability.orbits import Orbit, find_large_orbit, find_orbit, from_
 from chilopod.stability.returns import ReturnMap, flow_with_error, return_maps
 from chilopod.stability.scales import numerical_balance, sizes
 from chilopod.stability.splitting import split_product
+from chilopod.stability.stiff import disturbed, split_stiff
 from chilopod.stability.system import PeriodicSystem
 
 Array = NDArray[np.float64]
@@ -36,6 +37,7 @@ _WORST_CONDITION = 1e6
 _FEWEST_FACTORS, _MOST_FACTORS = 8, 32768
 _COMPOSED = 1e-6  # by so much the parts of a flow may miss the whole
 _SAME_ANGLE = 1e-12
+_EPSILON = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
@@ -126,11 +128,12 @@ class Spectrum(ReadOnlyArrays):
 
 def spectrum(image: ReturnMap) -> Spectrum:
     """Eigenvalues of a return map with their condition; without the zero that stands for the motion itself."""
-    into, out_of = across(image)
-    jacobian = out_of @ image.jacobian @ into
+    section = None if image.normal is None else across(image)
+    jacobian = image.jacobian if section is None else section[1] @ image.jacobian @ section[0]
     # In units in which all entries are alike the errors of the eigenvalue solver are small against every one of them.
     units = numerical_balance(jacobian)
-    values, right = np.linalg.eig(jacobian * units / units[:, None])
+    scaled = jacobian * units / units[:, None]
+    values, right = np.linalg.eig(scaled)
     # Moduli that differ by round-off are equal; the two of a pair stand together, positive frequency first.
     sizes = np.round(np.abs(values) / max(float(np.abs(values).max()), 1e-300), 12)
     order = np.lexsort((-values.imag, -np.round(np.abs(values.imag), 12), -sizes))
@@ -139,11 +142,11 @@ def spectrum(image: ReturnMap) -> Spectrum:
         left = np.linalg.inv(right).conj().T
     except np.linalg.LinAlgError:  # a defective matrix: no bound to be had from conditions
         left = np.full_like(right, np.nan)
-    # The backward error of the eigenvalue solver.
-    size = float(np.linalg.norm(jacobian * units / units[:, None]))
-    error = 4.0 * np.finfo(float).eps * size * np.linalg.norm(left, axis=0) * np.linalg.norm(right, axis=0)
-    right = into @ (units[:, None] * right)
-    left = out_of.T @ (left / units[:, None])
+    # The backward error of the eigenvalue solver, whose eigenvectors have length 1.
+    error = 4.0 * _EPSILON * float(np.linalg.norm(scaled)) * np.linalg.norm(left, axis=0)
+    right, left = units[:, None] * right, left / units[:, None]
+    if section is not None:
+        right, left = section[0] @ right, section[1].T @ left
     norms = np.linalg.norm(right, axis=0)
     right, left = right / norms, left * norms
     # d nu = left^H E right, of which a bound of every entry of E tells the most; with one number for all of them, that
@@ -154,8 +157,9 @@ def spectrum(image: ReturnMap) -> Spectrum:
         error += 4.0 * image.error * np.linalg.norm(left, axis=0)
     error = np.where(np.isfinite(error), error, np.inf)
     if (error > FIRST_ORDER * np.abs(values).max(initial=0.0)).any():
-        scaled = np.abs(out_of) @ np.broadcast_to(image.error, image.jacobian.shape) @ np.abs(into)
-        error = np.minimum(error, eigenvalues_moved(values, jacobian, scaled))
+        off = np.broadcast_to(image.error, image.jacobian.shape)
+        off = off if section is None else np.abs(section[1]) @ off @ np.abs(section[0])
+        error = np.minimum(error, eigenvalues_moved(values, jacobian, off))
     return Spectrum(values, right, left, error)
 
 
@@ -172,6 +176,16 @@ def across(image: ReturnMap) -> tuple[Array, Array]:
     into = units[:, None] * basis
     along = np.eye(n) - np.outer(image.velocity, image.normal) / float(image.normal @ image.velocity)
     return into, (basis.T / units) @ along
+
+
+def return_multipliers(image: ReturnMap) -> ComplexArray:
+    """Eigenvalues of a return map by falling modulus, without the zero that stands for the motion itself."""
+    jacobian = image.jacobian
+    if image.normal is not None:
+        into, out_of = across(image)
+        jacobian = out_of @ jacobian @ into
+    values = np.linalg.eigvals(jacobian).astype(np.complex128)
+    return values[np.lexsort((-values.imag, -np.abs(values)))]
 
 
 def phased(right: ComplexArray, left: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
@@ -283,11 +297,12 @@ def exponents(system: SystemLike, orbit: ArrayLike | None = None) -> Exponents:
     """
     found = find_orbit(system, orbit)
     image = found.image
-    factors, errors, units = _factors(system, found)
-    log_nu, modes = split_product(factors)
-    random = np.random.default_rng(0)
-    disturbed = [f + e * random.choice([-1.0, 1.0], f.shape) for f, e in zip(factors, errors, strict=True)]
-    moved = np.abs(log_nu[:, None] - split_product(disturbed)[0]).min(axis=1)
+    if isinstance(system, FlowsFrames) and system.is_stiff():
+        log_nu, modes, units, moved = split_stiff(system, found)
+    else:
+        factors, errors, units = _factors(system, found)
+        log_nu, modes = split_product(factors)
+        moved = np.abs(log_nu[:, None] - split_product(disturbed(factors, errors))[0]).min(axis=1)
     bound = image.returns * (DRAWN * moved + 4.0 * np.finfo(float).eps * np.abs(log_nu)) / image.period
     # Principal logarithm of nu^k: the imaginary part back into (-pi, pi].
     angle = np.angle(np.exp(1j * image.returns * log_nu.imag))

@@ -13,18 +13,22 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability.asked import Asking
-from chilopod.stability.capabilities import Family, SystemLike, spatial_symmetries
-from chilopod.stability.described import describe, fold_point
+from chilopod.stability.branches.fold import Fold
+from chilopod.stability.capabilities import Family
+from chilopod.stability.course import Course, place_error
+from chilopod.stability.described import Formed, described
 from chilopod.stability.extent import Extent, extent
-from chilopod.stability.orbits import Orbit
-from chilopod.stability.points import BifurcationPoint
-from chilopod.stability.returns import ReturnMap
+from chilopod.stability.normal_forms.normal_form import normal_form as normal_form_of
+from chilopod.stability.orbits import Orbit, bounded, from_known
+from chilopod.stability.points import BifurcationPoint, Kind
+from chilopod.stability.returns import ReturnMap, returned_states
 from chilopod.stability.samples import Samples
-from chilopod.stability.scales import numerical_balance
-from chilopod.stability.symmetry.groups import centraliser, commutes, finite_group, isotropy
-from chilopod.stability.symmetry.isotypic import Block, Type, isotypic
-from chilopod.stability.unit_circle.crossings import Crossings, Status, find_crossings
-from chilopod.stability.unit_circle.spectra import Event
+from chilopod.stability.scales import numerical_balance, sizes
+from chilopod.stability.singular import past_singular
+from chilopod.stability.symmetry.isotypic import Block
+from chilopod.stability.symmetry.orbit_blocks import crossings_in, orbit_blocks
+from chilopod.stability.unit_circle.crossings import Crossing, Crossings, Status, find_crossings
+from chilopod.stability.unit_circle.spectra import Event, Matrices
 
 Array = NDArray[np.float64]
 
@@ -36,6 +40,7 @@ _DESCRIBING = 400  # return maps to solve for the orbits beside a point
 _GRAVITY = (Status.COMPLETE, Status.CONSERVATIVE, Status.INCOMPLETE, Status.BUDGET)
 _FOLLOWED = 10.0  # factor on the error of the first orbit for that of those which are followed from it
 _LEAST_ERROR = 1e-15
+_BESIDE = 1e-6  # of the interval: how far beside a crossing rates of change are taken
 
 
 @dataclass(frozen=True)
@@ -140,11 +145,11 @@ def locate(
                 samples.allow(_DESCRIBING)
                 try:
                     with Asking("family", crossing.value):
-                        points.append(describe(samples, crossing, block, normal_form))
+                        points.append(_described(samples, crossing, block, normal_form))
                 except AnalysisError as error:
                     status = max(status, Status.INCOMPLETE, key=_GRAVITY.index)
                     remarks.append(f"what crosses at {crossing.value:.9g} could not be described: {error}")
-    points += [fold_point(fold, samples, normal_form) for fold in here.folds]
+    points += [_fold(samples, fold, normal_form) for fold in here.folds]
     if samples.remarks:
         status = max(status, Status.INCOMPLETE, key=_GRAVITY.index)
     ordered = tuple(sorted(points, key=lambda point: point.value))
@@ -163,7 +168,7 @@ def _interval(between: tuple[float, float]) -> tuple[float, float]:
 
 def _searched(samples: Samples, here: Extent, budget: int) -> tuple[list[tuple[Block | None, Crossings]], list[str]]:
     """The crossings in every block of the return map, and what is to be said of the blocks."""
-    blocks, remarks = _blocks(samples.family(samples.low), samples.first)
+    blocks, remarks = orbit_blocks(samples.family(samples.low), samples.first)
     # Of the first orbit hardly a trace may be left after a return; of those that are followed from it there is more.
     uncertain = _FOLLOWED * _relative(samples.of_flow(), at_least=1.0)
 
@@ -178,39 +183,66 @@ def _searched(samples: Samples, here: Extent, budget: int) -> tuple[list[tuple[B
             errors = np.full(len(found), uncertain)
         return np.stack([each.image.jacobian for each in found]), errors
 
-    searched: list[tuple[Block | None, Crossings]] = []
-    for block in blocks:
+    def search(matrices: Matrices) -> Crossings:
+        return find_crossings(matrices, here.start, here.end, budget=budget, affordable=samples.affordable)
 
-        def reduced(values: Array, block: Block | None = block) -> tuple[Array, Array]:
-            matrices, errors = whole(values)
-            if block is None:
-                return matrices, errors
-            if errors.ndim == 3:
-                errors = np.abs(block.dual) @ errors @ np.abs(block.basis)
-            if block.type is Type.REAL:
-                return np.stack([np.real(block.reduced(matrix)) for matrix in matrices]), errors
-            return block.dual @ matrices @ block.basis, errors
-
-        searched.append(
-            (block, find_crossings(reduced, here.start, here.end, budget=budget, affordable=samples.affordable))
-        )
-    return searched, remarks
+    return [(block, crossings_in(block, whole, search)) for block in blocks], list(remarks)
 
 
-def _blocks(system: SystemLike, orbit: Orbit) -> tuple[tuple[Block | None, ...], list[str]]:
-    """Of the symmetries that leave the orbit as it is; a single None where there are none."""
-    generators = spatial_symmetries(system)
-    if not generators:
-        return (None,), []
-    group = finite_group(np.stack(generators))
-    if system.symmetry is not None:
-        group = centraliser(group, system.symmetry)
-    group = isotropy(group, orbit.state, np.nan_to_num(orbit.error))
-    if group.order == 1:
-        return (None,), ["the orbit has none of the spatial symmetries"]
-    if commutes(group, orbit.image.jacobian, orbit.image.error) > 1.0:
-        return (None,), ["the return map does not have the spatial symmetries: they are left aside"]
-    return isotypic(group), []
+def _described(samples: Samples, crossing: Crossing, block: Block | None, with_normal_form: bool) -> BifurcationPoint:
+    """What happens at a crossing of an orbit that is known, or followed."""
+
+    def bounded_at(value: float, state: Array, error: Array, image: ReturnMap) -> Orbit:
+        return bounded(samples.family(value), state, image, error=error)
+
+    course = Course(samples.at, samples.low, samples.end, samples.width, _BESIDE * samples.width)
+    # A mode that breaks a symmetry is no part of the orbit, which is regular among those that have it.
+    trivial = block is None or block.trivial
+    regular = past_singular(course, crossing, bounded_at) if trivial and not samples.known else None
+    if regular is None:
+        value, orbit = crossing.value, _orbit(samples, crossing.value)
+        bound = place_error(course, crossing, orbit.image)
+    else:
+        value, bound, orbit = regular.place, regular.error_bound, regular.orbit
+    # Where an orbit is lost the point may be the fold that it ends in.
+    lost = samples.end < samples.high and value + bound >= samples.end
+    return described(
+        value,
+        bound,
+        orbit,
+        crossing,
+        block,
+        _formed(samples, value, orbit),
+        kind=Kind.BRANCH_POINT if lost and trivial and crossing.event is Event.PLUS else None,
+        with_normal_form=with_normal_form,
+    )
+
+
+def _fold(samples: Samples, fold: Fold, with_normal_form: bool) -> BifurcationPoint:
+    """The fold that a followed orbit begins or ends in."""
+    orbit = Orbit(fold.image.state, fold.image, np.zeros(fold.image.state.size))
+    crossing = Crossing(fold.value, (fold.value, fold.value), Event.PLUS, 1, 1, 1.0 + 0.0j)
+    formed = _formed(samples, fold.value, orbit)
+    return described(
+        fold.value, fold.error_bound, orbit, crossing, None, formed, kind=Kind.FOLD, with_normal_form=with_normal_form
+    )
+
+
+def _orbit(samples: Samples, value: float) -> Orbit:
+    """The orbit at a value, with error bounds."""
+    sample = samples.at(np.array([value]))[0]
+    system = samples.family(value)
+    return from_known(system, sample.orbit) if samples.known else bounded(system, sample.orbit, sample.image)
+
+
+def _formed(samples: Samples, value: float, orbit: Orbit) -> Formed:
+    system = samples.family(value)
+    scale = sizes(system, orbit.state, orbit.period / orbit.image.returns)
+
+    def mapped(states: Array) -> Array:
+        return returned_states(system, states, orbit.section)
+
+    return lambda critical, uncertainty: normal_form_of(mapped, critical, uncertainty=uncertainty, scale=scale)
 
 
 def _relative(image: ReturnMap, at_least: float = 0.0) -> float:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,10 +23,11 @@ from chilopod.stability.arguments import (
 from chilopod.stability.called import CalledFlow
 from chilopod.stability.capabilities import spatial_symmetries
 from chilopod.stability.events import Event, check_events, checked_events
+from chilopod.stability.implicit.implicit import ImplicitFlow, can_be_implicit
 from chilopod.stability.jumps import fast_parts, warn_of_jumps
 from chilopod.stability.system import PeriodicSystem
 from chilopod.stability.taylor.evaluation import evaluate, evaluate_jacobian
-from chilopod.stability.taylor.taylor import TaylorFlow
+from chilopod.stability.taylor.taylor import TaylorFlow, TooManySteps
 from chilopod.stability.taylor.trace import Trace, trace
 from chilopod.stability.taylor.traced import Untraceable
 
@@ -35,6 +37,13 @@ TOLERANCE = 1e-14
 _SAME = 1e-6
 _FLOOR = 0.01
 """Truncation of a Taylor step relative to the tolerance: it costs next to nothing."""
+_ESTIMATED = 100.0
+"""Of an implicit step likewise: its estimate is far larger than its error."""
+
+_BOTH = ("flow", "flow_with_error", "flow_states")
+"""What either method offers."""
+
+Method = Literal["automatic", "taylor", "implicit"]
 
 
 def from_rhs(
@@ -51,6 +60,7 @@ def from_rhs(
     orbit: ArrayLike | None = None,
     guess_period: float | None = None,
     scale: ArrayLike | None = None,
+    method: Method = "automatic",
     tolerance: float = TOLERANCE,
 ) -> PeriodicSystem:
     """Build a :class:`PeriodicSystem` from dx/dt = rhs(t, x, *args).
@@ -62,6 +72,10 @@ def from_rhs(
     kinks (``sign``, ``abs``, ``where``, ``%``, comparisons, ...) are found and crossed exactly, in time and in state.
     What depends on time alone is looked at on a grid of 4096 points over the period, so a pulse that is not seen there
     (narrower than about T / 50 000) is missed.
+
+    Taylor series take steps as short as the fastest decay. Where that is much faster than the motion, the system is
+    stiff, and an implicit method, Radau IIA collocation with the exact derivative of its steps, goes on in their place:
+    tried when the series have used up their steps, or from the start with ``method="implicit"``.
 
     A function that branches on its arguments (``if x[0] > 0``) or calls other libraries cannot be traced. It is
     integrated by scipy's DOP853 from calls, hundreds of times slower.
@@ -88,6 +102,11 @@ def from_rhs(
     symmetry, spatial_symmetry, orbit, scale, guess_period
         See :class:`PeriodicSystem`. Where the period is not known, ``guess_period`` has to be given; ``orbit`` may be a
         guess.
+    method
+        "taylor" or "implicit", of functions that can be traced; "automatic": Taylor series, and the implicit method
+        from where these take too many steps on. That is found out anew for every system, in a second or two, so
+        families that are known to be stiff are better told. The implicit method is for smooth functions of the
+        state without events, and for some tens of states.
     tolerance
         Local error per step, relative to the size of each state.
 
@@ -98,6 +117,8 @@ def from_rhs(
     NotAnalytic
         If the derivative of such a function has to be taken by differences.
     """
+    if method not in get_args(Method):
+        raise ParameterError("is not known", field="method", value=method, allowed=", ".join(get_args(Method)))
     dimension, args, tolerance = checked_arguments(rhs, dimension, args, tolerance)
     autonomous = period is None
     length = checked_duration("guess_period" if autonomous else "period", guess_period if autonomous else period)
@@ -122,6 +143,10 @@ def from_rhs(
                 field="events",
                 allowed="arithmetic, elementary functions and numpy arrays, without branches on the state",
             ) from None
+        if method != "automatic":
+            raise ParameterError(
+                f"needs a function that can be traced: {reason}", field="method", value=method, allowed="automatic"
+            ) from None
         check_shape(rhs, args, times, base, (dimension,), "rhs")
         if jacobian is not None:
             check_shape(jacobian, args, times, base, (dimension, dimension), "jacobian")
@@ -137,10 +162,11 @@ def from_rhs(
         if jacobian is not None:
             check_shape(jacobian, args, times, base, (dimension, dimension), "jacobian")
             _check_jacobian(jacobian, args, traced, times, base)
-        flows = _taylor_flows(traced, edges, tolerance, happening)
 
         def slopes(t: Array, x: Array) -> Array:
             return evaluate(traced.tape, t, x, traced.params)[traced.tape.slopes]
+
+        flows = _traced_flows(traced, edges, tolerance, happening, method, lambda: fast_parts(slopes, base, edges))
 
     system = PeriodicSystem(
         dimension=dimension,
@@ -162,6 +188,48 @@ def from_rhs(
         for matrix in spatial_symmetries(system):
             check_symmetry("spatial_symmetry", matrix, 0.0, slopes, times, base, length)
     return system
+
+
+def _traced_flows(
+    traced: Trace,
+    edges: Array,
+    tolerance: float,
+    events: tuple[Event, ...],
+    method: Method,
+    fast: Callable[[], Array],
+) -> dict[str, Any]:
+    """The flows of a traced right-hand side, as a :class:`PeriodicSystem` wants them."""
+
+    @functools.cache
+    def implicit() -> ImplicitFlow:
+        parts = fast() if traced.tape.clocks.size else np.empty((0, 2))
+        return ImplicitFlow(traced.tape, traced.params, edges, parts, _ESTIMATED * tolerance)
+
+    if method == "implicit":
+        own = {name: getattr(implicit(), name) for name in (*_BOTH, "flow_frame")}
+        return {**own, "is_stiff": lambda: True, "concurrent": True}
+    taylor = _taylor_flows(traced, edges, tolerance, events)
+    if method == "taylor" or not can_be_implicit(traced.tape):
+        return taylor
+    stiff: list[bool] = []
+
+    def either(name: str) -> Callable[..., Any]:
+        def flow(*arguments: Any) -> Any:
+            if not stiff:
+                try:
+                    return taylor[name](*arguments)
+                except TooManySteps:
+                    stiff.append(True)
+            return getattr(implicit(), name)(*arguments)
+
+        return flow
+
+    return {
+        **taylor,
+        **{name: either(name) for name in _BOTH},
+        "flow_frame": lambda *arguments: implicit().flow_frame(*arguments),
+        "is_stiff": lambda: bool(stiff),
+    }
 
 
 def _taylor_flows(traced: Trace, edges: Array, tolerance: float, events: tuple[Event, ...]) -> dict[str, Any]:

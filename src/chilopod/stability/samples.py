@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import AnalysisError, ParameterError, in_words
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.asked import Asking, ReturnBudget, SpentError, UserError
-from chilopod.stability.branches.curve import return_multipliers
 from chilopod.stability.capabilities import Family, SystemLike, is_autonomous
+from chilopod.stability.floquet import return_multipliers
 from chilopod.stability.orbits import Orbit, find_orbit, from_known, known_state
 from chilopod.stability.returns import ReturnMap, return_map, return_maps, section_at
 from chilopod.stability.scales import sizes
@@ -70,7 +70,7 @@ class Samples:
 
     Attributes
     ----------
-    low, width
+    low, high, width
         Of the interval.
     first
         The orbit at the lower end, with its error bounds.
@@ -92,7 +92,7 @@ class Samples:
         self, family: Family, guess: ArrayLike | None, low: float, high: float, budget: int, seconds: float
     ) -> None:
         self._family = family
-        self.low, self.width = low, high - low
+        self.low, self.high, self.width = low, high, high - low
         self.known = guess is None
         self._systems: dict[float, SystemLike] = {}
         self._by_value: dict[float, Sample] = {}

@@ -63,7 +63,7 @@ def split_product(factors: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]
     ]
     logarithms, vectors = [], []
     for a, b in zip(borders, borders[1:], strict=False):
-        bases = [_intersection(one[:, :b], other[:, : n - a], b - a) for one, other in zip(slow, fast, strict=True)]
+        bases = [intersection(one[:, :b], other[:, : n - a], b - a) for one, other in zip(slow, fast, strict=True)]
         values, columns = _restricted(factors, bases)
         logarithms.append(values)
         vectors.append(columns)
@@ -72,6 +72,18 @@ def split_product(factors: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]
     vec_all = vec_all[:, order]
     peaks = vec_all[np.abs(vec_all).argmax(axis=0), range(n)]
     return log_all[order], vec_all * (np.abs(peaks) / peaks) / np.linalg.norm(vec_all, axis=0)
+
+
+def split_leading(factors: Sequence[Array], count: int) -> tuple[ComplexArray, ComplexArray]:
+    """The same for the ``count`` directions that grow most, of factors that may make nothing of the others.
+
+    These have to be separated from the others by a gap, and the factors to be of moderate condition on them.
+    """
+    bases = [basis[:, :count] for basis in _iterate(factors, factors[0].shape[0])[0]]
+    following = [*bases[1:], bases[0]]
+    restricted = [after.T @ f @ before for f, before, after in zip(factors, bases, following, strict=True)]
+    logarithms, vectors = split_product(restricted)
+    return logarithms, bases[0] @ vectors
 
 
 def _iterate(factors: Sequence[Array], n: int) -> tuple[list[Array], Array, Array]:
@@ -92,7 +104,7 @@ def _iterate(factors: Sequence[Array], n: int) -> tuple[list[Array], Array, Arra
     return bases, growth / (_PASSES - _PASSES // 2), motion
 
 
-def _intersection(one: Array, other: Array, dimension: int) -> Array:
+def intersection(one: Array, other: Array, dimension: int) -> Array:
     """Orthonormal basis of the intersection of two column spaces that is known to have the given dimension."""
     left = np.linalg.svd(one.T @ other)[0]
     return one @ left[:, :dimension]

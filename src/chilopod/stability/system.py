@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import ParameterError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.arguments import finite_array
+from chilopod.stability.capabilities import Stretched
 from chilopod.stability.scales import numerical_balance
 
 Array = NDArray[np.float64]
@@ -57,7 +58,7 @@ class PeriodicSystem(ReadOnlyArrays):
     guess_period
         About how long an orbit of such a system takes; orbits have their own, shortest period, also where this is
         nearer to a multiple of it.
-    flow_with_error, flow_states, flow_tangents
+    flow_with_error, flow_states, flow_tangents, flow_frame, is_stiff
         See :mod:`chilopod.stability.capabilities`.
     concurrent
         Whether flows may run in several threads at once, which :func:`chilopod.stability.sweep` then does.
@@ -77,6 +78,8 @@ class PeriodicSystem(ReadOnlyArrays):
     )
     flow_states: Callable[[Array, float, float], Array] | None = field(default=None, repr=False)
     flow_tangents: Callable[[Array, Array, float, float], tuple[Array, Array]] | None = field(default=None, repr=False)
+    flow_frame: Callable[[Array, Array, Array, float, float], Stretched] | None = field(default=None, repr=False)
+    is_stiff: Callable[[], bool] | None = field(default=None, repr=False)
     concurrent: bool = field(default=False, repr=False)
     symmetry_order: int = field(init=False, default=1, repr=False)
 

@@ -19,8 +19,9 @@ from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, Step
 from chilopod.stability.branches.branch_starts import IN_FOLD, Start, anchored, begin, branch_sizes, switch
 from chilopod.stability.branches.closure import closes
-from chilopod.stability.branches.curve import PRECISION, Curve, OutsideIntervalError
+from chilopod.stability.branches.curve import PRECISION, Curve
 from chilopod.stability.branches.inspection import Found, inspect
+from chilopod.stability.branches.stepping import taken
 from chilopod.stability.capabilities import Family
 from chilopod.stability.orbits import Orbit
 from chilopod.stability.points import BifurcationPoint
@@ -37,10 +38,6 @@ BUDGET = 200_000
 
 _SHORTEST = 1e-5  # step at which a curve is lost, relative to the longest
 _FEW, _MANY = 4, 7  # corrections after which steps grow, and shrink
-_STRAIGHT = 0.7  # cosine between a step and the tangent where it starts
-_SURPRISE = 0.3  # of a step: predicted worse than that, it is held against half of it
-_AWAY = 0.1  # of a step
-_OVER = 2.0  # of a step that has to end on the interval's end: as long as that at most
 _NARROWEST = 1e-9  # width of an interval, relative to the values in it
 
 Progress = Callable[[int, BranchPoint], None]
@@ -298,7 +295,7 @@ def _followed(
             if curve.left <= 0:
                 return ended(Ending.BUDGET)
             try:
-                step, left = _taken(curve, anchor, size)
+                step, left = taken(curve, anchor, size)
                 what, closed = inspect(curve, step, closely), None
                 if count > 2 and not left:
                     closed = closes(curve, found[0], step)
@@ -353,55 +350,3 @@ def _take_error(curve: Curve, found: list[BranchPoint]) -> None:
     # Of the first orbit hardly a trace may be left after a return; of others there is more.
     size = max(1.0, float(np.linalg.norm(image.jacobian * sizes / sizes[:, None])))
     curve.relative_error = float(np.max(wrong)) / size
-
-
-def _taken(curve: Curve, anchor: Anchor, size: float) -> tuple[Step, bool]:
-    """A step of a size, or a shorter one to the end of the interval, and whether it is that."""
-    last = anchor.last
-    guess = curve.predicted(anchor, size)[0]
-    low, high = ((end - last.value) / curve.scale for end in curve.between)
-    left = not low <= guess[-1] <= high
-    step: Step | None = None
-    if not left:
-        try:
-            step = curve.step(anchor, size)
-        except OutsideIntervalError:
-            left = True
-    if step is None:
-        end = curve.between[0] if abs(guess[-1] - low) < abs(guess[-1] - high) else curve.between[1]
-        try:
-            step = _to_end(curve, anchor, size, end)
-        except AnalysisError:
-            # It may turn back just before the end, or in it.
-            step, left = curve.step(anchor, size), False
-    length = float(np.linalg.norm(step.moved))
-    if not step.size >= _STRAIGHT * length:
-        raise AnalysisError("the step went astray", field="step")
-    if step.missed > _SURPRISE * length:
-        half = curve.within(step, 0.5 * step.size)
-        if not float(np.linalg.norm(half.moved - step.between(half.size)[0])) <= _AWAY * length:
-            raise AnalysisError("the curve is not smooth within the step", field="step")
-    return step, left
-
-
-def _to_end(curve: Curve, anchor: Anchor, size: float, end: float) -> Step:
-    """A step that ends on the interval's end, about as long as it was to be."""
-    target = (end - anchor.last.value) / curve.scale
-    place = _reaches(curve, anchor, size, target)
-    guess, matrix = curve.predicted(anchor, place)
-    guess[-1] = target
-    step = curve.to_value(anchor, end, guess, matrix)
-    if not 0.0 < step.size <= _OVER * size:
-        raise AnalysisError("the curve does not reach the end of the interval so soon", field="step")
-    return step
-
-
-def _reaches(curve: Curve, anchor: Anchor, size: float, target: float) -> float:
-    """At which part of a step the parameter is predicted to reach an end of the interval, first."""
-    low, high = 0.0, size
-    beyond = np.sign(curve.predicted(anchor, size)[0][-1] - target)
-    for _ in range(30):
-        middle = 0.5 * (low + high)
-        past = (curve.predicted(anchor, middle)[0][-1] - target) * beyond > 0.0
-        low, high = (low, middle) if past else (middle, high)
-    return high

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.asked import Asking
+from chilopod.stability.branches.bordered_matrices import symmetric_space, within_space
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.capabilities import Family, given_scale, is_autonomous, known_orbit
@@ -143,6 +144,8 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
             field="point",
             value=point.value,
         )
+    if kind is Kind.KREIN_COLLISION:
+        raise ParameterError("is a Krein collision: no periodic orbits leave it", field="point", value=point.value)
     modes = point.mode.real[None] if point.modes is None else point.modes.real.T
     system = family(point.value)
     period = None
@@ -154,8 +157,10 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
             Start(point.value, point.orbit, mode=mode, periods=2 * periods, period=twice, bifurcation=point)
             for mode in modes
         )
-    # Of several modes each has a branch of its own, and the equation for where two curves cross does not hold.
-    crossing = kind is not Kind.PITCHFORK and len(modes) == 1
+    # Of several modes each has a branch of its own, and the equation for where two curves cross holds only where a
+    # symmetry tells them apart.
+    axial = point.symmetry is not None and bool(point.symmetry.branches)
+    crossing = kind is not Kind.PITCHFORK and (len(modes) == 1 or axial)
     return tuple(
         Start(point.value, point.orbit, True, sign * mode, crossing, old, periods, period, point)
         for mode in modes
@@ -236,7 +241,9 @@ def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
     if start.mode is None:
         tangent = _along(matrix, start.rising)
     elif start.crossing:
-        tangent = _other(curve, start, section, matrix)
+        # Where a symmetry makes several modes critical, it is a crossing of two among the orbits that have the mode's.
+        space = symmetric_space(curve.system(start.value), start.orbit, units[:-1], start.mode / units[:-1])
+        tangent = _other(curve, start, section, within_space(space, matrix))
     else:
         tangent = np.append(start.mode / units[:-1], 0.0)
         tangent /= np.linalg.norm(tangent)

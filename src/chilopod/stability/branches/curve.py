@@ -17,9 +17,16 @@ from numpy.typing import NDArray
 from chilopod.errors import AnalysisError
 from chilopod.frozen import read_only
 from chilopod.stability.asked import Asking
+from chilopod.stability.branches.bordered_matrices import null_vector, symmetric_space, within_space
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, Step
-from chilopod.stability.capabilities import Family, FlowsEach, SystemLike, is_autonomous, returns_per_period
-from chilopod.stability.floquet import across
+from chilopod.stability.capabilities import (
+    Family,
+    FlowsEach,
+    SystemLike,
+    is_autonomous,
+    returns_per_period,
+)
+from chilopod.stability.floquet import return_multipliers
 from chilopod.stability.returns import ReturnMap, Section, return_map, returned_states, section_at, whole_period
 
 Array = NDArray[np.float64]
@@ -230,6 +237,9 @@ class Curve:
         units = self.units(n)
         moved, matrix = np.array(guess), np.array(matrix)
         matrix[-1] = row
+        mode = last.tangent[:n] if anchor.leaving else None
+        fixed = symmetric_space(self.system(last.value), last.orbit, units[:n], mode)
+        matrix = within_space(fixed, matrix)
         by_parameter = matrix[:n, n]
         try:
             inverse = np.linalg.inv(matrix)
@@ -240,6 +250,8 @@ class Curve:
         rounds = corrections = 0
         while True:
             x = last.orbit + units[:n] * moved[:n]
+            if fixed is not None:
+                x = units[:n] * (fixed @ (x / units[:n]))
             wanted = last.value + self.scale * float(moved[n]) if value is None else value
             here = min(max(wanted, self.between[0]), self.between[1])
             # A curve that turns back at the end of the interval is sought beyond it on the way there.
@@ -247,7 +259,8 @@ class Curve:
             if abs(strays) > _STRAYS * float(np.linalg.norm(guess)):
                 raise OutsideIntervalError("leaves the interval", field="parameter", value=wanted)
             mapped, beside = self._mapped(x, here, section)
-            residual = np.append((mapped - x) / units[:n] + strays * by_parameter, row @ moved - target)
+            off = (mapped - x) / units[:n]
+            residual = np.append((off if fixed is None else fixed @ off) + strays * by_parameter, row @ moved - target)
             now = float(np.abs(residual).max())
             if not np.isfinite(now) or (now > 10.0 * largest and now > _SETTLED):
                 raise AnalysisError("corrections diverge", field="step")
@@ -274,7 +287,7 @@ class Curve:
         image = self.image(x, here, section)
         derivative = self._difference(x, here, section, mapped, beside)
         bordered = self.matrix(image.jacobian, derivative, last.tangent)
-        tangent = _null_vector(bordered)
+        tangent = null_vector(within_space(fixed, bordered))
         if not tangent @ last.tangent >= _SHARPEST_TURN:
             raise AnalysisError("the curve turns too sharply", field="step")
         bordered[n] = tangent
@@ -370,25 +383,3 @@ class Curve:
 
 class OutsideIntervalError(AnalysisError):
     """A step asked for a value of the parameter outside the interval."""
-
-
-def return_multipliers(image: ReturnMap) -> ComplexArray:
-    """Eigenvalues of a return map by falling modulus, without the zero that stands for the motion itself."""
-    jacobian = image.jacobian
-    if image.normal is not None:
-        into, out_of = across(image)
-        jacobian = out_of @ jacobian @ into
-    values = np.linalg.eigvals(jacobian).astype(np.complex128)
-    return values[np.lexsort((-values.imag, -np.abs(values)))]
-
-
-def _null_vector(bordered: Array) -> Array:
-    """Unit vector that all but the last row of a matrix map to zero, on the side of the last row.
-
-    Exactly at a branch point the matrix is singular; of its solutions the shortest strays least.
-    """
-    n = len(bordered) - 1
-    if not np.isfinite(bordered).all():
-        raise AnalysisError("the return map is not finite", field="flow")
-    tangent: Array = np.linalg.lstsq(bordered, np.append(np.zeros(n), 1.0))[0]
-    return tangent / np.linalg.norm(tangent)

@@ -12,6 +12,7 @@ A determinant that changes its sign where no branches meet tells of a step that 
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,10 +23,13 @@ from scipy.optimize import brentq
 from chilopod.errors import AnalysisError
 from chilopod.stability.branches.branch_points import BranchPoint, Step
 from chilopod.stability.branches.curve import Curve
-from chilopod.stability.branches.special_points import Place, described
+from chilopod.stability.branches.special_points import Place, blocks_along, special_point
+from chilopod.stability.course import TARGETS
 from chilopod.stability.floquet import counts_outside
-from chilopod.stability.unit_circle.crossings import Crossings, Status, find_crossings
-from chilopod.stability.unit_circle.spectra import Event
+from chilopod.stability.symmetry.isotypic import Block
+from chilopod.stability.symmetry.orbit_blocks import Blocks, block_of, crossings_in
+from chilopod.stability.unit_circle.crossings import Crossing, Crossings, Status, find_crossings
+from chilopod.stability.unit_circle.spectra import Event, Matrices
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -46,6 +50,7 @@ _ERROR = 1e-10  # relative, of the return map's derivative at an orbit that was 
 _CLOSE = 1e-9  # of a step: how closely a point is located along the curve
 _SIDE = 1e-3  # of a step: how far beside a crossing the curve's sides are looked at
 _BRANCHING = 1e-4  # smallest singular value of [H' - 1, dH/dp], in units, where branches meet
+_COMPLEX = 1e-5  # imaginary part from which a multiplier on the circle is one of a pair
 _EVENTS = (Event.MINUS, Event.PLUS, Event.PAIR)
 
 Bracket = tuple[Event, float, float]
@@ -67,6 +72,11 @@ class Within:
         self.curve, self.step = curve, step
         self.low = _LEAVING * step.size if step.start.leaving else 0.0
         self._known = {step.size: step}
+
+    @functools.cached_property
+    def blocks(self) -> Blocks:
+        """Of the return map along the step, as the orbits' spatial symmetries make them."""
+        return blocks_along(self.curve, self.step)
 
     def at(self, place: float) -> Step:
         """The part of the step up to a place."""
@@ -107,7 +117,8 @@ def inspect(curve: Curve, step: Step, closely: bool) -> Found:
     places, remarks = _places(within, brackets, turned)
     if flipped and not any(place.branching for place in places):
         raise AnalysisError("the step landed on another curve", field="step")
-    points = [described(curve, within.at, place, (within.low, step.size)) for place in places]
+    between = within.low, step.size
+    points = [special_point(curve, within.at, place, between, within.blocks) for place in places]
     return Found(tuple(point for point in points if point is not None), remarks)
 
 
@@ -115,32 +126,36 @@ def _places(within: Within, brackets: list[Bracket] | None, turned: bool) -> tup
     """Where something happens within a step, in order; ``brackets`` None: anything may."""
     step = within.step
     remarks: tuple[str, ...] = ()
-    roots: list[tuple[Event, float]] = []
-    if brackets is None:
-        found = _searched(within)
-        if found.status in (Status.BUDGET, Status.INCOMPLETE):
-            remarks = tuple(f"near {step.end.last.value:.6g}: {remark}" for remark in found.remarks)
-        roots = [(crossing.event, crossing.value) for crossing in found.crossings]
+    roots: list[tuple[Crossing, Block | None]] = []
+    single = None if brackets is None else [_root(within, *bracket) for bracket in brackets]
+    if single is None or None in single:
+        for block, found in _searched(within):
+            if found.status in (Status.BUDGET, Status.INCOMPLETE):
+                remarks += tuple(f"near {step.end.last.value:.6g}: {remark}" for remark in found.remarks)
+            roots += [(crossing, block) for crossing in found.crossings]
     else:
-        roots = [(event, _root(within, event, a, b)) for event, a, b in brackets]
-    roots = [(event, root) for event, root in roots if root > _CLOSE * step.size]
-    places = [_placed(within, event, root) for event, root in roots]
+        for crossing in filter(None, single):
+            matrix = within.at(crossing.value).image.jacobian
+            roots.append((crossing, block_of(within.blocks, matrix, crossing.multiplier)))
+    places = [_placed(within, crossing, block) for crossing, block in roots if crossing.value > _CLOSE * step.size]
     if turned and not any(place.fold or place.branching for place in places):
         fold = _fold(within, 0.0, step.size)
         # Where branches meet the tangent is uncertain, and may seem to turn.
-        places.append(replace(fold, fold=False, branching=True) if _branches_meet(within.at(fold.place)) else fold)
-    return sorted(places, key=lambda place: place.place), remarks
+        places.append(
+            replace(fold, fold=False, branching=True) if _branches_meet(within.at(fold.crossing.value)) else fold
+        )
+    return sorted(places, key=lambda place: place.crossing.value), remarks
 
 
-def _placed(within: Within, event: Event, root: float) -> Place:
-    """What a zero of a test function is."""
-    if event is not Event.PLUS:
-        return Place(root, event)
-    before, after = within.sides(root)
-    branching = _branches_meet(within.at(root))
+def _placed(within: Within, crossing: Crossing, block: Block | None) -> Place:
+    """What happens where multipliers cross."""
+    if crossing.event is not Event.PLUS:
+        return Place(crossing, block)
+    before, after = within.sides(crossing.value)
+    branching = _branches_meet(within.at(crossing.value))
     if float(before.tangent[-1] * after.tangent[-1]) < 0.0 and not branching:
         return _fold(within, before.size, after.size)
-    return Place(root, event, branching=branching)
+    return Place(crossing, block, branching=branching)
 
 
 def _fold(within: Within, a: float, b: float) -> Place:
@@ -151,7 +166,7 @@ def _fold(within: Within, a: float, b: float) -> Place:
         return float(tangent[-1])
 
     place = float(brentq(along, a, b, xtol=_CLOSE * within.step.size))
-    return Place(place, Event.PLUS, fold=True)
+    return Place(Crossing(place, (place, place), Event.PLUS, 1, 1, 1.0 + 0.0j), fold=True)
 
 
 def _branches_meet(step: Step) -> bool:
@@ -163,27 +178,45 @@ def _sign(matrix: Array) -> float:
     return float(np.linalg.slogdet(matrix)[0])
 
 
-def _searched(within: Within) -> Crossings:
+def _searched(within: Within) -> list[tuple[Block | None, Crossings]]:
+    """All crossings within a step, in every block of the return map."""
     curve, step = within.curve, within.step
 
     def matrices(places: Array) -> tuple[Array, Array]:
         found = [_start_jacobian(within) if place == 0.0 else within.at(place).image.jacobian for place in places]
         return np.array(found), np.full(places.size, _ERROR)
 
-    budget = int(min(_BUDGET, max(curve.left, 0.0)))
-    return find_crossings(matrices, within.low, step.size, budget=max(budget, 30))
+    def search(matrices: Matrices) -> Crossings:
+        budget = int(min(_BUDGET, max(curve.left, 0.0)))
+        return find_crossings(matrices, within.low, step.size, budget=max(budget, 30))
+
+    return [(block, crossings_in(block, matrices, search)) for block in within.blocks]
 
 
-def _root(within: Within, event: Event, a: float, b: float) -> float:
-    """Zero of a test function between two places at which it has opposite signs."""
+def _root(within: Within, event: Event, a: float, b: float) -> Crossing | None:
+    """Where one multiplier, or one pair, crosses between two places at which a test function has opposite signs; None
+    where two real ones cross as one, which the function of a pair does not tell from a pair."""
+
+    def spectrum(place: float) -> ComplexArray:
+        jacobian = _start_jacobian(within) if place == 0.0 else within.at(place).image.jacobian
+        return np.linalg.eigvals(jacobian).astype(np.complex128)
 
     def test(place: float) -> float:
-        jacobian = _start_jacobian(within) if place == 0.0 else within.at(place).image.jacobian
-        return float(_tests(np.linalg.eigvals(jacobian).astype(np.complex128)[None])[0, _EVENTS.index(event)])
+        return float(_tests(spectrum(place)[None])[0, _EVENTS.index(event)])
 
     if test(a) * test(b) > 0.0:
         raise AnalysisError("the curve is not smooth within the step", field="step")
-    return float(brentq(test, a, b, xtol=1e-3 * _CLOSE * within.step.size))
+    root = float(brentq(test, a, b, xtol=1e-3 * _CLOSE * within.step.size))
+    nu = spectrum(root)
+    if event is Event.PAIR:
+        nu = nu[nu.imag > _COMPLEX]
+        if not nu.size:
+            return None
+        away = np.abs(np.abs(nu) - 1.0)
+    else:
+        away = np.abs(nu - TARGETS[event])
+    multiplier = complex(nu[away.argmin()])
+    return Crossing(root, (root, root), event, 2 if event is Event.PAIR else 1, 1, multiplier)
 
 
 def _start_jacobian(within: Within) -> Array:

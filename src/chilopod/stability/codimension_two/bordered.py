@@ -27,10 +27,10 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.asked import Asking
 from chilopod.stability.capabilities import KnowsOrbit, Scaled, SystemLike
-from chilopod.stability.codimension_two.mirrored import symmetric_states
 from chilopod.stability.orbits import from_known, known_state
 from chilopod.stability.returns import ReturnMap, Section, return_map, section_at
 from chilopod.stability.scales import sizes
+from chilopod.stability.symmetry.mirrored import symmetric_states
 
 Array = NDArray[np.float64]
 

@@ -19,10 +19,10 @@ from chilopod.stability.codimension_two.bordered import Equations, Family2, OutO
 from chilopod.stability.codimension_two.codimension2 import Codimension2, CodimensionTwo
 from chilopod.stability.codimension_two.curve2 import Curve2, CurveEnd, Point2
 from chilopod.stability.codimension_two.detection import Detector, Signals, across, critical
-from chilopod.stability.codimension_two.mirrored import reverses
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import return_duration
 from chilopod.stability.scales import sizes
+from chilopod.stability.symmetry.mirrored import reverses
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import matrix_balance
+
+from chilopod.stability.scales import numerical_balance
 
 Array = NDArray[np.float64]
 
@@ -16,7 +17,8 @@ def uncertainties(jacobian: Array, relative: float) -> tuple[NDArray[np.complex1
 
     Norms are those of the balanced matrix, so that units do not matter.
     """
-    balanced, _ = matrix_balance(jacobian, permute=False)
+    units = numerical_balance(jacobian)
+    balanced = jacobian * units / units[:, None]
     values, right = np.linalg.eig(balanced)
     try:
         left = np.linalg.inv(right).conj().T

@@ -58,7 +58,7 @@ _REASONS = {
     1: ("the motion diverges, or the right-hand side is not finite, at t = {t:g}", None),
     2: (
         "takes too many steps, and came to t = {t:g} only",
-        "a right-hand side that is less stiff, or a shorter interval",
+        "method='implicit' if it is stiff, or a shorter interval",
     ),
     3: ("cannot be continued beyond t = {t:.17g}: a singularity, or rates beyond the resolution of time", None),
     4: (
@@ -68,6 +68,10 @@ _REASONS = {
     5: ("chatters (Zeno): crossings accumulate at t = {t:g}", "a guard or a reset that ends it"),
     6: ("grazes a switching surface at t = {t:g}: there the flow has no derivative", None),
 }
+
+
+class TooManySteps(AnalysisError):
+    """The budget of steps did not suffice, as of a right-hand side that is stiff."""
 
 
 @dataclass(frozen=True)
@@ -289,7 +293,7 @@ def pieces(edges: Array, period: float, t0: float, t1: float) -> list[tuple[floa
 
 def _failure(status: int, t: float) -> AnalysisError:
     reason, advice = _REASONS[status]
-    return AnalysisError(reason.format(t=t), field="rhs", allowed=advice)
+    return (TooManySteps if status == 2 else AnalysisError)(reason.format(t=t), field="rhs", allowed=advice)
 
 
 @functools.cache

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from chilopod.stability.unit_circle.critical import LOST, UNKNOWN, Critical, Group, Point, Root
-from chilopod.stability.unit_circle.spectra import Event, Spectra
+from chilopod.stability.unit_circle.spectra import Event, Spectra, margins
 from chilopod.stability.unit_circle.zeros import Interval
 
 Array = NDArray[np.float64]
@@ -69,6 +69,7 @@ class Accounts:
         self._counts: dict[float, int | None] = {}
         self._settled: set[Interval] = set()  # gaps about which a remark was made
         probes = [spectra.values[0], spectra.values[len(spectra.values) // 2], spectra.values[-1]]
+        spectra.disturbed(np.array(probes))  # together
         self._clearly = max(_CLEARLY, _ROOM * max(float(spectra.margin_errors(u).max()) for u in probes))
 
     def balance(self, roots: list[Root]) -> list[Point]:
@@ -86,18 +87,29 @@ class Accounts:
 
     def count(self, place: float) -> int | None:
         """Number of multipliers outside the circle; None where one of them is too near to say."""
+        self._count_clear([place])
         if place not in self._counts:
             self._counts[place] = self._counted(place)
         return self._counts[place]
 
+    def _count_clear(self, places: list[float]) -> None:
+        """Count where all multipliers are clear of the circle; where not, compute their errors together."""
+        new = np.array([place for place in places if place not in self._counts])
+        if not new.size:
+            return
+        found = margins(self._spectra.at(new))
+        clear = np.abs(found).min(axis=1, initial=np.inf) > self._clearly
+        if self._resting or self._conservative:
+            clear[:] = False
+        self._counts.update(zip(new[clear].tolist(), (found[clear] > 0.0).sum(axis=1).tolist(), strict=True))
+        self._spectra.disturbed(new[~clear])
+
     def _counted(self, place: float) -> int | None:
-        margins = self._spectra.margins(place)
-        if not self._resting and not self._conservative and np.abs(margins).min() > self._clearly:
-            return int((margins > 0.0).sum())
+        found = self._spectra.margins(place)
         errors = self._spectra.margin_errors(place)
-        outside = int((margins > errors).sum())
+        outside = int((found > errors).sum())
         if self._conservative:
-            sizes = np.abs(margins) / errors
+            sizes = np.abs(found) / errors
             for event in Event:
                 # Those that meet may have left the circle or not.
                 distances, uncertain = self._spectra.distances(place, event)
@@ -105,7 +117,7 @@ class Accounts:
                 if (distances[idle:] <= _GREY * uncertain[idle:]).any():
                     return None
             return None if ((sizes > 1.0) & (sizes <= _GREY)).any() else outside
-        return outside if int((np.abs(margins) <= errors).sum()) <= self._resting else None
+        return outside if int((np.abs(found) <= errors).sum()) <= self._resting else None
 
     def _walk(self, roots: list[Root]) -> tuple[list[Root], list[Point], bool]:
         """Compare counts along all gaps between decided places; the roots after that, the points, and whether to do
@@ -187,6 +199,7 @@ class Accounts:
         for root in roots:
             left, right = (root.place, root.place) if root.touch else (root.left, root.right)
             within.update(values[bisect.bisect_left(values, left) : bisect.bisect_right(values, right)])
+        self._count_clear([v for v in values if v not in within])
         return [(v, count) for v in values if v not in within and (count := self.count(v)) is not None]
 
     def _remark(self, remark: str, gap: Interval) -> None:

@@ -175,6 +175,8 @@ class _Finder:
         first = first_places(self.a, self.b)
         self.spectra.at(first)
         if not self.spectra.values:
+            if self.spectra.left <= 0:
+                return Crossings((), Status.BUDGET, (), self.spectra.evaluations)
             return Crossings((), Status.INCOMPLETE, ("there is no matrix anywhere",), self.spectra.evaluations)
         idle = {event: self._idle(first, event) for event in Event}
         resting = idle[Event.PLUS] + idle[Event.MINUS]

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.stability.capabilities import SystemLike, spatial_symmetries
+from chilopod.stability.symmetry.groups import finite_group
 
 Array = NDArray[np.float64]
 
@@ -16,13 +19,20 @@ def symmetric_states(system: SystemLike, state: Array, size: Array) -> Array:
     """Orthonormal basis, in units of the states' sizes, of the states with the spatial symmetries of one of them."""
     n = size.size
     conditions = [np.zeros((0, n))]
-    for matrix in spatial_symmetries(system):
+    generators = spatial_symmetries(system)
+    for matrix in _elements(np.stack(generators).tobytes(), n) if generators else ():
         if (np.abs(matrix @ state - state) <= _LOOSE * size).all():
             conditions.append(matrix * size / size[:, None] - np.eye(n))
     stacked = np.vstack(conditions)
     _, values, right = np.linalg.svd(stacked) if len(stacked) else (None, np.zeros(0), np.eye(n))
     rank = int((values > _LOOSE).sum())
     return np.asarray(right[rank:].T)
+
+
+@functools.lru_cache(maxsize=8)
+def _elements(generators: bytes, n: int) -> Array:
+    """Of the group that some matrices generate, shape (order, n, n)."""
+    return finite_group(np.frombuffer(generators).reshape(-1, n, n)).elements
 
 
 def reverses(system: SystemLike, mode: NDArray[np.complex128], size: Array) -> bool:

@@ -1,0 +1,64 @@
+"""The bordered matrix of a curve of periodic orbits: the space of states that it is solved in, and its tangent."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.errors import AnalysisError
+from chilopod.stability.capabilities import SystemLike, spatial_symmetries
+from chilopod.stability.symmetry.mirrored import symmetric_states
+
+Array = NDArray[np.float64]
+
+
+def symmetric_space(system: SystemLike, state: Array, sizes: Array, mode: Array | None = None) -> Array | None:
+    """Projection onto the states with the spatial symmetries of an orbit, in units of the states' ``sizes``.
+
+    Among these its branch is regular where others leave it that break the symmetries (Golubitsky, Stewart & Schaeffer,
+    *Singularities and Groups in Bifurcation Theory* II, 1988, section XIII.3).
+
+    Parameters
+    ----------
+    system, state
+        The system and a state on the orbit, shape (n,).
+    sizes
+        Of the states, shape (n,).
+    mode
+        In units, shape (n,): the symmetries are those that it has as well, which are those of what branches off along
+        it.
+
+    Returns
+    -------
+    Shape (n, n); None if there are no symmetries.
+    """
+    if system.symmetry is not None or not spatial_symmetries(system):
+        return None
+    x = state if mode is None else state + sizes * mode / np.linalg.norm(mode)
+    basis = symmetric_states(system, x, sizes)
+    return basis @ basis.T if basis.shape[1] < x.size else None
+
+
+def within_space(space: Array | None, matrix: Array) -> Array:
+    """The matrix of a curve, shape (n, n+1) or with its tangent (n+1, n+1), within a space of states; across it that of
+    a contraction."""
+    if space is None:
+        return matrix
+    n = len(space)
+    across = np.eye(n) - space
+    result = np.array(matrix)
+    result[:n] = space @ result[:n]
+    result[:n, :n] -= result[:n, :n] @ across + across
+    return result
+
+
+def null_vector(bordered: Array) -> Array:
+    """Unit vector that all but the last row of a matrix map to zero, on the side of the last row.
+
+    Exactly at a branch point the matrix is singular; of its solutions the shortest strays least.
+    """
+    n = len(bordered) - 1
+    if not np.isfinite(bordered).all():
+        raise AnalysisError("the return map is not finite", field="flow")
+    tangent: Array = np.linalg.lstsq(bordered, np.append(np.zeros(n), 1.0))[0]
+    return tangent / np.linalg.norm(tangent)

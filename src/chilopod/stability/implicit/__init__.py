@@ -1,0 +1,1 @@
+"""Flows of stiff right-hand sides."""

@@ -1,0 +1,246 @@
+"""Flows of taped stiff right-hand sides by implicit collocation (:mod:`.collocation`)."""
+
+from __future__ import annotations
+
+import functools
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.cores import cores
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.capabilities import Stretched
+from chilopod.stability.scales import numerical_balance
+from chilopod.stability.taylor import tape as ops
+from chilopod.stability.taylor.evaluation import evaluate, evaluate_jacobian
+from chilopod.stability.taylor.tape import Tape
+from chilopod.stability.taylor.taylor import RESOLUTION, pieces
+
+Array = NDArray[np.float64]
+
+_STAGES, _OTHER_STAGES = 9, 7
+_NEAREST = 3  # couplings between two states up to which the derivative of one by the other is under step control
+_MOST_WORK = 3e9  # multiplications
+_FEWEST_STEPS = 2000
+_FEWEST_PER_THREAD = 4
+_STEPS_IN_FAST_PART = 16
+_OWN = 10.0  # two independent errors differ by less than a tenth of them rarely enough
+_FINER = 0.2
+_SHAKE = 2.0**-52
+_ROUNDING = 2.0**-49
+
+_REASONS = {
+    1: "the motion diverges, or the right-hand side is not finite, at t = {t:g}",
+    2: "takes too many steps, and came to t = {t:g} only",
+    3: "cannot be continued beyond t = {t:.17g}: a singularity, or rates beyond the resolution of time",
+}
+
+
+@dataclass(frozen=True)
+class ImplicitFlow(ReadOnlyArrays):
+    """The flow of a tape that is stiff.
+
+    Attributes
+    ----------
+    tape
+        The right-hand side, without events; it may switch in time, not in the state.
+    params
+        Values of its parameters.
+    edges
+        Times from 0 to the period that no step may straddle.
+    fast
+        Borders of the parts of the period in which the function changes fast, shape (parts, 2): the step is limited
+        there.
+    tolerance
+        Estimated error of a step relative to the size of each state and entry of the derivative. The estimate is that
+        of a formula of order s, so the error itself is far smaller where steps are short for the fast states too.
+
+    Raises
+    ------
+    ParameterError
+        If the right-hand side has events, or switches in the state.
+    """
+
+    tape: Tape
+    params: Array
+    edges: Array
+    fast: Array
+    tolerance: float
+    _cuts: Array = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        if not can_be_implicit(self.tape):
+            raise ParameterError(
+                "does not take events or switches in the state",
+                field="method",
+                value="implicit",
+                allowed="'taylor', or a right-hand side that is smooth in the state",
+            )
+        period = float(self.edges[-1])
+        switches = _switch_instants(self.tape, self.params, period)
+        object.__setattr__(self, "_cuts", np.unique(np.concatenate([self.edges, self.fast.ravel(), switches])))
+        super().__post_init__()
+
+    def flow(self, x: Array, t0: float, t1: float) -> tuple[Array, Array]:
+        """State at t1 and its derivative with respect to the state at t0."""
+        return self._run(x, t0, t1, _STAGES, self.tolerance)
+
+    def flow_with_error(self, x: Array, t0: float, t1: float) -> tuple[Array, Array, Array]:
+        """The same with a bound on the error of every entry of the derivative.
+
+        It is a multiple of the larger difference to two other computations, of lower order and of smaller steps, from
+        starts that are off by round-off. Two, because with one of them an entry may agree by chance; and round-off of
+        the entry and of what it may be a difference of.
+        """
+        state, derivative = self._run(x, t0, t1, _STAGES, self.tolerance)
+        shake = _SHAKE * np.sign(np.cos(3.0 * np.arange(x.size) + 1.0))
+        _, lower = self._run(x * (1.0 + shake), t0, t1, _OTHER_STAGES, self.tolerance)
+        _, finer = self._run(x * (1.0 - shake), t0, t1, _STAGES, _FINER * self.tolerance)
+        difference = np.maximum(np.abs(lower - derivative), np.abs(finer - derivative))
+        size = np.abs(derivative)
+        return state, derivative, _OWN * difference + _ROUNDING * (size + size @ size)
+
+    def flow_states(self, states: Array, t0: float, t1: float) -> Array:
+        """Many states, shape (states, n), without derivatives."""
+        states = np.array(states, dtype=np.float64)
+
+        def carry(i: int) -> Array:
+            return self._run(states[i], t0, t1, _STAGES, self.tolerance, derived=False)[0]
+
+        threads = min(cores(), len(states) // _FEWEST_PER_THREAD)
+        if threads > 1:
+            with ThreadPoolExecutor(threads) as pool:
+                return np.array(list(pool.map(carry, range(len(states)))))
+        return np.array([carry(i) for i in range(len(states))]).reshape(states.shape)
+
+    def flow_frame(self, x: Array, units: Array, frame: Array, t0: float, t1: float) -> Stretched:
+        """See :class:`chilopod.stability.capabilities.FlowsFrames`."""
+        other, _ = self._turned(x, units, frame, t0, t1, _OTHER_STAGES)
+        stretch, (state, end, turned) = self._turned(x, units, frame, t0, t1, _STAGES)
+        return Stretched(state, end, stretch, other, turned)
+
+    def _turned(
+        self, x: Array, units: Array, frame: Array, t0: float, t1: float, stages: int
+    ) -> tuple[Array, tuple[Array, Array, Array]]:
+        n = x.size
+        frame, stretch, turned = np.array(frame, order="C"), np.zeros(n), np.ones(n)
+        state, _ = self._run(x, t0, t1, stages, self.tolerance, units=units, carried=(frame, stretch, turned))
+        return stretch, (state, frame, turned)
+
+    def _run(
+        self,
+        x: Array,
+        t0: float,
+        t1: float,
+        stages: int,
+        tolerance: float,
+        derived: bool = True,
+        units: Array | None = None,
+        carried: tuple[Array, Array, Array] = (np.empty((0, 0)), np.empty(0), np.empty(0)),
+    ) -> tuple[Array, Array]:
+        """State and derivative at t1; a frame is carried in place, with the stretch and the turn of its directions."""
+        n, t = self.tape.dimension, self.tape
+        # Copies, because compiled code is compiled anew for arrays that are read-only.
+        x, params = np.array(x, dtype=np.float64), self.params.copy()
+        if not np.isfinite(x).all():
+            raise AnalysisError("the state is not finite", field="rhs")
+        balanced, near = self._coupling(x, 0.5 * (t0 + t1))
+        units = balanced if units is None else np.array(units)
+        x = x / units
+        size = n if derived else 0
+        derivative, extent, largest = np.eye(size), np.eye(size), np.zeros(n)
+        report = np.zeros(2)
+        budget = max(_FEWEST_STEPS, int(_MOST_WORK / (n * stages) ** 3))
+        for a, b in pieces(self._cuts, float(self.edges[-1]), t0, t1):
+            status = _compiled().advance(
+                (t.program, t.terms, t.numbers, t.layout, t.slopes),
+                _coefficients(stages),
+                params,
+                units,
+                near,
+                x,
+                a,
+                b,
+                self._longest(a, b),
+                tolerance,
+                budget,
+                self._branches(a, b),
+                derivative,
+                largest,
+                extent,
+                *carried,
+                report,
+            )
+            if status:
+                raise AnalysisError(_REASONS[status].format(t=report[1]), field="rhs")
+            budget -= int(report[0])
+        return x * units, derivative * (units[:, None] / units if derived else 1.0)
+
+    def _coupling(self, x: Array, t: float) -> tuple[Array, NDArray[np.bool_]]:
+        """Units of the states, shape (n,), in which the jacobian is balanced, and which states are near each other."""
+        jacobian = np.abs(evaluate_jacobian(self.tape, t, x, self.params)[1])
+        jacobian = np.where(np.isfinite(jacobian), jacobian, 0.0)
+        n = x.size
+        links = (jacobian > 0.0) | np.eye(n, dtype=bool)
+        return numerical_balance(jacobian), np.linalg.matrix_power(links.astype(np.int64), _NEAREST) > 0
+
+    def _longest(self, a: float, b: float) -> float:
+        middle = (0.5 * (a + b)) % float(self.edges[-1])
+        inside = (self.fast[:, 0] < middle) & (middle < self.fast[:, 1])
+        return (b - a) / _STEPS_IN_FAST_PART if inside.any() else np.inf
+
+    def _branches(self, a: float, b: float) -> Array:
+        return _branches(self.tape, self.params, np.array([0.5 * (a + b)]))[:, 0].copy()
+
+
+def can_be_implicit(tape: Tape) -> bool:
+    """Whether a right-hand side has no events, and switches in time only."""
+    return all(kind != ops.GUARD and tape.program[4, node] == 0 for kind, node in zip(*tape.switches[:2], strict=True))
+
+
+def _branches(tape: Tape, params: Array, times: Array) -> Array:
+    """Of switches that know only time, shape (switches, times)."""
+    if tape.switches.shape[1] == 0:
+        return np.zeros((0, times.size))
+    values = evaluate(tape, times, np.zeros((tape.dimension, 1)), params)[tape.switches[1]]
+    floor = tape.switches[0][:, None] == ops.FLOOR
+    return np.where(floor, np.floor(values), np.where(values >= 0.0, 1.0, -1.0))
+
+
+def _switch_instants(tape: Tape, params: Array, period: float) -> Array:
+    """When the switches that know only time leave their branches, by bisection from a grid over the period."""
+    if tape.switches.shape[1] == 0:
+        return np.zeros(0)
+    times = np.linspace(0.0, period, RESOLUTION + 1)
+    found = []
+    for s, branches in enumerate(_branches(tape, params, times)):
+        for i in np.flatnonzero(np.diff(branches)):
+            low, high = float(times[i]), float(times[i + 1])
+            while low < 0.5 * (low + high) < high:
+                middle = 0.5 * (low + high)
+                if _branches(tape, params, np.array([middle]))[s, 0] == branches[i]:
+                    low = middle
+                else:
+                    high = middle
+            found.append(high)
+    return np.array([t for t in found if t < period])
+
+
+@functools.cache
+def _coefficients(stages: int) -> tuple[Any, ...]:
+    from chilopod.stability.implicit.radau import radau  # scipy.special takes its time to import
+
+    found = radau(stages)
+    return found.nodes.copy(), found.matrix.copy(), found.start.copy(), found.filter
+
+
+@functools.cache
+def _compiled() -> Any:
+    # numba takes half a second to import, and only who integrates needs it.
+    from chilopod.stability.implicit import collocation
+
+    return collocation

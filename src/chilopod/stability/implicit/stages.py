@@ -1,0 +1,283 @@
+"""One step of collocation: its stages, the estimate of its error, what it makes of a frame (:mod:`.collocation`)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from chilopod.compiled import fused_njit
+from chilopod.stability.taylor.series import tangents_at, values_at
+
+_MOST_ROUNDS = 10
+_CLOSE = 1e-7
+"""A move of Newton's method after which the next one is round-off."""
+_NOISE = 2.0**-51
+"""Round-off, of the terms whose difference is the estimate of an error."""
+
+
+@fused_njit(error_model="numpy")
+def decompose(matrix: Any, order: Any) -> bool:
+    """LU decomposition in place with rows exchanged; False if the matrix is singular or not finite."""
+    n = matrix.shape[0]
+    for k in range(n):
+        pivot = k
+        largest = abs(matrix[k, k])
+        for i in range(k + 1, n):
+            if abs(matrix[i, k]) > largest:
+                pivot, largest = i, abs(matrix[i, k])
+        if not 0.0 < largest < math.inf:
+            return False
+        order[k] = pivot
+        if pivot != k:
+            for j in range(n):
+                matrix[k, j], matrix[pivot, j] = matrix[pivot, j], matrix[k, j]
+        for i in range(k + 1, n):
+            if matrix[i, k] != 0.0:
+                f = matrix[i, k] / matrix[k, k]
+                matrix[i, k] = f
+                for j in range(k + 1, n):
+                    matrix[i, j] -= f * matrix[k, j]
+    return True
+
+
+@fused_njit(error_model="numpy")
+def substitute(matrix: Any, order: Any, columns: Any) -> None:
+    """Solve with a decomposed matrix, in place, columns of shape (n, m)."""
+    n, m = columns.shape
+    for k in range(n):
+        pivot = order[k]
+        if pivot != k:
+            for j in range(m):
+                columns[k, j], columns[pivot, j] = columns[pivot, j], columns[k, j]
+    for i in range(n):
+        for k in range(i):
+            f = matrix[i, k]
+            for j in range(m):
+                columns[i, j] -= f * columns[k, j]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            f = matrix[i, k]
+            for j in range(m):
+                columns[i, j] -= f * columns[k, j]
+        f = 1.0 / matrix[i, i]
+        for j in range(m):
+            columns[i, j] *= f
+
+
+@fused_njit(error_model="numpy")
+def at(
+    tape: Any, units: Any, x: Any, t: float, values: Any, tangents: Any, branches: Any, slope: Any, jacobian: Any
+) -> bool:
+    """f and its jacobian in a state, everything in units; False if they are not finite."""
+    program, terms, _, layout, slopes = tape
+    n = layout[0]
+    for i in range(n):
+        values[i, 0] = x[i] * units[i]
+    values[n, 0] = t
+    values_at(program, terms, layout[3], layout[4], 0, values, branches)
+    tangents_at(program, terms, layout[3], layout[4], 0, values, tangents)
+    s = 0.0
+    for i in range(n):
+        slope[i] = values[slopes[i], 0] / units[i]
+        s += abs(slope[i])
+        for j in range(n):
+            jacobian[i, j] = tangents[slopes[i], 0, j] * (units[j] / units[i])
+            s += abs(jacobian[i, j])
+    return s < math.inf
+
+
+@fused_njit(error_model="numpy")
+def stages(
+    tape: Any,
+    coefficients: Any,
+    units: Any,
+    x: Any,
+    t: float,
+    h: float,
+    largest: Any,
+    values: Any,
+    tangents: Any,
+    branches: Any,
+    moved: Any,
+    slopes: Any,
+    jacobians: Any,
+    matrix: Any,
+    order: Any,
+    columns: Any,
+) -> bool:
+    """Solve for the stages; ``moved`` is Y - x, a guess at first.
+
+    In the end ``columns`` has the derivative of the stages with respect to x, shape (s n, n), and ``slopes`` and
+    ``jacobians`` belong to the stages. False if it does not converge.
+    """
+    nodes, weights = coefficients
+    s, n = moved.shape
+    y = np.empty(n)
+    residual = np.empty((s * n, 1))
+    before = math.inf
+    close = False
+    for _ in range(_MOST_ROUNDS):
+        for j in range(s):
+            for i in range(n):
+                y[i] = x[i] + moved[j, i]
+            if not at(tape, units, y, t + nodes[j] * h, values, tangents, branches, slopes[j], jacobians[j]):
+                return False
+        for i in range(s):
+            for k in range(n):
+                total = 0.0
+                for j in range(s):
+                    total += weights[i, j] * slopes[j, k]
+                residual[i * n + k, 0] = h * total - moved[i, k]
+            for j in range(s):
+                f = h * weights[i, j]
+                for k in range(n):
+                    for m in range(n):
+                        matrix[i * n + k, j * n + m] = -f * jacobians[j, k, m]
+        for i in range(s * n):
+            matrix[i, i] += 1.0
+        if not decompose(matrix, order):
+            return False
+        substitute(matrix, order, residual)
+        off = 0.0
+        for k in range(n):
+            size = largest[k]
+            for i in range(s):
+                size = max(size, abs(x[k] + moved[i, k]))
+            for i in range(s):
+                move = residual[i * n + k, 0]
+                moved[i, k] += move
+                if move != 0.0:
+                    off = max(off, abs(move) / max(size, abs(move)))
+        if close or off <= 1e-15:
+            columns[:] = 0.0
+            for i in range(s):
+                for k in range(n):
+                    columns[i * n + k, k] = 1.0
+            substitute(matrix, order, columns)
+            return True
+        if off > 2.0 * before:
+            return False
+        close = off <= _CLOSE or (off >= 0.5 * before and off <= 1e3 * _CLOSE)
+        before = off
+    return False
+
+
+@fused_njit(error_model="numpy")
+def estimated(
+    x: Any,
+    h: float,
+    coefficients: Any,
+    largest: Any,
+    near: Any,
+    moved: Any,
+    slopes: Any,
+    jacobians: Any,
+    columns: Any,
+    slope: Any,
+    jacobian: Any,
+    derivative: Any,
+    extent: Any,
+    reached: Any,
+) -> float:
+    """The error of a step over what every state and entry of the derivative is large for.
+
+    What f at the start differs by from the polynomial through its values in the stages, filtered by the inverse of
+    1 - h gamma J. States are measured
+    by the largest they have been, and by what the others make of them within the step; so are the entries of the
+    derivative, ``extent``.
+    """
+    start, gamma = coefficients
+    s, n = moved.shape
+    size = derivative.shape[0]
+    off = np.empty((n, 1 + size))
+    terms = np.empty((n, 1 + size))
+    filtering = np.empty((n, n))
+    inverse = np.eye(n)
+    order = np.empty(n, np.int64)
+    end = columns[(s - 1) * n :]
+    factor = np.zeros((n, n))
+    for k in range(n):
+        total = slope[k]
+        for j in range(s):
+            total -= start[j] * slopes[j, k]
+        off[k, 0] = h * gamma * total
+        for m in range(n):
+            filtering[k, m] = (1.0 if k == m else 0.0) - h * gamma * jacobian[k, m]
+    if size > 0:
+        for k in range(n):
+            for m in range(n):
+                factor[k, m] = jacobian[k, m]
+        for j in range(s):
+            factor -= start[j] * (jacobians[j] @ columns[j * n : (j + 1) * n])
+        off[:, 1:] = (h * gamma) * (factor @ derivative)
+    for m in range(n):
+        terms[m, 0] = abs(x[m])
+        for j in range(size):
+            terms[m, 1 + j] = abs(derivative[m, j])
+    if not decompose(filtering, order):
+        return math.inf
+    substitute(filtering, order, inverse)
+    off = inverse @ off
+    # No shorter step takes away what is round-off in it.
+    noise = (_NOISE * h * gamma) * (np.abs(inverse) @ (np.abs(jacobian) @ terms))
+    worst = 0.0
+    for k in range(n):
+        scale = largest[k]
+        for i in range(s):
+            scale = max(scale, abs(x[k] + moved[i, k]))
+        for m in range(n):
+            scale = max(scale, abs(end[k, m]) * largest[m])
+        if abs(off[k, 0]) > noise[k, 0]:
+            worst = max(worst, abs(off[k, 0]) / scale)
+    if size > 0:
+        for i in range(s):
+            reached[i] = columns[i * n : (i + 1) * n] @ derivative
+        for k in range(n):
+            for j in range(n):
+                if not near[k, j] or abs(off[k, 1 + j]) <= noise[k, 1 + j]:
+                    continue
+                scale = extent[k, j]
+                for i in range(s):
+                    scale = max(scale, abs(reached[i, k, j]))
+                for m in range(n):
+                    scale = max(scale, abs(end[k, m]) * extent[m, j])
+                worst = max(worst, abs(off[k, 1 + j]) / scale)
+    return worst
+
+
+@fused_njit(error_model="numpy")
+def turn(frame: Any, columns: Any, jacobians: Any, weights: Any, h: float, stretch: Any, turned: Any) -> None:
+    """Carry an orthonormal frame over a step: in each stage its columns span, the first k for every k, what the
+    derivative makes of those at the start, and grow at the rates on the diagonal of Q^T J Q.
+
+    How fast a direction decays is seen from J, and its turning from the derivative; so both are right in directions of
+    which the derivative itself retains nothing.
+    """
+    n = frame.shape[0]
+    s = weights.size
+    for j in range(s):
+        new = columns[j * n : (j + 1) * n] @ frame
+        for k in range(n):
+            for _ in range(2):
+                for m in range(k):
+                    dot = 0.0
+                    for i in range(n):
+                        dot += new[i, m] * new[i, k]
+                    for i in range(n):
+                        new[i, k] -= dot * new[i, m]
+                norm = math.sqrt((new[:, k] ** 2).sum())
+                for i in range(n):
+                    new[i, k] /= norm
+        rates = new.T @ (jacobians[j] @ new)
+        for k in range(n):
+            stretch[k] += h * weights[j] * rates[k, k]
+    for k in range(n):
+        along = 0.0
+        for i in range(n):
+            along += new[i, k] * frame[i, k]
+        sign = 1.0 if along >= 0.0 else -1.0
+        turned[k] = min(turned[k], abs(along))
+        for i in range(n):
+            frame[i, k] = sign * new[i, k]

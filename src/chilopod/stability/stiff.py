@@ -1,0 +1,243 @@
+"""Eigenvalues of the derivative of a return where some directions decay beyond all resolution.
+
+Of a direction that decays by e^-1000 within a step of an implicit method, the derivative of the flow retains nothing,
+nor does it have to for the multipliers. Its exponent is the mean of the rates at which an orthonormal frame is
+stretched that the flow carries along, the first k columns on the space of the k slowest directions for every k (Dieci,
+Russell and Van Vleck, *SIAM Journal on Numerical Analysis* 34, 402, 1997).
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.errors import AnalysisError
+from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.capabilities import FlowsFrames, Stretched, SystemLike, is_autonomous
+from chilopod.stability.orbits import Orbit
+from chilopod.stability.returns import flow_with_error
+from chilopod.stability.scales import numerical_balance, sizes
+from chilopod.stability.splitting import intersection, split_leading
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+_PARTS = 64
+_PASSES = 12
+_DEEPEST = -7.0  # logarithm of the stretch within a part from which on a direction is left to the frame
+_SETTLED = 1e-9  # change of a logarithm from one pass to the next, of its size
+_UNSURE = 1e-6  # of a logarithm
+_GAP = 1.0  # between the logarithms of directions that are told apart
+_TURNED = 0.1  # cosine of an angle beyond which the sign of a direction is lost
+_SAME = 1e-8  # of the logarithms in a part: two computations agree
+_NOISE = 1e-12  # of the largest of them, likewise
+_HALVINGS = 200  # in a pass, of parts where they do not
+_SHORTENINGS = 100
+_LEFT, _APART = (
+    1e-12,
+    1e-4,
+)  # of directions that decay, over a short time: what is above round-off, and tells them apart
+
+
+@dataclass(frozen=True)
+class Cut(ReadOnlyArrays):
+    """A return in equal parts.
+
+    Attributes
+    ----------
+    times, states
+        Of the borders, shapes (parts + 1,) and (parts + 1, n).
+    sections
+        Orthonormal bases in the borders: of the plane across the motion where the system does not depend on time.
+    factors
+        Derivatives of the flow over the parts in these bases; the last one with the symmetry in time.
+    errors
+        Bounds on the errors of their entries.
+    basis
+        The first section in the units of the states.
+    """
+
+    times: Array
+    states: Array
+    sections: Sequence[Array]
+    factors: Sequence[Array]
+    errors: Sequence[Array]
+    basis: Array
+
+
+def disturbed(factors: Sequence[Array], errors: Sequence[Array]) -> list[Array]:
+    """Factors that are off by their errors, with signs by chance."""
+    random = np.random.default_rng(0)
+    return [f + e * random.choice([-1.0, 1.0], f.shape) for f, e in zip(factors, errors, strict=True)]
+
+
+def _cut(system: FlowsFrames, orbit: Orbit, units: Array) -> Cut:
+    times = np.linspace(0.0, orbit.image.period / orbit.image.returns, _PARTS + 1)
+    states, factors, errors = [orbit.state], [], []
+    for t0, t1 in itertools.pairwise(times.tolist()):
+        state, factor, error = flow_with_error(system, states[-1].copy(), t0, t1)
+        states.append(state)
+        factors.append(factor * units / units[:, None])
+        errors.append(np.broadcast_to(error, factor.shape) * units / units[:, None])
+    turn = _turn(system, units)
+    factors[-1], errors[-1] = turn @ factors[-1], np.abs(turn) @ errors[-1]
+    sections = [_section(system, state, units) for state in states[:-1]]
+    sections.append(sections[0])
+    borders = list(itertools.pairwise(sections))
+    factors = [after.T @ f @ before for f, (before, after) in zip(factors, borders, strict=True)]
+    errors = [np.abs(after.T) @ e @ np.abs(before) for e, (before, after) in zip(errors, borders, strict=True)]
+    return Cut(times, np.array(states), sections, factors, errors, units[:, None] * sections[0])
+
+
+def _turn(system: SystemLike, units: Array) -> Array:
+    return np.eye(units.size) if system.symmetry is None else system.symmetry * units / units[:, None]
+
+
+def _section(system: SystemLike, state: Array, units: Array) -> Array:
+    """Orthonormal basis of the plane across the motion, shape (n, n-1), or of the whole space."""
+    if not is_autonomous(system):
+        return np.eye(units.size)
+    basis: Array = np.linalg.svd((np.asarray(system.velocity(state)) / units)[None])[2][1:].T
+    return basis
+
+
+def split_stiff(system: FlowsFrames, orbit: Orbit) -> tuple[ComplexArray, ComplexArray, Array, Array]:
+    """Logarithms of the eigenvalues of the return map, its eigenvectors in a basis, this basis, and how far the
+    logarithms move with the errors.
+
+    Directions that the derivative of the flow resolves are split by it; the others, which have to be real and of
+    different sizes, have the stretch of the frame and its sign. The fastest has all digits, by Liouville's formula; two
+    and more of them share an error, and are refused where it is beyond 1e-6 of either.
+
+    Raises
+    ------
+    AnalysisError
+        If they are not.
+    """
+    image = orbit.image
+    # The derivative on a section may be nothing but round-off; an orbit that moves has sizes of its own.
+    if is_autonomous(system):
+        units = sizes(system, orbit.state, image.period / image.returns)
+    else:
+        units = numerical_balance(image.jacobian)
+    cut = _cut(system, orbit, units)
+    frame, logarithms, signs, unsure = _carried(system, cut, units)
+    total, n = logarithms.sum(axis=0), logarithms.shape[1]
+    deep = np.flatnonzero((logarithms < _DEEPEST).any(axis=0))
+    slow = int(deep[0]) if deep.size else n
+    apart = np.diff(total, prepend=np.inf)[slow:] < -_GAP
+    if not (apart.all() and (unsure[slow:] <= _UNSURE * np.abs(total[slow:])).all() and signs[slow:].all()):
+        raise AnalysisError("several directions decay too fast to be told apart", field="flow")
+    values: list[ComplexArray] = []
+    modes: list[ComplexArray] = []
+    moved = unsure.copy()
+    if slow:
+        leading, vectors = split_leading(cut.factors, slow)
+        others = split_leading(disturbed(cut.factors, cut.errors), slow)[0]
+        moved[:slow] = np.abs(leading[:, None] - others).min(axis=1)
+        values, modes = [leading], [vectors]
+    for k in range(slow, n):
+        values.append(np.array([total[k] + (0.0 if signs[k] > 0 else 1j * np.pi)]))
+        modes.append(intersection(frame[:, : k + 1], _fastest(system, cut, units, k), 1).astype(np.complex128))
+    return np.concatenate(values), np.hstack(modes), cut.basis, moved
+
+
+def _carried(system: FlowsFrames, cut: Cut, units: Array) -> tuple[Array, Array, Array, Array]:
+    """The frame at time 0 on the section, the logarithms of its stretch in every part, the signs it returns with (0 if
+    they were lost), and how unsure the sums of the logarithms are."""
+    n = units.size
+    along = 1 if is_autonomous(system) else 0
+    frame = np.linalg.qr(np.random.default_rng(0).standard_normal((n, n)))[0]
+    before = np.full(n - along, np.inf)
+    for turn in range(_PASSES):
+        start = frame = _behind_motion(system, frame, cut.states[0], units)
+        left = _HALVINGS if turn else 0  # the first only turns the frame to where it belongs
+        logarithms, others, turned = np.zeros((_PARTS, n)), np.zeros(n), np.ones(n)
+        for k in range(_PARTS):
+            t0, t1 = float(cut.times[k]), float(cut.times[k + 1])
+            part, halved = _stretched(system, cut.states[k], units, frame, t0, t1, left)
+            left -= halved
+            frame, turned = part.frame, np.minimum(turned, part.turned)
+            logarithms[k] = part.stretch
+            others += part.other
+        frame, upper = _orthonormal(_turn(system, units) @ frame)
+        logarithms[-1] += np.log(np.diag(upper))
+        others += np.log(np.diag(upper))
+        total = logarithms[:, along:].sum(axis=0)
+        moved = np.abs(total - before)
+        if (moved <= _SETTLED * np.abs(total)).all():
+            break
+        before = total
+    end = _behind_motion(system, frame, cut.states[0], units)
+    signs = np.where(turned > _TURNED, np.sign((end * start).sum(axis=0)), 0.0)[along:]
+    section = _orthonormal(cut.sections[0].T @ start[:, along:])[0]
+    return section, logarithms[:, along:], signs, moved + np.abs(total - others[along:])
+
+
+def _stretched(
+    system: FlowsFrames, state: Array, units: Array, frame: Array, t0: float, t1: float, most: int
+) -> tuple[Stretched, int]:
+    """A frame over a part, and how often the part was halved, at most ``most`` times.
+
+    It is where two computations differ: where a direction turns from a fast decay to a slow one, steps have to be short
+    for it, which they are after a start.
+    """
+    n = units.size
+    sums, turned, halved = np.zeros((2, n)), np.ones(n), 0
+    ends = [t1]
+    while ends:
+        part = system.flow_frame(state, units, _behind_motion(system, frame, state, units), t0, ends[-1])
+        both = np.stack([part.stretch, part.other])
+        if is_autonomous(system):
+            # The stretch of the motion is known; the rest of that of the plane of the first two belongs to the second.
+            speeds = [float(np.linalg.norm(np.asarray(system.velocity(x)) / units)) for x in (state, part.state)]
+            known = np.log(speeds[1] / speeds[0])
+            both[:, 1:2] += both[:, :1] - known
+            both[:, 0] = known
+        size = np.abs(both[0])
+        if halved < most and (np.abs(both[1] - both[0]) > _SAME * np.maximum(1.0, size) + _NOISE * size.max()).any():
+            halved += 1
+            ends.append(0.5 * (t0 + ends[-1]))
+            continue
+        state, frame, t0 = part.state, part.frame, ends.pop()
+        sums, turned = sums + both, np.minimum(turned, part.turned)
+    return Stretched(state, frame, sums[0], sums[1], turned), halved
+
+
+def _behind_motion(system: SystemLike, frame: Array, state: Array, units: Array) -> Array:
+    """The frame with the motion as its first direction where a system does not depend on time."""
+    if not is_autonomous(system):
+        return frame
+    velocity = np.asarray(system.velocity(state)) / units
+    return _orthonormal(np.column_stack([velocity, frame[:, 1:]]))[0]
+
+
+def _orthonormal(matrix: Array) -> tuple[Array, Array]:
+    """QR decomposition with a positive diagonal."""
+    q, r = np.linalg.qr(matrix)
+    signs = np.where(np.diag(r) < 0.0, -1.0, 1.0)
+    return q * signs, r * signs[:, None]
+
+
+def _fastest(system: SystemLike, cut: Cut, units: Array, k: int) -> Array:
+    """Orthonormal basis of the directions at time 0 that decay faster than the first k, on the section.
+
+    Those which the flow contracts most, over a time so short that they are above round-off still.
+    """
+    if k == 0:
+        return np.eye(cut.sections[0].shape[1])
+    duration = float(cut.times[-1])
+    for _ in range(_SHORTENINGS):
+        state, derivative = system.flow(cut.states[0].copy(), 0.0, duration)
+        derivative = derivative * units / units[:, None]
+        stretch, right = np.linalg.svd(_section(system, state, units).T @ derivative @ cut.sections[0])[1:]
+        if stretch[k] >= _LEFT * max(1.0, stretch[0]):
+            if stretch[k] <= _APART * stretch[k - 1]:
+                return np.asarray(right[k:].T)
+            break
+        duration *= 0.5
+    raise AnalysisError("the flow contracts too strongly to be resolved", field="flow")

@@ -1,0 +1,71 @@
+"""The blocks that the spatial symmetries of an orbit make of its return map, and what crosses the unit circle in
+them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.stability.capabilities import SystemLike, spatial_symmetries
+from chilopod.stability.orbits import Orbit
+from chilopod.stability.symmetry.groups import centraliser, commutes, finite_group, isotropy
+from chilopod.stability.symmetry.isotypic import Block, Type, isotypic
+from chilopod.stability.unit_circle.crossings import Crossings
+from chilopod.stability.unit_circle.spectra import Matrices
+
+Array = NDArray[np.float64]
+
+Blocks = tuple[Block | None, ...]
+"""A single None stands for the whole return map."""
+
+
+def orbit_blocks(system: SystemLike, orbit: Orbit) -> tuple[Blocks, tuple[str, ...]]:
+    """The blocks of the symmetries that leave an orbit as it is, and a sentence where there are none of them."""
+    generators = spatial_symmetries(system)
+    if not generators:
+        return (None,), ()
+    group = finite_group(np.stack(generators))
+    if system.symmetry is not None:
+        group = centraliser(group, system.symmetry)
+    group = isotropy(group, orbit.state, np.nan_to_num(orbit.error))
+    if group.order == 1:
+        return (None,), ("the orbit has none of the spatial symmetries",)
+    if commutes(group, orbit.image.jacobian, orbit.image.error) > 1.0:
+        return (None,), ("the return map does not have the spatial symmetries: they are left aside",)
+    return isotypic(group), ()
+
+
+def in_block(block: Block | None, matrices: Array) -> Array:
+    """What return maps, shape (k, n, n), are in a block, shape (k, m, m): every multiplier of the real type once
+    instead of ``block.dimension`` times."""
+    if block is None:
+        return matrices
+    if block.type is Type.REAL:
+        return np.real(block.reduced(matrices))
+    return np.asarray(block.dual @ matrices @ block.basis)
+
+
+def crossings_in(block: Block | None, matrices: Matrices, search: Callable[[Matrices], Crossings]) -> Crossings:
+    """What a search finds in a block of return maps; its multiplicities are those in the whole."""
+    found = search(lambda values: _reduced(block, *matrices(values)))
+    times = 1 if block is None or block.type is not Type.REAL else block.dimension
+    crossings = tuple(
+        replace(each, multiplicity=times * each.multiplicity, change=times * each.change) for each in found.crossings
+    )
+    return replace(found, crossings=crossings)
+
+
+def _reduced(block: Block | None, matrices: Array, errors: Array) -> tuple[Array, Array]:
+    if block is not None and errors.ndim == 3:
+        real = block.type is Type.REAL
+        errors = block.reduced_error(matrices, errors) if real else np.abs(block.dual) @ errors @ np.abs(block.basis)
+    return in_block(block, matrices), errors
+
+
+def block_of(blocks: Blocks, matrix: Array, multiplier: complex) -> Block | None:
+    """The block that a simple multiplier of a return map, shape (n, n), belongs to."""
+    away = [float(np.abs(np.linalg.eigvals(in_block(block, matrix[None])[0]) - multiplier).min()) for block in blocks]
+    return blocks[int(np.argmin(away))]

@@ -1,0 +1,156 @@
+"""Special points on branches of rings and of conservative systems, where several multipliers cross at once."""
+
+from math import cos, pi, sqrt
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from chilopod.errors import ParameterError
+from chilopod.stability import Ending, Kind, PeriodicSystem, follow, locate, switch
+from chilopod.stability.symmetry.equivariants import SymmetricKind
+
+BETWEEN = (-2.0, 1.0)
+
+
+def ring(cells, power, units=1.0, declared=True):
+    """Cells u -> u / 2 - c (u_left + u_right - 2 u) - u^power about an orbit that moves with c, in some units.
+
+    Wave number k has the multiplier 1/2 + c l, l = 2 - 2 cos(2 pi k / cells): +1 at 1 / (2 l), -1 at -3 / (2 l).
+    """
+    shift = np.roll(np.eye(cells), 1, axis=0)
+    coupling = shift + shift.T - 2.0 * np.eye(cells)
+    symmetry = {"spatial_symmetry": [shift, np.eye(cells)[::-1]]} if declared else {}
+
+    def family(c):
+        center = (0.5 + 0.3 * c) * units
+
+        def flow(x, t0, t1):
+            product = np.eye(cells)
+            for _ in range(round(t1 - t0)):
+                u = (x - center) / units
+                product = (0.5 * np.eye(cells) - c * coupling - np.diag(power * u ** (power - 1))) @ product
+                x = center + units * (0.5 * u - c * coupling @ u - u**power)
+            return x, product
+
+        def with_error(x, t0, t1):
+            state, product = flow(x, t0, t1)
+            return state, product, 4e-16 * np.abs(product)
+
+        return PeriodicSystem(cells, 1.0, flow, flow_with_error=with_error, **symmetry)
+
+    return family
+
+
+def crossings(cells):
+    factors = [2.0 - 2.0 * cos(2.0 * pi * k / cells) for k in range(1, cells // 2 + 1)]
+    found = [(s / factor, 1 if abs(factor - 4.0) < 1e-9 else 2) for factor in factors for s in (-1.5, 0.5)]
+    return sorted((value, count) for value, count in found if BETWEEN[0] < value < BETWEEN[1])
+
+
+@pytest.mark.parametrize(("cells", "power"), [(3, 2), (4, 3), (5, 2), (5, 3)])
+@pytest.mark.parametrize("units", [1.0, 1e-9])
+def test_a_branch_of_symmetric_orbits_names_what_locate_does(cells, power, units):
+    family, orbit = ring(cells, power, units), np.full(cells, -0.1 * units)
+    special = [point.bifurcation for point in follow(family, orbit, BETWEEN).special_points]
+    known = crossings(cells)
+    assert len(special) == len(known)
+    for point, (value, count) in zip(special, known, strict=True):
+        assert abs(point.value - value) < 1e-12
+        assert point.error_bound < 1e-12
+        assert point.multiplicity == count
+        np.testing.assert_allclose(point.orbit, (0.5 + 0.3 * value) * units, rtol=1e-11)
+    for point, other in zip(special, locate(family, BETWEEN, orbit=orbit), strict=True):
+        assert (point.kind, point.multiplicity) == (other.kind, other.multiplicity)
+        assert point.symmetry.kind is other.symmetry.kind
+        if other.modes is not None:
+            assert point.modes.shape == other.modes.shape
+
+
+def test_two_branches_leave_where_a_ring_of_three_crosses():
+    """In the plane u = (a, b, a): a new orbit on either side of c = 1/6, along one line through it."""
+    family = ring(3, 2)
+    old = follow(family, np.full(3, -0.1), BETWEEN)
+    (point,) = [point for point in old.special_points if point.special is Kind.TRANSCRITICAL]
+    assert point.bifurcation.symmetry.kind is SymmetricKind.EQUIVARIANT_TRANSCRITICAL
+    sides = []
+    for start in switch(family, point):
+        branch = follow(family, start, BETWEEN, points=5)
+        assert branch.ending is Ending.ENOUGH_POINTS
+        for each in branch.points[1:]:
+            u = each.orbit - (0.5 + 0.3 * each.value)
+            a, b = u[0], u[1]
+            assert u[2] == pytest.approx(a, abs=1e-13)
+            # a / 2 + a^2 = c (a - b) and b / 2 + b^2 = 2 c (b - a)
+            assert 0.5 * a + a * a == pytest.approx(each.value * (a - b), abs=1e-10)
+            assert 0.5 * b + b * b == pytest.approx(2.0 * each.value * (b - a), abs=1e-10)
+            assert abs(a - b) > 1e-4
+        sides.append(branch.points[-1].value - 1.0 / 6.0)
+    assert sides[0] * sides[1] < 0.0
+
+
+@pytest.mark.parametrize("count", [3, 5])
+def test_what_leaves_a_ring_keeps_a_mirror(count):
+    family = ring(count, 3)
+    old = follow(family, np.full(count, -0.1), BETWEEN)
+    for point in old.special_points:
+        starts = switch(family, point, periods=1)
+        branch = follow(family, starts[0], BETWEEN, points=4)
+        assert branch.ending is Ending.ENOUGH_POINTS
+        last = branch.points[-1]
+        u = last.orbit - (0.5 + 0.3 * last.value)
+        mirrors = [np.roll(u[::-1], turn) for turn in range(count)]
+        assert min(float(np.abs(mirror - u).max()) for mirror in mirrors) < 1e-12
+        assert np.abs(u).max() > 1e-3
+
+
+@pytest.mark.parametrize("cells", [3, 5])
+def test_the_symmetry_of_a_ring_need_not_be_declared(cells):
+    special = follow(ring(cells, 3, declared=False), np.full(cells, -0.1), BETWEEN).special_points
+    known = crossings(cells)
+    assert [point.bifurcation.multiplicity for point in special] == [count for _, count in known]
+    for point, (value, _) in zip(special, known, strict=True):
+        assert abs(point.value - value) < 1e-12
+
+
+def linear(matrix):
+    """x' = A x about the orbit zero."""
+
+    def family(p):
+        a = np.array(matrix(p), dtype=float)
+
+        def flow(x, t0, t1):
+            derivative = expm(a * (t1 - t0))
+            return derivative @ x, derivative
+
+        return PeriodicSystem(len(a), 1.0, flow)
+
+    return family
+
+
+def test_two_multipliers_that_cross_at_once():
+    special = follow(linear(lambda p: np.diag([p, 2.0 * p, -1.0])), np.zeros(3), (-0.3, 0.4)).special_points
+    (point,) = (each.bifurcation for each in special)
+    assert (point.kind, point.multiplicity) == (Kind.BRANCH_POINT, 2)
+    assert abs(point.value) <= point.error_bound < 1e-13
+    assert point.modes.shape == (3, 2)
+    assert np.linalg.matrix_rank(point.modes[:2]) == 2
+
+
+def test_krein_collision_on_a_branch():
+    """x'' - 2 p y' = x, y'' + 2 p x' = y: s^2 = 1 - 2 p^2 +- 2 p sqrt(p^2 - 1), so pairs meet at p = 1."""
+    family = linear(lambda p: [[0, 0, 1, 0], [0, 0, 0, 1], [1, 0, 0, 2 * p], [0, 1, -2 * p, 0]])
+    (point,) = follow(family, np.zeros(4), (0.5, 1.0 + 0.2 * sqrt(7.0))).special_points
+    assert point.special is Kind.KREIN_COLLISION
+    assert abs(point.value - 1.0) <= point.bifurcation.error_bound < 1e-10
+    assert point.bifurcation.multiplicity == 4
+    assert point.bifurcation.frequency == pytest.approx(1.0, abs=1e-5)
+    with pytest.raises(ParameterError, match="Krein"):
+        switch(family, point)
+
+
+def test_collision_at_plus_one_on_a_branch():
+    """x'' = p x has the multipliers exp(+-sqrt(p))."""
+    (point,) = follow(linear(lambda p: [[0.0, 1.0], [p, 0.0]]), np.zeros(2), (-0.7, 1.0)).special_points
+    assert point.special is Kind.COLLISION
+    assert abs(point.value) <= point.bifurcation.error_bound < 1e-10
