@@ -83,7 +83,7 @@ def test_without_something_essential(capsys, monkeypatch, wish):
     if wish:
         monkeypatch.setenv("MUJOCO_GL", wish)
     monkeypatch.setattr(doctor, "_fault", lambda module: "broken" if module in ("scipy", "chilopod.twin") else "")
-    found = findings(capsys, code=1)
+    found = findings(capsys, code=3)
     assert found["scipy"]["essential"]
     assert found["scipy"]["mend"].endswith("-m pip install --force-reinstall scipy")
     assert ("MUJOCO_GL" in found["mujoco"]["mend"]) is (wish is not None)

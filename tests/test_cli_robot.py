@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 import chilopod
 from chilopod.cli import main
-from chilopod.robot import load_robot
+from chilopod.robot import load_robot, presets
 
 PRESET = "aoi2022-planar"
 
@@ -57,6 +57,11 @@ def test_help_names_the_commands():
         assert "show" in out
 
 
+def test_help_names_the_presets():
+    for command in (["robot", "show"], ["walk"]):
+        assert f"one of the presets {' and '.join(presets())}." in " ".join(run(*command, "--help")[1].split())
+
+
 def test_version():
     assert chilopod.__version__ == importlib.metadata.version("chilopod")
     assert run("--version") == (0, f"chilopod {chilopod.__version__}\n", "")
@@ -83,6 +88,25 @@ def test_new_overwrites_only_when_told(folder):
     assert code == 0
     assert json.loads(out) == {"robot": "mine", "file": "mine.toml"}
     assert load_robot("mine.toml").name == "mine"
+
+
+def test_new_with_a_twin_walks_in_three_dimensions(folder):
+    assert run("robot", "new", "whole.toml", "--twin", "--modules", "8", "--set", "twin.clearance=5 mm")[0] == 0
+    whole, preset = load_robot("whole.toml"), load_robot("aoi2022")
+    assert whole.twin == preset.with_value("twin.clearance", 0.005).twin
+    assert whole.body.modules == 8
+    assert whole.legs == preset.legs
+    # A robot of one's own keeps all it has, and gets what it lacks.
+    assert run("robot", "new", "flat.toml", "--set", "body.mass=9 kg")[0] == 0
+    assert load_robot("flat.toml").twin is None
+    assert run("robot", "new", "mine.toml", "--twin", "--preset", "flat.toml")[0] == 0
+    mine = load_robot("mine.toml")
+    assert (mine.body.mass, mine.twin) == (9.0, preset.twin)
+    assert mine.provenance_of("twin.clearance") == preset.provenance_of("twin.clearance")
+    assert mine.provenance_of("legs.half_width") == load_robot(PRESET).provenance_of("legs.half_width")
+    assert run("robot", "new", "again.toml", "--twin", "--preset", "whole.toml")[0] == 0
+    assert load_robot("again.toml").twin == whole.twin
+    assert run("robot", "export", "mine.toml", "--out", "mine.xml")[0] == 0
 
 
 @pytest.mark.parametrize(

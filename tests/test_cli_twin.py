@@ -108,8 +108,11 @@ def test_identify_twin_keeps_what_it_has_tried(capsys, tmp_path, monkeypatch):
     arguments = ["identify", "twin", "--out", str(tmp_path), "--starts", "1", "--generations", "1", "--json"]
     found = printed(capsys, *arguments)
     count = 10 + len(twin.known())
+    assert found["robot"] == ROBOT
     assert found["evaluations"] == len(asked) == count
-    assert found == printed(capsys, *arguments)
+    assert main(arguments) == 2
+    assert "--force" in capsys.readouterr().err
+    assert found == printed(capsys, *arguments, "--force")
     assert len(asked) == count
     assert load_robot(tmp_path / "identified.toml").get("legs.half_width") == pytest.approx(
         found["constants"]["legs.half_width"]["value_si"]

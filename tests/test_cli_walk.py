@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from chilopod import planar, twin
 from chilopod.cli import main
-from chilopod.cli.options import EngineOption
+from chilopod.cli.options import EngineOption, StrategyOption
 from chilopod.engine import ENGINES
 from chilopod.record import RATE
+from chilopod.steering import ARRIVAL_RADIUS, STRATEGIES
 
 ROBOT = "aoi2022-planar"
 SOFT = ["--set", "springs.stiffness[0]=9 N*mm/deg"]
@@ -310,12 +312,6 @@ def test_an_engine_of_ones_own_walks(capsys, own):
     assert "is a class; allowed: an object" in refused(capsys, "walk", ROBOT, "--engine", f"{own}:Left")
 
 
-def test_the_engines_are_choices_in_the_help(capsys):
-    assert main(["walk", "--help"]) == 0
-    assert "planar|twin|MODULE:OBJECT" in capsys.readouterr().out
-    assert EngineOption.__metadata__[0].metavar.split("|")[:-1] == list(ENGINES)
-
-
 def test_walks_are_kept_and_not_walked_again(capsys, tmp_path):
     folder = tmp_path / "kept"
     arguments = ["walk", ROBOT, *SOFT, "--duration", "3 s", "--seed", "1", "--json", "--trials", str(folder)]
@@ -331,3 +327,31 @@ def test_walks_are_kept_and_not_walked_again(capsys, tmp_path):
     (folder / one).write_bytes((folder / other).read_bytes())
     assert printed(capsys, *arguments, "--repeats", "2") == first
     assert (folder / f"{one}.aside").exists()
+
+
+def test_a_walk_that_nothing_bends_says_why(capsys):
+    why = "nothing disturbed it, so nothing bends it"
+    arguments = ["walk", ROBOT, *SOFT, "--duration", "3 s"]
+    assert main(arguments) == 0
+    out = capsys.readouterr().out
+    assert why in out
+    assert "straight" in out.splitlines()[2]
+    for more in (["--seed", "1"], ["--initial-joints", "2 deg"]):
+        assert main([*arguments, *more]) == 0
+        assert why not in capsys.readouterr().out
+    arguments = ["turn", ROBOT, "--target", "45 deg, 1.3 m", "--k1", "9 N*mm/deg", "--duration", "3 s"]
+    for strategy, straight in (("open-loop", True), ("pitchfork", False)):
+        assert main([*arguments, "--strategy", strategy]) == 0
+        assert (why in capsys.readouterr().out) is straight
+
+
+def test_choices_are_listed_and_completed(capsys):
+    for option, names in ((EngineOption, [*ENGINES, "MODULE:OBJECT"]), (StrategyOption, list(STRATEGIES))):
+        assert option.__metadata__[0].metavar.split("|") == names
+        assert set(option.__metadata__[0].autocompletion()) <= set(names)
+    assert main(["turn", "--help"]) == 0
+    out = capsys.readouterr().out
+    assert "pitchfork|hopf|leg-yaw|open-loop" in out
+    out = " ".join(out.split())
+    assert f"within {ARRIVAL_RADIUS:g} m of the target" in out
+    assert f"by default {planar.traits.haste:g} (planar) or {twin.traits.haste:g} (twin) times" in out

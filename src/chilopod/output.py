@@ -45,7 +45,7 @@ def write_atomic(
         if path.is_dir():
             raise OutputError("is a folder, not a file", source=str(path))
         if not replace and path.exists():
-            raise OutputError("exists and is not overwritten", source=str(path))
+            raise _taken(path)
         # In the same folder, because a rename is atomic only within one file system.
         handle, temporary = tempfile.mkstemp(prefix=".chilopod-", dir=path.parent)
         try:
@@ -91,7 +91,7 @@ def free_path(path: str | Path, force: bool = False) -> Path:
     if path.is_dir():
         raise OutputError("is a folder, not a file", source=str(path))
     if path.exists() and not force:
-        raise OutputError("exists and is only replaced with --force", source=str(path))
+        raise _taken(path)
     prepare_folder(path.parent)
     return path
 
@@ -132,6 +132,10 @@ def netcdf(data: xr.Dataset) -> bytes:
         path = Path(folder) / "data.nc"
         storable(data).to_netcdf(path, engine="h5netcdf")
         return path.read_bytes()
+
+
+def _taken(path: Path) -> OutputError:
+    return OutputError("exists and is only replaced with --force", source=str(path))
 
 
 def _refused(path: Path, error: OSError | ValueError) -> OutputError:

@@ -7,7 +7,7 @@ import xarray as xr
 from chilopod import stability
 from chilopod.analysis.branch import as_json, curved_walks, read_walks, resumed
 from chilopod.analysis.parameters import K1, stiffness
-from chilopod.errors import AnalysisError, OutputError, ParameterError
+from chilopod.errors import AnalysisError, ParameterError
 from chilopod.planar import PlanarModel
 from chilopod.planar.along import walk_means
 from chilopod.report import write_branch
@@ -159,11 +159,3 @@ def test_written_and_printed(right, tmp_path):
     assert result["direction_confirms"] is True
     lines = (tmp_path / "branch.csv").read_text().splitlines()
     assert len([line for line in lines if not line.startswith("#")]) == 1 + right.sizes["point"]
-
-
-def test_files_are_only_replaced_if_told(right, tmp_path):
-    write_branch(right, tmp_path, replace=False)
-    before = (tmp_path / "branch.nc").read_bytes()
-    with pytest.raises(OutputError, match="not overwritten"):
-        write_branch(right.isel(point=slice(0, 5)), tmp_path, replace=False)
-    assert (tmp_path / "branch.nc").read_bytes() == before

@@ -44,6 +44,11 @@ class StraightWalk(ReadOnlyArrays):
         """Whether every disturbance dies out."""
         return self.exponents.multipliers.stable
 
+    @property
+    def moduli(self) -> NDArray[np.float64]:
+        """By what every mode has grown after one period, shape (2N+1,)."""
+        return np.exp(self.exponents.values.real * self.robot.gait.period)
+
     def as_json(self) -> dict[str, Any]:
         """The result as plain numbers; complex ones as [real, imaginary]."""
         multipliers = self.exponents.multipliers

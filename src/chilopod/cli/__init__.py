@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from chilopod.cli import branch, doctor, reproduce, robot, stability, walk
+from chilopod.cli import branch, doctor, reproduce, robot, stability, turn, walk
 from chilopod.cli.options import new_app
 from chilopod.errors import ChilopodError, one_line
 
@@ -21,16 +21,16 @@ USAGE_ERROR = 2
 INTERNAL_ERROR = 1
 INTERRUPTED = 130
 
-app = new_app("Many-legged robots that turn by bifurcation: simulate, analyse and steer them.")
-app.command("reproduce")(reproduce.reproduce)
+app = new_app("Many-legged robots that turn by bifurcation: simulate, analyse and steer them.", completion=True)
+app.command("reproduce", short_help="Repeat the paper, and write a report beside its numbers.")(reproduce.reproduce)
 app.add_typer(robot.app, name="robot")
-app.command("stability")(stability.stability)
-app.command("bifurcation")(stability.bifurcation)
-app.command("branch")(branch.branch)
-app.command("walk")(walk.walk)
-app.command("turn")(walk.turn)
+app.command("stability", short_help="Does the straight walk hold? Its Floquet exponents.")(stability.stability)
+app.command("bifurcation", short_help="Where does the straight walk give way, and how?")(stability.bifurcation)
+app.command("branch", short_help="Follow the curved walks beyond: how tightly they turn.")(branch.branch)
+app.command("walk", short_help="Let a robot walk, and say where it gets to.")(walk.walk)
+app.command("turn", short_help="Pick the spring that leads to a target, and walk there.")(turn.turn)
 app.add_typer(reproduce.identify_app, name="identify")
-app.command("doctor")(doctor.doctor)
+app.command("doctor", short_help="Is all here that chilopod needs, and what mends it?")(doctor.doctor)
 
 
 @app.callback(invoke_without_command=True)
@@ -59,7 +59,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit code: 0, or 2 for anything the user can put right, 1 for a fault of chilopod, 130 when interrupted.
+        Exit code: 0, or 2 for anything the user can put right, 1 for a fault of chilopod, 3 where ``doctor`` finds that
+        something essential is missing, 130 when interrupted.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     # What a robot is called need not fit the terminal's encoding; better a question mark than a crash.

@@ -8,18 +8,19 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from chilopod.cli.options import (
+    ForceOption,
     JsonOption,
     OutOption,
     ParameterOption,
     RobotArg,
     SetOption,
+    free,
     interval,
-    prepared,
     print_json,
     read_robot,
+    wrote,
 )
 from chilopod.cli.progress import progress_bar
-from chilopod.errors import OutputError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,12 +39,15 @@ def branch(
         ),
     ] = None,
     points: Annotated[
-        int, typer.Option(metavar="N", min=1, max=10_000, help="At most so many points (with --resume: more points).")
+        int, typer.Option(metavar="N", min=1, max=10_000, help="How many points at most; with --resume, how many more.")
     ] = 60,
     longest: Annotated[
         float,
         typer.Option(
-            metavar="STEP", min=1e-4, max=10.0, help="Largest step along the branch; halve it for more points."
+            metavar="STEP",
+            min=1e-4,
+            max=10.0,
+            help="Largest step along the branch, without a unit; halve it for points half as far apart.",
         ),
     ] = 0.15,
     left: Annotated[
@@ -56,31 +60,36 @@ def branch(
         Path | None,
         typer.Option(metavar="FOLDER", help="Go on with the branch saved there; without --out it grows in its place."),
     ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Overwrite a branch that is already in the folder of --out.")
-    ] = False,
+    force: ForceOption = False,
 ) -> None:
-    """Follow the curved walks from the pitchfork: radius, speed, stability, folds and what else happens on the way.
+    """Follow the curved walks from the pitchfork at which the straight walk gives way: how tightly they turn, how
+    fast and stable they are, folds and what else happens on the way.
+
+    The axis radius is that of the arc into which the body is bent, as in the paper; the path radius that of the circle
+    on the floor; the cost of transport is leg power over weight times speed.
 
     With --out, draws the branch (unstable parts dashed) and writes it as netCDF and CSV; --resume goes on with it.
     """
     described = read_robot(robot, overrides)
     chosen = between or (None if resume else _BETWEEN)
     limits = interval(described, parameter, chosen) if chosen else None
-    folder = prepared(out)
-    # A branch that goes on where it is saved holds all it held before.
-    replace = force or (resume is not None and (folder is None or folder.resolve() == resume.resolve()))
-    if folder and not replace and (folder / "branch.nc").exists():
-        raise OutputError("exists and is not overwritten", source=str(folder / "branch.nc"), allowed="--force")
     from chilopod.analysis.branch import as_json as plain
     from chilopod.analysis.branch import curved_walks, read_walks, resumed
 
+    saved = None if resume is None else read_walks(resume / "branch.nc")
+    folder = out or resume
+    if folder:
+        from chilopod.report import files_of_branch
+
+        # A branch that goes on where it is saved holds all it held before.
+        grows = resume is not None and folder.resolve() == resume.resolve()
+        free(files_of_branch(folder), force or grows)
     with progress_bar() as show:
 
         def progress(done: float, words: str) -> None:
             show("branch", done, words)
 
-        if resume is None:
+        if saved is None:
             assert limits is not None
             data = curved_walks(
                 described,
@@ -93,7 +102,7 @@ def branch(
             )
         else:
             data = resumed(
-                read_walks(resume / "branch.nc"),
+                saved,
                 described,
                 parameter,
                 limits,
@@ -102,12 +111,10 @@ def branch(
                 side=-1 if left else None,
                 progress=progress,
             )
-            folder = folder or prepared(resume)
     if folder:
         from chilopod.report import write_branch
 
-        for path in write_branch(data, folder, replace=replace):
-            typer.echo(f"wrote {path}", err=True)
+        wrote(write_branch(data, folder))
     if as_json:
         print_json(plain(data))
         return
@@ -120,12 +127,12 @@ def _print(data: xr.Dataset) -> None:
     verdict = about["criticality"]
     agrees = "confirms" if about["direction_confirms"] == "yes" else "does not confirm"
     typer.echo(f"  the normal form says {verdict}; the direction in which the branch leaves {agrees} it")
-    typer.echo(f"  {unit:<12} axis radius  path radius  speed (m/s)  cost of transport  stability")
+    typer.echo(f"  {unit:<12} axis radius (m)  path radius (m)  speed (m/s)  cost of transport  stability")
     for i in range(data.sizes["point"]):
         at = data.isel(point=i)
         special = str(at.special.values)
         stability = "stable" if bool(at.stable) else "unstable"
         typer.echo(
-            f"  {float(at.parameter):<12.6g} {float(at.axis_radius):<11.4g}  {float(at.path_radius):<11.4g}  "
+            f"  {float(at.parameter):<12.6g} {float(at.axis_radius):<15.4g}  {float(at.path_radius):<15.4g}  "
             f"{float(at.speed):<11.4g}  {float(at.cost_of_transport):<17.3g}  {special or stability}"
         )

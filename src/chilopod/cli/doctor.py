@@ -24,7 +24,8 @@ _PACKAGES = {
 }
 """What is imported, and what it is called where it comes from."""
 
-_BROKEN = 1  # exit code
+BROKEN = 3
+"""Exit code where something is missing that nothing works without."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,8 @@ class Finding:
 def doctor(as_json: JsonOption = False) -> None:
     """Say what is here that chilopod needs, and of everything that is missing the one line that mends it.
 
-    The exit code is 0 unless something is missing that nothing works without.
+    The exit code is 0, or 3 if something is missing that nothing works without. Without OpenGL or an encoder all but
+    films and pictures in 3-D works.
     """
     found = [finding for look in (_versions, _cores, _cache, _drawing, _encoder, _fonts) for finding in look()]
     broken = any(each.mend and each.essential for each in found)
@@ -82,7 +84,7 @@ def doctor(as_json: JsonOption = False) -> None:
             if each.mend:
                 typer.echo(f"  {'':<{width}}  to mend it: {each.mend}")
     if broken:
-        raise typer.Exit(_BROKEN)
+        raise typer.Exit(BROKEN)
 
 
 def _versions() -> list[Finding]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,34 +13,75 @@ import typer
 if TYPE_CHECKING:
     from chilopod.robot import Robot
 
-RobotArg = Annotated[str, typer.Argument(metavar="ROBOT", help="A robot file, or the name of a preset.")]
+STAYS_STRAIGHT = "nothing disturbed it, so nothing bends it, even where the straight walk is unstable"
+
+
+def _engines() -> list[str]:
+    from chilopod.engine import ENGINES
+
+    return list(ENGINES)
+
+
+def _strategies() -> list[str]:
+    from chilopod.steering import STRATEGIES
+
+    return list(STRATEGIES)
+
+
+RobotArg = Annotated[
+    str, typer.Argument(metavar="ROBOT", help="A robot file, or one of the presets aoi2022 and aoi2022-planar.")
+]
 SetOption = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
         metavar="PATH=VALUE",
-        help='Override a number, such as springs.stiffness[0]="12 N*mm/deg"; may be repeated.',
+        help='Change a number of the robot, such as "springs.stiffness[0]=12 N*mm/deg"; may be repeated. '
+        "`chilopod robot show` lists them all.",
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout instead of text.")]
 ParameterOption = Annotated[
     str,
-    typer.Option(metavar="PATH", help="What to vary, such as springs.stiffness[0]; springs.stiffness: all springs."),
+    typer.Option(
+        metavar="PATH",
+        help="Which number of the robot to vary, such as springs.stiffness[0], the first yaw spring (the paper's k1), "
+        "or springs.stiffness, all of them together.",
+    ),
 ]
 BetweenOption = Annotated[
-    tuple[str, str], typer.Option(metavar="LOW HIGH", help='The interval, such as "2 N*mm/deg" "75 N*mm/deg".')
+    tuple[str, str],
+    typer.Option(metavar="LOW HIGH", help='Between which values, with their unit, such as "2 N*mm/deg" "75 N*mm/deg".'),
 ]
-OutOption = Annotated[Path | None, typer.Option("--out", metavar="FOLDER", help="Write results into this folder.")]
-ForceOption = Annotated[bool, typer.Option("--force", help="Replace results that are already there.")]
+OutOption = Annotated[
+    Path | None, typer.Option("--out", metavar="FOLDER", help="Write the results into this folder too.")
+]
+ForceOption = Annotated[bool, typer.Option("--force", help="Replace files that are already there.")]
 SeedOption = Annotated[
     int | None,
-    typer.Option(metavar="N", min=0, help="Disturb start, feet and sensor at random; without it nothing is disturbed."),
+    typer.Option(
+        metavar="N",
+        min=0,
+        help="Disturb start, feet and sensor a little, at random; the same seed disturbs in the same way. Without it "
+        "nothing is disturbed.",
+    ),
 ]
 EngineOption = Annotated[
     str,
     typer.Option(
         metavar="planar|twin|MODULE:OBJECT",
-        help="The paper's model, the whole robot in three dimensions (MuJoCo), or an engine of your own.",
+        help="What computes the walk: the paper's planar model, the whole robot in three dimensions (MuJoCo; a robot "
+        "with a [twin] section, such as aoi2022), or an engine of your own.",
+        autocompletion=_engines,
+    ),
+]
+StrategyOption = Annotated[
+    str,
+    typer.Option(
+        metavar="pitchfork|hopf|leg-yaw|open-loop",
+        help="How it turns. pitchfork: a soft first spring, and the legs of module 1 yaw towards the target; hopf: all "
+        "springs alike and soft, with leg yaw; leg-yaw: leg yaw alone; open-loop: a soft first spring alone.",
+        autocompletion=_strategies,
     ),
 ]
 ControllerOption = Annotated[
@@ -52,7 +93,7 @@ TrialsOption = Annotated[
     typer.Option("--trials", metavar="FOLDER", help="Keep all trials here, and walk none that is there already."),
 ]
 RepeatsOption = Annotated[
-    int, typer.Option(metavar="N", min=1, max=100_000, help="Walks, with seeds counting up from --seed.")
+    int, typer.Option(metavar="N", min=1, max=100_000, help="How many walks, with seeds counting up from --seed.")
 ]
 ClusterOption = Annotated[
     str | None,
@@ -64,14 +105,22 @@ ClusterOption = Annotated[
 ]
 
 
-def new_app(help_text: str) -> typer.Typer:
-    """Return an empty group of commands with the settings all groups share."""
+def new_app(help_text: str, *, completion: bool = False) -> typer.Typer:
+    """Return an empty group of commands with the settings all groups share.
+
+    Parameters
+    ----------
+    help_text
+        What it is for.
+    completion
+        Whether it has the options that make a shell complete its commands; only the outermost can.
+    """
     # Help without rich: importing it costs a third of what --help may take. Tracebacks are the business of `main`.
     return typer.Typer(
         help=help_text,
         rich_markup_mode=None,
         pretty_exceptions_enable=False,
-        add_completion=False,
+        add_completion=completion,
         no_args_is_help=False,
     )
 
@@ -101,13 +150,18 @@ def print_json(result: dict[str, Any]) -> None:
     typer.echo(json.dumps(result, indent=2, allow_nan=False))
 
 
-def prepared(folder: Path | None) -> Path | None:
-    """Make the folder of ``--out``, if it was given, before any work is done for it."""
-    if folder is None:
-        return None
-    from chilopod.output import prepare_folder
+def print_creep(coefficient: float | None) -> None:
+    """Say how firmly the floor holds standing feet, where they creep."""
+    if coefficient is not None:
+        typer.echo(f"  standing feet creep like viscous ones of {coefficient:.0f} N*s/m")
 
-    return prepare_folder(folder)
+
+def free(paths: Iterable[Path], force: bool) -> None:
+    """Make sure, before any work is done for them, that files can be written and replace none without ``--force``."""
+    from chilopod.output import free_path
+
+    for path in paths:
+        free_path(path, force)
 
 
 def save_json(path: Path, result: dict[str, Any]) -> None:
@@ -115,7 +169,13 @@ def save_json(path: Path, result: dict[str, Any]) -> None:
     from chilopod.output import write_atomic
 
     write_atomic(path, json.dumps(result, indent=2, allow_nan=False) + "\n")
-    typer.echo(f"wrote {path}", err=True)
+    wrote([path])
+
+
+def wrote(paths: Iterable[Path]) -> None:
+    """Say on stderr what was written."""
+    for path in paths:
+        typer.echo(f"wrote {path}", err=True)
 
 
 def interval(robot: Robot, parameter: str, between: tuple[str, str]) -> tuple[float, float]:

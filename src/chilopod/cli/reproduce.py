@@ -9,15 +9,25 @@ import typer
 
 from chilopod.cli.options import (
     ClusterOption,
+    ForceOption,
     JsonOption,
     SetOption,
+    free,
     new_app,
     print_json,
     read_robot,
     save_json,
     walking_on,
+    wrote,
 )
 from chilopod.cli.progress import progress_bar
+
+_SECTIONS = (
+    *("mode", "exponents", "variants", "modules", "uniform", "identification", "branch", "curved", "undulation"),
+    *("turning", "movies", "robot-walks", "robot-turning", "robot-spread", "robot-numerics", "robot-structures"),
+    *("robot-why", "robot-movies"),
+)
+"""For the help, which loads nothing heavy; a test holds them to what there is."""
 
 PRESET, WHOLE = "aoi2022-planar", "aoi2022"
 
@@ -32,17 +42,35 @@ def _group(ctx: typer.Context) -> None:
 
 def reproduce(
     only: Annotated[
-        list[str] | None, typer.Option("--only", metavar="SECTION", help="Just this section; may be repeated.")
+        list[str] | None,
+        typer.Option(
+            "--only",
+            metavar="SECTION",
+            help=f"Just this section; may be repeated: {', '.join(_SECTIONS)}.",
+            autocompletion=lambda: list(_SECTIONS),
+        ),
     ] = None,
-    out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Where the report goes.")] = Path("report"),
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FOLDER", help="Where the report goes; one that is there is gone on with.")
+    ] = Path("report"),
     quick: Annotated[bool, typer.Option("--quick", help="Coarser sweeps, fewer trials.")] = False,
     cluster: ClusterOption = None,
     as_json: JsonOption = False,
+    overrides: Annotated[list[str] | None, typer.Option("--set", hidden=True)] = None,
 ) -> None:
     """Repeat the paper with its planar model and with its robot in 3-D, and write a report beside its own numbers.
 
-    Trials are kept in the folder, so a run that was stopped goes on where it was.
+    Trials are kept in the folder, so a run that was stopped goes on where it was. It takes no robot and no --set: the
+    numbers beside which it puts its own are those of the paper's robot.
     """
+    if overrides:
+        from chilopod.errors import ParameterError
+
+        raise ParameterError(
+            "reproduce changes nothing about the robot: the paper's numbers are those of the paper's",
+            value=overrides[0],
+            allowed="no --set; stability, bifurcation, branch, walk and turn take any robot",
+        )
     from chilopod.output import prepare_folder
     from chilopod.studies.reproduce import SECTIONS, chosen
 
@@ -66,7 +94,8 @@ def reproduce(
     rows = [row.as_json() for row in results.all_rows]
     if as_json:
         robot_rows = [row.as_json() for row in results.all_robot_rows]
-        print_json({"report": str(page), "rows": rows, "robot_rows": robot_rows, "seconds": results.seconds})
+        robots = {"robot": results.robot.name, "whole_robot": WHOLE}
+        print_json({**robots, "report": str(page), "rows": rows, "robot_rows": robot_rows, "seconds": results.seconds})
         return
     for row in results.all_rows:
         typer.echo(f"{row.verdict:<12} {row.quantity}")
@@ -90,26 +119,27 @@ def reproduce(
         typer.echo(f"  {command}")
 
 
-@identify_app.command()
+@identify_app.command(short_help="Constants of the planar model from printed numbers.")
 def planar(
     robot: Annotated[str, typer.Argument(metavar="[ROBOT]", help="A robot file or preset.")] = PRESET,
     overrides: SetOption = None,
     out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Where results go.")] = Path("identification"),
-    points: Annotated[int, typer.Option(metavar="N", help="Points of the profile, 3 to 200.", min=3, max=200)] = 25,
+    force: ForceOption = False,
+    points: Annotated[int, typer.Option(metavar="N", help="Points of the profile.", min=3, max=200)] = 25,
     as_json: JsonOption = False,
 ) -> None:
     """Friction, half-width and forward offset of the feet from the paper's printed numbers, and how sure they are.
 
     Writes the profile over the forward offset as a figure and as data, and the robot with the best constants.
     """
-    from chilopod.output import prepare_folder, write_atomic
+    from chilopod.output import write_atomic
 
     described = read_robot(robot, overrides)
-    folder = prepare_folder(out)
-    from chilopod.report import write_identification
+    from chilopod.report import files_of_identification, write_identification
     from chilopod.studies.fit_data import critical_mode_data, variant_settings
     from chilopod.tasks.identify import identify_planar
 
+    free([*files_of_identification(out), out / "identification.json", out / "identified.toml"], force)
     with progress_bar() as show:
         found = identify_planar(
             described,
@@ -119,26 +149,26 @@ def planar(
             lambda done, words: show("identification", done, words),
         )
     best = found.best.with_(name="identified")
-    write_identification(found, folder)
-    write_atomic(folder / "identified.toml", best.to_toml())
-    result = found.as_json()
-    save_json(folder / "identification.json", result)
+    wrote([*write_identification(found, out), write_atomic(out / "identified.toml", best.to_toml())])
+    result = {"robot": described.name, **found.as_json()}
+    save_json(out / "identification.json", result)
     if as_json:
         print_json(result)
         return
     for name, value in result["constants"].items():
         typer.echo(f"{name} = {value['text']}  (rounding of the printed numbers allows {value['allowed_text']})")
     typer.echo(f"largest residual {result['largest_residual']:.2f}: 1 is what rounding of the printed numbers allows")
-    typer.echo(f"profile, figure and robot file are in {folder}")
+    typer.echo(f"profile, figure and robot file are in {out}")
 
 
-@identify_app.command()
+@identify_app.command(short_help="Constants of the 3-D robot from the paper's walks.")
 def twin(
     robot: Annotated[str, typer.Argument(metavar="[ROBOT]", help="A robot file or preset with a [twin].")] = WHOLE,
     overrides: SetOption = None,
     out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Where results go.")] = Path(
         "identification-twin"
     ),
+    force: ForceOption = False,
     starts: Annotated[int, typer.Option(metavar="N", help="Searches, from different places.", min=1, max=100)] = 3,
     generations: Annotated[
         int, typer.Option(metavar="N", help="Of ten evaluations each, in every search.", min=1, max=1000)
@@ -150,12 +180,12 @@ def twin(
     """Constants of the three-dimensional robot from the paper's base series of walks, and how sure they are.
 
     Half an hour on two cores; evaluations are kept in the folder, so a search that was stopped goes on where it
-    was. The preset aoi2022 is what this finds by default.
+    was, and with --force one that has ended goes on with more. The preset aoi2022 is what this finds by default.
     """
     from chilopod.output import prepare_folder, write_atomic
 
     described = read_robot(robot, overrides)
-    folder = prepare_folder(out)
+    free([out / "identification.json", out / "identified.toml"], force)
     from chilopod.studies.fit_data import base_series_data
     from chilopod.tasks.identify import identify_twin
 
@@ -166,13 +196,13 @@ def twin(
             starts,
             generations,
             seed,
-            prepare_folder(folder / "evaluations"),
+            prepare_folder(out / "evaluations"),
             fresh,
             lambda done, words: show("identification", done, words),
         )
-    write_atomic(folder / "identified.toml", found.best.with_(name="identified").to_toml())
-    result = found.as_json()
-    save_json(folder / "identification.json", result)
+    wrote([write_atomic(out / "identified.toml", found.best.with_(name="identified").to_toml())])
+    result = {"robot": described.name, **found.as_json()}
+    save_json(out / "identification.json", result)
     if as_json:
         print_json(result)
         return
@@ -182,4 +212,4 @@ def twin(
         f"misfit {result['misfit']:.2f} (1: every datum within 5 %), {result['good']} of {result['evaluations']} "
         "evaluations are below 1"
     )
-    typer.echo(f"fits and robot file are in {folder}")
+    typer.echo(f"fits and robot file are in {out}")

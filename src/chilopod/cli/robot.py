@@ -7,7 +7,9 @@ from typing import Annotated
 
 import typer
 
-from chilopod.cli.options import JsonOption, RobotArg, SetOption, new_app, print_json, read_robot
+from chilopod.cli.options import ForceOption, JsonOption, RobotArg, SetOption, new_app, print_json, read_robot
+
+_PLANAR, _WHOLE = "aoi2022-planar", "aoi2022"
 
 app = new_app("Make, show, check and export robot files.")
 
@@ -23,18 +25,37 @@ def new(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="The robot file to write, such as my.toml.")],
     modules: Annotated[
         str | None,
-        typer.Option(metavar="N", help="Number of modules; the last spring is repeated, length and mass stay."),
+        typer.Option(
+            metavar="N", help="Number of modules; length and mass stay those of the whole, the last spring is repeated."
+        ),
     ] = None,
-    preset: Annotated[str, typer.Option(metavar="NAME", help="The robot to start from.")] = "aoi2022-planar",
+    preset: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ROBOT",
+            help=f"The robot to start from, a preset or a file; by default {_PLANAR}, with --twin {_WHOLE}.",
+        ),
+    ] = None,
+    twin: Annotated[
+        bool,
+        typer.Option(
+            "--twin",
+            help="With a [twin] section, so that it walks in three dimensions too; where the robot to start from has "
+            f"none, that of {_WHOLE}.",
+        ),
+    ] = False,
     overrides: SetOption = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite the file if it exists.")] = False,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Write a new robot file, named after the file, to edit by hand."""
     from chilopod.output import write_atomic
 
-    robot = read_robot(preset, ([f"body.modules={modules}"] if modules is not None else []) + (overrides or []))
-    robot = robot.with_(name=file.stem)
+    robot = read_robot(preset or (_WHOLE if twin else _PLANAR), None)
+    if twin and robot.twin is None:
+        robot = robot.with_twin_of(read_robot(_WHOLE, None))
+    robot = robot.set_from_text([f"body.modules={modules}"] if modules is not None else [])
+    robot = robot.set_from_text(overrides or []).with_(name=file.stem)
     write_atomic(file, robot.to_toml(), replace=force)
     if as_json:
         print_json({"robot": robot.name, "file": str(file)})
@@ -112,10 +133,10 @@ def export(
         Path, typer.Option("--out", metavar="FILE", help="The file to write: .xml for MJCF (MuJoCo), .urdf for URDF.")
     ],
     overrides: SetOption = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite the file if it exists.")] = False,
+    force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Write the three-dimensional model of a robot for other programs."""
+    """Write the three-dimensional model of a robot, which must have a [twin] section, for other programs."""
     from chilopod.output import write_atomic
     from chilopod.twin.export import format_of
 

@@ -10,42 +10,50 @@ import typer
 
 from chilopod.cli.options import (
     BetweenOption,
+    ForceOption,
     JsonOption,
     OutOption,
     ParameterOption,
     RobotArg,
     SetOption,
+    free,
     interval,
-    prepared,
     print_json,
     read_robot,
     save_json,
 )
 
 
-def stability(robot: RobotArg, overrides: SetOption = None, as_json: JsonOption = False, out: OutOption = None) -> None:
-    """Floquet multipliers, exponents and modes of the straight walk in the planar model.
+def stability(
+    robot: RobotArg,
+    overrides: SetOption = None,
+    as_json: JsonOption = False,
+    out: OutOption = None,
+    force: ForceOption = False,
+) -> None:
+    """Is the straight walk stable in the planar model? Its Floquet multipliers, exponents and modes.
 
-    Exponents are the principal logarithms of the full-period multipliers over the period: their imaginary parts lie in
-    (-pi/T, pi/T].
+    A small disturbance is a sum of modes. A mode grows with its exponent, and by its multiplier from one period T of
+    the gait to the next: the walk is stable if every |multiplier| is below 1, every exponent's real part below 0.
+    Exponents are the principal logarithms of the multipliers over T: their imaginary parts lie in (-pi/T, pi/T].
     """
     described = read_robot(robot, overrides)
-    folder = prepared(out)
+    file = out / "stability.json" if out else None
+    free([file] if file else [], force)
     from chilopod.analysis import straight_walk
 
     found = straight_walk(described)
     result = found.as_json()
-    if folder:
-        save_json(folder / "stability.json", result)
+    if file:
+        save_json(file, result)
     if as_json:
         print_json(result)
         return
     verdict = "stable" if found.stable else "unstable"
     typer.echo(f"{described.name}: the straight walk is {verdict} (period {described.gait.period:g} s)")
     typer.echo("  exponent (1/s)              |multiplier|   joint angles of the mode, front to rear")
-    for exponent, components in zip(found.exponents.values, found.joint_components, strict=True):
-        multiplier = math.exp(exponent.real * described.gait.period)
-        typer.echo(f"  {_complex(exponent, 6):<26}  {multiplier:<12.6g}   {_components(components)}")
+    for exponent, modulus, components in zip(found.exponents.values, found.moduli, found.joint_components, strict=True):
+        typer.echo(f"  {_complex(exponent, 6):<26}  {modulus:<12.6g}   {_components(components)}")
     typer.echo(f"  multipliers are within {found.exponents.multipliers.error_bound:.1e}")
 
 
@@ -55,15 +63,22 @@ def bifurcation(
     between: BetweenOption,
     overrides: SetOption = None,
     seconds: Annotated[
-        float, typer.Option(metavar="S", min=0.0, help="Time for the search; then it ends with what it has.")
+        float, typer.Option(metavar="S", min=0.0, help="Time for the search, s; then it ends with what it has.")
     ] = 60.0,
     as_json: JsonOption = False,
     out: OutOption = None,
+    force: ForceOption = False,
 ) -> None:
-    """Every bifurcation of the straight walk as one number of the robot varies, with its error bound and direction."""
+    """Where does the straight walk give way as one number of the robot varies, and how?
+
+    Every bifurcation in the interval, that is every value at which the straight walk gains or loses stability: its
+    kind, its error bound, the mode that grows, and whether what replaces the straight walk sets in gently
+    (supercritical) or by a jump (subcritical).
+    """
     described = read_robot(robot, overrides)
     low, high = interval(described, parameter, between)
-    folder = prepared(out)
+    file = out / "bifurcation.json" if out else None
+    free([file] if file else [], force)
     from chilopod.analysis import bifurcations
 
     points = bifurcations(
@@ -73,9 +88,9 @@ def bifurcation(
         remark=lambda text: typer.echo(f"note: {text}", err=True),
         seconds=seconds,
     )
-    result = {"points": [point.as_json() for point in points]}
-    if folder:
-        save_json(folder / "bifurcation.json", result)
+    result = {"robot": described.name, "points": [point.as_json() for point in points]}
+    if file:
+        save_json(file, result)
     if as_json:
         print_json(result)
         return

@@ -155,6 +155,16 @@ def _write_films(movies: Sequence[Movie], folder: Path) -> list[Film]:
     return written
 
 
+def files_of_branch(folder: str | Path) -> list[Path]:
+    """What :func:`write_branch` writes."""
+    return _files_of("branch", folder)
+
+
+def files_of_identification(folder: str | Path) -> list[Path]:
+    """What :func:`write_identification` writes."""
+    return _files_of("identification", folder)
+
+
 def write_identification(found: Identification, folder: str | Path) -> list[Path]:
     """Write the profile of an identification as ``identification`` with ``.png``, ``.svg``, ``.csv`` and ``.nc``.
 
@@ -170,7 +180,7 @@ def write_identification(found: Identification, folder: str | Path) -> list[Path
     return _write_alone(identification.panel_of(found), folder)
 
 
-def write_branch(data: xr.Dataset, folder: str | Path, *, replace: bool = True) -> list[Path]:
+def write_branch(data: xr.Dataset, folder: str | Path) -> list[Path]:
     """Write a branch of curved walks as ``branch`` with ``.png``, ``.svg``, ``.csv`` and ``.nc``.
 
     The netCDF file holds all that the branch goes on from, the table what a reader wants.
@@ -181,8 +191,6 @@ def write_branch(data: xr.Dataset, folder: str | Path, *, replace: bool = True) 
         From :mod:`chilopod.analysis.branch`.
     folder
         Created where there is none.
-    replace
-        Whether files of these names may be replaced.
 
     Returns
     -------
@@ -191,9 +199,9 @@ def write_branch(data: xr.Dataset, folder: str | Path, *, replace: bool = True) 
     Raises
     ------
     OutputError
-        If the folder cannot be written, or a file exists and may not be replaced.
+        If the folder cannot be written.
     """
-    return _write_alone(branch.panel(data), folder, branch.table(data), replace)
+    return _write_alone(branch.panel(data), folder, branch.table(data))
 
 
 def write_undulation(data: xr.Dataset, folder: str | Path) -> list[Path]:
@@ -211,22 +219,25 @@ def write_undulation(data: xr.Dataset, folder: str | Path) -> list[Path]:
     return _write_alone(undulation.panel(data), folder)
 
 
-def _write_alone(panel: Panel, folder: str | Path, table: xr.Dataset | None = None, replace: bool = True) -> list[Path]:
+def _write_alone(panel: Panel, folder: str | Path, table: xr.Dataset | None = None) -> list[Path]:
     folder = prepare_folder(folder)
-    _write(panel, folder, folder, table, replace)
-    return [folder / f"{panel.name}.{kind}" for kind in ("png", "svg", "csv", "nc")]
+    _write(panel, folder, folder, table)
+    return _files_of(panel.name, folder)
 
 
-def _write(panel: Panel, figures: Path, data: Path, table: xr.Dataset | None = None, replace: bool = True) -> bytes:
+def _files_of(name: str, folder: str | Path) -> list[Path]:
+    return [Path(folder) / f"{name}.{kind}" for kind in ("png", "svg", "csv", "nc")]
+
+
+def _write(panel: Panel, figures: Path, data: Path, table: xr.Dataset | None = None) -> bytes:
     """Write a figure, its data, and as a table the data or what is given for them; returns the SVG."""
     with style.house_style():
         drawn = panel.draw(False)
         vector, pixels = style.svg(drawn, panel.name), style.png(drawn)
-    # The data first: if they may not be replaced, nothing is.
-    write_atomic(data / f"{panel.name}.nc", netcdf(panel.data), replace=replace)
-    write_atomic(data / f"{panel.name}.csv", tables.csv(panel.data if table is None else table), replace=replace)
-    write_atomic(figures / f"{panel.name}.svg", vector, replace=replace)
-    write_atomic(figures / f"{panel.name}.png", pixels, replace=replace)
+    write_atomic(data / f"{panel.name}.nc", netcdf(panel.data))
+    write_atomic(data / f"{panel.name}.csv", tables.csv(panel.data if table is None else table))
+    write_atomic(figures / f"{panel.name}.svg", vector)
+    write_atomic(figures / f"{panel.name}.png", pixels)
     return vector
 
 

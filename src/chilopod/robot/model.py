@@ -266,6 +266,11 @@ class Robot(Description):
         """Return this robot with whole fields replaced, such as ``name=`` or ``gait=``, validated again."""
         return type(self)(**{**dict(self), **fields})
 
+    def with_twin_of(self, other: Robot) -> Self:
+        """Return this robot with the [twin] of another, and what is said there of where its numbers come from."""
+        told = {path: text for path, text in other.provenance.items() if path.startswith("twin.")}
+        return self.with_(twin=other.twin, provenance={**self.provenance, **told})
+
     def provenance_of(self, path: str) -> str | None:
         """Return what is said about where a parameter comes from; a spring falls back on what is said of all."""
         found: str | None = self.provenance.get(path, self.provenance.get(path.partition("[")[0]))

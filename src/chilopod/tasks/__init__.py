@@ -1,4 +1,4 @@
-"""The robot's verbs that walk: turn to a target, find how tightly a spring turns, find constants from walks."""
+"""The robot's verbs that walk: walk, turn to a target, find how tightly a spring turns, find constants from walks."""
 
 from typing import TYPE_CHECKING
 
@@ -8,6 +8,7 @@ if TYPE_CHECKING:
     from chilopod.tasks.identify import identify_planar, identify_twin
     from chilopod.tasks.radius_law import radius_law
     from chilopod.tasks.turn import Turn, best_spring, turn
+    from chilopod.tasks.walk import Walks, foot_creep, walk
 else:
     __getattr__, __dir__ = exports(
         __name__,
@@ -15,7 +16,18 @@ else:
             "identify": ("identify_planar", "identify_twin"),
             "radius_law": ("radius_law",),
             "turn": ("Turn", "best_spring", "turn"),
+            "walk": ("Walks", "foot_creep", "walk"),
         },
     )
 
-__all__ = ["Turn", "best_spring", "identify_planar", "identify_twin", "radius_law", "turn"]
+__all__ = [
+    "Turn",
+    "Walks",
+    "best_spring",
+    "foot_creep",
+    "identify_planar",
+    "identify_twin",
+    "radius_law",
+    "turn",
+    "walk",
+]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,8 @@ from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import Criteria, Strategy, Target, earliest_arrival, evaluate, steered
 from chilopod.tasks.radius_law import radius_law
-from chilopod.trials import NONE, Disturbance, Trial, run, together
+from chilopod.tasks.walk import check_repeats, foot_creep, repeated
+from chilopod.trials import NONE, Trial, run, straight, together
 
 Array = NDArray[np.float64]
 
@@ -61,6 +63,16 @@ class Turn:
     record: xr.Dataset
     criteria: Criteria
 
+    @property
+    def straight(self) -> bool:
+        """See :func:`chilopod.trials.straight`."""
+        return straight(self.record)
+
+    @cached_property
+    def foot_creep(self) -> float | None:
+        """See :func:`chilopod.tasks.walk.foot_creep`."""
+        return foot_creep(self.robot, self.engine)
+
     def as_json(self) -> dict[str, Any]:
         """Plain numbers; null for what there is not."""
 
@@ -89,6 +101,7 @@ class Turn:
                 }
                 for i, outcome in enumerate(found.outcome)
             ],
+            "foot_creep_N_s_m": self.foot_creep,
         }
 
 
@@ -121,8 +134,8 @@ def turn(
         to the target in undisturbed simulated trials, which takes into account that a walk needs time to bend. Without
         leg yaw nothing bends undisturbed, and ``auto`` is ``law``.
     duration
-        s; by default what the circle takes at the speed of the straight walk without slip, times the engine's haste
-        (planar 1.6, twin 1.9).
+        s; by default what the circle takes at the speed of the straight walk without slip, times the engine's haste,
+        see :class:`chilopod.engine.Traits`; at least 5 s.
     seed
         Of the first repeat's disturbances, the others count up from it; None for no disturbance at all.
     repeats
@@ -144,10 +157,7 @@ def turn(
     """
     if spring not in ("auto", "law") and isinstance(spring, str):
         raise ParameterError("is no spring", field="spring", value=spring, allowed="auto, law, or a stiffness")
-    if repeats < 1:
-        raise ParameterError("must be positive", field="repeats", value=repeats)
-    if repeats > 1 and seed is None:
-        raise ParameterError("are all alike without a seed", field="repeats", value=repeats, allowed="1, or a seed")
+    check_repeats(seed, repeats)
     traits = engine_named(engine).traits
     engine_named(engine).common(robot)
     if controller is not None:
@@ -176,9 +186,8 @@ def turn(
     progress(0.9, "walk")
     walker, chosen = steered(robot, strategy, stiffness)
     steering = controller or chosen
-    spread = Disturbance() if seed is not None else NONE
-    trial = Trial(walker, time, 0, (), target, steering, spread, engine=engine, poses=traits.poses)
-    record = together(run([replace(trial, seed=(seed or 0) + repeat) for repeat in range(repeats)], folder))
+    trial = Trial(walker, time, target=target, controller=steering, engine=engine, poses=traits.poses)
+    record = together(run(repeated(trial, seed, repeats), folder))
     when = earliest_arrival(record)
     criteria = evaluate(record, when if np.isfinite(when) else float(record.time[-1]))
     return Turn(walker, target, strategy, engine, steering, by_law, stiffness, record, criteria)

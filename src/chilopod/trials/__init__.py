@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from chilopod.trials.executors import Executor, Here, using
     from chilopod.trials.run import run, together
     from chilopod.trials.store import Store
-    from chilopod.trials.summary import AVERAGED, WalkSummary, axis_radius, mean_joint_angles, summaries
+    from chilopod.trials.summary import AVERAGED, WalkSummary, axis_radius, mean_joint_angles, straight, summaries
     from chilopod.trials.trial import Trial
 else:
     __getattr__, __dir__ = exports(
@@ -28,7 +28,7 @@ else:
             "executors": ("Executor", "Here", "using"),
             "run": ("run", "together"),
             "store": ("Store",),
-            "summary": ("AVERAGED", "WalkSummary", "axis_radius", "mean_joint_angles", "summaries"),
+            "summary": ("AVERAGED", "WalkSummary", "axis_radius", "mean_joint_angles", "straight", "summaries"),
             "trial": ("Trial",),
         },
     )
@@ -47,6 +47,7 @@ __all__ = [
     "batches",
     "mean_joint_angles",
     "run",
+    "straight",
     "summaries",
     "together",
     "using",

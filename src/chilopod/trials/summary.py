@@ -79,6 +79,12 @@ def mean_joint_angles(record: xr.Dataset, seconds: float = AVERAGED) -> xr.DataA
     return record.joint_angle.where(record.time >= end - seconds * (1.0 + 1e-9), drop=True).mean("time", skipna=False)
 
 
+def straight(record: xr.Dataset) -> bool:
+    """Whether no joint bends ever, to the last bit: nothing told left from right, and a straight walk stays straight
+    even where it is unstable."""
+    return not record.joint_angle.values.any()
+
+
 def axis_radius(robot: Robot, angles: Array) -> Array:
     """The paper's (N-1) L / sum |theta|, m, of joint angles over the last axis; infinite where all are zero."""
     bent = np.abs(angles).sum(-1)

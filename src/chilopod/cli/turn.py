@@ -1,0 +1,147 @@
+"""``chilopod turn``: let a robot walk to a target."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from chilopod.cli.options import (
+    STAYS_STRAIGHT,
+    ClusterOption,
+    ControllerOption,
+    EngineOption,
+    ForceOption,
+    JsonOption,
+    OutOption,
+    RepeatsOption,
+    RobotArg,
+    SeedOption,
+    SetOption,
+    StrategyOption,
+    TrialsOption,
+    free,
+    print_creep,
+    print_json,
+    read_robot,
+    walking_on,
+    wrote,
+)
+from chilopod.cli.own import own_code, own_controller
+from chilopod.cli.progress import progress_bar
+
+if TYPE_CHECKING:
+    from chilopod.tasks import Turn
+
+
+def turn(
+    robot: RobotArg,
+    target: Annotated[
+        str,
+        typer.Option(
+            metavar="BEARING, DISTANCE", help='Where to, such as "45 deg, 1.3 m"; a positive bearing is to the left.'
+        ),
+    ],
+    k1: Annotated[
+        str,
+        typer.Option(
+            "--k1",
+            metavar="auto|law|VALUE",
+            help="Stiffness of the springs that the strategy softens. auto: what comes nearest to the target in "
+            "undisturbed trials; law: what bends the settled walk into the circle to the target (the paper's k1-hat); "
+            'or a value such as "10 N*mm/deg".',
+        ),
+    ] = "auto",
+    strategy: StrategyOption = "pitchfork",
+    duration: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TIME",
+            help='How long, such as "30 s"; by default 1.6 (planar) or 2.8 (twin) times what the circle to the target '
+            "takes at the speed of the straight walk, 5 s at least.",
+        ),
+    ] = None,
+    seed: SeedOption = None,
+    repeats: RepeatsOption = 1,
+    engine: EngineOption = "planar",
+    controller: ControllerOption = None,
+    trials: TrialsOption = None,
+    cluster: ClusterOption = None,
+    overrides: SetOption = None,
+    as_json: JsonOption = False,
+    out: OutOption = None,
+    force: ForceOption = False,
+) -> None:
+    """Pick the spring that leads to a target, walk there, and say how well it went.
+
+    The robot arrives where it comes within 0.15 m of the target. The criteria are the paper's: what is left of the
+    distance (epsilon 1) and the angle between heading and target (epsilon 2) when the first walk arrives, and until
+    then the leg yaw squared, over time (epsilon 3, what steering cost).
+
+    With --out, draws the way and writes the record, and a replay that opens in any browser.
+    """
+    from chilopod import units
+    from chilopod.steering import Target, strategy_named
+
+    described = read_robot(robot, overrides)
+    goal, chosen = Target.parse(target), strategy_named(strategy)
+    spring = k1 if k1 in ("auto", "law") else units.parse(k1, "N*m/rad")
+    seconds = None if duration is None else units.parse(duration, "s")
+    if out:
+        from chilopod.report.turn import files_of_turn
+
+        free(files_of_turn(out), force)
+    from chilopod.tasks import turn as walk_there
+
+    with own_code(), walking_on(cluster), progress_bar() as show:
+        done = walk_there(
+            described,
+            goal,
+            chosen,
+            spring,
+            duration=seconds,
+            seed=seed,
+            repeats=repeats,
+            engine=engine,
+            controller=own_controller(controller),
+            folder=trials,
+            progress=lambda part, words: show("turn", part, words),
+        )
+    if out:
+        from chilopod.report.turn import write_turn
+
+        wrote(write_turn(done, out))
+    if as_json:
+        print_json(done.as_json())
+    else:
+        _print(done, seed)
+
+
+def _print(done: Turn, seed: int | None) -> None:
+    from chilopod import units
+
+    def shown(value: float) -> str:
+        return units.format(value, "N*mm/deg", digits=4)
+
+    found = done.criteria
+    typer.echo(f"{done.robot.name}, {done.engine}, {done.strategy.name}: {done.strategy.sentence}")
+    typer.echo(f"  target {done.target}: a circle of {done.target.radius:.3f} m")
+    if done.by_law is not None:
+        typer.echo(f"  spring by the settled radius (the paper's k1-hat): {shown(done.by_law)}")
+    if done.stiffness is not None:
+        typer.echo(f"  spring walked with: {shown(done.stiffness)}")
+    typer.echo(
+        f"  distance left, angle and effort (the paper's epsilon 1 to 3) at {found.time:.2f} s; nearest at any time"
+    )
+    typer.echo("  seed    outcome         arrival (s)  nearest (m)  left (m)  angle (deg)  effort (rad2 s)")
+    for i, outcome in enumerate(found.outcome):
+        label = "-" if seed is None else str(seed + i)
+        arrival = f"{found.arrival[i]:.2f}" if math.isfinite(found.arrival[i]) else "never"
+        typer.echo(
+            f"  {label:<6}  {outcome.label:<14}  {arrival:<11}  {found.nearest[i]:<11.4f}  "
+            f"{found.distance[i]:<8.3f}  {math.degrees(found.angle[i]):<11.2f}  {found.effort[i]:.4f}"
+        )
+    if done.straight:
+        typer.echo(f"  {STAYS_STRAIGHT}: try --seed 1")
+    print_creep(done.foot_creep)

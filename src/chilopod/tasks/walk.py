@@ -1,0 +1,171 @@
+"""Walks of one robot: one, or many that differ in their disturbances, and what they came to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from chilopod.engine import Controller, HasFootCreep, engine_named
+from chilopod.engine.named import path_of
+from chilopod.errors import ParameterError
+from chilopod.progress import Progress, silent
+from chilopod.record import RATE
+from chilopod.robot import Robot
+from chilopod.trials import NONE, Disturbance, Trial, WalkSummary, run, straight, summaries, together
+
+_MOST_BENT = 1.5  # rad; at a right angle modules run into each other
+
+
+@dataclass(frozen=True)
+class Walks:
+    """Walks that differ in nothing but their seed.
+
+    Attributes
+    ----------
+    trials
+        With all that makes each of them.
+    record
+        Of all walks.
+    """
+
+    trials: tuple[Trial, ...]
+    record: xr.Dataset
+
+    @property
+    def first(self) -> Trial:
+        """All but the seed is the same in the others."""
+        return self.trials[0]
+
+    @property
+    def seeded(self) -> bool:
+        """Whether the walks are disturbed."""
+        return self.first.disturbance != NONE
+
+    @property
+    def straight(self) -> bool:
+        """See :func:`chilopod.trials.straight`."""
+        return straight(self.record)
+
+    @cached_property
+    def summaries(self) -> Sequence[WalkSummary]:
+        """The end of every walk."""
+        return summaries(self.first.robot, self.record)
+
+    @cached_property
+    def foot_creep(self) -> float | None:
+        """See :func:`foot_creep`."""
+        return foot_creep(self.first.robot, self.first.engine)
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain numbers; null for what there is not."""
+        first = self.first
+        return {
+            "robot": first.robot.name,
+            "engine": first.engine,
+            "controller": None if first.controller is None else path_of(type(first.controller)),
+            "duration_s": first.duration,
+            "seeded": self.seeded,
+            "walks": [
+                {"seed": trial.seed, **end.as_json()} for trial, end in zip(self.trials, self.summaries, strict=True)
+            ],
+            "foot_creep_N_s_m": self.foot_creep,
+        }
+
+
+def walk(
+    robot: Robot,
+    duration: float,
+    *,
+    seed: int | None = None,
+    repeats: int = 1,
+    joint_angles: Sequence[float] = (),
+    rate: float = RATE,
+    forces: bool = False,
+    engine: str = "planar",
+    controller: Controller | None = None,
+    folder: str | Path | None = None,
+    progress: Progress = silent,
+) -> Walks:
+    """Let a robot walk, once or many times.
+
+    Parameters
+    ----------
+    robot
+        The robot.
+    duration
+        s.
+    seed
+        Of the first walk's disturbances, the others count up from it; None for no disturbance at all.
+    repeats
+        How many walks.
+    joint_angles
+        At the start, before disturbance, rad: one a joint, front to rear, one for all, or none for straight.
+    rate
+        Samples per second.
+    forces
+        Whether the record has the force on every foot.
+    engine
+        Of :data:`chilopod.engine.ENGINES`, or one's own as ``package.module:object``.
+    controller
+        What steers, if anything: a frozen dataclass, see :class:`chilopod.trials.Trial`.
+    folder
+        Where the trials are kept; without one nothing is kept.
+    progress
+        Called with the part done (0 to 1) and a few words.
+
+    Raises
+    ------
+    ParameterError
+        If something is out of range.
+    """
+    angles, joints = tuple(joint_angles), robot.body.modules - 1
+    if len(angles) == 1:
+        angles *= joints
+    if len(angles) not in (0, joints):
+        raise ParameterError(
+            f"are {len(angles)} angles", field="joint_angles", value=angles, allowed=f"{joints}, or one for all"
+        )
+    if not all(abs(angle) <= _MOST_BENT for angle in angles):
+        raise ParameterError(
+            "are bent too far", field="joint_angles", value=angles, allowed=f"{_MOST_BENT} rad (85 deg) to either side"
+        )
+    check_repeats(seed, repeats)
+    one = Trial(robot, duration, joint_angles=angles, controller=controller, rate=rate, forces=forces, engine=engine)
+    trials = repeated(one, seed, repeats)
+    return Walks(trials, together(run(trials, folder, progress)))
+
+
+def check_repeats(seed: int | None, repeats: int) -> None:
+    """Make sure that there are walks, and that several differ.
+
+    Raises
+    ------
+    ParameterError
+        If not.
+    """
+    if repeats < 1:
+        raise ParameterError("must be positive", field="repeats", value=repeats)
+    if repeats > 1 and seed is None:
+        raise ParameterError("are all alike without a seed", field="repeats", value=repeats, allowed="1, or a seed")
+
+
+def repeated(trial: Trial, seed: int | None, repeats: int) -> tuple[Trial, ...]:
+    """A trial so many times, disturbed with seeds that count up; once and undisturbed where the seed is None."""
+    spread = NONE if seed is None else Disturbance()
+    return tuple(replace(trial, seed=(seed or 0) + i, disturbance=spread) for i in range(repeats))
+
+
+def foot_creep(robot: Robot, engine: str) -> float | None:
+    """How firmly an engine's floor holds standing feet: the coefficient of viscous friction across the way that lets
+    them creep as much, N*s/m; None where they do not creep, or the robot does not stand."""
+    walks = engine_named(engine)
+    if not isinstance(walks, HasFootCreep):
+        return None
+    found = walks.foot_creep(robot).across
+    return found if np.isfinite(found) else None

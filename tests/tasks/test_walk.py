@@ -1,0 +1,58 @@
+"""Walks from Python: the same as the command's, and bad input in one line."""
+
+import numpy as np
+import pytest
+
+from chilopod import load_robot
+from chilopod.errors import ParameterError
+from chilopod.tasks import foot_creep, walk
+from chilopod.tasks.walk import repeated
+from chilopod.trials import NONE, Disturbance, Trial, run
+
+ROBOT = load_robot("aoi2022-planar").with_value("springs.stiffness[0]", 0.5)
+
+
+def test_seeds_count_up_and_walk_as_trials_do():
+    done = walk(ROBOT, 3.0, seed=4, repeats=2, joint_angles=[0.02])
+    assert [trial.seed for trial in done.trials] == [4, 5]
+    assert done.seeded
+    assert not done.straight
+    assert done.foot_creep is None
+    (record,) = run([Trial(ROBOT, 3.0, 5, (0.02,) * 5)])
+    np.testing.assert_array_equal(done.record.joint_angle.values[:, 1], record.joint_angle.values[:, 0])
+    told = done.as_json()
+    assert (told["robot"], told["engine"], told["duration_s"], told["seeded"]) == (ROBOT.name, "planar", 3.0, True)
+    assert [each["seed"] for each in told["walks"]] == [4, 5]
+
+
+def test_without_a_seed_it_stays_straight():
+    done = walk(ROBOT, 3.0)
+    assert done.straight
+    assert not done.seeded
+    assert np.isinf(done.summaries[0].axis_radius)
+
+
+def test_disturbances_only_with_a_seed():
+    one = Trial(ROBOT, 3.0)
+    assert [trial.disturbance for trial in repeated(one, None, 1)] == [NONE]
+    assert [trial.disturbance for trial in repeated(one, 0, 2)] == [Disturbance()] * 2
+
+
+def test_feet_of_the_twin_creep():
+    assert foot_creep(load_robot("aoi2022"), "twin") > 1000.0
+
+
+@pytest.mark.parametrize(
+    ("more", "match"),
+    [
+        ({"repeats": 0}, "must be positive"),
+        ({"repeats": 2}, "alike without a seed"),
+        ({"joint_angles": (0.1, 0.2)}, "are 2 angles; allowed: 5, or one for all"),
+        ({"joint_angles": (-1.6,)}, "bent too far"),
+        ({"joint_angles": (float("nan"),)}, "bent too far"),
+        ({"engine": "plana"}, "did you mean 'planar'"),
+    ],
+)
+def test_bad_input_is_one_line(more, match):
+    with pytest.raises(ParameterError, match=match):
+        walk(ROBOT, 3.0, **more)

@@ -1,0 +1,31 @@
+"""What ``chilopod reproduce`` says of what it takes; what it computes is tested where that is computed."""
+
+import json
+
+from chilopod.cli import main
+from chilopod.studies.reproduce import SECTIONS
+
+
+def test_the_help_lists_the_sections(capsys):
+    assert main(["reproduce", "--help"]) == 0
+    words = capsys.readouterr().out
+    listed = words[words.index("repeated:") + len("repeated:") : words.index("--out")]
+    assert "".join(listed.split()).rstrip(".").split(",") == list(SECTIONS)
+
+
+def test_another_robot_is_refused_in_one_line(capsys):
+    assert main(["reproduce", "--set", "body.mass=9 kg"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "body.mass=9 kg" in line
+    assert "stability, bifurcation, branch, walk and turn take any robot" in line
+    assert main(["reproduce", "my.toml"]) == 2
+    assert "my.toml" in capsys.readouterr().err
+    assert main(["reproduce", "--help"]) == 0
+    assert "takes no robot and no --set" in " ".join(capsys.readouterr().out.split())
+
+
+def test_the_json_names_the_robots(capsys, tmp_path):
+    assert main(["reproduce", "--only", "mode", "--out", str(tmp_path), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["robot"], found["whole_robot"]) == ("aoi2022-planar", "aoi2022")
+    assert found["rows"]
