@@ -8,8 +8,8 @@ import pytest
 import xarray as xr
 
 from chilopod import load_robot
-from chilopod.studies import Results, Row, reproduce
-from chilopod.studies.movies import Movie
+from chilopod.paper import Results, Row, reproduce
+from chilopod.paper.movies import Movie
 from chilopod.tasks.identify import Identification
 
 WALK = runpy.run_path(str(Path(__file__).with_name("walks.py")))["walk"]

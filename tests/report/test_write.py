@@ -12,11 +12,11 @@ import xarray as xr
 
 from chilopod import load_robot
 from chilopod.errors import OutputError
+from chilopod.paper import Results, Row
+from chilopod.paper.robot.table import RobotRow
 from chilopod.report import write_identification, write_report
-from chilopod.report.page import summary
+from chilopod.report.kit.page import summary
 from chilopod.report.write import panels
-from chilopod.studies import Results, Row
-from chilopod.studies.robot_table import RobotRow
 
 VOID = {"meta", "link", "img", "source", "br", "hr", "input"}
 

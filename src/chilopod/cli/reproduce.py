@@ -44,15 +44,15 @@ def reproduce(
     Trials are kept in the folder, so a run that was stopped goes on where it was.
     """
     from chilopod.output import prepare_folder
-    from chilopod.studies.reproduce import SECTIONS, chosen
+    from chilopod.paper.sections import SECTIONS, chosen
 
     chosen(only)  # refuses an unknown section
     folder = prepare_folder(out)
-    from chilopod import studies
+    from chilopod import paper
     from chilopod.report import write_report
 
     with walking_on(cluster), progress_bar() as show:
-        results = studies.reproduce(
+        results = paper.reproduce(
             read_robot(PRESET, None),
             only,
             quick,
@@ -106,8 +106,8 @@ def planar(
 
     described = read_robot(robot, overrides)
     folder = prepare_folder(out)
+    from chilopod.paper.fit_data import critical_mode_data, variant_settings
     from chilopod.report import write_identification
-    from chilopod.studies.fit_data import critical_mode_data, variant_settings
     from chilopod.tasks.identify import identify_planar
 
     with progress_bar() as show:
@@ -156,7 +156,7 @@ def twin(
 
     described = read_robot(robot, overrides)
     folder = prepare_folder(out)
-    from chilopod.studies.fit_data import base_series_data
+    from chilopod.paper.fit_data import base_series_data
     from chilopod.tasks.identify import identify_twin
 
     with progress_bar() as show:

@@ -163,7 +163,7 @@ def turn(
 
     if folder:
         from chilopod.output import free_path
-        from chilopod.report.turn import files_of_turn
+        from chilopod.report.figures.turn import files_of_turn
 
         for path in files_of_turn(folder):
             free_path(path, force)
@@ -183,7 +183,7 @@ def turn(
         )
         added = creep(described, engine)
     if folder:
-        from chilopod.report.turn import write_turn
+        from chilopod.report.figures.turn import write_turn
 
         for path in write_turn(done, folder):
             typer.echo(f"wrote {path}", err=True)

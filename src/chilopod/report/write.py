@@ -9,7 +9,9 @@ import xarray as xr
 
 from chilopod.errors import OutputError
 from chilopod.output import netcdf, prepare_folder, write_atomic
-from chilopod.report import (
+from chilopod.paper import CHAPTERS, Results
+from chilopod.paper.movies import Movie
+from chilopod.report.figures import (
     branch,
     critical,
     curved_trials,
@@ -22,21 +24,18 @@ from chilopod.report import (
     robot_walks,
     robot_why,
     schematic,
-    style,
-    tables,
     turning,
     undulation,
     uniform,
 )
-from chilopod.report.movie import has_encoder, movie
-from chilopod.report.page import Drawn, Film, page
-from chilopod.report.panel import Panel
-from chilopod.report.render import film_3d, stills
-from chilopod.report.replay import replay
-from chilopod.report.replay_3d import replay_3d
+from chilopod.report.kit import style, tables
+from chilopod.report.kit.page import Drawn, Film, page
+from chilopod.report.kit.panel import Panel
+from chilopod.report.scene.film import has_encoder, movie
+from chilopod.report.scene.film_3d import film_3d, stills
+from chilopod.report.scene.replay import replay
+from chilopod.report.scene.replay_3d import replay_3d
 from chilopod.robot import Robot, load_robot, presets
-from chilopod.studies import CHAPTERS, Results
-from chilopod.studies.movies import Movie
 from chilopod.tasks.identify import Identification
 
 _STRAIGHT: Mapping[str, Callable[[Results], Panel]] = {
@@ -92,7 +91,7 @@ def write_report(results: Results, folder: str | Path) -> Path:
     Parameters
     ----------
     results
-        From :func:`chilopod.studies.reproduce`; only its sections are shown.
+        From :func:`chilopod.paper.sections`; only its sections are shown.
     folder
         Created where there is none.
 
