@@ -1,5 +1,6 @@
-"""The report: draws what the studies found, computes nothing."""
+"""The report: draws what the paper's sections found, computes nothing."""
 
-from chilopod.report.write import write_branch, write_identification, write_report, write_undulation
+from chilopod.report.filling import Report, write_report
+from chilopod.report.write import write_branch, write_identification, write_undulation
 
-__all__ = ["write_branch", "write_identification", "write_report", "write_undulation"]
+__all__ = ["Report", "write_branch", "write_identification", "write_report", "write_undulation"]

@@ -3,9 +3,6 @@
 import numpy as np
 import pytest
 
-from chilopod.errors import ParameterError
-from chilopod.paper import reproduce
-from chilopod.paper.sections import ON_REQUEST, SECTIONS, chosen
 from chilopod.paper.straight import study as floquet
 from chilopod.robot import load_robot
 
@@ -48,22 +45,3 @@ def test_uniform_springs():
     assert data.attrs["value"] == pytest.approx(6.5756, abs=5e-5)
     assert data.attrs["frequency_rad_s"] == pytest.approx(0.5767, abs=5e-5)
     assert np.linalg.norm(data.amplitude) == pytest.approx(1.0)
-
-
-def test_sections_come_in_their_own_order_and_misspelt_ones_are_refused():
-    assert chosen(None) == [name for name in SECTIONS if name not in ON_REQUEST]
-    assert chosen(ON_REQUEST) == list(ON_REQUEST)
-    assert chosen(["uniform", "mode"]) == ["mode", "uniform"]
-    with pytest.raises(ParameterError, match="uniform"):
-        chosen(["unifrom"])
-
-
-def test_rows_put_the_paper_beside_what_was_computed():
-    seen = []
-    results = reproduce(ROBOT, ["mode", "uniform"], progress=lambda section, done, words: seen.append((section, done)))
-    assert list(results.datasets) == ["mode", "uniform"]
-    verdicts = {row.quantity: row.verdict for row in results.all_rows}
-    assert verdicts["critical k1 of the planar model"] == "agrees"
-    # Honest to the last digit: 0.6349 is not 0.64 within rounding.
-    assert verdicts["critical mode, joint 1"] == "differs"
-    assert seen[-1] == ("uniform", 1.0)

@@ -6,11 +6,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
 from chilopod import load_robot
-from chilopod.paper import Results
+from chilopod.paper.straight.sections import EXPONENTS, MODE
 from chilopod.report.figures import exponents, overview, schematic
+from chilopod.report.figures.drawings import DRAWINGS
 from chilopod.report.kit import style, words
 from chilopod.report.scene.outline import chain, turned_about_tail
-from chilopod.report.write import panels
 
 PRESET = load_robot("aoi2022-planar")
 ROBOTS = {
@@ -49,7 +49,8 @@ def too_small(drawn, monkeypatch) -> list[str]:
 
 @pytest.mark.parametrize("narrow", [False, True])
 def test_no_text_is_cut_or_tiny(full, narrow, monkeypatch):
-    for panel in (each for of_chapter in panels(full).values() for each in of_chapter):
+    drawn = [each for each in DRAWINGS if each.section in full.values]
+    for panel in (panel for each in drawn for panel in each.panels(full[each.section], full)):
         with style.house_style():
             drawn = panel.draw(narrow)
             assert clipped(drawn, monkeypatch) == [], panel.name
@@ -60,7 +61,7 @@ def test_no_text_is_cut_or_tiny(full, narrow, monkeypatch):
 @pytest.mark.parametrize("kind", ROBOTS)
 def test_schematic_of_any_robot(kind, narrow, monkeypatch):
     with style.house_style():
-        drawn = schematic.panel(Results(ROBOTS[kind])).draw(narrow)
+        drawn = schematic.panel(ROBOTS[kind]).draw(narrow)
         assert clipped(drawn, monkeypatch) == []
 
 
@@ -99,7 +100,7 @@ def test_chain_hangs_together():
 
 
 def test_curves_meet_where_a_pair_becomes_real(results):
-    data = results.datasets["exponents"]
+    data = results[EXPONENTS]
     k1 = data.k1.values
     ks, real, imaginary = exponents._joined(data)
     exact = np.sqrt((0.02 * np.log(13.0 / ks)).astype(complex))
@@ -110,7 +111,7 @@ def test_curves_meet_where_a_pair_becomes_real(results):
 
 
 def test_overview_is_small(results, tmp_path):
-    path = overview.write_overview(results, tmp_path / "overview.png")
+    path = overview.write_overview(results[MODE], results[EXPONENTS], tmp_path / "overview.png")
     assert path.stat().st_size < 150_000
 
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import xarray as xr
 
 from chilopod.paper.curved.study import CurvedStudy, axis_radius, bent
 from chilopod.paper.printed import printed
@@ -16,19 +15,16 @@ from chilopod.paper.turning.study import Turning
 from chilopod.paper.turning.trials import springs_by_outcome
 from chilopod.steering import Outcome
 
-if TYPE_CHECKING:
-    from chilopod.paper.sections import Results
 
-
-def planar_words(results: Results) -> dict[str, str]:
+def planar_words(uniform: xr.Dataset | None, curved: CurvedStudy | None, turning: Turning | None) -> dict[str, str]:
     """By the keys that :mod:`chilopod.paper.robot.rows` asks for; only what was computed."""
     words: dict[str, str] = {}
-    if "uniform" in results.datasets:
-        words["uniform"] = f"{results.datasets['uniform'].attrs['value']:.2f} N*mm/deg"
-    if results.curved:
-        words |= _curved(results.curved)
-    if results.turning:
-        words |= _turning(results.turning)
+    if uniform is not None:
+        words["uniform"] = f"{uniform.attrs['value']:.2f} N*mm/deg"
+    if curved is not None:
+        words |= _curved(curved)
+    if turning is not None:
+        words |= _turning(turning)
     return words
 
 

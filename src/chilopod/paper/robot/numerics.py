@@ -8,7 +8,8 @@ import xarray as xr
 from chilopod.analysis.square_root import square_root_fit
 from chilopod.errors import AnalysisError
 from chilopod.paper.fit_data import base_series_data
-from chilopod.paper.robot.table import CHECKED, VERDICTS, RobotRow
+from chilopod.paper.robot.table import CHECKED, VERDICTS
+from chilopod.paper.table import RobotRow
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.tasks.identify.twin_series import base_series

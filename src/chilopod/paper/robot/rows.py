@@ -23,7 +23,6 @@ from chilopod.paper.robot.table import (
     UNCHANGED,
     VERDICTS,
     Planar,
-    RobotRow,
     percent,
     printed_spring,
     spring_row,
@@ -42,6 +41,7 @@ from chilopod.paper.scatter import (
     near,
     spread_difference,
 )
+from chilopod.paper.table import RobotRow
 from chilopod.tasks.radius_law import in_settled_curve
 
 STRAIGHT, CURVED = (41.0, 75.0), (15.0, 17.0, 21.0, 28.0)

@@ -1,9 +1,8 @@
-"""Lines of the table quantity | the paper's robot | twin | planar model | within?, and what counts as within."""
+"""What counts as within in the table of the robot, and its lines about springs."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from chilopod import units
 from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.paper.printed import printed_stiffness
 from chilopod.paper.scatter import Answer, near
+from chilopod.paper.table import RobotRow
 
 FITTED, PREDICTED, CHECKED = "fitted", "predicted", "checked"
 
@@ -34,38 +34,6 @@ K_HAT = 0.15
 
 VERDICTS: Mapping[Answer, str] = {True: "within", False: "outside", None: "undecided"}
 """In words: undecided is what the scatter of the trials leaves open."""
-
-
-@dataclass(frozen=True)
-class RobotRow:
-    """A line of the table.
-
-    Attributes
-    ----------
-    quantity
-        What it is about.
-    robot, twin, planar
-        What the paper prints of its robot, what the twin does, and what the planar model does, empty where it was not
-        asked; in words and numbers with units.
-    kind
-        "fitted" if the twin's constants were fitted to it, else "predicted"; "checked" for what is about the twin.
-    verdict
-        "within" or "outside" of what is asked of the twin, or "undecided" if the scatter of trials leaves that open.
-    asked
-        What counts as within.
-    """
-
-    quantity: str
-    robot: str
-    twin: str
-    planar: str
-    kind: str
-    verdict: str
-    asked: str
-
-    def as_json(self) -> dict[str, str]:
-        """The row by column."""
-        return asdict(self)
 
 
 Planar = Mapping[str, str]

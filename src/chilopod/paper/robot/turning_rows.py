@@ -18,7 +18,6 @@ from chilopod.paper.robot.table import (
     PREDICTED,
     VERDICTS,
     Planar,
-    RobotRow,
     percent,
     with_error,
 )
@@ -26,6 +25,7 @@ from chilopod.paper.robot.turning import PAPER_SPRING, RobotTurning
 from chilopod.paper.robot.walk_measures import spring_for
 from chilopod.paper.robot.walks import RobotWalks
 from chilopod.paper.scatter import SURE, near
+from chilopod.paper.table import RobotRow
 from chilopod.paper.turning import hopf
 from chilopod.paper.turning.minima import AROUND, NAMES, SCALES, around, minima
 from chilopod.paper.turning.trials import springs_by_outcome

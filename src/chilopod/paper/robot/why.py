@@ -26,7 +26,8 @@ from chilopod.analysis.square_root import square_root_fit
 from chilopod.analysis.straight_walk import pitchfork
 from chilopod.errors import AnalysisError
 from chilopod.paper.printed import printed
-from chilopod.paper.robot.table import CHECKED, VERDICTS, RobotRow
+from chilopod.paper.robot.table import CHECKED, VERDICTS
+from chilopod.paper.table import RobotRow
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot, Twin
 from chilopod.tasks.radius_law import CURVED

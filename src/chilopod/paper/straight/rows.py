@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import xarray as xr
 
 from chilopod.paper.fit_data import K1_ROUNDING, MODE_ROUNDING
 from chilopod.paper.printed import printed
 from chilopod.paper.table import Row, agrees
-
-if TYPE_CHECKING:
-    from chilopod.paper.sections import Results
+from chilopod.tasks.identify import Identification
 
 
-def mode_rows(results: Results) -> list[Row]:
+def mode_rows(data: xr.Dataset) -> list[Row]:
     """The pitchfork and its mode."""
-    data, table = results.datasets["mode"], printed()["pitchfork"]
+    table = printed()["pitchfork"]
     value, bound = data.attrs["value"], data.attrs["error_bound"]
     paper = float(table["critical_k1"].split()[0])
     rows = [
@@ -54,9 +51,9 @@ def mode_rows(results: Results) -> list[Row]:
     return rows
 
 
-def variant_rows(results: Results) -> list[Row]:
+def variant_rows(data: xr.Dataset) -> list[Row]:
     """The paper's variants."""
-    data, table = results.datasets["variants"], printed()["pitchfork"]
+    table = printed()["pitchfork"]
     base = float(data.critical_k1[0])
     rows = [
         Row(
@@ -88,9 +85,8 @@ def variant_rows(results: Results) -> list[Row]:
     return rows
 
 
-def module_rows(results: Results) -> list[Row]:
+def module_rows(data: xr.Dataset) -> list[Row]:
     """Longer robots."""
-    data = results.datasets["modules"]
     longer = data.sel(modules=data.modules > 6).critical_k1
     base = float(data.sel(modules=6).critical_k1)
     off = np.abs(longer / base - 1.0)
@@ -105,9 +101,9 @@ def module_rows(results: Results) -> list[Row]:
     ]
 
 
-def uniform_rows(results: Results) -> list[Row]:
+def uniform_rows(data: xr.Dataset) -> list[Row]:
     """All springs alike."""
-    data, table = results.datasets["uniform"], printed()["uniform"]
+    table = printed()["uniform"]
     return [
         Row(
             "uniform springs: critical k of the planar model",
@@ -127,10 +123,8 @@ def uniform_rows(results: Results) -> list[Row]:
     ]
 
 
-def identification_rows(results: Results) -> list[Row]:
+def identification_rows(found: Identification) -> list[Row]:
     """The constants the paper does not print."""
-    found = results.identification
-    assert found is not None
     best = found.best
     profile = found.profile
     inside = profile.forward_offset.values[profile.largest_residual.values <= 1.0]

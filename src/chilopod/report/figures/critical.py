@@ -8,19 +8,18 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from chilopod.paper import Results
 from chilopod.report.kit import style
 from chilopod.report.kit.panel import Panel
 from chilopod.report.kit.words import SPRING_UNIT, k, listing, number, signed, spans, spring, typeset
+from chilopod.robot import Robot
 
 _VARIANTS = (style.Layout("AB", 3.9, widths=(1.25, 1.0)), style.Layout("A;B", 7.4))
 _MODULES = (style.Layout("A", 3.6), style.Layout("A", 3.6))
 _SERIES = (("planar model, computed", style.BLUE, "o", "full"), ("robot, paper", style.ORANGE, "D", "none"))
 
 
-def variants(results: Results) -> Panel:
-    """Section "variants"."""
-    data = results.datasets["variants"]
+def variants(data: xr.Dataset) -> Panel:
+    """Of the paper's variants."""
     model, robot = data.critical_k1.values, data.robot_printed.values
     names = [typeset(str(name)) for name in data.variant.values[1:]]
     changes = 100.0 * (data.critical_k1.values / model[0] - 1.0), 100.0 * (robot / robot[0] - 1.0)
@@ -57,9 +56,8 @@ def variants(results: Results) -> Panel:
     )
 
 
-def modules(results: Results) -> Panel:
-    """Section "modules"."""
-    data = results.datasets["modules"]
+def modules(data: xr.Dataset, robot: Robot) -> Panel:
+    """Of longer and shorter robots."""
     counts, values, says = data.modules.values, data.critical_k1.values, data.says.values
     found = ~np.isnan(values)
     sub = [int(count) for count, word in zip(counts, says, strict=True) if word == "subcritical"]
@@ -83,7 +81,7 @@ def modules(results: Results) -> Panel:
         name="modules",
         letter="D",
         title="Critical k₁ over the number of modules",
-        draw=lambda narrow: _draw_modules(data, results.robot.body.modules, narrow),
+        draw=lambda narrow: _draw_modules(data, robot.body.modules, narrow),
         alt=f"Critical front spring for {counts[0]} to {counts[-1]} modules, between {number(np.nanmin(values))} and "
         f"{spring(float(np.nanmax(values)), 3)}; open markers where the pitchfork is subcritical.",
         text=(

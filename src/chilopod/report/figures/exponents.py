@@ -12,7 +12,6 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
-from chilopod.paper import Results
 from chilopod.report.kit import style
 from chilopod.report.kit.panel import Panel
 from chilopod.report.kit.words import SPRING_UNIT, minus, number, spring
@@ -26,10 +25,9 @@ _MARKED = (75.0, 41.0, 28.0, 21.0, 15.0, 8.0, 4.0, 2.0)  # the paper's springs, 
 _STAR: Any = {"marker": "*", "markersize": 15, "color": style.VERMILLION, "markeredgecolor": style.BLACK}
 
 
-def panel(results: Results) -> Panel:
-    """The exponents of section "exponents"; the crossing is that of section "mode" where it is there."""
-    data = results.datasets["exponents"]
-    crossing = results.datasets["mode"].attrs["value"] if "mode" in results.datasets else None
+def panel(data: xr.Dataset, mode: xr.Dataset | None) -> Panel:
+    """The exponents over k1; the crossing is the located pitchfork where it is there."""
+    crossing = None if mode is None else mode.attrs["value"]
     critical = _critical(data)
     count = data.sizes["exponent"]
     first, last = float(data.k1[0]), float(data.k1[-1])

@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from chilopod.paper import Results
 from chilopod.report.kit import style
 from chilopod.report.kit.panel import Panel
 from chilopod.report.kit.words import SPRING_UNIT, listing, number, typeset
@@ -33,13 +32,7 @@ _OWN = {
 }
 
 
-def panel(results: Results) -> Panel:
-    """Section "identification"."""
-    assert results.identification is not None
-    return panel_of(results.identification)
-
-
-def panel_of(fit: Identification) -> Panel:
+def panel(fit: Identification) -> Panel:
     """The profile of a fit, with the robot it was given beside."""
     data, best = fit.profile, fit.best
     inside = _inside(data)

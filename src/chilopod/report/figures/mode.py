@@ -8,7 +8,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from chilopod.paper import Results
 from chilopod.paper.fit_data import MODE_ROUNDING
 from chilopod.report.kit import style
 from chilopod.report.kit.panel import Panel
@@ -21,9 +20,8 @@ _NARROW = style.Layout("A;B;C", 10.8, heights=(1.2, 0.9, 1.9))
 _DRAWN_BEND = 75.0  # degrees from head to tail: the mode leaves the size free
 
 
-def panel(results: Results) -> Panel:
-    """Section "mode", with the best fit of section "identification" where it is there."""
-    data, fit = results.datasets["mode"], results.identification
+def panel(data: xr.Dataset, fit: Identification | None) -> Panel:
+    """The mode, with the best fit of the constants that are not printed where it is there."""
     computed, printed = data.computed.values, data.printed.values
     known = ~np.isnan(printed)
     off = np.abs(computed - printed)[known]

@@ -10,7 +10,6 @@ from matplotlib.patches import Circle
 from matplotlib.ticker import MaxNLocator
 
 from chilopod import units
-from chilopod.paper import Results
 from chilopod.report.kit import style
 from chilopod.report.kit.panel import Panel
 from chilopod.report.kit.words import SPRING_UNIT, k, minus, number
@@ -23,9 +22,8 @@ _WIDE = style.Layout("AA;BC", 6.0, heights=(1.0, 1.55), widths=(1.0, 1.15))
 _NARROW = style.Layout("A;B;C", 8.6, heights=(0.9, 1.5, 1.7))
 
 
-def panel(results: Results) -> Panel:
+def panel(robot: Robot) -> Panel:
     """The schematic; it needs nothing computed."""
-    robot = results.robot
     data = legs(robot)
     standing = [
         f"{side} {module}"

@@ -7,11 +7,11 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from chilopod.paper import Results
 from chilopod.report.kit import style
 from chilopod.report.kit.panel import Panel
 from chilopod.report.kit.words import minus, number, spring
 from chilopod.report.scene.outline import chain, draw_heading, draw_joints, draw_modules
+from chilopod.robot import Robot
 
 _WIDE = style.Layout("AB;CC", 6.4, heights=(1.0, 1.25))
 _NARROW = style.Layout("A;B;C", 9.6, heights=(0.8, 0.8, 1.9))
@@ -19,11 +19,10 @@ _SNAPSHOTS = 8
 _DRAWN_ANGLE = 35.0  # degrees, of the joint that bends most
 
 
-def panel(results: Results) -> Panel:
-    """Section "uniform"."""
-    data = results.datasets["uniform"]
+def panel(data: xr.Dataset, robot: Robot) -> Panel:
+    """The undulation that sets in."""
     period, turns = data.attrs["oscillation_period_s"], data.phase.values[-1] / (2.0 * np.pi)
-    cycles = period / results.robot.gait.period
+    cycles = period / robot.gait.period
     runs = "from head to tail" if turns < 0.0 else "from tail to head"
     return Panel(
         name="uniform",

@@ -6,16 +6,22 @@ import platform
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from enum import Enum
 from importlib.metadata import version
 from importlib.resources import files
 from typing import Any, Final
 
+import xarray as xr
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from chilopod import units
-from chilopod.paper import CHAPTERS, SECTIONS, Results, Row
-from chilopod.paper.robot.table import PREDICTED, RobotRow
+from chilopod.errors import in_words
+from chilopod.paper.robot.table import PREDICTED
+from chilopod.paper.section import Found, Section
+from chilopod.paper.straight.sections import MODE, UNIFORM
+from chilopod.paper.table import RobotRow, Row
+from chilopod.paper.turning.sections import TURNING
 from chilopod.report.kit.panel import Panel
 from chilopod.report.kit.words import listing, minus, spring, typeset
 from chilopod.robot import Robot
@@ -33,6 +39,7 @@ _ROBOT_VERDICTS: Final[Mapping[str, tuple[str, str]]] = {
     "undecided": _VERDICTS["undecided"],
 }
 _MOST_LISTED: Final = 4
+_RELOAD: Final = 10  # s
 _LIBRARIES: Final = ("numpy", "numba", "scipy", "xarray", "matplotlib")
 
 
@@ -70,24 +77,51 @@ class Film:
     pictured: bool = False
 
 
+@dataclass(frozen=True)
+class Shown:
+    """What is drawn of a section."""
+
+    section: Section[Any]
+    figures: Sequence[Drawn]
+    films: Sequence[Film]
+
+
+class State(Enum):
+    """Whether a report is still being computed, is complete, or was stopped before it was."""
+
+    RUNNING = "running"
+    DONE = "done"
+    STOPPED = "stopped"
+
+
 def page(
-    results: Results,
-    figures: Mapping[str, Sequence[Drawn]],
-    films: Mapping[str, Sequence[Film]],
+    found: Found,
+    sections: Sequence[Section[Any]],
+    opening: Sequence[Drawn],
+    shown: Sequence[Shown],
+    failures: Mapping[Section[Any], Exception],
     robot_file: str,
+    state: State = State.DONE,
 ) -> str:
     """The page as HTML.
 
     Parameters
     ----------
-    results
-        What is shown.
-    figures
-        By chapter, in the order they are shown.
-    films
-        By chapter, shown behind its figures.
+    found
+        What was computed so far.
+    sections
+        That are to be shown in the end, in the order they are computed.
+    opening
+        Figures of the robot itself, at the beginning of the first chapter.
+    shown
+        What is drawn so far, in the order it stands within its chapter; figures with a letter come first, in the
+        order of their letters.
+    failures
+        Why sections could not be computed or drawn.
     robot_file
         What to type for this robot on the command line: a preset, or the path of a file.
+    state
+        While it is running, the page reloads itself.
     """
     folder = files("chilopod.report.kit")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
@@ -95,47 +129,52 @@ def page(
     return template.render(
         title=_TITLE,
         css=Markup(folder.joinpath("page.css").read_text(encoding="utf-8")),
-        summary=summary(results),
-        tables=_tables(results),
-        robot_rows=[_robot_row(row) for row in results.all_robot_rows],
-        chapters=_chapters(figures, films),
-        commands=commands(robot_file, results),
-        robots=_robots(results),
+        state=state.value,
+        reload=_RELOAD,
+        done=len(found.seconds),
+        count=len(sections),
+        summary=summary(found),
+        tables=_tables(found),
+        robot_rows=[_robot_row(row) for row in found.lines(RobotRow)],
+        chapters=_chapters(found, sections, opening, shown, failures),
+        commands=commands(robot_file, found[MODE]),
+        robots=_robots(found),
         versions=listing(
             [f"chilopod {version('chilopod')}", f"Python {platform.python_version()}"]
             + [f"{name} {version(name)}" for name in _LIBRARIES]
         ),
-        seconds=", ".join(f"{SECTIONS[name]} {value:.1f}" for name, value in results.seconds.items()),
+        seconds=", ".join(f"{section.sentence} {value:.1f}" for section, value in found.seconds.items()),
     )
 
 
-def summary(results: Results) -> str:
+def summary(results: Found) -> str:
     """What was found, in a few plain sentences."""
-    data, parts = results.datasets, []
+    parts, mode, uniform, turning = [], results[MODE], results[UNIFORM], results[TURNING]
+    modules = results.context.robot.body.modules
     parts.append(
-        f"A {results.robot.body.modules}-module robot walks straight as long as the springs between its modules are "
+        f"A {modules}-module robot walks straight as long as the springs between its modules are "
         "stiff enough. Below a critical stiffness the straight walk cannot hold, and the body bends by itself."
     )
-    if "mode" in data:
-        found = data["mode"].attrs
+    if mode is not None:
+        found = mode.attrs
         parts.append(
             f"Softening the front spring alone, that happens at {spring(found['value'], 5)}: a {found['criticality']} "
             f"{found['kind']}, and the robot turns left or right."
         )
-    if "uniform" in data:
-        found = data["uniform"].attrs
+    if uniform is not None:
+        found = uniform.attrs
         parts.append(
             f"Softening all springs together, it happens at {spring(found['value'], 5)} and the body undulates, once "
             f"in {found['oscillation_period_s']:.1f} s."
         )
-    if results.turning:
-        task = results.turning.tasks["A"]
+    if turning is not None:
+        task = turning.tasks["A"]
         parts.append(
             f"Sent to a target at {task.target}, it arrives with a front spring of {spring(task.best, 3)}; stiffer "
             "ones carry it past outside, softer ones inside."
         )
-    if results.robot_rows:
-        predicted = [row for row in results.all_robot_rows if row.kind == PREDICTED]
+    if robot_rows := results.lines(RobotRow):
+        predicted = [row for row in robot_rows if row.kind == PREDICTED]
         counted = {word: sum(row.verdict == word for row in predicted) for word in _ROBOT_VERDICTS}
         open_ = counted["undecided"]
         left = f"; {open_} more {'is' if open_ == 1 else 'are'} left open by the scatter of its trials" if open_ else ""
@@ -144,10 +183,11 @@ def summary(results: Results) -> str:
             f"their speed alone, meets {counted['within']} of {len(predicted)} further statements about the robot that "
             f"it was not fitted to{left}."
         )
-    counted = {word: sum(row.verdict == word for row in results.all_rows) for word in _VERDICTS}
+    rows = results.lines(Row)
+    counted = {word: sum(row.verdict == word for row in rows) for word in _VERDICTS}
     compared = sum(counted.values()) - counted["not printed"]
     if compared:
-        differing = [typeset(row.quantity) for row in results.all_rows if row.verdict == "differs"]
+        differing = [typeset(row.quantity) for row in rows if row.verdict == "differs"]
         said = [f"{counted['agrees']} agree"]
         if counted["undecided"]:
             said.append(f"{counted['undecided']} are left open by the scatter of the trials")
@@ -158,11 +198,9 @@ def summary(results: Results) -> str:
     return " ".join(parts)
 
 
-def commands(robot: str, results: Results) -> list[dict[str, str]]:
+def commands(robot: str, mode: xr.Dataset | None) -> list[dict[str, str]]:
     """Commands that lead on from here."""
-    soft = 10.0
-    if "mode" in results.datasets:
-        soft = float(f"{0.8 * results.datasets['mode'].attrs['value']:.2g}")
+    soft = 10.0 if mode is None else float(f"{0.8 * mode.attrs['value']:.2g}")
     quoted = f'"{robot}"' if " " in robot else robot
     both = '--between "2 N*mm/deg" "75 N*mm/deg"'
     return [
@@ -205,26 +243,38 @@ def commands(robot: str, results: Results) -> list[dict[str, str]]:
     ]
 
 
-def _tables(results: Results) -> list[dict[str, Any]]:
+def _tables(found: Found) -> list[dict[str, Any]]:
     """The table paper | computed, one part a chapter."""
-    parts = {
-        chapter: [_row(row) for name in sections for row in results.rows.get(name, ())]
-        for chapter, sections in CHAPTERS.items()
-    }
+    chapters = dict.fromkeys(section.chapter for section in found.rows)
+    parts = {chapter: [_row(row) for row in found.lines(Row, chapter)] for chapter in chapters}
     return [{"title": chapter, "rows": rows} for chapter, rows in parts.items() if rows]
 
 
-def _chapters(figures: Mapping[str, Sequence[Drawn]], films: Mapping[str, Sequence[Film]]) -> list[dict[str, Any]]:
-    found = [
-        {
-            "title": chapter,
-            "anchor": f"chapter-{number}",
-            "figures": [_figure(drawn) for drawn in figures.get(chapter, ())],
-            "films": films.get(chapter, ()),
-        }
-        for number, chapter in enumerate(CHAPTERS, 1)
-    ]
-    return [chapter for chapter in found if chapter["figures"] or chapter["films"]]
+def _chapters(
+    found: Found,
+    sections: Sequence[Section[Any]],
+    opening: Sequence[Drawn],
+    shown: Sequence[Shown],
+    failures: Mapping[Section[Any], Exception],
+) -> list[dict[str, Any]]:
+    chapters: list[dict[str, Any]] = []
+    for number, title in enumerate(dict.fromkeys(section.chapter for section in sections), 1):
+        here = [each for each in shown if each.section.chapter == title]
+        figures = [drawn for each in here for drawn in each.figures]
+        planned = [section for section in sections if section.chapter == title]
+        chapters.append(
+            {
+                "title": title,
+                "anchor": f"chapter-{number}",
+                "figures": [_figure(drawn) for drawn in sorted(figures, key=lambda drawn: drawn.panel.letter)],
+                "films": [film for each in here for film in each.films],
+                "coming": [each.sentence for each in planned if each not in found.seconds],
+                "failed": {each.sentence: in_words(failures[each]) for each in planned if each in failures},
+            }
+        )
+    for first in chapters[:1]:
+        first["figures"][:0] = [_figure(drawn) for drawn in opening]
+    return chapters
 
 
 def _row(row: Row) -> dict[str, str]:
@@ -264,11 +314,11 @@ def _embedded(svg: bytes) -> str:
     return "data:image/svg+xml;base64," + b64encode(svg).decode("ascii")
 
 
-def _robots(results: Results) -> list[dict[str, Any]]:
+def _robots(results: Found) -> list[dict[str, Any]]:
     """The robots of the report, with the files their numbers stand in."""
-    found = [("The robot of the planar model", results.robot, "robot.toml")]
-    if results.whole and results.all_robot_rows:
-        found.append(("The robot in three dimensions", results.whole, "robot-3d.toml"))
+    found = [("The robot of the planar model", results.context.robot, "robot.toml")]
+    if results.lines(RobotRow):
+        found.append(("The robot in three dimensions", results.context.whole, "robot-3d.toml"))
     return [{"says": says, "name": robot.name, "file": file, "numbers": _numbers(robot)} for says, robot, file in found]
 
 
