@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, TypeVar
 
 from chilopod.errors import OutputError
 from chilopod.output import prepare_folder, write_atomic
@@ -21,6 +22,8 @@ from chilopod.report.kit.panel import Panel
 from chilopod.report.scene.movie import write_movie
 from chilopod.report.write import write_panel
 from chilopod.robot import Robot, load_robot, presets
+
+T = TypeVar("T")
 
 
 class Report:
@@ -90,7 +93,8 @@ class Report:
 
     def _open(self) -> None:
         """Draw the robot, which needs nothing computed."""
-        self._opening = [self._draw_panel(schematic.panel(self._found.context.robot))]
+        panel = schematic.panel(self._found.context.robot)
+        self._opening = [_again(partial(self._draw_panel, panel))]
         self._write_if_possible()
 
     def _add(self, found: Found, sections: Collection[Section[Any]]) -> None:
@@ -101,7 +105,7 @@ class Report:
             changed = drawing.section in sections or any(each in sections for each in drawing.beside)
             if drawing.section in found.values and changed:
                 try:
-                    self._shown[drawing] = self._draw(drawing, found)
+                    self._shown[drawing] = _again(partial(self._draw, drawing, found))
                 except Exception as error:
                     self.failures[drawing.section] = error
         self._write_if_possible()
@@ -157,6 +161,14 @@ def write_report(found: Found, folder: str | Path) -> Path:
         if section not in found.failures:
             raise error
     return report.page
+
+
+def _again(draw: Callable[[], T]) -> T:
+    """Draw, and once more if somebody deleted the folder meanwhile."""
+    try:
+        return draw()
+    except OutputError:
+        return draw()
 
 
 def _is_preset(robot: Robot) -> bool:

@@ -101,11 +101,11 @@ def write_panel(
     OutputError
         If a folder cannot be written, or a file exists and may not be replaced.
     """
-    for folder in (figures, data):
-        prepare_folder(folder)
     with style.house_style():
         drawn = panel.draw(False)
         vector, pixels = style.svg(drawn, panel.name), style.png(drawn)
+    for folder in (figures, data):
+        prepare_folder(folder)
     # The data first: if they may not be replaced, nothing is.
     write_atomic(data / f"{panel.name}.nc", netcdf(panel.data), replace=replace)
     write_atomic(data / f"{panel.name}.csv", tables.csv(panel.data if table is None else table), replace=replace)
