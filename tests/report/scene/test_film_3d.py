@@ -150,7 +150,7 @@ def test_what_cannot_be_drawn(tmp_path, monkeypatch, record):
         film_3d(record, tmp_path / "a.mp4", **names)
     with pytest.raises(OutputError, match="plug one in"):
         stills(record, [0.0], tmp_path / "a.png")
-    monkeypatch.setattr("chilopod.report.scene.film_3d.has_encoder", lambda: False)
+    monkeypatch.setattr("chilopod.report.scene.film.has_encoder", lambda: False)
     with pytest.raises(OutputError, match="encoder"):
         film_3d(record, tmp_path / "a.mp4", **names)
     assert list(tmp_path.iterdir()) == []

@@ -26,7 +26,7 @@ from chilopod.paper.curved.trials import (
     variant_trials,
 )
 from chilopod.paper.printed import printed
-from chilopod.progress import Progress, silent
+from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.trials import Disturbance
 
@@ -101,11 +101,8 @@ def curved_study(
         Called as the work goes on.
     """
 
-    def part(first: float, last: float) -> Progress:
-        return lambda done, words: progress(first + (last - first) * done, words)
-
-    trials = curved_trials(robot, SPRINGS, repeats, folder=folder, progress=part(0.0, 0.3))
-    variants = variant_trials(robot, trials, variant_repeats, folder=folder, progress=part(0.3, 0.8))
+    trials = curved_trials(robot, SPRINGS, repeats, folder=folder, progress=part(progress, 0.0, 0.3))
+    variants = variant_trials(robot, trials, variant_repeats, folder=folder, progress=part(progress, 0.3, 0.8))
     progress(0.8, "branches")
     branches = {name: _branch(variant, variants[name]) for name, variant in variant_robots(robot).items()}
     progress(0.9, "trials beside the branch")

@@ -27,7 +27,7 @@ from chilopod.paper.robot.table import printed_spring
 from chilopod.paper.robot.turning import TASK_DURATION
 from chilopod.paper.turning.minima import NAMES, minima
 from chilopod.paper.turning.trials import turning_task
-from chilopod.progress import Progress, silent
+from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.steering import Target
 from chilopod.tasks.identify.data import BaseSeries
@@ -181,7 +181,7 @@ def structures(
     by the nearer of its two readings.
     """
     data = base_series_data()
-    law = _law(robot, data, lambda done, words: progress(0.1 * done, words))
+    law = _law(robot, data, part(progress, 0.0, 0.1))
     rows: list[Mapping[str, Any]] = []
     for index, each in enumerate(tried):
         progress(0.1 + 0.9 * index / len(tried), each.name)

@@ -10,7 +10,7 @@ import xarray as xr
 
 from chilopod.paper.printed import printed
 from chilopod.paper.turning.trials import DURATION, REPEATS, TurningTask, turning_task, without_leg_yaw
-from chilopod.progress import Progress, silent
+from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.steering import Target
 
@@ -70,9 +70,6 @@ def robot_turning(
         Called as the work goes on.
     """
 
-    def part(first: float, last: float, name: str) -> Progress:
-        return lambda done, words: progress(first + (last - first) * done, f"{name}: {words}")
-
     repeats, springs = (2, SPRINGS[1::2]) if quick else (REPEATS, SPRINGS)
     springs = tuple(sorted({*springs, *SHOWN}))
     tasks = {}
@@ -86,7 +83,7 @@ def robot_turning(
             shown=SHOWN,
             engine="twin",
             folder=folder,
-            progress=part(0.35 * index, 0.35 * (index + 1), f"task {letter}"),
+            progress=part(progress, 0.35 * index, 0.35 * (index + 1), f"task {letter}"),
         )
     hopf = turning_task(
         robot,
@@ -98,7 +95,7 @@ def robot_turning(
         duration=TASK_DURATION,
         engine="twin",
         folder=folder,
-        progress=part(0.7, 0.9, "uniform springs"),
+        progress=part(progress, 0.7, 0.9, "uniform springs"),
     )
     without = without_leg_yaw(
         robot,
@@ -107,6 +104,6 @@ def robot_turning(
         duration=TASK_DURATION,
         engine="twin",
         folder=folder,
-        progress=part(0.9, 1.0, "without leg yaw"),
+        progress=part(progress, 0.9, 1.0, "without leg yaw"),
     )
     return RobotTurning(robot, tasks, hopf, without)

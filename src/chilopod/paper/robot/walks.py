@@ -21,7 +21,7 @@ from chilopod.analysis.square_root import SquareRootFit, square_root_fit
 from chilopod.errors import AnalysisError
 from chilopod.paper.curved.trials import variant_robots
 from chilopod.paper.robot.walk_measures import onset, onset_with_error, radius_at, shares
-from chilopod.progress import Progress, silent
+from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.tasks.radius_law import DURATION, end_of_walk
 from chilopod.trials import AVERAGED, Disturbance, Trial
@@ -109,14 +109,11 @@ def robot_walks(
         Called as the work goes on.
     """
 
-    def part(first: float, last: float, name: str) -> Progress:
-        return lambda done, words: progress(first + (last - first) * done, f"{name}: {words}")
-
     repeats, fewer, fewest = (2, 1, 1) if quick else (REPEATS, VARIANT_REPEATS, UNIFORM_REPEATS)
     springs, uniform_springs = (
         (VARIANT_SPRINGS[1::2], UNIFORM_SPRINGS[:4]) if quick else (VARIANT_SPRINGS, UNIFORM_SPRINGS)
     )
-    records = walk_records(robot, SPRINGS, repeats, folder=folder, progress=part(0.0, 0.31, "as built"))
+    records = walk_records(robot, SPRINGS, repeats, folder=folder, progress=part(progress, 0.0, 0.31, "as built"))
     base, durations = walk_ends(records, robot, SPRINGS), by_duration(records, robot, SPRINGS)
     robots = {name: each for name, each in variant_robots(robot).items() if name != "as built"}
     readings = {
@@ -125,13 +122,15 @@ def robot_walks(
     asked = [(robots, name) for name in robots] + [(readings, name) for name in readings]
     found: list[xr.Dataset] = []
     for index, (of, name) in enumerate(asked):
-        shown = part(0.31 + 0.6 * index / len(asked), 0.31 + 0.6 * (index + 1) / len(asked), name)
+        shown = part(progress, 0.31 + 0.6 * index / len(asked), 0.31 + 0.6 * (index + 1) / len(asked), name)
         # Growing and settling go with the way: who makes shorter steps is given the time to walk as far.
         longer = DURATION * robot.gait.stride / of[name].gait.stride
         walked = walk_records(of[name], springs, fewer, duration=longer, folder=folder, progress=shown)
         found.append(walk_ends(walked, of[name], springs))
     variants, lower = dict(zip(robots, found, strict=False)), dict(zip(readings, found[len(robots) :], strict=True))
-    uniform = undulations(robot, uniform_springs, fewest, folder=folder, progress=part(0.91, 1.0, "uniform springs"))
+    uniform = undulations(
+        robot, uniform_springs, fewest, folder=folder, progress=part(progress, 0.91, 1.0, "uniform springs")
+    )
     return RobotWalks(robot, base, durations, variants, lower, _examples(robot, folder), uniform)
 
 

@@ -25,7 +25,7 @@ from chilopod.paper.turning.trials import (
     turning_task,
     without_leg_yaw,
 )
-from chilopod.progress import Progress, silent
+from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.stability import Kind
 from chilopod.steering import STRATEGIES, Target, earliest_arrival, evaluate, steered
@@ -102,8 +102,8 @@ def turning(
     laws = radius_laws(robot)
     tasks: dict[str, TurningTask] = {}
     for index, (letter, entry) in enumerate(printed()["turning"]["tasks"].items()):
-        part = _part(progress, 0.25 * index, 0.25, f"task {letter}")
-        tasks[letter] = turning_task(robot, Target.parse(entry["target"]), springs, folder=folder, progress=part)
+        told = part(progress, 0.25 * index, 0.25 * (index + 1), f"task {letter}")
+        tasks[letter] = turning_task(robot, Target.parse(entry["target"]), springs, folder=folder, progress=told)
     task = tasks["A"]
     hopf = turning_task(
         robot,
@@ -112,7 +112,7 @@ def turning(
         strategy="hopf",
         time=task.time,
         folder=folder,
-        progress=_part(progress, 0.5, 0.15, "uniform springs"),
+        progress=part(progress, 0.5, 0.65, "uniform springs"),
     )
     usual = Disturbance()
     rough = turning_task(
@@ -121,7 +121,7 @@ def turning(
         QUICK_SPRINGS if quick else ROUGH_SPRINGS,
         disturbance=replace(usual, **{name: ROUGH * value for name, value in vars(usual).items()}),
         folder=folder,
-        progress=_part(progress, 0.65, 0.2, "larger disturbances"),
+        progress=part(progress, 0.65, 0.85, "larger disturbances"),
     )
     law, _ = laws.k_hat(task.target.radius)
     without = without_leg_yaw(
@@ -129,7 +129,7 @@ def turning(
         task.target,
         {"best spring": task.best, "spring of the law": law},
         folder=folder,
-        progress=_part(progress, 0.85, 0.05, "with and without leg yaw"),
+        progress=part(progress, 0.85, 0.9, "with and without leg yaw"),
     )
     settled = settled_start(robot, laws, {letter: each.target for letter, each in tasks.items()}, folder)
     distances = FARTHER[:2] if quick else FARTHER
@@ -137,10 +137,6 @@ def turning(
     progress(1.0, "turning tasks")
     point = first_loss(robot, ALL, (stiffness(2.0), stiffness(75.0)), Kind.NEIMARK_SACKER, normal_form=False)
     return Turning(robot, laws, tasks, hopf, rough, point.value, without, settled, farther)
-
-
-def _part(progress: Progress, start: float, share: float, what: str) -> Progress:
-    return lambda done, words: progress(start + share * done, f"{what}: {words}")
 
 
 def settled_start(

@@ -30,11 +30,13 @@ from chilopod.report.scene.frames import Outcome, Scene, scene
 from chilopod.report.scene.outline import SLIMNESS
 from chilopod.report.scene.replay import COLORS
 
+Array = NDArray[np.float64]
+
 _ENCODER: Final = "libx264"
-_SMALLEST, _LARGEST = 240, 4096
-_PIXEL: Final = 72.0  # points in an inch: at so many dots per inch, matplotlib's sizes are pixels
-_GAP: Final = 12.0  # to the edges and from row to row, pixels
-_APART: Final = 28.0  # from column to column: outcome and next title stand side by side
+_SMALLEST, LARGEST = 240, 4096
+PIXEL: Final = 72.0  # points in an inch: at so many dots per inch, matplotlib's sizes are pixels
+GAP: Final = 12.0  # to the edges and from row to row, pixels
+APART: Final = 28.0  # from column to column: outcome and next title stand side by side
 _MARKS: Final = {"arrived": ("✓ ", "#00563f"), "stopped": ("✕ ", "#8f3d00"), "ended": ("", style.BLACK)}
 
 
@@ -79,22 +81,37 @@ def movie(
     OutputError
         If the file cannot be written, or PyAV was built without its H.264 encoder.
     """
+    times = frame_times(record, size, fps, speed)
+    path = Path(path)
+    prepare_folder(path.parent)
+    shown = scene(record, titles, times)
+    return write_atomic(path, encoded(_frames(shown, heading, size, speed), fps, size))
+
+
+def frame_times(record: xr.Dataset, size: tuple[int, int], fps: int, speed: float) -> Array:
+    """When the frames of a film are, s of the record.
+
+    Raises
+    ------
+    ParameterError
+        If it cannot be encoded in this size, or at this rate or speed.
+    OutputError
+        If PyAV was built without its H.264 encoder.
+    """
     if not 1 <= fps <= 120:
         raise ParameterError("is no frame rate", field="fps", value=fps, allowed="1 to 120 per second")
     if not 0.01 <= speed <= 1000.0:
         raise ParameterError("is no speed", field="speed", value=speed, allowed="0.01 to 1000")
-    if any(side % 2 or not _SMALLEST <= side <= _LARGEST for side in size):
-        allowed = f"two even numbers from {_SMALLEST} to {_LARGEST}"
+    if any(side % 2 or not _SMALLEST <= side <= LARGEST for side in size):
+        allowed = f"two even numbers from {_SMALLEST} to {LARGEST}"
         raise ParameterError("is no size of a film", field="size", value=size, allowed=allowed)
     if not has_encoder():
         raise OutputError(f"PyAV was built without the encoder {_ENCODER}, which movies need")
-    path = Path(path)
-    prepare_folder(path.parent)
     recorded = record["time"].values.astype(np.float64)
     # The last frame is at or before the last sample; the tolerance is for round-off in the duration.
     count = int((recorded[-1] - recorded[0]) * fps / speed + 1e-6) + 1
-    shown = scene(record, titles, recorded[0] + np.arange(count) * (speed / fps))
-    return write_atomic(path, encoded(_frames(shown, heading, size, speed), fps, size))
+    times: Array = recorded[0] + np.arange(count) * (speed / fps)
+    return times
 
 
 def has_encoder() -> bool:
@@ -136,18 +153,18 @@ class Stage:
     def __init__(self, shown: Scene, heading: str, size: tuple[int, int], speed: float) -> None:
         self.shown, self.size = shown, size
         self.font = max(12.0, min(size[1] / 32.0, size[0] / 48.0))
-        self.figure = Figure(figsize=(size[0] / _PIXEL, size[1] / _PIXEL), dpi=_PIXEL)
+        self.figure = Figure(figsize=(size[0] / PIXEL, size[1] / PIXEL), dpi=PIXEL)
         self.canvas: Any = FigureCanvasAgg(self.figure)  # matplotlib does not say what its methods take and give
         width, height = size
         top = height - 0.45 * self.font
-        self.clock = self._text(width - _GAP, top, "", ha="right", va="top", animated=True)
+        self.clock = self._text(width - GAP, top, "", ha="right", va="top", animated=True)
         self.pace = "" if speed == 1.0 else f"   ({speed:g}×)"
         self.clock.set_text(self._time(len(shown.frames.time) - 1))
-        room = width - 3.0 * _GAP - self._extent(self.clock)
-        title = self._text(_GAP, top, heading, va="top", fontsize=1.2 * self.font, weight="bold")
+        room = width - 3.0 * GAP - self._extent(self.clock)
+        title = self._text(GAP, top, heading, va="top", fontsize=1.2 * self.font, weight="bold")
         self._fit(title, room)
         below = self._legend()
-        self._panels(_GAP + below, top - 1.9 * self.font)
+        self._panels(GAP + below, top - 1.9 * self.font)
         self.known: tuple[bool, ...] = ()
         self.background: Any = None
 
@@ -211,14 +228,14 @@ class Stage:
                 handlelength=1.5,
                 handletextpad=0.5,
             )
-            if self._extent(legend) <= self.size[0] - _GAP:
+            if self._extent(legend) <= self.size[0] - GAP:
                 break
             legend.remove()
         return float(legend.get_window_extent(self.canvas.get_renderer()).height)
 
     def _panels(self, bottom: float, top: float) -> None:
         """Lay the panels out as large as they fit, with title and outcome in one line if there is room for both."""
-        floor, width = self.shown.floor, self.size[0] - 2.0 * _GAP
+        floor, width = self.shown.floor, self.size[0] - 2.0 * GAP
         count, aspect = len(self.shown.titles), (floor.y1 - floor.y0) / (floor.x1 - floor.x0)
         titles = [self._text(0.0, 0.0, title, weight="bold", va="top") for title in self.shown.titles]
         outcomes = [self._text(0.0, 0.0, says(outcome), weight="bold", va="top") for outcome in self.shown.outcomes]
@@ -228,19 +245,19 @@ class Stage:
             sizes = []
             for columns in range(1, count + 1):
                 rows = math.ceil(count / columns)
-                wide = (width - _APART * (columns - 1)) / columns
-                sizes.append((min(wide, ((top - bottom - _GAP * (rows - 1)) / rows - caption) / aspect), columns))
+                wide = (width - APART * (columns - 1)) / columns
+                sizes.append((min(wide, ((top - bottom - GAP * (rows - 1)) / rows - caption) / aspect), columns))
             across, columns = max(sizes)
             if longest <= across:
                 break
         across = max(across, 40.0)
-        left = _GAP + 0.5 * (width - columns * across - (columns - 1) * _APART)
+        left = GAP + 0.5 * (width - columns * across - (columns - 1) * APART)
         rows = math.ceil(count / columns)
-        top -= max(0.0, 0.5 * (top - bottom + _GAP - rows * (across * aspect + caption + _GAP)))
+        top -= max(0.0, 0.5 * (top - bottom + GAP - rows * (across * aspect + caption + GAP)))
         self.panels = []
         for index, (title, outcome) in enumerate(zip(titles, outcomes, strict=True)):
-            x = left + (index % columns) * (across + _APART)
-            y = top - (index // columns) * (across * aspect + caption + _GAP)
+            x = left + (index % columns) * (across + APART)
+            y = top - (index // columns) * (across * aspect + caption + GAP)
             title.set_position((x / self.size[0], y / self.size[1]))
             self._fit(title, across)
             line = 0.0 if lines == 1 else 1.35 * self.font

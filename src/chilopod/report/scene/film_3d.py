@@ -18,20 +18,18 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.errors import OutputError, ParameterError
+from chilopod.errors import ParameterError
 from chilopod.output import prepare_folder, write_atomic
 from chilopod.report.kit import style
 from chilopod.report.scene.film import (
-    _APART,
-    _ENCODER,
-    _GAP,
-    _LARGEST,
-    _PIXEL,
-    _SMALLEST,
+    APART,
+    GAP,
+    LARGEST,
+    PIXEL,
     FilmPanel,
     Stage,
     encoded,
-    has_encoder,
+    frame_times,
     says,
 )
 from chilopod.report.scene.frames import Scene, scene
@@ -93,24 +91,14 @@ def film_3d(
     OutputError
         If there is no OpenGL, PyAV was built without its H.264 encoder, or the file cannot be written.
     """
-    if not 1 <= fps <= 120:
-        raise ParameterError("is no frame rate", field="fps", value=fps, allowed="1 to 120 per second")
-    if not 0.01 <= speed <= 1000.0:
-        raise ParameterError("is no speed", field="speed", value=speed, allowed="0.01 to 1000")
-    if any(side % 2 or not _SMALLEST <= side <= _LARGEST for side in size):
-        allowed = f"two even numbers from {_SMALLEST} to {_LARGEST}"
-        raise ParameterError("is no size of a film", field="size", value=size, allowed=allowed)
-    if not has_encoder():
-        raise OutputError(f"PyAV was built without the encoder {_ENCODER}, which movies need")
-    recorded = record["time"].values.astype(np.float64)
-    count = int((recorded[-1] - recorded[0]) * fps / speed + 1e-6) + 1
-    walks = _Walks(record, titles, recorded[0] + np.arange(count) * (speed / fps))
+    times = frame_times(record, size, fps, speed)
+    walks = _Walks(record, titles, times)
     path = Path(path)
     prepare_folder(path.parent)
     with gl.context(*size), style.house_style():
         stage = _Stage3D(walks, heading, size, speed, follow)
         try:
-            film = encoded((stage.drawn(index) for index in range(count)), fps, size)
+            film = encoded((stage.drawn(index) for index in range(len(times))), fps, size)
         finally:
             stage.studio.close()
     return write_atomic(path, film)
@@ -164,8 +152,8 @@ def stills(
     if outside.any():
         allowed = f"{recorded[0]:g} to {recorded[-1]:g} s"
         raise ParameterError("is not in the record", field="times", value=float(wanted[outside][0]), allowed=allowed)
-    if any(not _NARROWEST <= side <= _LARGEST for side in size):
-        allowed = f"{_NARROWEST} to {_LARGEST} pixels"
+    if any(not _NARROWEST <= side <= LARGEST for side in size):
+        allowed = f"{_NARROWEST} to {LARGEST} pixels"
         raise ParameterError("is no size of a picture", field="size", value=size, allowed=allowed)
     walks = _Walks(record, [""] * robots if titles is None else titles, wanted)
     path = Path(path)
@@ -173,7 +161,7 @@ def stills(
     with gl.context(*size), style.house_style():
         studio = Studio(walks.shown.frames.robot, size, walks.view(size), fine=True)
         try:
-            return write_atomic(path, style.png(_arranged(walks, studio, heading, size), dpi=_PIXEL))
+            return write_atomic(path, style.png(_arranged(walks, studio, heading, size), dpi=PIXEL))
         finally:
             studio.close()
 
@@ -248,29 +236,29 @@ class _Stage3D(Stage):
 
     def _panels(self, bottom: float, top: float) -> None:
         """Lay the panels out, all of one size, with title and outcome in one line if there is room for both."""
-        width, count = self.size[0] - 2.0 * _GAP, len(self.shown.titles)
+        width, count = self.size[0] - 2.0 * GAP, len(self.shown.titles)
         columns = _columns(count)
         rows = math.ceil(count / columns)
-        across = max(_NARROWEST, int((width - _APART * (columns - 1)) / columns))
+        across = max(_NARROWEST, int((width - APART * (columns - 1)) / columns))
         titles = [self._text(0.0, 0.0, title, weight="bold", va="top") for title in self.shown.titles]
         outcomes = [self._text(0.0, 0.0, says(outcome), weight="bold", va="top") for outcome in self.shown.outcomes]
         longest = max(self._extent(a) + self._extent(b) for a, b in zip(titles, outcomes, strict=True)) + self.font
         lines = 1 if longest <= across else 2
         caption = (0.35 + 1.35 * lines) * self.font
-        tall = max(_LOWEST, int((top - bottom - _GAP * (rows - 1)) / rows - caption))
+        tall = max(_LOWEST, int((top - bottom - GAP * (rows - 1)) / rows - caption))
         robot, panel = self.shown.frames.robot, (across, tall)
         self.studio = Studio(robot, panel, self.walks.view(panel, 0 if self.follow else None))
         self.panels = []
         for index, (title, outcome) in enumerate(zip(titles, outcomes, strict=True)):
-            x = _GAP + (index % columns) * (across + _APART)
-            y = top - (index // columns) * (tall + caption + _GAP)
+            x = GAP + (index % columns) * (across + APART)
+            y = top - (index // columns) * (tall + caption + GAP)
             self._place(title, x, y, across)
             where = (x + across, y) if lines == 1 else (x, y - 1.35 * self.font)
             outcome.set_horizontalalignment("right" if lines == 1 else "left")
             self._place(outcome, *where, across)
             corner = (round(x), round(self.size[1] - y + caption))
             self.panels.append(_Panel3D(self, index, panel, corner, outcome))
-        note = self._text(self.size[0] - _GAP, _GAP, f"tiles of {TILE:g} m", ha="right", fontsize=0.85 * self.font)
+        note = self._text(self.size[0] - GAP, GAP, f"tiles of {TILE:g} m", ha="right", fontsize=0.85 * self.font)
         note.set_visible(self._room_beside_key(note))
 
     def _place(self, text: Text, x: float, y: float, room: float) -> None:
@@ -323,15 +311,15 @@ def _arranged(walks: _Walks, studio: Studio, heading: str, size: tuple[int, int]
     columns = count if robots > 1 else _columns(count)
     rows = robots if robots > 1 else math.ceil(count / columns)
     font = max(12.0, size[0] / 32.0)
-    caption, above = 1.7 * font, 2.2 * font if heading else 0.5 * _GAP
-    width = columns * (size[0] + _GAP) + _GAP
-    height = rows * (size[1] + caption) + above + _GAP
-    figure = Figure(figsize=(width / _PIXEL, height / _PIXEL), dpi=_PIXEL)
+    caption, above = 1.7 * font, 2.2 * font if heading else 0.5 * GAP
+    width = columns * (size[0] + GAP) + GAP
+    height = rows * (size[1] + caption) + above + GAP
+    figure = Figure(figsize=(width / PIXEL, height / PIXEL), dpi=PIXEL)
     if heading:
-        figure.text(_GAP / width, 1.0 - 0.5 * font / height, heading, fontsize=1.2 * font, weight="bold", va="top")
+        figure.text(GAP / width, 1.0 - 0.5 * font / height, heading, fontsize=1.2 * font, weight="bold", va="top")
     for number in range(count * robots):
         index, robot = number % count, number // count
-        x = _GAP + (number % columns) * (size[0] + _GAP)
+        x = GAP + (number % columns) * (size[0] + GAP)
         y = height - above - (number // columns) * (size[1] + caption)
         says = f"{shown.frames.time[index]:.1f} s"
         title = shown.titles[robot] if index == 0 else ""
