@@ -30,7 +30,7 @@ def rows(value, found):
 
 def panel(name):
     data = xr.Dataset({"y": ("x", np.arange(3.0))})
-    return Panel(name, "", f"Figure {name}", lambda narrow: Figure(), "nothing to be seen", (), data)
+    return Panel(name, f"Figure {name}", lambda narrow: Figure(), "nothing to be seen", (), data)
 
 
 ONE = Section("one", "First chapter", "the first", lambda context, found, report: 1, rows)

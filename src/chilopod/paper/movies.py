@@ -18,6 +18,7 @@ from chilopod.trials import NONE, Trial, run, together
 TASK_A = Target(float(np.deg2rad(45.0)), 1.3)
 
 _WALK = 45.0  # s
+_ROBOT_STILLS = ((2.0, 30.0, 60.0, 88.0), (0.5, 8.0, 16.0, 24.0))  # s
 _ROBOT_WALK = 90.0
 _TASK, _ROBOT_TASK = 24.0, 32.0
 _BEND = tuple(float(angle) for angle in np.deg2rad([20.0, 10.0, 14.0, 12.0, 4.0]))
@@ -39,6 +40,8 @@ class Movie:
         The walks.
     speed
         Seconds of the walks per second of the film.
+    stills
+        Moments of it that are pictured in three dimensions, s; none of a film from above.
     """
 
     name: str
@@ -46,6 +49,7 @@ class Movie:
     titles: tuple[str, ...]
     record: xr.Dataset
     speed: float
+    stills: tuple[float, ...] = ()
 
 
 def movies(
@@ -106,7 +110,8 @@ def robot_movies(
     ]
     tasks = [replace(each, duration=_ROBOT_TASK, engine="twin", poses=True) for each in _tasks(robot, tried)]
     records = run([*walks, *tasks], folder, progress)
-    return _movies("robot-", (*springs, *tried), records, speed=3.0)
+    first, second = _movies("robot-", (*springs, *tried), records, speed=3.0)
+    return [replace(first, stills=_ROBOT_STILLS[0]), replace(second, stills=_ROBOT_STILLS[1])]
 
 
 def _tasks(robot: Robot, tried: tuple[float, float, float]) -> list[Trial]:

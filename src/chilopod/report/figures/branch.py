@@ -21,7 +21,6 @@ def panel(data: xr.Dataset) -> Panel:
     shown = data.attrs["varied"]
     return Panel(
         name="branch",
-        letter="",
         title=f"Curved walks over {shown}",
         draw=lambda narrow: _draw(data, narrow),
         alt=f"Mean joint angles, radii of axis and path, and cost of transport over {shown}; unstable parts dashed.",

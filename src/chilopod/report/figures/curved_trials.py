@@ -39,7 +39,6 @@ def walks(study: CurvedStudy) -> Panel:
     ours = [axis_radius(study.branch, exact / relative) for relative, _ in robot]
     return Panel(
         name="curved-walks",
-        letter="",
         title="Curved walks below the critical spring",
         draw=lambda narrow: _draw_walks(study, narrow),
         alt=f"A and B: joint angles over time at {k(1)} = {straight:g} and {curved:g}. C: mean angle of joint 1 over "
@@ -73,7 +72,6 @@ def joints(study: CurvedStudy) -> Panel:
     """The paper's Fig. "absolute"."""
     return Panel(
         name="curved-joints",
-        letter="",
         title="All joints of the curved walk",
         draw=lambda narrow: _draw_joints(study, narrow),
         alt=f"Mean absolute angles of all joints over 1/{k(1)}: zero up to the critical spring, then rising steeply.",
@@ -92,7 +90,6 @@ def onset(study: CurvedStudy) -> Panel:
     power = float(law.power.sel(softest=0.98 * exact, method="nearest"))
     return Panel(
         name="curved-onset",
-        letter="",
         title="How sure the square-root fit is",
         draw=lambda narrow: _draw_onset(study, narrow),
         alt=f"Critical spring by the fit over ranges of springs, from {number(float(near.critical_k1), 4)} to "

@@ -38,7 +38,6 @@ def panel(study: CurvedStudy) -> Panel:
     ]
     return Panel(
         name="curved-variants",
-        letter="",
         title="Curved walks of the paper's variants",
         draw=lambda narrow: _draw(study, narrow),
         alt=f"Radius of the body axis for four variants, over 1/{k(1)} and over critical {k(1)} / {k(1)}, where the "

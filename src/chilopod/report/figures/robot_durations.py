@@ -23,7 +23,6 @@ def panel(data: xr.Dataset) -> Panel:
     said = "; ".join(f"{row.quantity.partition(',')[0]} {row.twin}" for row in duration_rows(data))
     return Panel(
         name="robot-durations",
-        letter="",
         title="The robot in three dimensions: what if its walks had been shorter",
         draw=lambda narrow: _draw(data, narrow),
         alt=f"A: where curved walks set in, by walks of {times} s. B: the two radii that the paper prints. C: the "

@@ -36,7 +36,6 @@ def panel(data: xr.Dataset) -> Panel:
     lower = [str(name) for name, yes in zip(data.structure.values, below & met, strict=True) if yes]
     return Panel(
         name="robot-structures",
-        letter="",
         title="What else the robot could be made of",
         draw=lambda narrow: _draw(data, narrow),
         alt="A: how far each structure's predictions are from the paper's. B: predictions, relative to the paper's.",

@@ -39,7 +39,6 @@ def turning(found: RobotTurning) -> Panel:
     task = found.tasks["A"]
     return Panel(
         name="robot-turning",
-        letter="",
         title="The robot in three dimensions: turning task A",
         draw=lambda narrow: draw_turning(found.robot, task, narrow),
         alt="The circle to the target; paths, distance and angle of the target over time with three springs.",
@@ -67,7 +66,6 @@ def criteria(found: RobotTurning, letter: str, walks: RobotWalks | None) -> Pane
     )
     return Panel(
         name=f"robot-criteria-{letter.lower()}",
-        letter="",
         title=f"The robot in three dimensions: the three criteria, task {letter}",
         draw=lambda narrow: draw_criteria(task, k_hat, narrow, _TOP),
         alt=f"Distance, angle and leg yaw over 1/{k(1)}: {places}.",
@@ -92,7 +90,6 @@ def without(found: RobotTurning) -> Panel:
     trials = int(np.isfinite(alone.arrived).sum())
     return Panel(
         name="robot-without",
-        letter="",
         title="The robot in three dimensions: with and without leg yaw",
         draw=lambda narrow: draw_without(data, narrow),
         alt="Paths of module 1 with and without leg yaw.",
@@ -112,7 +109,6 @@ def comparison(found: RobotTurning) -> Panel:
     task = found.tasks["A"]
     return Panel(
         name="robot-hopf",
-        letter="",
         title="The robot in three dimensions: pitchfork against Hopf",
         draw=lambda narrow: draw_comparison(task, found.hopf, narrow, _TOP_HOPF),
         alt="The three criteria over the spring for the two strategies.",

@@ -51,7 +51,6 @@ def walks(found: RobotWalks) -> Panel:
     straight, curved = (float(value) for value in found.examples.spring.values)
     return Panel(
         name="robot-walks",
-        letter="",
         title="The robot in three dimensions: curved walks below the critical spring",
         draw=lambda narrow: _draw_walks(found, narrow),
         alt=f"A and B: joint angles over time at {k(1)} = {straight:g} and {curved:g}. C: mean angle of joint 1 over "
@@ -81,7 +80,6 @@ def joints(found: RobotWalks) -> Panel:
     order = [int(joint) + 1 for joint in np.argsort(-softest)]
     return Panel(
         name="robot-joints",
-        letter="",
         title="The robot in three dimensions: all joints of the curved walk",
         draw=lambda narrow: _draw_joints(found, narrow),
         alt=f"Mean absolute angles of all joints over 1/{k(1)}.",
@@ -102,7 +100,6 @@ def different(found: RobotWalks) -> Panel:
         said.append(f"{typeset(title)} {number(point, 3) if np.isfinite(point) else 'none'} (robot: {paper:g})")
     return Panel(
         name="robot-different",
-        letter="",
         title="The robot in three dimensions: other springs, strides and phases",
         draw=lambda narrow: _draw_different(found, narrow),
         alt=f"A: radius over 1/{k(1)} of the robot as built and of three variants. B: the same over the distance from "

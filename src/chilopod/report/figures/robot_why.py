@@ -32,7 +32,6 @@ def why(data: xr.Dataset) -> Panel:
     largest = [str(data.factor.values[i]) for i in np.argsort(-np.abs(moves))[:2]]
     return Panel(
         name="robot-why",
-        letter="",
         title="Why 34 and not 12: from the planar model to the robot",
         draw=lambda narrow: _draw_why(data, narrow),
         alt="A: where curved walks set in, from the planar limit to the twin, one assumption after the other. B: each "
@@ -134,7 +133,6 @@ def spread(data: xr.Dataset, robot: Robot) -> Panel:
     )
     return Panel(
         name="robot-spread",
-        letter="",
         title="How far to trust the predictions: other constants that fit as well",
         draw=lambda narrow: _draw_spread(data, robot, narrow),
         alt="A: the constants of several fits, in parts of their ranges. B: what each predicts, beside the robot.",

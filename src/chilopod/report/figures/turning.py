@@ -63,7 +63,6 @@ def turning(found: Turning) -> Panel:
     psi, away = np.rad2deg(task.target.bearing), task.target.distance
     return Panel(
         name="turning",
-        letter="",
         title="Turning task A: a target ahead to the left",
         draw=lambda narrow: draw_turning(found.robot, task, narrow),
         alt=f"A circle from the robot to a target {away:g} m away at {psi:g} degrees; walks with three springs, "
@@ -210,7 +209,6 @@ def without(found: Turning) -> Panel:
     helped = data.isel(case=np.flatnonzero(data.leg_yaw.values))
     return Panel(
         name="turning-without",
-        letter="",
         title="With and without leg yaw",
         draw=lambda narrow: draw_without(data, narrow),
         alt="Paths of module 1: without leg yaw they go almost straight, some to the left and some to the right; with "
@@ -269,7 +267,6 @@ def why(found: Turning) -> Panel:
     )
     return Panel(
         name="turning-why",
-        letter="",
         title="Why the best spring is not that of the radius law",
         draw=lambda narrow: _draw_why(settled, farther, narrow),
         alt="How near the target comes at the spring of the law, starting straight and bent; and the leg yaw needed "

@@ -35,7 +35,6 @@ def criteria(found: Turning) -> Panel:
     whole = low.sel(criterion="effort_until_arrival")
     return Panel(
         name="turning-criteria",
-        letter="",
         title="Task A: the paper's three criteria over the spring",
         draw=lambda narrow: draw_criteria(task, found.laws.k_hat(task.target.radius)[0], narrow),
         alt=_alt(found, "A"),
@@ -56,7 +55,6 @@ def another(found: Turning) -> Panel:
     task = found.tasks["B"]
     return Panel(
         name="turning-another",
-        letter="",
         title=f"Task B ({task.target.bearing * 180.0 / np.pi:g}°, {task.target.distance:g} m): the criteria again",
         draw=lambda narrow: draw_criteria(task, found.laws.k_hat(task.target.radius)[0], narrow),
         alt=_alt(found, "B"),
@@ -71,7 +69,6 @@ def comparison(found: Turning) -> Panel:
     ever = int(np.isfinite(found.hopf.criteria.arrival.values).sum())
     return Panel(
         name="turning-hopf",
-        letter="",
         title="Pitchfork against Hopf",
         draw=lambda narrow: draw_comparison(task, found.hopf, narrow),
         alt="The three criteria over the spring for the two strategies; the pitchfork's smallest values lie below.",

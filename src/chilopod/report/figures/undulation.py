@@ -20,7 +20,6 @@ def panel(data: xr.Dataset) -> Panel:
     off = 100.0 * abs(float(near.amplitude / near.predicted_amplitude) - 1.0)
     return Panel(
         name="undulation",
-        letter="",
         title="Undulating walks of uniform springs",
         draw=lambda narrow: _draw(data, narrow),
         alt="Amplitude and frequency of the settled undulation over the springs, and how far the normal form is off, "

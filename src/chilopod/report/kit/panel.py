@@ -17,8 +17,8 @@ class Panel:
     ----------
     name
         Of its files.
-    letter, title
-        Its heading; A to D are those of the paper's figure.
+    title
+        Its heading.
     draw
         Makes the figure, in the narrow layout if told so; call it within :func:`chilopod.report.kit.style.house_style`.
     alt
@@ -27,12 +27,14 @@ class Panel:
         Paragraphs beside it.
     data
         What is drawn.
+    letter
+        Before its heading, if it has one; A to D are those of the paper's figure.
     """
 
     name: str
-    letter: str
     title: str
     draw: Callable[[bool], Figure]
     alt: str
     text: tuple[str, ...]
     data: xr.Dataset
+    letter: str = ""

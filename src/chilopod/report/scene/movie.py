@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from chilopod.errors import OutputError
 from chilopod.output import prepare_folder, write_atomic
@@ -14,12 +16,11 @@ from chilopod.report.scene.replay import replay
 from chilopod.report.scene.replay_3d import replay_3d
 
 _FILM_SIZE = (1280, 320)  # three panels in a row
-_STILLS = {"robot-movie-1": (2.0, 30.0, 60.0, 88.0), "robot-movie-2": (0.5, 8.0, 16.0, 24.0)}  # s, of films in 3-D
 
 
 def write_movie(shown: Movie, folder: Path) -> Film:
-    """Write a movie as ``NAME.html``, ``NAME.mp4`` where films can be encoded and, in 3-D, ``NAME.png`` where it can be
-    rendered.
+    """Write a movie as ``NAME.html``, ``NAME.mp4`` where films can be encoded and, of some moments of it in 3-D,
+    ``NAME.png`` where it can be rendered.
 
     Raises
     ------
@@ -30,22 +31,21 @@ def write_movie(shown: Movie, folder: Path) -> Film:
     solid = "pose" in shown.record
     page_of = replay_3d if solid else replay
     write_atomic(folder / f"{shown.name}.html", page_of(shown.record, titles=shown.titles, heading=shown.heading))
-    encoded, pictured = has_encoder(), False
-    if encoded:
-        file = folder / f"{shown.name}.mp4"
-        encoded_solid = False
-        if solid:
-            try:
-                film_3d(shown.record, file, titles=shown.titles, heading=shown.heading, speed=shown.speed)
-                encoded_solid = True
-            except OutputError:
-                pass  # no graphics here: the film from above needs none, and `chilopod doctor` says what is missing
-        if not encoded_solid:
-            movie(shown.record, file, titles=shown.titles, heading=shown.heading, speed=shown.speed, size=_FILM_SIZE)
-    if solid:
-        try:
-            stills(shown.record, _STILLS[shown.name], folder / f"{shown.name}.png", titles=shown.titles)
-            pictured = True
-        except OutputError:
-            pass
+    look: dict[str, Any] = {"titles": shown.titles, "heading": shown.heading, "speed": shown.speed}
+    file, encoded = folder / f"{shown.name}.mp4", has_encoder()
+    if encoded and not (solid and _rendered(lambda: film_3d(shown.record, file, **look))):
+        movie(shown.record, file, **look, size=_FILM_SIZE)
+    picture = folder / f"{shown.name}.png"
+    pictured = bool(shown.stills) and _rendered(
+        lambda: stills(shown.record, shown.stills, picture, titles=shown.titles)
+    )
     return Film(shown.name, shown.heading, shown.speed, encoded, pictured)
+
+
+def _rendered(render: Callable[[], object]) -> bool:
+    """Render if there are graphics here; the film from above needs none, and `chilopod doctor` says what is missing."""
+    try:
+        render()
+    except OutputError:
+        return False
+    return True
