@@ -2,7 +2,9 @@
 
 import json
 import re
+import runpy
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,6 +24,7 @@ from chilopod.report.kit.panel import Panel
 
 RELOAD = '<meta http-equiv="refresh"'
 CONTEXT = Context()
+PAGE = runpy.run_path(str(Path(__file__).with_name("html_page.py")))["Page"]
 
 
 def rows(value, found):
@@ -53,7 +56,7 @@ def drawn(monkeypatch):
 
 def text(report):
     html = report.page.read_text(encoding="utf-8")
-    assert html.rstrip().endswith("</html>")
+    PAGE(html)  # whole and valid at any time
     return html
 
 
@@ -64,6 +67,13 @@ def test_page_is_there_before_anything_is_computed(drawn, tmp_path):
         assert RELOAD in html
         assert "0 of 2 sections" in html
         assert re.findall("Still to come:</b> (.*).</p>", html) == ["the first", "the second"]
+
+
+def test_the_first_line_says_where_the_page_is(drawn, monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr(sections, "SECTIONS", (ONE,))
+    drawn(drawing(ONE))
+    assert main(["reproduce", "--out", str(tmp_path)]) == 0
+    assert capsys.readouterr().out.splitlines()[0] == f"The page is {tmp_path / 'index.html'}"
 
 
 def test_every_section_is_on_the_page_before_the_next_is_drawn(drawn, tmp_path):

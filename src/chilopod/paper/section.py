@@ -129,4 +129,6 @@ class _Seen(Found):
     """Insists that what is used was said to be needed."""
 
     def __getitem__(self, section: Section[T]) -> T | None:
-        return self.values[section]
+        if section not in self.values:
+            raise KeyError(f"{section.name} is not among the sections that are needed")
+        return super().__getitem__(section)
