@@ -4,6 +4,7 @@ import json
 import re
 import runpy
 import shutil
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from chilopod.paper.table import Row
 from chilopod.report import Report, write_report
 from chilopod.report.figures import drawings
 from chilopod.report.kit.drawing import Drawing
+from chilopod.report.kit.page import Film
 from chilopod.report.kit.panel import Panel
 
 RELOAD = '<meta http-equiv="refresh"'
@@ -98,6 +100,32 @@ def test_what_is_shown_beside_others_is_drawn_once_more(drawn, tmp_path):
     assert seen == [None, 2]
     write_report(Found(values={ONE: 1, TWO: 2}), tmp_path)
     assert seen == [None, 2, 2]
+
+
+def test_films_wait_while_there_is_anything_else_to_draw(drawn, monkeypatch, tmp_path):
+    seen, added = [], threading.Event()
+
+    def film(movie, folder):
+        seen.append(movie)
+        assert re.findall("Still to come:</b> (.*).</p>", text(report)) == ["the first"]
+        return Film(movie, "A walk", 1.0, False)
+
+    def panels(value, found):
+        added.wait(60.0)
+        return [panel("one")]
+
+    monkeypatch.setattr("chilopod.report.filling.write_movie", film)
+    drawn(
+        Drawing(ONE, panels, films=lambda value: ["film"], beside=(TWO,)),
+        Drawing(TWO, lambda value, found: seen.append("two") or ()),
+    )
+    with Report([ONE, TWO], CONTEXT, tmp_path) as report:
+        reproduce([ONE, TWO], CONTEXT, told=lambda found, section: report.add(found, [section]))
+        added.set()
+    assert not report.failures
+    assert seen == ["two", "film"]
+    assert 'href="movies/film.html"' in text(report)
+    assert '<section id="one"' in text(report)
 
 
 @pytest.mark.parametrize("what", ["computed", "drawn"])

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -12,6 +14,7 @@ from typing import Any, TypeVar
 
 from chilopod.errors import OutputError
 from chilopod.output import prepare_folder, write_atomic
+from chilopod.paper.movies import Movie
 from chilopod.paper.section import Context, Found, Section
 from chilopod.paper.sections import Progress
 from chilopod.report.figures import drawings, schematic
@@ -67,7 +70,9 @@ class Report:
         self._found = Found(context)
         self._opening: list[Drawn] = []
         self._shown: dict[Drawing[Any], Shown] = {}
-        self._drawn = 0
+        self._films: deque[tuple[Drawing[Any], Movie]] = deque()
+        self._added = self._drawn = 0
+        self._stopped = False
         self._thread = ThreadPoolExecutor(1, "drawing")
 
     def __enter__(self) -> Report:
@@ -78,7 +83,8 @@ class Report:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._thread.shutdown(cancel_futures=error is not None)
+        self._stopped = error is not None
+        self._thread.shutdown(cancel_futures=self._stopped)
         if error is None:
             self._progress("figures and films", 1.0, "done")
             self._opened.result()
@@ -89,6 +95,7 @@ class Report:
 
     def add(self, found: Found, sections: Collection[Section[Any]]) -> None:
         """Show sections that were computed, or that failed; returns at once."""
+        self._added += 1
         self._thread.submit(self._add, found.copy(), sections)
 
     def _open(self) -> None:
@@ -102,22 +109,37 @@ class Report:
         self.failures |= found.failures
         self._write_if_possible()
         for drawing in drawings.DRAWINGS:
-            changed = drawing.section in sections or any(each in sections for each in drawing.beside)
-            if drawing.section in found.values and changed:
-                try:
-                    self._shown[drawing] = _again(partial(self._draw, drawing, found))
-                except Exception as error:
-                    self.failures[drawing.section] = error
+            new = drawing.section in sections
+            if drawing.section in found.values and (new or any(each in sections for each in drawing.beside)):
+                self._try(drawing, partial(self._draw, drawing, found, new))
+        self._drawn += 1
         self._write_if_possible()
-        self._drawn += len(sections)
-        self._progress("figures and films", self._drawn / (len(self._sections) + 1), "")
+        self._progress("figures and films", len(found.seconds) / (len(self._sections) + 1), "")
+        # Films take long, and wait while there is anything else to draw.
+        while self._films and self._added == self._drawn and not self._stopped:
+            drawing, movie = self._films[0]
+            self._try(drawing, partial(self._film, drawing, movie))
+            self._films.popleft()
+            self._write_if_possible()
 
-    def _draw(self, drawing: Drawing[Any], found: Found) -> Shown:
+    def _try(self, drawing: Drawing[Any], draw: Callable[[], Shown]) -> None:
+        try:
+            self._shown[drawing] = _again(draw)
+        except Exception as error:
+            self.failures[drawing.section] = error
+
+    def _draw(self, drawing: Drawing[Any], found: Found, new: bool) -> Shown:
         value = found[drawing.section]
         panels = drawing.panels(value, found.seen_by(drawing.beside))
         figures = tuple(self._draw_panel(panel) for panel in panels)
-        films = tuple(write_movie(movie, self.page.parent / "movies") for movie in drawing.films(value))
-        return Shown(drawing.section, figures, films)
+        if not new and drawing in self._shown:
+            return replace(self._shown[drawing], figures=figures)
+        self._films += ((drawing, movie) for movie in drawing.films(value))
+        return Shown(drawing.section, figures, ())
+
+    def _film(self, drawing: Drawing[Any], movie: Movie) -> Shown:
+        film, shown = write_movie(movie, self.page.parent / "movies"), self._shown[drawing]
+        return replace(shown, films=(*shown.films, film))
 
     def _draw_panel(self, panel: Panel) -> Drawn:
         folder = self.page.parent
@@ -137,7 +159,9 @@ class Report:
         write_atomic(data / "robot-3d.toml", context.whole.to_toml())
         name = context.robot.name if _is_preset(context.robot) else str(robot_file)
         shown = [self._shown[each] for each in drawings.DRAWINGS if each in self._shown]
-        html = page(self._found, self._sections, self._opening, shown, self.failures, name, state)
+        waiting = [section for section in self._sections if section not in self._found.seconds]
+        waiting += [drawing.section for drawing, _ in self._films]
+        html = page(self._found, self._sections, self._opening, shown, self.failures, waiting, name, state)
         write_atomic(self.page, html)
 
 

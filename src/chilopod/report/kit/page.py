@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from importlib.metadata import version
@@ -100,6 +100,7 @@ def page(
     opening: Sequence[Drawn],
     shown: Sequence[Shown],
     failures: Mapping[Section[Any], Exception],
+    waiting: Collection[Section[Any]],
     robot_file: str,
     state: State = State.DONE,
 ) -> str:
@@ -118,6 +119,8 @@ def page(
         order of their letters.
     failures
         Why sections could not be computed or drawn.
+    waiting
+        Sections that are still to be computed or drawn.
     robot_file
         What to type for this robot on the command line: a preset, or the path of a file.
     state
@@ -136,7 +139,7 @@ def page(
         summary=summary(found),
         tables=_tables(found),
         robot_rows=[_robot_row(row) for row in found.lines(RobotRow)],
-        chapters=_chapters(found, sections, opening, shown, failures),
+        chapters=_chapters(sections, opening, shown, failures, waiting),
         commands=commands(robot_file, found[MODE]),
         robots=_robots(found),
         versions=listing(
@@ -251,11 +254,11 @@ def _tables(found: Found) -> list[dict[str, Any]]:
 
 
 def _chapters(
-    found: Found,
     sections: Sequence[Section[Any]],
     opening: Sequence[Drawn],
     shown: Sequence[Shown],
     failures: Mapping[Section[Any], Exception],
+    waiting: Collection[Section[Any]],
 ) -> list[dict[str, Any]]:
     chapters: list[dict[str, Any]] = []
     for number, title in enumerate(dict.fromkeys(section.chapter for section in sections), 1):
@@ -268,7 +271,7 @@ def _chapters(
                 "anchor": f"chapter-{number}",
                 "figures": [_figure(drawn) for drawn in sorted(figures, key=lambda drawn: drawn.panel.letter)],
                 "films": [film for each in here for film in each.films],
-                "coming": [each.sentence for each in planned if each not in found.seconds],
+                "coming": [each.sentence for each in planned if each in waiting],
                 "failed": {each.sentence: in_words(failures[each]) for each in planned if each in failures},
             }
         )
