@@ -76,6 +76,8 @@ def test_page_stands_on_its_own(folder, html):
         elif not address.startswith("data:"):
             assert (folder / address).is_file()
     assert "@import" not in html
+    assert "Still to come" not in html
+    assert "refresh" not in html
     assert "url(" not in html
     assert "<script" not in html
 

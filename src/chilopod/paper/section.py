@@ -99,6 +99,10 @@ class Found:
     def __getitem__(self, section: Section[T]) -> T | None:
         return self.values.get(section)
 
+    def __contains__(self, section: Section[Any]) -> bool:
+        """Whether it was computed, or failed."""
+        return section in self.values or section in self.failures
+
     def add(self, section: Section[T], value: T) -> None:
         """Keep a result, and make its lines of the tables."""
         rows = section.rows(value, self.seen_by(section.needs))

@@ -114,7 +114,7 @@ class Report:
                 self._try(drawing, partial(self._draw, drawing, found, new))
         self._drawn += 1
         self._write_if_possible()
-        self._progress("figures and films", len(found.seconds) / (len(self._sections) + 1), "")
+        self._progress("figures and films", self._drawn / (len(self._sections) + 1), "")
         # Films take long, and wait while there is anything else to draw.
         while self._films and self._added == self._drawn and not self._stopped:
             drawing, movie = self._films[0]
@@ -159,7 +159,7 @@ class Report:
         write_atomic(data / "robot-3d.toml", context.whole.to_toml())
         name = context.robot.name if _is_preset(context.robot) else str(robot_file)
         shown = [self._shown[each] for each in drawings.DRAWINGS if each in self._shown]
-        waiting = [section for section in self._sections if section not in self._found.seconds]
+        waiting = [section for section in self._sections if section not in self._found]
         waiting += [drawing.section for drawing, _ in self._films]
         html = page(self._found, self._sections, self._opening, shown, self.failures, waiting, name, state)
         write_atomic(self.page, html)
@@ -178,7 +178,7 @@ def write_report(found: Found, folder: str | Path) -> Path:
     OutputError
         If the folder cannot be written.
     """
-    sections = list(found.seconds | found.values)
+    sections = [*found.values, *found.failures]
     with Report(sections, found.context, folder) as report:
         report.add(found, sections)
     for section, error in report.failures.items():

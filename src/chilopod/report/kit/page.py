@@ -134,7 +134,7 @@ def page(
         css=Markup(folder.joinpath("page.css").read_text(encoding="utf-8")),
         state=state.value,
         reload=_RELOAD,
-        done=len(found.seconds),
+        done=sum(section in found for section in sections),
         count=len(sections),
         summary=summary(found),
         tables=_tables(found),
