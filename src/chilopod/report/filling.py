@@ -87,8 +87,8 @@ class Report:
         self._thread.shutdown(cancel_futures=self._stopped)
         if error is None:
             self._progress("figures and films", 1.0, "done")
-            self._opened.result()
             self._write(State.DONE)
+            self._opened.result()
         else:
             with suppress(OutputError):
                 self._write(State.STOPPED)
