@@ -3,14 +3,14 @@
 import json
 
 from chilopod.cli import main
-from chilopod.studies.reproduce import SECTIONS
+from chilopod.paper.sections import SECTIONS
 
 
 def test_the_help_lists_the_sections(capsys):
     assert main(["reproduce", "--help"]) == 0
     words = capsys.readouterr().out
     listed = words[words.index("repeated:") + len("repeated:") : words.index("--out")]
-    assert "".join(listed.split()).rstrip(".").split(",") == list(SECTIONS)
+    assert "".join(listed.split()).rstrip(".").split(",") == [section.name for section in SECTIONS]
 
 
 def test_another_robot_is_refused_in_one_line(capsys):

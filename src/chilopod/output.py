@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+import threading
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,6 +13,8 @@ from chilopod.errors import OutputError
 
 if TYPE_CHECKING:
     import xarray as xr
+
+_ASKING = threading.Lock()  # asking for the umask sets it for a moment, and threads write beside each other
 
 
 def write_atomic(
@@ -144,6 +147,7 @@ def _refused(path: Path, error: OSError | ValueError) -> OutputError:
 
 
 def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
+    with _ASKING:
+        mask = os.umask(0)
+        os.umask(mask)
     return mask

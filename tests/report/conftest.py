@@ -8,23 +8,29 @@ import pytest
 import xarray as xr
 
 from chilopod import load_robot
-from chilopod.studies import Results, Row, reproduce
-from chilopod.studies.movies import Movie
+from chilopod.paper.movies import Movie
+from chilopod.paper.section import Context, Found
+from chilopod.paper.sections import chosen, reproduce
+from chilopod.paper.straight.sections import EXPONENTS, IDENTIFICATION, MODE, MODULES
+from chilopod.paper.table import Row
+from chilopod.paper.turning.sections import MOVIES
 from chilopod.tasks.identify import Identification
 
 WALK = runpy.run_path(str(Path(__file__).with_name("walks.py")))["walk"]
 
 
 @pytest.fixture(scope="session")
-def results() -> Results:
-    found = reproduce(load_robot("aoi2022-planar"), only=["mode", "variants", "uniform"], quick=True)
-    found.rows["mode"].append(Row("a <b> & c", "1 N*mm/deg", "-2e-10 N*mm/deg", "nowhere", "differs", "for <script>"))
+def results() -> Found:
+    found = reproduce(chosen(["mode", "variants", "uniform"]), Context(quick=True))
+    assert not found.failures
+    odd = Row("a <b> & c", "1 N*mm/deg", "-2e-10 N*mm/deg", "nowhere", "differs", "for <script>")
+    found.rows[MODE] = [*found.rows[MODE], odd]
     # What a sweep and a count of modules look like, without computing them.
     k1 = np.geomspace(75.0, 2.0, 40)
     square = np.log(13.0 / k1) * 0.02
     root = np.sqrt(square.astype(complex))
     values = np.stack([-0.08 + root, -0.08 - root, -60.0 + 0.0 * root], axis=-1)
-    found.datasets["exponents"] = xr.Dataset(
+    found.values[EXPONENTS] = xr.Dataset(
         {
             "real": (("k1", "exponent"), values.real, {"units": "1/s"}),
             "imaginary": (("k1", "exponent"), values.imag, {"units": "rad/s"}),
@@ -33,7 +39,7 @@ def results() -> Results:
         coords={"k1": ("k1", k1, {"units": "N*mm/deg"})},
         attrs={"robot": "aoi2022-planar"},
     )
-    found.datasets["modules"] = xr.Dataset(
+    found.values[MODULES] = xr.Dataset(
         {
             "critical_k1": (("modules",), np.array([10.0, np.nan, 12.0, 12.1, 12.2]), {"units": "N*mm/deg"}),
             "error_bound": (("modules",), np.full(5, 1e-10), {"units": "N*mm/deg"}),
@@ -69,12 +75,8 @@ def fit() -> Identification:
 
 
 @pytest.fixture(scope="session")
-def full(results, fit) -> Results:
-    return Results(
-        results.robot,
-        {**results.datasets, "identification": fit.profile},
-        fit,
-        movies=[Movie("movie-1", "Two walks", ("left", "right"), WALK(0.5, -0.5, duration=1.0), 2.0)],
-        rows=results.rows,
-        seconds={**results.seconds},
-    )
+def full(results, fit) -> Found:
+    found = results.copy()
+    found.values[IDENTIFICATION] = fit
+    found.values[MOVIES] = [Movie("movie-1", "Two walks", ("left", "right"), WALK(0.5, -0.5, duration=1.0), 2.0)]
+    return found

@@ -3,7 +3,8 @@
 import base64
 import csv
 import re
-from html.parser import HTMLParser
+import runpy
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -12,45 +13,26 @@ import xarray as xr
 
 from chilopod import load_robot
 from chilopod.errors import OutputError
+from chilopod.paper.robot.sections import WALKS
+from chilopod.paper.section import Context, Found
+from chilopod.paper.straight.sections import IDENTIFICATION, MODE
+from chilopod.paper.table import RobotRow, Row
 from chilopod.report import write_identification, write_report
-from chilopod.report.page import summary
-from chilopod.report.write import panels
-from chilopod.studies import Results, Row
-from chilopod.studies.robot_table import RobotRow
+from chilopod.report.figures import schematic
+from chilopod.report.figures.drawings import DRAWINGS
+from chilopod.report.kit.page import summary
 
-VOID = {"meta", "link", "img", "source", "br", "hr", "input"}
-
-
-class Page(HTMLParser):
-    """Reads a page, insists that tags close in order, and keeps what the tests ask about."""
-
-    def __init__(self, html: str) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.tags: list[tuple[str, dict[str, str]]] = []
-        self.text = ""
-        self.feed(html)
-        self.close()
-        assert self.open == []
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.append((tag, {key: value or "" for key, value in attrs}))
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        if "style" not in self.open:
-            self.text += data
-
-    def attributes(self, name: str) -> list[str]:
-        return [attrs[name] for _, attrs in self.tags if name in attrs]
+Page = runpy.run_path(str(Path(__file__).with_name("html_page.py")))["Page"]
 
 
-def figures(results):
-    return [panel for of_chapter in panels(results).values() for panel in of_chapter]
+def figures(found):
+    drawn = [each for each in DRAWINGS if each.section in found.values]
+    panels = [panel for each in drawn for panel in each.panels(found[each.section], found)]
+    return sorted([schematic.panel(found.context.robot), *panels], key=lambda panel: panel.letter)
+
+
+def only(found, section, context=None):
+    return Found(context or found.context, {section: found[section]})
 
 
 @pytest.fixture(scope="module")
@@ -94,6 +76,8 @@ def test_page_stands_on_its_own(folder, html):
         elif not address.startswith("data:"):
             assert (folder / address).is_file()
     assert "@import" not in html
+    assert "Still to come" not in html
+    assert "refresh" not in html
     assert "url(" not in html
     assert "<script" not in html
 
@@ -115,11 +99,11 @@ def test_page_says_what_was_found(html, full):
     text = " ".join(Page(html).text.split())
     assert "12.001 N·mm/deg" in text
     assert "6.5756 N·mm/deg" in text
-    for name, seconds in full.seconds.items():
-        assert f"{seconds:.1f}" in text, name
-    for path in full.robot.parameters():
+    for section, seconds in full.seconds.items():
+        assert f"{section.sentence} {seconds:.1f}" in text
+    for path in full.context.robot.parameters():
         assert path in text
-        assert full.robot.provenance_of(path) in text
+        assert full.context.robot.provenance_of(path) in text
     assert "a <b> & c" in text
     assert "−2×10⁻¹⁰ N·mm/deg" in text
     assert "chilopod bifurcation aoi2022-planar" in text
@@ -130,7 +114,7 @@ def test_page_says_what_was_found(html, full):
 
 
 def test_verdict_that_rounding_leaves_open_is_named(fit):
-    (panel,) = [each for each in figures(Results(fit.best, {"identification": fit.profile}, fit)) if each.letter == "G"]
+    (panel,) = [each for each in figures(Found(values={IDENTIFICATION: fit})) if each.letter == "G"]
     words = " ".join(panel.text)
     assert "changes within the valley" in words
     assert "near a forward offset of 46.6 mm" in words
@@ -161,9 +145,9 @@ def test_data_read_back(folder, full, name):
 
 
 def test_only_what_was_asked_for(results, tmp_path):
-    robot = results.robot.set_from_text(["gait.swing=0.3 s"])
+    robot = results.context.robot.set_from_text(["gait.swing=0.3 s"])
     folder = tmp_path / "a b"
-    page = Page(write_report(Results(robot, {"mode": results.datasets["mode"]}), folder).read_text(encoding="utf-8"))
+    page = Page(write_report(only(results, MODE, Context(robot)), folder).read_text(encoding="utf-8"))
     assert {path.stem for path in (folder / "figures").iterdir()} == {"schematic", "mode"}
     assert [attrs["id"] for tag, attrs in page.tags if tag == "section"] == [
         "chapter-1",
@@ -178,9 +162,9 @@ def test_only_what_was_asked_for(results, tmp_path):
 
 
 def test_same_results_same_bytes(folder, full, tmp_path):
-    write_report(Results(full.robot, {"mode": full.datasets["mode"]}, full.identification), tmp_path)
+    write_report(Found(full.context, {each: full[each] for each in (MODE, IDENTIFICATION)}), tmp_path)
     written = [path for path in tmp_path.rglob("*.*") if path.name != "index.html"]
-    assert len(written) == 9
+    assert len(written) == 14
     for path in written:
         assert (folder / path.relative_to(tmp_path)).read_bytes() == path.read_bytes(), path.name
 
@@ -204,24 +188,23 @@ def test_what_scatter_leaves_open_has_its_own_mark_and_is_counted(results, tmp_p
     verdicts = ("within", "within", "outside", "undecided")
     rows = [*(row("predicted", each) for each in verdicts), row("fitted", "undecided"), row("checked", "within")]
     planar = [Row(each, "1", "2", "here", each) for each in ("agrees", "differs", "undecided", "not printed")]
-    found = Results(results.robot, whole=load_robot("aoi2022"), rows={"mode": planar}, robot_rows={"robot-walks": rows})
+    found = Found(rows={MODE: planar, WALKS: rows})
     page = Page(write_report(found, tmp_path).read_text(encoding="utf-8"))
     text = " ".join(page.text.split())
     assert "meets 2 of 4 further statements about the robot that it was not fitted to; 1 more is left open" in text
     assert "Of 3 statements of the paper compared with the planar model, 1 agree, 1 are left open" in text
     assert text.count("? undecided") == 3
     assert [tag for tag, attrs in page.tags if attrs.get("class") == "verdict undecided"] == ["span"] * 3
-    alone = summary(Results(results.robot, rows={"mode": planar[2:3]}))
+    alone = summary(Found(rows={MODE: planar[2:3]}))
     assert alone.endswith("planar model, 0 agree and 1 are left open by the scatter of the trials.")
 
 
 def test_the_robot_has_a_table_and_its_numbers(results, tmp_path):
-    whole = load_robot("aoi2022")
     row = RobotRow("where <it> bends", "34 N*mm/deg", "33.2 N*mm/deg (-2 %)", "", "predicted", "outside", "10 %")
-    found = Results(results.robot, whole=whole, robot_rows={"robot-walks": [row]})
+    found = Found(rows={WALKS: [row]})
     page = Page(write_report(found, tmp_path).read_text(encoding="utf-8"))
     assert "robot-table" in [attrs.get("id") for tag, attrs in page.tags if tag == "section"]
     assert "33.2 N·mm/deg (−2 %)" in page.text.replace("\u00a0", " ")
     assert "meets 0 of 1 further statements about the robot that it was not fitted to." in page.text
     assert "twin.clearance" in page.text
-    assert load_robot(tmp_path / "data" / "robot-3d.toml") == whole
+    assert load_robot(tmp_path / "data" / "robot-3d.toml") == found.context.whole

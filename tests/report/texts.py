@@ -3,7 +3,7 @@
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
-from chilopod.report import style
+from chilopod.report.kit import style
 
 
 def painted(figure, monkeypatch) -> list[Text]:

@@ -6,8 +6,8 @@ import pytest
 
 from chilopod import load_robot
 from chilopod.errors import ParameterError
+from chilopod.paper.straight.study import with_modules
 from chilopod.planar import PlanarModel
-from chilopod.studies.floquet import with_modules
 from chilopod.twin import TwinModel
 from chilopod.twin.legs import joint_angles, tip_place
 

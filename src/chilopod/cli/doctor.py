@@ -176,7 +176,7 @@ def _drawing() -> list[Finding]:
 
 def _encoder() -> list[Finding]:
     def encoder() -> Finding:
-        from chilopod.report.movie import has_encoder
+        from chilopod.report.scene.film import has_encoder
 
         if not has_encoder():
             return Finding("mp4 encoder", "PyAV has no H.264; all but mp4 films works", _again("av"))
@@ -190,7 +190,7 @@ def _fonts() -> list[Finding]:
         import matplotlib as mpl
         from matplotlib.font_manager import FontProperties, findfont
 
-        from chilopod.report.style import house_style
+        from chilopod.report.kit.style import house_style
 
         with house_style():
             families = list(mpl.rcParams["font.family"])

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import traceback
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -23,11 +24,14 @@ from chilopod.cli.options import (
 from chilopod.cli.progress import progress_bar
 
 _SECTIONS = (
-    *("mode", "exponents", "variants", "modules", "uniform", "identification", "branch", "curved", "undulation"),
-    *("turning", "movies", "robot-walks", "robot-turning", "robot-spread", "robot-numerics", "robot-structures"),
-    *("robot-why", "robot-movies"),
+    *("mode", "exponents", "variants", "modules", "uniform", "branch", "curved", "undulation", "turning", "movies"),
+    *("robot-walks", "robot-turning", "robot-movies", "identification", "robot-spread", "robot-numerics"),
+    *("robot-structures", "robot-why"),
 )
 """For the help, which loads nothing heavy; a test holds them to what there is."""
+
+if TYPE_CHECKING:
+    from chilopod.paper.table import RobotRow, Row
 
 PRESET, WHOLE = "aoi2022-planar", "aoi2022"
 
@@ -41,6 +45,7 @@ def _group(ctx: typer.Context) -> None:
 
 
 def reproduce(
+    ctx: typer.Context,
     only: Annotated[
         list[str] | None,
         typer.Option(
@@ -54,14 +59,17 @@ def reproduce(
         Path, typer.Option("--out", metavar="FOLDER", help="Where the report goes; one that is there is gone on with.")
     ] = Path("report"),
     quick: Annotated[bool, typer.Option("--quick", help="Coarser sweeps, fewer trials.")] = False,
+    paper: Annotated[
+        bool, typer.Option("--paper", help="The paper's own experiments, not what goes beyond them.")
+    ] = False,
     cluster: ClusterOption = None,
     as_json: JsonOption = False,
     overrides: Annotated[list[str] | None, typer.Option("--set", hidden=True)] = None,
 ) -> None:
     """Repeat the paper with its planar model and with its robot in 3-D, and write a report beside its own numbers.
 
-    Trials are kept in the folder, so a run that was stopped goes on where it was. It takes no robot and no --set: the
-    numbers beside which it puts its own are those of the paper's robot.
+    The page is there at once and fills in. Trials are kept in the folder, so a run that was stopped goes on where it
+    was. It takes no robot and no --set: the numbers beside which it puts its own are those of the paper's robot.
     """
     if overrides:
         from chilopod.errors import ParameterError
@@ -71,37 +79,49 @@ def reproduce(
             value=overrides[0],
             allowed="no --set; stability, bifurcation, branch, walk and turn take any robot",
         )
+    from chilopod.paper.sections import chosen
+
+    sections = chosen(only, quick, paper)  # refuses an unknown section
+    from chilopod.errors import in_words
     from chilopod.output import prepare_folder
-    from chilopod.studies.reproduce import SECTIONS, chosen
+    from chilopod.paper import sections as computed
+    from chilopod.paper.section import Context
+    from chilopod.paper.table import RobotRow, Row
+    from chilopod.report import Report
 
-    chosen(only)  # refuses an unknown section
-    folder = prepare_folder(out)
-    from chilopod import studies
-    from chilopod.report import write_report
-
-    with walking_on(cluster), progress_bar() as show:
-        results = studies.reproduce(
-            read_robot(PRESET, None),
-            only,
-            quick,
-            prepare_folder(folder / "trials"),
-            lambda section, done, words: show(SECTIONS[section], done, words),
-            whole=read_robot(WHOLE, None),
-        )
-        show("figures and report", 0.0, "")
-        page = write_report(results, folder)
-        show("figures and report", 1.0, "done")
-    rows = [row.as_json() for row in results.all_rows]
+    context = Context(read_robot(PRESET, None), read_robot(WHOLE, None), quick, prepare_folder(out / "trials"))
+    with walking_on(cluster), progress_bar() as show, Report(sections, context, out, show) as report:
+        typer.echo(f"The page is {report.page.resolve()}", err=as_json)
+        found = computed.reproduce(sections, context, show, lambda found, section: report.add(found, [section]))
+    rows, robot_rows = found.lines(Row), found.lines(RobotRow)
     if as_json:
-        robot_rows = [row.as_json() for row in results.all_robot_rows]
-        robots = {"robot": results.robot.name, "whole_robot": WHOLE}
-        print_json({**robots, "report": str(page), "rows": rows, "robot_rows": robot_rows, "seconds": results.seconds})
-        return
-    for row in results.all_rows:
+        print_json(
+            {
+                "robot": context.robot.name,
+                "whole_robot": context.whole.name,
+                "report": str(report.page),
+                "rows": [row.as_json() for row in rows],
+                "robot_rows": [row.as_json() for row in robot_rows],
+                "seconds": {section.name: value for section, value in found.seconds.items()},
+                "failures": {section.name: in_words(error) for section, error in report.failures.items()},
+            }
+        )
+    else:
+        _print(rows, robot_rows, report.page)
+    for section, error in report.failures.items():
+        typer.echo(f"failed: {section.sentence}: {in_words(error)}", err=True)
+        if ctx.find_root().params.get("debug"):
+            traceback.print_exception(error)
+    if report.failures:
+        raise typer.Exit(1)
+
+
+def _print(rows: list[Row], robot_rows: list[RobotRow], page: Path) -> None:
+    for row in rows:
         typer.echo(f"{row.verdict:<12} {row.quantity}")
         typer.echo(f"{'':<12}   paper: {row.paper}")
         typer.echo(f"{'':<12}   here:  {row.computed}")
-    for line in results.all_robot_rows:
+    for line in robot_rows:
         typer.echo(f"{line.verdict:<12} {line.quantity} ({line.kind})")
         typer.echo(f"{'':<12}   robot:  {line.robot}")
         typer.echo(f"{'':<12}   twin:   {line.twin}")
@@ -135,8 +155,8 @@ def planar(
     from chilopod.output import write_atomic
 
     described = read_robot(robot, overrides)
+    from chilopod.paper.fit_data import critical_mode_data, variant_settings
     from chilopod.report import files_of_identification, write_identification
-    from chilopod.studies.fit_data import critical_mode_data, variant_settings
     from chilopod.tasks.identify import identify_planar
 
     free([*files_of_identification(out), out / "identification.json", out / "identified.toml"], force)
@@ -186,7 +206,7 @@ def twin(
 
     described = read_robot(robot, overrides)
     free([out / "identification.json", out / "identified.toml"], force)
-    from chilopod.studies.fit_data import base_series_data
+    from chilopod.paper.fit_data import base_series_data
     from chilopod.tasks.identify import identify_twin
 
     with progress_bar() as show:

@@ -89,7 +89,7 @@ def turn(
     spring = k1 if k1 in ("auto", "law") else units.parse(k1, "N*m/rad")
     seconds = None if duration is None else units.parse(duration, "s")
     if out:
-        from chilopod.report.turn import files_of_turn
+        from chilopod.report.figures.turn import files_of_turn
 
         free(files_of_turn(out), force)
     from chilopod.tasks import turn as walk_there
@@ -109,7 +109,7 @@ def turn(
             progress=lambda part, words: show("turn", part, words),
         )
     if out:
-        from chilopod.report.turn import write_turn
+        from chilopod.report.figures.turn import write_turn
 
         wrote(write_turn(done, out))
     if as_json:

@@ -1,15 +1,16 @@
-"""The report: draws what the studies found, computes nothing."""
+"""The report: draws what the paper's sections found, computes nothing."""
 
+from chilopod.report.filling import Report, write_report
 from chilopod.report.write import (
     files_of_branch,
     files_of_identification,
     write_branch,
     write_identification,
-    write_report,
     write_undulation,
 )
 
 __all__ = [
+    "Report",
     "files_of_branch",
     "files_of_identification",
     "write_branch",

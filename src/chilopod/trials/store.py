@@ -8,6 +8,7 @@ import os
 import stat
 import zlib
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import xarray as xr
@@ -104,11 +105,14 @@ class Store:
         content = encode(record, {_CHECKSUM: _BLANK})
         at = content.index(_BEFORE) + len(_BEFORE)
         content[at : at + len(_BLANK)] = f"{zlib.crc32(content):08x}".encode()
+        # Whoever deletes the folder while trials walk loses what was in it, not the walks to come.
+        self.folder.mkdir(parents=True, exist_ok=True)
         write_atomic(self.folder / trial.file_name, content, durable=True)
 
     def sync(self) -> None:
         """Make sure that what has been written is there even after a power failure."""
-        sync_folder(self.folder)
+        with suppress(FileNotFoundError):  # somebody deleted it
+            sync_folder(self.folder)
 
     def _move_aside(self, path: Path, why: str) -> None:
         aside = path.with_name(f"{path.name}.aside")

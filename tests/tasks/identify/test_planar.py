@@ -5,8 +5,8 @@ import pytest
 import xarray as xr
 
 from chilopod.errors import AnalysisError
+from chilopod.paper.fit_data import critical_mode_data, variant_settings
 from chilopod.robot import load_robot
-from chilopod.studies.fit_data import critical_mode_data, variant_settings
 from chilopod.tasks.identify import identify_planar, planar
 
 ROBOT = load_robot("aoi2022-planar")

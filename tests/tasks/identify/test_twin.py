@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from chilopod import load_robot
-from chilopod.studies.fit_data import base_series_data
+from chilopod.paper.fit_data import base_series_data
 from chilopod.tasks.identify import BaseSeries, twin, twin_series
 from chilopod.tasks.identify.twin import Fit, TwinIdentification, known, refined, search, unlike
 from chilopod.tasks.identify.twin_constants import FREE, constants_of, parts_of, values_at, with_constants

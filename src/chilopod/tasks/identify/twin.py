@@ -30,7 +30,7 @@ from chilopod import units
 from chilopod.analysis.parameters import K1, stiffness
 from chilopod.errors import ChilopodError
 from chilopod.output import prepare_folder, write_atomic
-from chilopod.progress import Progress, silent
+from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.tasks.identify.data import BaseSeries
 from chilopod.tasks.identify.known_fits import known_fits
@@ -371,9 +371,9 @@ def identify_twin(
     """
     kept = None if folder is None else prepare_folder(folder)
     fits = [] if fresh else [evaluate(robot, fit.constants, data, kept) for fit in known()]
-    fits += search(robot, data, starts, generations, seed, folder, lambda done, words: progress(0.85 * done, words))
+    fits += search(robot, data, starts, generations, seed, folder, part(progress, 0.0, 0.85))
     fits.sort(key=lambda fit: fit.objective)
-    fits += refined(robot, data, fits, kept, lambda done, words: progress(0.85 + 0.1 * done, words))
+    fits += refined(robot, data, fits, kept, part(progress, 0.85, 0.95))
     fits.sort(key=lambda fit: fit.objective)
     progress(0.95, "walks from straight on")
     for index, fit in enumerate(fits[:_MOST_CONFIRMED]):

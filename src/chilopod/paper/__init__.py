@@ -1,0 +1,1 @@
+"""The paper: the numbers it prints, and its experiments repeated; a folder for each chapter of the report."""

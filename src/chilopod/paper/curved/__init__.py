@@ -1,0 +1,1 @@
+"""Curved walks of the planar model, trial by trial and along their branch."""

@@ -1,0 +1,38 @@
+"""Curved walks: the sections of this chapter."""
+
+from __future__ import annotations
+
+import xarray as xr
+
+from chilopod.analysis.branch import curved_walks
+from chilopod.analysis.parameters import K1, stiffness
+from chilopod.analysis.undulation import undulating_walks
+from chilopod.paper.curved.rows import rows
+from chilopod.paper.curved.study import CurvedStudy, curved_study
+from chilopod.paper.section import Section
+
+CHAPTER = "Curved walks"
+
+_SPRINGS = (stiffness(6.0), stiffness(20.0))
+
+BRANCH: Section[xr.Dataset] = Section(
+    "branch",
+    CHAPTER,
+    "the curved walks beyond the pitchfork",
+    lambda context, found, report: curved_walks(context.robot, K1, _SPRINGS, longest=0.05, progress=report),
+)
+CURVED: Section[CurvedStudy] = Section(
+    "curved",
+    CHAPTER,
+    "walks from straight on, trial by trial",
+    lambda context, found, report: curved_study(
+        context.robot, 3 if context.quick else 10, 2 if context.quick else 5, context.folder, report
+    ),
+    lambda study, found: rows(study),
+)
+UNDULATION: Section[xr.Dataset] = Section(
+    "undulation",
+    CHAPTER,
+    "undulating walks of uniform springs",
+    lambda context, found, report: undulating_walks(context.robot, progress=report),
+)

@@ -1,0 +1,272 @@
+"""What the trials of curved walks show: the paper's estimate of the pitchfork beside the point, and its variants.
+
+Fig. "curved", "absolute" and "different" of the paper, with the branch that the trials settle on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from chilopod.analysis.branch import curved_walks
+from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
+from chilopod.analysis.square_root import SquareRootFit, square_root_fit
+from chilopod.paper.curved.trials import (
+    SPRINGS,
+    curved_trials,
+    example_walks,
+    off_branch,
+    on_branch,
+    variant_robots,
+    variant_trials,
+)
+from chilopod.paper.printed import printed
+from chilopod.progress import Progress, part, silent
+from chilopod.robot import Robot
+from chilopod.trials import Disturbance
+
+Array = NDArray[np.float64]
+
+AGREEMENT_SPRINGS = (8.0, 10.0, 11.0)
+"""N*mm/deg, where trials without spread of friction are held against the branch."""
+
+_NARROWEST, _WIDEST = 1e-4, 0.4  # of the critical spring, ranges that the law is fitted over along the branch
+
+
+@dataclass(frozen=True)
+class CurvedStudy:
+    """Everything the trials of curved walks found.
+
+    Attributes
+    ----------
+    trials
+        See :func:`chilopod.paper.curved.trials.curved_trials`.
+    examples
+        See :func:`chilopod.paper.curved.trials.example_walks`.
+    branch
+        The exact curved walks, turning right, see :func:`chilopod.analysis.branch.curved_walks`.
+    fits
+        See :func:`onset_fits`.
+    law
+        See :func:`law_along_branch`.
+    agreement
+        See :func:`chilopod.paper.curved.trials.off_branch`: rad, of trials without spread of friction.
+    variants
+        Trials by variant, "as built" first.
+    branches
+        The branch of every variant.
+    comparison
+        See :func:`compared`.
+    """
+
+    trials: xr.Dataset
+    examples: xr.Dataset
+    branch: xr.Dataset
+    fits: xr.Dataset
+    law: xr.Dataset
+    agreement: xr.DataArray
+    variants: Mapping[str, xr.Dataset]
+    branches: Mapping[str, xr.Dataset]
+    comparison: xr.Dataset
+
+    @property
+    def fit(self) -> SquareRootFit:
+        """The square-root law over all springs, as the paper fits it."""
+        return fitted(self.trials)
+
+
+def curved_study(
+    robot: Robot,
+    repeats: int = 10,
+    variant_repeats: int = 5,
+    folder: str | Path | None = None,
+    progress: Progress = silent,
+) -> CurvedStudy:
+    """Run the trials of the paper's curved walks and compare them with the exact branches.
+
+    Parameters
+    ----------
+    robot
+        The paper's, as the springs of the trials are spread about its critical one.
+    repeats, variant_repeats
+        Trials at every spring, of the robot as built and of each variant; the paper has 10 and 5.
+    folder
+        Where trials are kept.
+    progress
+        Called as the work goes on.
+    """
+
+    trials = curved_trials(robot, SPRINGS, repeats, folder=folder, progress=part(progress, 0.0, 0.3))
+    variants = variant_trials(robot, trials, variant_repeats, folder=folder, progress=part(progress, 0.3, 0.8))
+    progress(0.8, "branches")
+    branches = {name: _branch(variant, variants[name]) for name, variant in variant_robots(robot).items()}
+    progress(0.9, "trials beside the branch")
+    even = Disturbance(friction=0.0)
+    settled = curved_trials(robot, AGREEMENT_SPRINGS, 3, disturbance=even, e_folds=25.0, folder=folder)
+    branch = branches["as built"]
+    study = CurvedStudy(
+        trials=trials,
+        examples=example_walks(robot, folder=folder),
+        branch=branch,
+        fits=onset_fits(trials, branch),
+        law=law_along_branch(branch),
+        agreement=off_branch(robot, settled, branch),
+        variants=variants,
+        branches=branches,
+        comparison=compared(variants, branches),
+    )
+    progress(1.0, "done")
+    return study
+
+
+def bent(trials: xr.Dataset) -> NDArray[np.bool_]:
+    """Which trials settled on a curved walk, shape (spring, repeat)."""
+    return np.isin(trials.direction.values, ("left", "right"))
+
+
+def fitted(trials: xr.Dataset, joint: int = 1) -> SquareRootFit:
+    """The square-root law through the trials that settled on a curved walk."""
+    here = bent(trials)
+    inverse = np.broadcast_to(1.0 / trials.spring.values[:, None], here.shape)
+    return square_root_fit(inverse[here], trials.mean_angle.sel(joint=joint).values[here])
+
+
+def onset_fits(trials: xr.Dataset, branch: xr.Dataset) -> xr.Dataset:
+    """The square-root fit over nested ranges of springs, from the pair nearest the point to all of them.
+
+    Returns
+    -------
+    Dataset over softest (the softest spring fitted, N*mm/deg): ``critical_k1``, its ``error`` and ``bootstrap_error``
+    (see :class:`chilopod.analysis.SquareRootFit`), ``exact_walks``, what the fit gives if every trial is
+    replaced by the exact walk of its spring: the part of being off that no repeating cures, and ``trials``.
+    """
+    curved = trials.isel(spring=bent(trials).any(axis=1))
+    softest, rows = curved.spring.values[:-1][::-1], []
+    for low in softest:
+        part = curved.isel(spring=curved.spring.values >= low)
+        here = bent(part)
+        springs = np.broadcast_to(part.spring.values[:, None], here.shape)[here]
+        exact = [float(on_branch(branch, "mean_angle", float(spring))[0]) for spring in springs]
+        found = fitted(part)
+        without = square_root_fit(1.0 / springs, exact, resampled=0).critical
+        rows.append((found.critical, found.error, found.bootstrap_error, without, found.trials))
+    names = ("critical_k1", "error", "bootstrap_error", "exact_walks")
+    columns = np.array(rows, dtype=np.float64).T
+    return xr.Dataset(
+        {
+            **{name: ("softest", column, {"units": PAPER_UNIT}) for name, column in zip(names, columns, strict=False)},
+            "trials": ("softest", columns[-1].astype(int)),
+        },
+        coords={"softest": ("softest", softest, {"units": PAPER_UNIT})},
+        attrs={"robot": trials.attrs["robot"], "exact_k1": trials.attrs["critical_k1"]},
+    )
+
+
+def law_along_branch(branch: xr.Dataset, count: int = 25) -> xr.Dataset:
+    """How far the square-root law is off by itself: fits to exact walks, evenly spread in 1/k, from the pitchfork to a
+    softest spring.
+
+    Returns
+    -------
+    Dataset over softest (N*mm/deg): ``critical_k1`` as fitted, ``angle`` of joint 1 there (rad), and ``power``, the
+    slope of its logarithm over that of 1/k - 1/kc: one half where the law holds.
+    """
+    exact = float(branch.parameter.values[0])
+    softest = exact * (1.0 - np.geomspace(_NARROWEST, _WIDEST, count))
+    found = []
+    for low in softest:
+        inverse = np.linspace(1.0 / exact, 1.0 / low, 21)[1:]
+        angles = [float(on_branch(branch, "mean_angle", float(1.0 / value))[0]) for value in inverse]
+        found.append((square_root_fit(inverse, angles, resampled=0).critical, angles[-1]))
+    critical, angle = np.array(found).T
+    return xr.Dataset(
+        {
+            "critical_k1": ("softest", critical, {"units": PAPER_UNIT}),
+            "angle": ("softest", angle, {"units": "rad"}),
+            "power": ("softest", np.gradient(np.log(angle), np.log(1.0 / softest - 1.0 / exact)), {"units": "1"}),
+        },
+        coords={"softest": ("softest", softest, {"units": PAPER_UNIT})},
+        attrs={"robot": branch.attrs["robot"], "exact_k1": exact},
+    )
+
+
+def compared(variants: Mapping[str, xr.Dataset], branches: Mapping[str, xr.Dataset]) -> xr.Dataset:
+    """What each of the paper's variants changes (Fig. "different").
+
+    Returns
+    -------
+    Dataset over variant and ratio (of k1 to the variant's own critical one): ``fitted_k1`` with its ``error`` (of the
+    bootstrap), ``exact_k1``, ``robot_k1`` as printed, ``stiffest_k1``, up to which curved walks exist (above
+    ``exact_k1`` where the branch folds back), all in N*mm/deg; ``criticality``; ``radius`` with ``radius_error``, mean
+    and standard error over the trials that settled on a curved walk (m; NaN where there are fewer than two);
+    ``equal_ratio``, the radius over that as built at the same ratio, mean over all ratios, with ``equal_ratio_error``,
+    its standard error from that of the radii; ``equal_spring``, over that
+    at the same k1, along the branches, at ``spring``.
+    """
+    base = branches["as built"]
+    exact = np.array([trials.attrs["critical_k1"] for trials in variants.values()])
+    fits = [fitted(trials) for trials in variants.values()]
+    statistics = np.array([_statistics(trials) for trials in variants.values()])
+    curved = np.isfinite(statistics[:, 0]).all(axis=0)
+    ratios = variants["as built"].spring.values / exact[0]
+    radius = statistics[:, 0]
+    ratio = (radius / radius[0])[:, curved]
+    # Of independent trials; the base is one with itself, which is not asked.
+    off = np.hypot(*((statistics[each, 1] / radius[each])[..., curved] for each in (slice(None), slice(1))))
+    # Every variant walks a curve there: softer than all critical springs, stiffer than where a branch ends.
+    spring = float(0.9 * exact.min())
+    there = np.array([axis_radius(branch, spring) for branch in branches.values()])
+    table = printed()
+    robots = [table["variants"].get(name, table["pitchfork"])["robot_critical_k1"] for name in variants]
+    return xr.Dataset(
+        {
+            "fitted_k1": ("variant", np.array([fit.critical for fit in fits]), {"units": PAPER_UNIT}),
+            "error": ("variant", np.array([fit.bootstrap_error for fit in fits]), {"units": PAPER_UNIT}),
+            "exact_k1": ("variant", exact, {"units": PAPER_UNIT}),
+            "robot_k1": ("variant", np.array([float(each.split()[0]) for each in robots]), {"units": PAPER_UNIT}),
+            "stiffest_k1": (
+                "variant",
+                np.array([float(branch.parameter.max()) for branch in branches.values()]),
+                {"units": PAPER_UNIT},
+            ),
+            "criticality": (
+                "variant",
+                np.array([branch.attrs["criticality"] for branch in branches.values()], dtype=object),
+            ),
+            "radius": (("variant", "ratio"), radius, {"units": "m"}),
+            "radius_error": (("variant", "ratio"), statistics[:, 1], {"units": "m"}),
+            "equal_ratio": ("variant", ratio.mean(axis=1), {"units": "1"}),
+            "equal_ratio_error": ("variant", np.linalg.norm(ratio * off, axis=1) / off.shape[1], {"units": "1"}),
+            "equal_spring": ("variant", there / axis_radius(base, spring), {"units": "1"}),
+        },
+        coords={"variant": np.array(list(variants), dtype=object), "ratio": ratios},
+        attrs={"robot": base.attrs["robot"], "spring": spring},
+    )
+
+
+def axis_radius(branch: xr.Dataset, spring: float) -> float:
+    """The paper's radius (N-1) L / sum |theta| of the exact walk at a spring (N*mm/deg), m."""
+    # Along a branch only the bend changes, so that any of its points gives (N-1) L.
+    length = float(branch.axis_radius[-1]) * float(np.abs(branch.mean_angle[-1]).sum())
+    total = float(np.abs(on_branch(branch, "mean_angle", spring)).sum())
+    return length / total if total > 0.0 else float("inf")
+
+
+def _branch(robot: Robot, trials: xr.Dataset) -> xr.Dataset:
+    """The exact curved walks over the springs of the trials; a fold lies a few per cent above the pitchfork at most."""
+    lowest, highest = 0.97 * float(trials.spring.min()), 1.1 * trials.attrs["critical_k1"]
+    return curved_walks(robot, K1, (stiffness(lowest), stiffness(float(highest))))
+
+
+def _statistics(trials: xr.Dataset) -> Array:
+    """Mean and standard error of the radius of curved walks at every spring, shape (2, spring)."""
+    found = np.full((2, trials.sizes["spring"]), np.nan)
+    for index, (radii, here) in enumerate(zip(trials.axis_radius.values, bent(trials), strict=True)):
+        if here.sum() > 1:
+            found[:, index] = radii[here].mean(), radii[here].std(ddof=1) / np.sqrt(here.sum())
+    return found

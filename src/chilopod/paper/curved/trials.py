@@ -1,0 +1,289 @@
+"""Curved walks as the paper's experiments: straight at the start, a small disturbance, and a long walk.
+
+The paper walks its robot at k1 = 15, 17, 21, 28, 41 and 75 N*mm/deg, from 0.44 to 2.2 times the 34 at which it sees
+the curved walk set in. In the planar model that happens at 12.0, and a joint passes a right angle below about 0.55
+times that, so the springs here are spread about 12, denser where the bend grows steeply.
+
+A bend grows from nothing at the rate of the straight walk's leading exponent, 0.06/s at 10 N*mm/deg and a quarter of
+that at 11.5: every trial walks for a number of e-folds of it, and says whether it had settled by then.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+
+from chilopod import stability
+from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
+from chilopod.analysis.straight_walk import pitchfork
+from chilopod.engine import Status
+from chilopod.paper.printed import printed
+from chilopod.planar import PlanarModel
+from chilopod.progress import Progress, silent
+from chilopod.robot import Robot
+from chilopod.stability.returns import whole_period
+from chilopod.trials import AVERAGED, Disturbance, Trial, run
+
+Array = NDArray[np.float64]
+
+SPRINGS = (7.0, 8.0, 9.0, 10.0, 11.0, 11.5, 13.0, 15.0, 41.0)
+"""k1 of the trials, N*mm/deg."""
+
+EXAMPLES = (41.0, 8.0)
+"""k1 of the two walks that are shown over time, N*mm/deg: straight, and about as far below the point as the paper's."""
+
+BEFORE = 30.0
+"""s; the mean over so long before that tells whether they had settled."""
+
+SETTLED = 0.01
+"""Largest change between those two means, relative to the largest joint angle."""
+
+STRAIGHT = float(np.deg2rad(0.1))
+"""Below this mean angle of every joint a walk is called straight."""
+
+_E_FOLDS = 15.0  # growth from half a degree takes some 6, and a bend settles twice as fast as it grew
+_SHORTEST, _LONGEST = 180.0, 1200.0  # s
+_SEEDS = 10_000  # between springs, so that more repeats leave the others as they are
+_ROUNDING = 1e-6  # rad; a walk straighter than this is as straight as it gets
+_SAMPLES = 6  # per period: means are then good to 0.02 deg
+
+
+def curved_trials(
+    robot: Robot,
+    springs: Sequence[float] = SPRINGS,
+    repeats: int = 10,
+    *,
+    disturbance: Disturbance | None = None,
+    e_folds: float = _E_FOLDS,
+    folder: str | Path | None = None,
+    progress: Progress = silent,
+) -> xr.Dataset:
+    """Walks from straight on, several at every spring, and the bend that each ends in.
+
+    Parameters
+    ----------
+    robot
+        The robot; its first spring does not matter.
+    springs
+        Values of k1, N*mm/deg, rising.
+    repeats
+        Trials at each of them, all with seeds of their own.
+    disturbance
+        By default that of all studies.
+    e_folds
+        How long a trial walks, in e-folds of the slowest motion about the straight walk, but 180 s at least and 1200 s
+        at most.
+    folder
+        Where trials are kept, see :func:`chilopod.trials.run`.
+    progress
+        Called as trials are done.
+
+    Returns
+    -------
+    Dataset over spring (N*mm/deg), repeat, joint and state: ``mean_angle`` over the last 5 s (rad; NaN where the walk
+    ended before), ``change`` (rad; largest of any joint against the mean over the 30 s before), ``settled``,
+    ``axis_radius`` (m, the paper's (N-1) L / sum |theta|), ``direction`` (left, right, straight; empty where it had not
+    settled), ``status``, ``duration`` (s) and ``end_state``, the reduced state at the end, a whole number of periods
+    after the start.
+    """
+    disturbance = Disturbance() if disturbance is None else disturbance
+    robots = [robot.with_value(K1, stiffness(float(value))) for value in springs]
+    durations = [_walking_time(each, e_folds) for each in robots]
+    records = run(
+        [
+            Trial(each, duration, _SEEDS * row + repeat, disturbance=disturbance, rate=_SAMPLES / robot.gait.period)
+            for row, (each, duration) in enumerate(zip(robots, durations, strict=True))
+            for repeat in range(repeats)
+        ],
+        folder,
+        progress,
+    )
+    outcomes = [_outcome(record, robot) for record in records]
+    rows = [xr.concat(outcomes[i : i + repeats], "repeat") for i in range(0, len(outcomes), repeats)]
+    data = xr.concat(rows, "spring").assign_coords(
+        spring=("spring", np.asarray(springs, dtype=np.float64), {"units": PAPER_UNIT}), repeat=np.arange(repeats)
+    )
+    data["duration"] = ("spring", np.array(durations), {"units": "s"})
+    data.attrs = {
+        "robot": robot.name,
+        "varied": K1,
+        "critical_k1": pitchfork(robot, normal_form=False).value,
+        "averaged_s": AVERAGED,
+        "about": "walks from straight on, averaged at their end",
+    }
+    return data
+
+
+def example_walks(
+    robot: Robot,
+    springs: Sequence[float] = EXAMPLES,
+    duration: float = 120.0,
+    seed: int = 0,
+    folder: str | Path | None = None,
+) -> xr.Dataset:
+    """Joint angles over time of one walk at each of some springs.
+
+    Returns
+    -------
+    Dataset over (time, spring, joint): ``joint_angle`` (rad).
+    """
+    records = run(
+        [Trial(robot.with_value(K1, stiffness(float(value))), duration, seed, rate=50.0) for value in springs], folder
+    )
+    angles = xr.concat([record.joint_angle.isel(robot=0, drop=True) for record in records], dim="spring")
+    data = angles.transpose("time", "spring", "joint").to_dataset(name="joint_angle")
+    data = data.assign_coords(spring=("spring", np.asarray(springs, dtype=np.float64), {"units": PAPER_UNIT}))
+    data.attrs = {"robot": robot.name, "varied": K1, "about": "yaw joint angles over time"}
+    return data
+
+
+def off_branch(robot: Robot, trials: xr.Dataset, branch: xr.Dataset) -> xr.DataArray:
+    """How far the walks ended from the periodic orbit of the branch at their very spring.
+
+    The orbit is solved anew at every spring, from the branch's points beside it; a left turn is compared with the
+    mirror image of the right one half a period later.
+
+    Parameters
+    ----------
+    robot
+        That of trials and branch.
+    trials
+        From :func:`curved_trials`; without spread of friction, which the branch does not have.
+    branch
+        From :func:`chilopod.analysis.branch.curved_walks` over k1, turning right.
+
+    Returns
+    -------
+    Largest difference of any joint angle, rad, over (spring, repeat); NaN where the walk is straight or not settled.
+    """
+    joints = slice(3, robot.body.modules + 2)
+    off = np.full((trials.sizes["spring"], trials.sizes["repeat"]), np.nan)
+    for row, spring in zip(off, trials.spring.values, strict=True):
+        at = trials.sel(spring=spring)
+        if not np.isin(at.direction.values, ("left", "right")).any():
+            continue
+        model = PlanarModel(robot.with_value(K1, stiffness(float(spring))))
+        guess = on_branch(branch, "orbit", float(spring))
+        orbit = stability.find_orbit(whole_period(model), guess, with_error=False).state
+        mirrored = model.reflection @ model.flow_states(orbit[None], 0.0, 0.5 * model.period)[0]
+        for side, expected in (("right", orbit), ("left", mirrored)):
+            here = at.direction.values == side
+            row[here] = np.abs(at.end_state.values[here] - expected)[:, joints].max(axis=1)
+    return xr.DataArray(
+        off,
+        dims=("spring", "repeat"),
+        coords={"spring": trials.spring, "repeat": trials.repeat},
+        attrs={"units": "rad"},
+    )
+
+
+def on_branch(branch: xr.Dataset, name: str, spring: float) -> Array:
+    """A quantity of the branch at a spring (N*mm/deg) between its points, beyond the stiffest of them.
+
+    That is the pitchfork, or the fold at which a subcritical branch turns back; either way angles change with the root
+    of the distance from it, and from there on the walks are stable until something else happens.
+    """
+    beyond = branch.isel(point=slice(int(branch.parameter.values.argmax()), None))
+    stiffest = float(beyond.parameter.values[0])
+    distance = np.sqrt(stiffest - beyond.parameter.values)
+    values: Array = PchipInterpolator(distance, beyond[name].values)(np.sqrt(max(stiffest - spring, 0.0)))
+    return values
+
+
+def variant_robots(robot: Robot) -> dict[str, Robot]:
+    """The robot as built and with each of the paper's changes."""
+    changed = {name: robot.set_from_text(entry["set"]) for name, entry in printed()["variants"].items()}
+    return {"as built": robot, **changed}
+
+
+def variant_trials(
+    robot: Robot,
+    base: xr.Dataset,
+    repeats: int = 5,
+    *,
+    folder: str | Path | None = None,
+    progress: Progress = silent,
+) -> dict[str, xr.Dataset]:
+    """Trials of the paper's variants at the same springs relative to each one's own pitchfork.
+
+    Parameters
+    ----------
+    robot
+        As built.
+    base
+        Its trials, from :func:`curved_trials`; their springs up to 1.2 times the critical one are used.
+    repeats
+        At every spring; of ``base`` the first so many.
+    folder
+        Where trials are kept.
+    progress
+        Called as trials are done.
+
+    Returns
+    -------
+    By variant, "as built" first, a dataset as :func:`curved_trials` gives.
+    """
+    ratios = base.spring.values / base.attrs["critical_k1"]
+    ratios = ratios[ratios < 1.2]
+    robots = variant_robots(robot)
+    found = {"as built": base.isel(spring=slice(len(ratios)), repeat=slice(repeats))}
+    for name, variant in robots.items():
+        if name in found:
+            continue
+        part = len(found) - 1
+
+        def shown(done: float, words: str, part: int = part, name: str = name) -> None:
+            progress((part + done) / (len(robots) - 1), f"{name}: {words}")
+
+        springs = ratios * pitchfork(variant, normal_form=False).value
+        found[name] = curved_trials(variant, springs.tolist(), repeats, folder=folder, progress=shown)
+    return found
+
+
+def _walking_time(robot: Robot, e_folds: float) -> float:
+    """Seconds, a whole number of periods."""
+    sizes = np.abs(stability.multipliers(PlanarModel(robot)).values)
+    slowest = np.abs(np.log(sizes[sizes > 0.1])).min(initial=np.log(10.0)) / robot.gait.period
+    seconds = np.clip(e_folds / slowest, _SHORTEST, _LONGEST)
+    return float(np.ceil(seconds / robot.gait.period)) * robot.gait.period
+
+
+def _outcome(record: xr.Dataset, robot: Robot) -> xr.Dataset:
+    """What one trial's record comes to."""
+    walk = record.isel(robot=0)
+    angles, times = walk.joint_angle.values, walk.time.values
+    end = times[-1] - AVERAGED
+    last = angles[times > end + 1e-9].mean(axis=0)
+    before = angles[(times <= end + 1e-9) & (times > end - BEFORE + 1e-9)].mean(axis=0)
+    change, bend = float(np.abs(last - before).max()), float(np.abs(last).max())
+    # A straight walk settles for ever; one that only just starts to bend is as straight, but no longer gets straighter.
+    straight = bend < STRAIGHT and bend <= max(np.abs(before).max(), _ROUNDING)
+    settled = walk.status.item() == Status.WALKED.label and (straight or change <= SETTLED * bend)
+    with np.errstate(divide="ignore"):
+        radius = (robot.body.modules - 1) * robot.module_length / np.abs(last).sum()
+    side = "straight" if straight else "right" if last.sum() > 0.0 else "left"
+    return xr.Dataset(
+        {
+            "mean_angle": ("joint", last, {"units": "rad"}),
+            "change": ((), change, {"units": "rad"}),
+            "settled": ((), settled),
+            "axis_radius": ((), radius, {"units": "m"}),
+            "direction": ((), np.array(side if settled else "", dtype=object)),
+            "status": ((), np.array(walk.status.item(), dtype=object)),
+            "end_state": ("state", _reduced(walk.isel(time=-1))),
+        },
+        coords={"joint": walk.joint.values},
+    )
+
+
+def _reduced(moment: xr.Dataset) -> Array:
+    """The reduced state (see :mod:`chilopod.planar.dynamics`) at a moment of a record."""
+    c, s = np.cos(float(moment.heading)), np.sin(float(moment.heading))
+    vx, vy = moment.velocity.values
+    ahead = [c * vx + s * vy, c * vy - s * vx, float(moment.heading_rate)]
+    return np.concatenate([ahead, moment.joint_angle.values, moment.joint_rate.values])

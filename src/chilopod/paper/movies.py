@@ -1,0 +1,130 @@
+"""The walks of the paper's two movies: what the springs do, and three attempts at a turn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from chilopod import units
+from chilopod.analysis.parameters import K1
+from chilopod.progress import Progress, silent
+from chilopod.robot import Robot
+from chilopod.steering import LegYawController, Target
+from chilopod.trials import NONE, Trial, run, together
+
+TASK_A = Target(float(np.deg2rad(45.0)), 1.3)
+
+_WALK = 45.0  # s
+_ROBOT_STILLS = ((2.0, 30.0, 60.0, 88.0), (0.5, 8.0, 16.0, 24.0))  # s
+_ROBOT_WALK = 90.0
+_TASK, _ROBOT_TASK = 24.0, 32.0
+_BEND = tuple(float(angle) for angle in np.deg2rad([20.0, 10.0, 14.0, 12.0, 4.0]))
+
+
+@dataclass(frozen=True)
+class Movie:
+    """A film of walks side by side.
+
+    Attributes
+    ----------
+    name
+        Of its files.
+    heading
+        Above all panels.
+    titles
+        Of the panels.
+    record
+        The walks.
+    speed
+        Seconds of the walks per second of the film.
+    stills
+        Moments of it that are pictured in three dimensions, s; none of a film from above.
+    """
+
+    name: str
+    heading: str
+    titles: tuple[str, ...]
+    record: xr.Dataset
+    speed: float
+    stills: tuple[float, ...] = ()
+
+
+def movies(
+    robot: Robot,
+    springs: tuple[float, float, float],
+    best: float,
+    folder: str | Path | None = None,
+    progress: Progress = silent,
+) -> list[Movie]:
+    """Walk what is filmed.
+
+    Parameters
+    ----------
+    robot
+        The robot.
+    springs
+        First springs of the three walks of movie 1, N*m/rad: one that walks straight, one that curves a little, one
+        that curves a lot. They start bent in the shape of the critical mode, for from straight it would take them
+        minutes to bend.
+    best
+        First spring for task A, N*m/rad; movie 2 shows it between one that is too stiff and one that is too soft.
+    folder
+        Where records are kept.
+    progress
+        Called with the part done (0 to 1) and a few words.
+    """
+
+    joints = robot.body.modules - 1
+    bend = (_BEND + (0.0,) * joints)[:joints]
+    walks = [Trial(robot.with_value(K1, value), _WALK, 0, bend, disturbance=NONE, rate=25.0) for value in springs]
+    tried = (4.0 * best, best, 0.7 * best)
+    records = run([*walks, *_tasks(robot, tried)], folder, progress)
+    return _movies("", (*springs, *tried), records)
+
+
+def robot_movies(
+    robot: Robot,
+    springs: tuple[float, float, float],
+    tried: tuple[float, float, float],
+    folder: str | Path | None = None,
+    progress: Progress = silent,
+) -> list[Movie]:
+    """The same of the whole robot: the walks of movie 1 start straight but for their disturbance, as the paper's do.
+
+    Parameters
+    ----------
+    robot
+        With a twin.
+    springs
+        As for :func:`movies`.
+    tried
+        First springs for task A, N*m/rad: too stiff, best, too soft.
+    folder, progress
+        As for :func:`movies`.
+    """
+    walks = [
+        Trial(robot.with_value(K1, value), _ROBOT_WALK, 1, rate=25.0, engine="twin", poses=True) for value in springs
+    ]
+    tasks = [replace(each, duration=_ROBOT_TASK, engine="twin", poses=True) for each in _tasks(robot, tried)]
+    records = run([*walks, *tasks], folder, progress)
+    first, second = _movies("robot-", (*springs, *tried), records, speed=3.0)
+    return [replace(first, stills=_ROBOT_STILLS[0]), replace(second, stills=_ROBOT_STILLS[1])]
+
+
+def _tasks(robot: Robot, tried: tuple[float, float, float]) -> list[Trial]:
+    return [
+        Trial(robot.with_value(K1, value), _TASK, 0, (), TASK_A, LegYawController(), NONE, rate=25.0) for value in tried
+    ]
+
+
+def _movies(prefix: str, springs: tuple[float, ...], records: list[xr.Dataset], speed: float = 2.0) -> list[Movie]:
+    kinds = ("straight", "curved a little", "curved a lot", "too stiff", "best", "too soft")
+    names = [units.format(value, "N*mm/deg", digits=3).replace("*", "·") for value in springs]
+    titles = tuple(f"k1 = {name}: {kind}" for name, kind in zip(names, kinds, strict=True))
+    return [
+        Movie(f"{prefix}movie-1", "One spring decides how the robot walks", titles[:3], together(records[:3]), speed),
+        Movie(f"{prefix}movie-2", f"Turning to a target, {TASK_A}", titles[3:], together(records[3:]), 1.0),
+    ]

@@ -1,0 +1,1 @@
+"""The whole robot in three dimensions."""

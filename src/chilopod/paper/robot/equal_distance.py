@@ -1,0 +1,153 @@
+"""How tightly a variant of a robot turns, like with like: at an equal distance from where its own curved walks set in.
+
+By the square-root law the bend is A sqrt(1/k1 - 1/k*): two robots of equal A that set in at different k* turn alike at
+equal 1/k1 - 1/k*, and at equal springs the one that sets in at a softer spring turns more widely. The ratio of the
+amplitudes A of two fits would do if the law held; it is only the first term of a series, the bend saturates, and fits
+over different ranges then differ in A where the walks do not. So the measured bends themselves are compared: squared,
+as they are nearly linear in 1/k1 then, joined by straight lines, over the distances at which there are trials of both.
+Only the onsets come from fits, to the summed bend of the trials of each. These move with saturation too, but both to
+stiffer springs, so that little of it remains in the ratio.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from chilopod.analysis.square_root import square_root_fit
+from chilopod.errors import AnalysisError
+from chilopod.paper.robot.walk_measures import counted
+from chilopod.paper.scatter import drawn_anew, mean_and_error
+
+Array = NDArray[np.float64]
+
+DRAWN = 200
+"""Sets of trials that are drawn anew for the standard errors."""
+
+
+@dataclass(frozen=True)
+class RadiusRatio:
+    """Radius of a variant over that of the robot as built.
+
+    Attributes
+    ----------
+    distance, distance_error
+        At equal distances from each one's own onset, with its standard error; NaN if they have no distance in common.
+    springs, springs_error
+        At equal springs, mean over those at which two trials of both curve; NaN if there is none.
+    compared
+        These springs, N*mm/deg.
+    """
+
+    distance: float
+    distance_error: float
+    springs: float
+    springs_error: float
+    compared: tuple[float, ...]
+
+
+def radius_ratio(base: xr.Dataset, variant: xr.Dataset, drawn: int = DRAWN, seed: int = 0) -> RadiusRatio:
+    """Compare the radii of two series of trials.
+
+    Parameters
+    ----------
+    base, variant
+        Over spring and repeat: ``axis_radius``, ``direction`` and ``settled``, as
+        :func:`chilopod.tasks.radius_law.end_of_walk` has them. What counts, see
+        :func:`chilopod.paper.robot.walk_measures.counted`.
+    drawn
+        How many times trials are drawn anew at every spring for the standard errors, onsets fitted anew each time; 0
+        for none.
+    seed
+        Of the drawing.
+    """
+    inverse, bends = zip(*(_bends(each) for each in (base, variant)), strict=True)
+    found = _ratios(inverse, bends)
+    rng = np.random.default_rng(seed)
+    again = [_ratios(inverse, [drawn_anew(each, rng) for each in bends]) for _ in range(drawn)]
+    if any((np.isfinite(each).sum(axis=1) < 2).all() for each in bends):  # nobody knows how these scatter
+        again = []
+    errors = [_spread([each[i] for each in again]) for i in range(2)]
+    compared = tuple(float(1.0 / x) for x in _shared(inverse, bends))
+    return RadiusRatio(found[0], errors[0], found[1], errors[1], compared)
+
+
+def law_ratio(springs: Sequence[float], base_onset: float, onset: float) -> float:
+    """Radius at equal springs by the square-root law with equal amplitudes: what the onsets alone make of it.
+
+    Mean over the springs (N*mm/deg) softer than both onsets; NaN if there is none.
+    """
+    inverse = np.array([1.0 / spring for spring in springs if spring < min(base_onset, onset)])
+    return mean_and_error(np.sqrt((inverse - 1.0 / base_onset) / (inverse - 1.0 / onset)))[0]
+
+
+def onset_of_bend(data: xr.Dataset) -> float:
+    """Where the curved walks of a series set in by the square-root fit to their summed bend, N*mm/deg; NaN if they
+    determine no point."""
+    return _onset(*_bends(data))
+
+
+def change(ratio: float, error: float = 0.0) -> str:
+    """What a ratio is more or less than one, in per cent, with its standard error if that is known and not zero."""
+    if np.isnan(ratio):
+        return "not determined"
+    return f"{round(100.0 * (ratio - 1.0)):+d}" + (f" ± {100.0 * error:.0f}" if error > 0.0 else "") + " %"
+
+
+def _spread(values: Sequence[float]) -> float:
+    """Standard deviation of what is not NaN."""
+    finite = np.array(values)[np.isfinite(values)]
+    return float(finite.std(ddof=1)) if finite.size > 1 else float("nan")
+
+
+def _bends(data: xr.Dataset) -> tuple[Array, Array]:
+    """1/k1, rising, and the bend of every trial that counts, NaN elsewhere, at springs at which some do."""
+    here = counted(data)
+    most = here.any(axis=1)
+    bend = np.where(here, 1.0 / data.axis_radius.values, np.nan)[most]  # in proportion: (N-1) L is the same in all
+    inverse = 1.0 / data.spring.values[most]
+    order = np.argsort(inverse)
+    return inverse[order], bend[order]
+
+
+def _shared(inverse: Sequence[Array], bends: Sequence[Array]) -> Array:
+    """1/k1 at which at least two trials of both curve."""
+    both = [x[np.isfinite(bend).sum(axis=1) > 1] for x, bend in zip(inverse, bends, strict=True)]
+    shared: Array = np.intersect1d(*both)
+    return shared
+
+
+def _ratios(inverse: Sequence[Array], bends: Sequence[Array]) -> tuple[float, float]:
+    """At equal distance and at equal springs."""
+    squared = [_squared(x, bend) for x, bend in zip(inverse, bends, strict=True)]
+    shared = _shared(inverse, bends)
+    means = [np.nanmean(1.0 / bend[np.isin(x, shared)], axis=1) for x, bend in zip(inverse, bends, strict=True)]
+    springs = float(np.mean(means[1] / means[0])) if shared.size else float("nan")
+    low, high = np.max([s[0][0] for s in squared]), np.min([s[0][-1] for s in squared])
+    if not low < high:  # nor if one of them has no onset
+        return float("nan"), springs
+    grid = np.unique([low, high, *(x for s in squared for x in s[0] if low < x < high)])
+    one, other = (float(np.trapezoid(np.interp(grid, *each), grid)) for each in squared)
+    return float(np.sqrt(one / other)), springs
+
+
+def _squared(inverse: Array, bend: Array) -> tuple[Array, Array]:
+    """Distance from the onset of these trials, rising, and the square of their mean bend; NaN if they have no onset."""
+    onset = _onset(inverse, bend)
+    if np.isnan(onset):
+        return np.array([np.nan]), np.array([np.nan])
+    distance = inverse - 1.0 / onset
+    return distance[distance > 0.0], (np.nanmean(bend, axis=1) ** 2)[distance > 0.0]
+
+
+def _onset(inverse: Array, bend: Array) -> float:
+    here = np.isfinite(bend)
+    try:
+        each = np.broadcast_to(inverse[:, None], bend.shape)[here]
+        return square_root_fit(each, bend[here], resampled=0).critical
+    except AnalysisError:
+        return float("nan")

@@ -1,0 +1,94 @@
+"""Whether what the twin finds hangs on numerics: the base series with finer steps and a tighter solver."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from chilopod.analysis.square_root import square_root_fit
+from chilopod.errors import AnalysisError
+from chilopod.paper.fit_data import base_series_data
+from chilopod.paper.robot.table import CHECKED, VERDICTS
+from chilopod.paper.table import RobotRow
+from chilopod.progress import Progress, silent
+from chilopod.robot import Robot
+from chilopod.tasks.identify.twin_series import base_series
+from chilopod.twin.walk import TOLERANCE
+
+SPRINGS = (15.0, 17.0, 21.0, 26.0, 28.0)
+"""k1 of the walks, N*mm/deg."""
+
+CASES = {"2 ms": (2e-3, TOLERANCE), "1 ms": (1e-3, TOLERANCE), "0.5 ms": (5e-4, TOLERANCE), "tight": (2e-3, 1e-13)}
+"""Step (s) and tolerance of the contact solver, the first what all studies have."""
+
+ALLOWED = 0.05
+
+
+def twin_numerics(robot: Robot, quick: bool = False, progress: Progress = silent) -> xr.Dataset:
+    """Onset, radii and speeds with finer steps and a tighter solver.
+
+    Parameters
+    ----------
+    robot
+        With a twin.
+    quick
+        The first two cases only.
+    progress
+        Called as the work goes on.
+
+    Returns
+    -------
+    Dataset over case and spring: ``axis_radius`` (m) and ``speed`` of module 1 (m/s); over case: ``onset`` by the
+    paper's method (N*mm/deg).
+    """
+    radii, speeds, onsets = [], [], []
+    cases = dict(list(CASES.items())[:2]) if quick else CASES
+    for index, (name, (step, tolerance)) in enumerate(cases.items()):
+        progress(index / len(cases), name)
+        finer = robot.with_value("twin.timestep", step)
+        found = base_series(finer, base_series_data(), SPRINGS, tolerance=tolerance)
+        angles = found.bends
+        speeds.append(found.speeds)
+        radii.append((robot.body.modules - 1) * robot.module_length / np.abs(angles).sum(axis=1))
+        try:
+            onsets.append(square_root_fit(1.0 / np.array(SPRINGS), np.abs(angles[:, 0]), resampled=0).critical)
+        except AnalysisError:
+            onsets.append(np.nan)
+    return xr.Dataset(
+        {
+            "axis_radius": (("case", "spring"), np.array(radii), {"units": "m"}),
+            "speed": (("case", "spring"), np.array(speeds), {"units": "m/s"}),
+            "onset": ("case", np.array(onsets), {"units": "N*mm/deg"}),
+        },
+        coords={"case": list(cases), "spring": ("spring", np.array(SPRINGS), {"units": "N*mm/deg"})},
+        attrs={"robot": robot.name},
+    )
+
+
+def largest_move(data: xr.Dataset) -> float:
+    """Largest relative change of the onset, a radius or a speed against the first case; NaN if a walk failed."""
+    moves = [data[name].values / data[name].values[0] - 1.0 for name in ("axis_radius", "speed", "onset")]
+    return float(max(np.abs(each).max() for each in moves))
+
+
+def rows(data: xr.Dataset) -> list[RobotRow]:
+    """The line of the robot's table."""
+    moved = data.onset.values / data.onset.values[0] - 1.0
+    at_21 = [data[name].sel(spring=21.0).values for name in ("axis_radius", "speed")]
+    radii, speeds = (each / each[0] - 1.0 for each in at_21)
+    said = "; ".join(
+        f"{name}: onset {100.0 * onset:+.1f} %, radius at 21 {100.0 * radius:+.1f} %, speed {100.0 * speed:+.1f} %"
+        for name, onset, radius, speed in zip(data.case.values[1:], moved[1:], radii[1:], speeds[1:], strict=True)
+    )
+    return [
+        RobotRow(
+            "numerics: finer steps, tight contact solver",
+            "no counterpart",
+            f"{said}; largest move of onset, and radii and speeds at 15 to 28 N*mm/deg, "
+            f"{100.0 * largest_move(data):.1f} %",
+            "",
+            CHECKED,
+            VERDICTS[largest_move(data) < ALLOWED],
+            f"less than {100.0 * ALLOWED:.0f} %",
+        )
+    ]

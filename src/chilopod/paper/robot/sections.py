@@ -1,0 +1,93 @@
+"""The whole robot in three dimensions: the sections of this chapter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import xarray as xr
+
+from chilopod.analysis.parameters import stiffness
+from chilopod.paper.curved.sections import CURVED
+from chilopod.paper.movies import Movie, robot_movies
+from chilopod.paper.robot import numerics, why
+from chilopod.paper.robot.beside import planar_words
+from chilopod.paper.robot.rows import walk_rows
+from chilopod.paper.robot.spread import COUNT, twin_spread
+from chilopod.paper.robot.structures import structures
+from chilopod.paper.robot.turning import RobotTurning, robot_turning
+from chilopod.paper.robot.turning_rows import turning_rows
+from chilopod.paper.robot.walks import RobotWalks, robot_walks
+from chilopod.paper.section import Found, Section
+from chilopod.paper.straight.sections import UNIFORM
+from chilopod.paper.table import RobotRow
+from chilopod.paper.turning.sections import TURNING
+
+CHAPTER = "The whole robot in three dimensions"
+
+_PLANAR = (UNIFORM, CURVED, TURNING)
+_FILMED = (stiffness(41.0), stiffness(26.0), stiffness(15.0))  # the paper's large, small and very small
+_TRIED = (stiffness(41.0), stiffness(21.0), stiffness(15.0))  # the paper's of task A
+
+
+def _words(found: Found) -> dict[str, str]:
+    return planar_words(found[UNIFORM], found[CURVED], found[TURNING])
+
+
+def _turning_rows(tasks: RobotTurning, found: Found) -> Sequence[RobotRow]:
+    return turning_rows(tasks, found[WALKS], _words(found))
+
+
+WALKS: Section[RobotWalks] = Section(
+    "robot-walks",
+    CHAPTER,
+    "the whole robot in 3-D: its walks",
+    lambda context, found, report: robot_walks(context.whole, context.folder, context.quick, report),
+    lambda walks, found: walk_rows(walks, _words(found)),
+    needs=_PLANAR,
+)
+TASKS: Section[RobotTurning] = Section(
+    "robot-turning",
+    CHAPTER,
+    "the whole robot in 3-D: turning to targets",
+    lambda context, found, report: robot_turning(context.whole, context.folder, context.quick, report),
+    _turning_rows,
+    needs=(*_PLANAR, WALKS),
+)
+FILMS: Section[list[Movie]] = Section(
+    "robot-movies",
+    CHAPTER,
+    "the paper's two movies in 3-D",
+    lambda context, found, report: robot_movies(context.whole, _FILMED, _TRIED, context.folder, report),
+)
+SPREAD: Section[xr.Dataset] = Section(
+    "robot-spread",
+    CHAPTER,
+    "the whole robot in 3-D: other constants that fit as well",
+    lambda context, found, report: twin_spread(context.whole, context.folder, 2 if context.quick else COUNT, report),
+    beyond=True,
+    full=True,
+)
+NUMERICS: Section[xr.Dataset] = Section(
+    "robot-numerics",
+    CHAPTER,
+    "the whole robot in 3-D: finer steps",
+    lambda context, found, report: numerics.twin_numerics(context.whole, context.quick, report),
+    lambda data, found: numerics.rows(data),
+    beyond=True,
+)
+STRUCTURES: Section[xr.Dataset] = Section(
+    "robot-structures",
+    CHAPTER,
+    "the whole robot in 3-D: what else it could be made of",
+    lambda context, found, report: structures(context.whole, context.folder, progress=report),
+    beyond=True,
+    on_request=True,
+)
+WHY: Section[xr.Dataset] = Section(
+    "robot-why",
+    CHAPTER,
+    "why the robot bends earlier than the planar model",
+    lambda context, found, report: why.ablation(context.whole, context.robot, context.folder, context.quick, report),
+    lambda data, found: why.rows(data),
+    beyond=True,
+)

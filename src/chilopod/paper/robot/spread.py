@@ -1,0 +1,153 @@
+"""How far to trust the twin's predictions: the same predictions by other sets of constants that fit as well.
+
+``twin_fits.json`` holds what ``chilopod identify twin`` found: the sets of constants that meet the base series within
+its tolerance. Those that differ most from each other predict what the paper prints of other experiments, each with few
+and undisturbed walks.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from chilopod import trials, units
+from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
+from chilopod.paper.curved.trials import variant_robots
+from chilopod.paper.fit_data import base_series_data
+from chilopod.paper.printed import printed
+from chilopod.paper.robot.equal_distance import radius_ratio
+from chilopod.paper.robot.turning import TASK_DURATION
+from chilopod.paper.robot.walk_measures import onset_with_error
+from chilopod.paper.robot.walks import lower_steps, undulations, walk_ends
+from chilopod.progress import Progress, silent
+from chilopod.robot import Robot
+from chilopod.steering import ARRIVAL_RADIUS, Target, steered, strategy_named
+from chilopod.tasks.identify.twin import known, unlike
+from chilopod.tasks.identify.twin_constants import FREE, with_constants
+from chilopod.trials import NONE, Trial
+
+SPRINGS = (13.0, 15.0, 17.0, 19.0, 21.0, 24.0, 28.0)
+"""k1 of the variants, N*mm/deg."""
+
+TASK_SPRINGS = (15.0, 17.0, 21.0, 26.0, 28.0, 34.0, 41.0)
+UNIFORM_SPRINGS = (8.7, 11.0, 13.0, 15.0)
+COUNT = 6
+"""Sets of constants that predict, the preset's among them."""
+
+LOWER = ", lower steps"
+"""Of a variant's name: its steps are as much lower as they are shorter."""
+
+_DURATION = 60.0  # s
+_BENT = 0.8  # rad in all, that walks begin with
+
+
+def twin_spread(
+    robot: Robot, folder: str | Path | None = None, count: int = COUNT, progress: Progress = silent
+) -> xr.Dataset:
+    """Predictions by several sets of constants.
+
+    Parameters
+    ----------
+    robot
+        For what is not fitted.
+    folder
+        Where trials are kept.
+    count
+        Of sets.
+    progress
+        Called as the work goes on.
+
+    Returns
+    -------
+    Dataset over set (0 the preset's): the constants (SI) by path over ``constant``, ``misfit``, and predictions: over
+    variant ``onset`` (N*mm/deg, NaN where walks determine none; ``paper`` what is printed) and ``radius`` (over that as
+    built, at an equal distance from each one's own onset), ``uniform`` (N*mm/deg), and over task ``best``, the spring
+    that comes nearest to the target (N*mm/deg), and ``arrives``, whether that arrives.
+    """
+    fits = unlike(known(), count)
+    rows: list[dict[str, Any]] = []
+    for index, fit in enumerate(fits):
+        progress(index / len(fits), f"set {index + 1} of {len(fits)}")
+        other = with_constants(robot, fit.constants)
+        rows.append({**predictions(other, folder), **nearest_springs(other, folder)})
+    series = base_series_data()
+    numbers, answers = len(series.radii) + len(series.speeds) + 1, len(series.curved) + len(series.straight)
+    names = list(rows[0]["onset"])
+    tasks = list(rows[0]["best"])
+    data = xr.Dataset(
+        {
+            "constants": (("set", "constant"), np.array([fit.constants for fit in fits])),
+            "misfit": ("set", np.array([fit.misfit for fit in fits])),
+            "uniform": ("set", np.array([row["uniform"] for row in rows]), {"units": "N*mm/deg"}),
+        },
+        coords={"set": np.arange(len(fits)), "constant": [c.path for c in FREE], "variant": names, "task": tasks},
+        attrs={"robot": robot.name, "known": len(known()), "numbers": numbers, "answers": answers},
+    )
+    for name, over, keys in (("onset", "variant", names), ("radius", "variant", names), ("best", "task", tasks)):
+        data[name] = (("set", over), np.array([[row[name][key] for key in keys] for row in rows]))
+    data["paper"] = ("variant", [printed_onset(name) for name in names], {"units": "N*mm/deg"})
+    data["arrives"] = (("set", "task"), np.array([[row["arrives"][task] for task in tasks] for row in rows]))
+    return data
+
+
+def printed_onset(variant: str) -> float:
+    """Where the paper's curved walks of a variant set in, N*mm/deg."""
+    entry = printed()["variants"].get(variant.removesuffix(LOWER), printed()["pitchfork"])
+    return units.from_si(units.parse(entry["robot_critical_k1"], "N*m/rad"), PAPER_UNIT)
+
+
+def predictions(robot: Robot, folder: str | Path | None = None, engine: str = "twin") -> dict[str, Any]:
+    """Where curved and undulating walks set in other than in the base series, and how tight they are.
+
+    Few and undisturbed walks, which begin bent, in place of the many from straight on that
+    :func:`chilopod.paper.robot.walks.robot_walks` has.
+
+    Returns
+    -------
+    By variant ``onset`` (N*mm/deg) and ``radius`` (over that as built, at an equal distance from each one's own onset),
+    NaN where walks determine none; and ``uniform`` (N*mm/deg).
+    """
+    shape = np.array(printed()["pitchfork"]["joint_components"])
+    if robot.body.modules - 1 != len(shape):
+        shape = np.ones(robot.body.modules - 1)
+    bend = tuple(_BENT * shape / shape.sum())
+    variants = variant_robots(robot)
+    for name, variant in list(variants.items()):
+        if variant.gait.stride != robot.gait.stride:
+            variants[f"{name}{LOWER}"] = lower_steps(robot, variant)
+    series = {}
+    for name, variant in variants.items():
+        duration = _DURATION * robot.gait.stride / variant.gait.stride
+        walks = [
+            Trial(variant.with_value(K1, stiffness(k)), duration, 0, bend, disturbance=NONE, rate=10.0, engine=engine)
+            for k in SPRINGS
+        ]
+        series[name] = walk_ends(trials.run(walks, folder), variant, SPRINGS)
+    base = next(iter(series.values()))
+    return {
+        "onset": {name: onset_with_error(each)[0] for name, each in series.items()},
+        "radius": {name: radius_ratio(base, each, drawn=0).distance for name, each in series.items()},
+        "uniform": undulations(robot, UNIFORM_SPRINGS, 1, folder=folder, engine=engine).attrs["critical_k"],
+    }
+
+
+def nearest_springs(robot: Robot, folder: str | Path | None = None) -> dict[str, dict[str, Any]]:
+    """For each of the paper's tasks the spring that comes ``best``, nearest to the target (N*mm/deg), undisturbed, and
+    whether it ``arrives``."""
+    found: dict[str, dict[str, Any]] = {"best": {}, "arrives": {}}
+    plan = strategy_named("pitchfork")
+    for letter, entry in printed()["turning"]["tasks"].items():
+        walks = []
+        for k in TASK_SPRINGS:
+            walker, controller = steered(robot, plan, stiffness(k))
+            target = Target.parse(entry["target"])
+            walks.append(
+                Trial(walker, TASK_DURATION, 0, (), target, controller, disturbance=NONE, rate=20.0, engine="twin")
+            )
+        nearest = [float(record.distance.min()) for record in trials.run(walks, folder)]
+        found["best"][letter] = TASK_SPRINGS[int(np.argmin(nearest))]
+        found["arrives"][letter] = bool(min(nearest) < ARRIVAL_RADIUS)
+    return found

@@ -1,0 +1,109 @@
+"""The paper's turning experiments with its own springs, as trials of the twin."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import xarray as xr
+
+from chilopod.paper.printed import printed
+from chilopod.paper.turning.trials import DURATION, REPEATS, TurningTask, turning_task, without_leg_yaw
+from chilopod.progress import Progress, part, silent
+from chilopod.robot import Robot
+from chilopod.steering import Target
+
+SPRINGS = (10.0, 15.0, 17.0, 21.0, 26.0, 28.0, 34.0, 41.0, 75.0)
+"""k1 of the tasks, N*mm/deg: the paper's and some between."""
+
+SHOWN = (15.0, 21.0, 41.0)
+"""k1 of the paths that the paper shows, N*mm/deg."""
+
+HOPF_SPRINGS = (8.7, 11.0, 15.0, 21.0, 41.0)
+"""All springs, of the strategy by Hopf bifurcation, N*mm/deg: the paper's."""
+
+TASK_DURATION = 1.5 * DURATION
+"""s: the paper does not print how long its tasks last, but longer than the earliest arrival of any of its robots; half
+as long again lets a robot that is as fast arrive, or pass the target."""
+
+PAPER_SPRING = 21.0
+"""N*mm/deg: of the walks without leg yaw."""
+
+
+@dataclass(frozen=True)
+class RobotTurning:
+    """What the tasks show.
+
+    Attributes
+    ----------
+    robot
+        The robot.
+    tasks
+        The paper's two, by letter.
+    hopf
+        Task A with uniform springs.
+    without
+        Task A with and without leg yaw at the paper's spring.
+    """
+
+    robot: Robot
+    tasks: Mapping[str, TurningTask]
+    hopf: TurningTask
+    without: xr.Dataset
+
+
+def robot_turning(
+    robot: Robot, folder: str | Path | None = None, quick: bool = False, progress: Progress = silent
+) -> RobotTurning:
+    """All turning tasks of the paper.
+
+    Parameters
+    ----------
+    robot
+        With a twin.
+    folder
+        Where trials are kept.
+    quick
+        Two repeats instead of five, and five springs instead of nine.
+    progress
+        Called as the work goes on.
+    """
+
+    repeats, springs = (2, SPRINGS[1::2]) if quick else (REPEATS, SPRINGS)
+    springs = tuple(sorted({*springs, *SHOWN}))
+    tasks = {}
+    for index, (letter, entry) in enumerate(printed()["turning"]["tasks"].items()):
+        tasks[letter] = turning_task(
+            robot,
+            Target.parse(entry["target"]),
+            springs,
+            repeats,
+            duration=TASK_DURATION,
+            shown=SHOWN,
+            engine="twin",
+            folder=folder,
+            progress=part(progress, 0.35 * index, 0.35 * (index + 1), f"task {letter}"),
+        )
+    hopf = turning_task(
+        robot,
+        tasks["A"].target,
+        HOPF_SPRINGS,
+        repeats,
+        "hopf",
+        time=tasks["A"].time,
+        duration=TASK_DURATION,
+        engine="twin",
+        folder=folder,
+        progress=part(progress, 0.7, 0.9, "uniform springs"),
+    )
+    without = without_leg_yaw(
+        robot,
+        tasks["A"].target,
+        {"paper's spring": PAPER_SPRING},
+        duration=TASK_DURATION,
+        engine="twin",
+        folder=folder,
+        progress=part(progress, 0.9, 1.0, "without leg yaw"),
+    )
+    return RobotTurning(robot, tasks, hopf, without)

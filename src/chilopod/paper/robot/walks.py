@@ -1,0 +1,316 @@
+"""The paper's walks of its robot (Fig. "curved", "absolute", "different"), as trials of the twin.
+
+Every trial starts straight but for its disturbance, walks for a minute and a half, and is judged by the mean joint
+angles of its last 5 s, with the springs, repeats and estimates of the paper: the radius 5L / sum |theta|, and the point
+at which curved walks set in from a square-root fit to the bend of joint 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from chilopod import trials
+from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT, stiffness
+from chilopod.analysis.square_root import SquareRootFit, square_root_fit
+from chilopod.errors import AnalysisError
+from chilopod.paper.curved.trials import variant_robots
+from chilopod.paper.robot.walk_measures import onset, onset_with_error, radius_at, shares
+from chilopod.progress import Progress, part, silent
+from chilopod.robot import Robot
+from chilopod.tasks.radius_law import DURATION, end_of_walk
+from chilopod.trials import AVERAGED, Disturbance, Trial
+
+Array = NDArray[np.float64]
+
+SPRINGS = (15.0, 17.0, 21.0, 26.0, 28.0, 41.0, 75.0)
+"""k1 of the base series, N*mm/deg: the paper's, and 26, at which it prints a radius."""
+
+VARIANT_SPRINGS = (12.0, 15.0, 17.0, 19.0, 21.0, 24.0, 28.0, 34.0)
+"""k1 of the variants, N*mm/deg."""
+
+UNIFORM_SPRINGS = (8.7, 11.0, 13.0, 15.0, 18.0, 21.0, 30.0)
+"""All springs together, N*mm/deg."""
+
+SWINGING = 15.0
+"""N*mm/deg: of the paper's uniform springs, those up to here are on the soft side of its Hopf point."""
+
+REPEATS, VARIANT_REPEATS, UNIFORM_REPEATS = 10, 5, 3
+
+SHORTER = (20.0, 30.0, 40.0, 60.0)
+"""s, after which the base series is judged besides: the paper does not say how long its trials last."""
+
+UNIFORM_DURATION = 60.0
+"""s, of walks with all springs alike, which settle sooner."""
+
+_RATE = 50.0
+_EXAMPLES = (41.0, 15.0)
+_WINDOW = 24.0  # s, some two cycles of an undulation
+_PER_CYCLE = 6  # samples
+_SEEDS = 10_000  # between springs
+
+
+@dataclass(frozen=True)
+class RobotWalks:
+    """What the walks show.
+
+    Attributes
+    ----------
+    robot
+        As built.
+    base
+        See :func:`walk_ends`.
+    durations
+        See :func:`by_duration`.
+    variants
+        As ``base``, of the paper's three variants, by name.
+    lower_steps
+        The same of those of them that change the stride, with another reading of what the paper leaves open: that a
+        shorter half ellipse of the leg tips is lower in proportion, see :func:`lower_steps`.
+    examples
+        Joint angles (rad) over time of one straight and one curved walk, over (time, spring, joint).
+    uniform
+        See :func:`undulations`.
+    """
+
+    robot: Robot
+    base: xr.Dataset
+    durations: xr.Dataset
+    variants: Mapping[str, xr.Dataset]
+    lower_steps: Mapping[str, xr.Dataset]
+    examples: xr.Dataset
+    uniform: xr.Dataset
+
+    @property
+    def fit(self) -> SquareRootFit | None:
+        """The square-root law of the base series."""
+        return onset(self.base)
+
+
+def robot_walks(
+    robot: Robot, folder: str | Path | None = None, quick: bool = False, progress: Progress = silent
+) -> RobotWalks:
+    """All walks of the paper.
+
+    Parameters
+    ----------
+    robot
+        With a twin.
+    folder
+        Where trials are kept.
+    quick
+        Two repeats of the base series, one of the variants and of uniform springs, with fewer springs.
+    progress
+        Called as the work goes on.
+    """
+
+    repeats, fewer, fewest = (2, 1, 1) if quick else (REPEATS, VARIANT_REPEATS, UNIFORM_REPEATS)
+    springs, uniform_springs = (
+        (VARIANT_SPRINGS[1::2], UNIFORM_SPRINGS[:4]) if quick else (VARIANT_SPRINGS, UNIFORM_SPRINGS)
+    )
+    records = walk_records(robot, SPRINGS, repeats, folder=folder, progress=part(progress, 0.0, 0.31, "as built"))
+    base, durations = walk_ends(records, robot, SPRINGS), by_duration(records, robot, SPRINGS)
+    robots = {name: each for name, each in variant_robots(robot).items() if name != "as built"}
+    readings = {
+        name: lower_steps(robot, each) for name, each in robots.items() if each.gait.stride != robot.gait.stride
+    }
+    asked = [(robots, name) for name in robots] + [(readings, name) for name in readings]
+    found: list[xr.Dataset] = []
+    for index, (of, name) in enumerate(asked):
+        shown = part(progress, 0.31 + 0.6 * index / len(asked), 0.31 + 0.6 * (index + 1) / len(asked), name)
+        # Growing and settling go with the way: who makes shorter steps is given the time to walk as far.
+        longer = DURATION * robot.gait.stride / of[name].gait.stride
+        walked = walk_records(of[name], springs, fewer, duration=longer, folder=folder, progress=shown)
+        found.append(walk_ends(walked, of[name], springs))
+    variants, lower = dict(zip(robots, found, strict=False)), dict(zip(readings, found[len(robots) :], strict=True))
+    uniform = undulations(
+        robot, uniform_springs, fewest, folder=folder, progress=part(progress, 0.91, 1.0, "uniform springs")
+    )
+    return RobotWalks(robot, base, durations, variants, lower, _examples(robot, folder), uniform)
+
+
+def lower_steps(robot: Robot, variant: Robot) -> Robot:
+    """A variant with another stride whose swing clearance is in proportion to the stride, as the robot has it."""
+    part = variant.gait.stride / robot.gait.stride
+    return variant.with_value("twin.clearance", part * robot.get("twin.clearance"))
+
+
+def walk_records(
+    robot: Robot,
+    springs: Sequence[float] = SPRINGS,
+    repeats: int = REPEATS,
+    *,
+    duration: float | None = None,
+    disturbance: Disturbance | None = None,
+    folder: str | Path | None = None,
+    progress: Progress = silent,
+) -> list[xr.Dataset]:
+    """Records of walks of the twin from straight on, spring by spring.
+
+    Parameters
+    ----------
+    robot
+        With a twin; its first spring does not matter.
+    springs
+        Values of k1, N*mm/deg.
+    repeats
+        Trials at each of them, all with seeds of their own.
+    duration
+        s; by default :data:`DURATION`.
+    disturbance
+        By default that of all studies.
+    folder
+        Where trials are kept.
+    progress
+        Called as trials are done.
+    """
+    asked = [
+        Trial(
+            robot.with_value(K1, stiffness(spring)),
+            DURATION if duration is None else duration,
+            int(_SEEDS * spring) + repeat,
+            disturbance=disturbance or Disturbance(),
+            rate=_RATE,
+            engine="twin",
+        )
+        for spring in springs
+        for repeat in range(repeats)
+    ]
+    return trials.run(asked, folder, progress)
+
+
+def walk_ends(
+    records: Sequence[xr.Dataset], robot: Robot, springs: Sequence[float], duration: float | None = None
+) -> xr.Dataset:
+    """What walks come to.
+
+    Parameters
+    ----------
+    records
+        From :func:`walk_records`.
+    robot, springs
+        Those of the records.
+    duration
+        s, after which the walks are cut; by default not at all.
+
+    Returns
+    -------
+    Dataset over spring (N*mm/deg), repeat and joint: what :func:`chilopod.tasks.radius_law.end_of_walk` makes of each.
+    """
+    repeats = len(records) // len(springs)
+    last = float(records[0].time[-1]) if duration is None else duration
+    ends = [end_of_walk(record.sel(time=record.time <= last + 1e-9), robot) for record in records]
+    rows = [xr.concat(ends[i : i + repeats], "repeat") for i in range(0, len(ends), repeats)]
+    data = xr.concat(rows, "spring").assign_coords(
+        spring=("spring", np.asarray(springs, dtype=np.float64), {"units": PAPER_UNIT}), repeat=np.arange(repeats)
+    )
+    data.attrs = {"robot": robot.name, "varied": K1, "averaged_s": AVERAGED, "duration_s": last}
+    return data
+
+
+def by_duration(records: Sequence[xr.Dataset], robot: Robot, springs: Sequence[float]) -> xr.Dataset:
+    """What the same walks would come to if they had ended earlier.
+
+    Parameters
+    ----------
+    records, robot, springs
+        As for :func:`walk_ends`.
+
+    Returns
+    -------
+    Dataset over duration (s; those of :data:`SHORTER`, and the walks' own last): ``onset`` with ``onset_error`` (of the
+    bootstrap), N*mm/deg; over duration and spring: those of :func:`shares`, and ``axis_radius`` with
+    ``axis_radius_error`` as of :func:`radius_at`, m.
+    """
+    durations = [*(each for each in SHORTER if each < DURATION), DURATION]
+    series = [walk_ends(records, robot, springs, duration) for duration in durations]
+    # Short walks have not settled: what they show is what one would take for the radius.
+    onsets = np.array([onset_with_error(each, settled=False) for each in series])
+    radii = np.array([[radius_at(each, spring, settled=False) for spring in springs] for each in series])
+    both = ("duration", "spring")
+    return xr.Dataset(
+        {
+            "onset": ("duration", onsets[:, 0], {"units": PAPER_UNIT}),
+            "onset_error": ("duration", onsets[:, 1], {"units": PAPER_UNIT}),
+            **xr.concat([shares(each) for each in series], "duration"),
+            "axis_radius": (both, radii[..., 0], {"units": "m"}),
+            "axis_radius_error": (both, radii[..., 1], {"units": "m"}),
+        },
+        coords={"duration": ("duration", np.array(durations), {"units": "s"}), "spring": series[0].spring},
+        attrs={"robot": robot.name, "repeats": series[0].sizes["repeat"], "averaged_s": AVERAGED},
+    )
+
+
+def undulations(
+    robot: Robot,
+    springs: Sequence[float] = UNIFORM_SPRINGS,
+    repeats: int = UNIFORM_REPEATS,
+    *,
+    engine: str = "twin",
+    folder: str | Path | None = None,
+    progress: Progress = silent,
+) -> xr.Dataset:
+    """Walks with all springs alike: how far the body swings once it has settled.
+
+    Returns
+    -------
+    Dataset over spring (N*mm/deg) and repeat: ``amplitude``, root mean square of the joint angles, averaged over gait
+    cycles, about their mean over the last 24 s (rad), and ``status``; attributes ``critical_k``, where by a square-root
+    fit to those at most :data:`SWINGING` the undulation sets in, and ``critical_k_error``, its standard error by the
+    bootstrap; NaN if they determine no point.
+    """
+    joints = robot.body.modules - 1
+    wave = tuple(np.deg2rad(4.0) * np.cos(np.arange(joints) * np.pi / 2.0))
+    rate = _PER_CYCLE / robot.gait.period
+    asked = [
+        Trial(
+            robot.with_value(ALL, stiffness(spring)),
+            UNIFORM_DURATION,
+            int(_SEEDS * spring) + repeat,
+            wave,
+            engine=engine,
+            rate=rate,
+        )
+        for spring in springs
+        for repeat in range(repeats)
+    ]
+    shape = (len(springs), repeats)
+    amplitude, status = np.empty(shape), np.empty(shape, dtype=object)
+    last = round(_WINDOW / robot.gait.period)
+    for index, record in enumerate(trials.run(asked, folder, progress)):
+        angles = record.joint_angle.isel(robot=0).transpose("time", "joint").values[1:]
+        cycles = angles[: len(angles) // _PER_CYCLE * _PER_CYCLE].reshape(-1, _PER_CYCLE, joints).mean(axis=1)
+        at = np.unravel_index(index, shape)
+        amplitude[at] = np.sqrt(cycles[-last:].var(axis=0).sum())
+        status[at] = record.status.values[0]
+    both = ("spring", "repeat")
+    data = xr.Dataset(
+        {"amplitude": (both, amplitude, {"units": "rad"}), "status": (both, status)},
+        coords={"spring": ("spring", np.asarray(springs, float), {"units": PAPER_UNIT}), "repeat": np.arange(repeats)},
+    )
+    soft = np.asarray(springs) <= SWINGING
+    inverse = np.broadcast_to(1.0 / np.asarray(springs)[:, None], shape)
+    try:
+        fit = square_root_fit(inverse[soft].ravel(), amplitude[soft].ravel())
+        critical = {"critical_k": fit.critical, "critical_k_error": fit.bootstrap_error}
+    except AnalysisError:
+        critical = dict.fromkeys(("critical_k", "critical_k_error"), float("nan"))
+    data.attrs = {"robot": robot.name, **critical}
+    return data
+
+
+def _examples(robot: Robot, folder: str | Path | None) -> xr.Dataset:
+    walks = [
+        Trial(robot.with_value(K1, stiffness(spring)), DURATION, int(_SEEDS * spring), rate=_RATE, engine="twin")
+        for spring in _EXAMPLES
+    ]
+    angles = xr.concat([each.joint_angle.isel(robot=0, drop=True) for each in trials.run(walks, folder)], dim="spring")
+    data = angles.transpose("time", "spring", "joint").to_dataset(name="joint_angle")
+    data = data.assign_coords(spring=("spring", np.array(_EXAMPLES), {"units": PAPER_UNIT}))
+    data.attrs = {"robot": robot.name, "varied": K1, "about": "yaw joint angles over time"}
+    return data

@@ -1,0 +1,338 @@
+"""Why the robot bends at 34 and the planar model says 12: from the planar model's assumptions to the twin's.
+
+The twin has a planar limit: legs as stiff as the step allows that lift their feet high and put them down on the point,
+and feet that never reach the Coulomb limit, so that the floor's hold on them is a viscous one with the coefficient of
+the planar model (see :mod:`chilopod.twin.creep`). There the two engines have to agree. Each :class:`Factor` then takes
+one assumption back. Factors are switched on alone in the planar limit, switched off alone in the twin, and switched on
+one after the other.
+
+The measure is the paper's: where curved walks set in by a square-root fit to the bend of joint 1. That the engines
+agree in the planar limit is held to a finer one: how fast a bend of one degree grows, and where that changes sign.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from chilopod import trials
+from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
+from chilopod.analysis.square_root import square_root_fit
+from chilopod.analysis.straight_walk import pitchfork
+from chilopod.errors import AnalysisError
+from chilopod.paper.printed import printed
+from chilopod.paper.robot.table import CHECKED, VERDICTS
+from chilopod.paper.table import RobotRow
+from chilopod.progress import Progress, silent
+from chilopod.robot import Robot, Twin
+from chilopod.tasks.radius_law import CURVED
+from chilopod.trials import NONE, Trial
+from chilopod.twin.creep import foot_creep
+from chilopod.twin.legs import twin_of
+
+Array = NDArray[np.float64]
+
+SPRINGS = (7.0, 10.0, 15.0, 22.0, 33.0, 50.0)
+"""k1 that is tried first, N*mm/deg."""
+
+PLANAR = {
+    "twin.sliding_friction": 1000.0,
+    "twin.servo_stiffness": 300.0,
+    "twin.servo_damping": 0.75,
+    "twin.joint_inertia": 3e-4,
+    "twin.clearance": 0.03,
+    "twin.contact_time": 0.002,
+    "twin.foot_radius": 5e-4,
+    "twin.link_mass": 0.01,
+    "twin.timestep": 5e-4,
+}
+"""What the planar limit has instead of the twin's constants, SI."""
+
+FINER = {
+    **PLANAR,
+    "twin.servo_stiffness": 1000.0,
+    "twin.servo_damping": 2.0,
+    "twin.contact_time": 0.001,
+    "twin.control_interval": 0.001,
+    "twin.timestep": 2e-4,
+}
+"""A planar limit that is nearer still, at 2.5 times the work."""
+
+
+@dataclass(frozen=True)
+class Factor:
+    """What the planar model leaves out.
+
+    Attributes
+    ----------
+    name, sentence
+        In a word, and what it means.
+    paths
+        Numbers of the robot that go from those of the planar limit to the twin's.
+    """
+
+    name: str
+    sentence: str
+    paths: tuple[str, ...]
+
+
+FACTORS = (
+    Factor("feet", "where the feet are", ("legs.forward_offset", "legs.half_width")),
+    Factor("grip", "how firmly the floor holds a foot that does not slide", ()),
+    Factor("dry friction", "feet slide beyond the Coulomb limit", ("twin.sliding_friction",)),
+    Factor(
+        "soft legs",
+        "servos give way under load",
+        ("twin.servo_stiffness", "twin.servo_damping", "twin.joint_inertia"),
+    ),
+    Factor("dragging feet", "swing feet are hardly lifted and touch the floor", ("twin.clearance",)),
+    Factor("joint damping", "friction in the yaw joints", ("springs.damping",)),
+    Factor(
+        "legs and floor",
+        "mass of the legs, size of the feet, softness of the floor",
+        ("twin.link_mass", "twin.foot_radius", "twin.contact_time"),
+    ),
+)
+"""In the order in which they are switched on one after the other."""
+
+_BEND = float(np.deg2rad(1.0))
+_DURATION, _SKIPPED = 18.0, 6.0  # s
+_SAMPLES = 6  # per period
+_BENT, _WALK = 0.5, 60.0  # rad (root of the sum of squares) and s, of the walks that a square root is fitted to
+_AVERAGED, _PER_SECOND = 12.0, 10.0  # s, a cycle of the undulation that the twin has besides; Hz
+_VOUCHED = 0.03
+_BESIDE = (0.75, 0.85, 0.95)  # of a point, springs for a finer one
+_SOFT_STEP = 2e-3  # s, enough for soft legs
+
+
+def planar_limit(robot: Robot, planar: Robot, constants: Mapping[str, float] = PLANAR) -> Robot:
+    """The twin under the assumptions of the planar model, with that model's feet and friction."""
+    return with_grip(_limit(robot, planar, constants), planar.ground.friction)
+
+
+def _limit(robot: Robot, planar: Robot, constants: Mapping[str, float]) -> Robot:
+    # All at once: not every step goes into every control interval.
+    own = {key.partition(".")[2]: value for key, value in constants.items()}
+    changed = robot.with_(twin=Twin(**{**dict(twin_of(robot)), **own})).with_value("springs.damping", 0.0)
+    for path in FACTORS[0].paths:
+        changed = changed.with_value(path, planar.get(path))
+    return changed
+
+
+def with_grip(robot: Robot, coefficient: float) -> Robot:
+    """The robot with feet that creep like viscous ones of a coefficient, N*s/m; it is in proportion to impratio."""
+    ratio = robot.get("twin.impedance_ratio")
+    return robot.with_value("twin.impedance_ratio", ratio * coefficient / foot_creep(robot).across)
+
+
+def with_factors(robot: Robot, planar: Robot, names: Sequence[str]) -> Robot:
+    """The planar limit with some factors switched on."""
+    limit = _limit(robot, planar, PLANAR)
+    for factor in FACTORS:
+        if factor.name in names:
+            for path in factor.paths:
+                limit = limit.with_value(path, robot.get(path))
+    if "soft legs" in names:
+        limit = limit.with_value("twin.timestep", min(_SOFT_STEP, robot.get("twin.timestep")))
+    return with_grip(limit, foot_creep(robot).across if "grip" in names else planar.ground.friction)
+
+
+def growth(
+    robot: Robot, springs: Sequence[float], folder: str | Path | None = None, duration: float = _DURATION
+) -> xr.Dataset:
+    """How fast a small bend grows.
+
+    Parameters
+    ----------
+    robot
+        With a twin.
+    springs
+        Values of k1, N*mm/deg.
+    folder
+        Where trials are kept.
+    duration
+        Of the walks, s.
+
+    Returns
+    -------
+    Dataset over spring: ``growth`` (1/s) of the bend averaged over gait cycles, NaN where a walk failed, and
+    ``undulates``, whether it changes sides meanwhile.
+    """
+    shape = _shape(robot)
+    asked = [
+        Trial(
+            robot.with_value(K1, stiffness(spring)),
+            duration,
+            joint_angles=tuple(sign * _BEND * shape),
+            disturbance=NONE,
+            rate=_SAMPLES / robot.gait.period,
+            engine="twin",
+        )
+        for spring in springs
+        for sign in (1.0, -1.0)
+    ]
+    angles = [each.joint_angle.isel(robot=0).transpose("time", "joint").values for each in trials.run(asked, folder)]
+    rates, undulates = [], []
+    for one, other in zip(angles[::2], angles[1::2], strict=True):
+        bend = 0.5 * (one - other)
+        cycles = bend[: len(bend) // _SAMPLES * _SAMPLES].reshape(-1, _SAMPLES, bend.shape[1]).mean(axis=1)
+        times = (np.arange(len(cycles)) + 0.5) * robot.gait.period
+        late = times > _SKIPPED
+        rates.append(np.polyfit(times[late], np.log(np.linalg.norm(cycles[late], axis=1)), 1)[0])
+        undulates.append(bool(np.ptp(np.sign(cycles[late] @ shape)) > 0.0))
+    return xr.Dataset(
+        {"growth": ("spring", np.array(rates), {"units": "1/s"}), "undulates": ("spring", np.array(undulates))},
+        coords={"spring": ("spring", np.asarray(springs, float), {"units": PAPER_UNIT})},
+    )
+
+
+def sign_change(springs: Array, growth: Array) -> float:
+    """The stiffest spring below which a growth rate is positive, between values linearly in 1/k; NaN if there is
+    none."""
+    inverse = 1.0 / np.asarray(springs)
+    for i in range(len(springs) - 1, 0, -1):
+        if growth[i] <= 0.0 < growth[i - 1]:
+            part = growth[i] / (growth[i] - growth[i - 1])
+            return float(1.0 / (inverse[i] + part * (inverse[i - 1] - inverse[i])))
+    return float("nan")
+
+
+def onset(robot: Robot, folder: str | Path | None = None, quick: bool = False) -> float:
+    """Where curved walks set in, N*mm/deg, by the paper's method: the square-root fit to the bend of joint 1 of walks
+    that begin bent; over the three stiffest springs that curve, then over three beside the point that these give.
+
+    Infinite if walks curve at the stiffest spring tried, NaN if at fewer than two, or if their bends point beyond it.
+    With ``quick`` without the second fit.
+    """
+    springs = SPRINGS[::2] if quick else SPRINGS
+    bends = _bends(robot, springs, folder)
+    if bends[-1] > 0.0:
+        return float("inf")
+    point = _fitted(springs, bends)
+    if quick or np.isnan(point):
+        return point
+    finer = [round(point * part, 2) for part in _BESIDE]
+    refined = _fitted(finer, _bends(robot, finer, folder))
+    return refined if refined <= max(springs) else point
+
+
+def _bends(robot: Robot, springs: Sequence[float], folder: str | Path | None) -> Array:
+    """Mean angle of joint 1 at the end of walks, rad; 0 where the body is straight, or the walk failed."""
+    bend = tuple(_BENT * _shape(robot))
+    asked = [
+        Trial(
+            robot.with_value(K1, stiffness(spring)), _WALK, 0, bend, disturbance=NONE, rate=_PER_SECOND, engine="twin"
+        )
+        for spring in springs
+    ]
+    found = []
+    for record in trials.run(asked, folder):
+        last = np.abs(record.joint_angle.isel(robot=0).values[-round(_AVERAGED * _PER_SECOND) :].mean(axis=0))
+        found.append(last[0] if last.sum() > CURVED else 0.0)
+    return np.array(found)
+
+
+def _fitted(springs: Sequence[float], bends: Array) -> float:
+    curved = np.flatnonzero(bends > 0.0)[-3:]
+    if len(curved) < 2:
+        return float("nan")
+    # Two springs have a point too: a third that is as straight as it gets does not move it.
+    inverse = np.array([*(1.0 / springs[i] for i in curved), 1e-3])
+    try:
+        point = square_root_fit(inverse, [*bends[curved], 0.0], resampled=0).critical
+    except AnalysisError:
+        return float("nan")
+    # Beyond a spring at which walks are straight there is no point.
+    return point if point <= max(springs) or bends[-1] > 0.0 else float("nan")
+
+
+def limit_point(
+    robot: Robot, planar: Robot, constants: Mapping[str, float] = FINER, folder: str | Path | None = None
+) -> float:
+    """Where a small bend neither grows nor dies out in the planar limit, N*mm/deg: what the planar model calls its
+    pitchfork; NaN if nowhere near that."""
+    springs = [round(part * pitchfork(planar, normal_form=False).value, 2) for part in (0.95, 1.05)]
+    found = growth(planar_limit(robot, planar, constants), springs, folder)
+    return sign_change(found.spring.values, found.growth.values)
+
+
+def ablation(
+    robot: Robot, planar: Robot, folder: str | Path | None = None, quick: bool = False, progress: Progress = silent
+) -> xr.Dataset:
+    """The point with factors switched on and off.
+
+    Parameters
+    ----------
+    robot
+        With a twin.
+    planar
+        What the planar limit takes feet and friction from.
+    folder
+        Where trials are kept.
+    quick
+        Only the path from the planar limit to the twin, by fewer springs.
+    progress
+        Called as the work goes on.
+
+    Returns
+    -------
+    Dataset over factor: ``alone``, the point in the planar limit with only this one (N*mm/deg); ``without``, in the
+    twin without it; ``path``, with it and all before it. Infinite where walks curve at all springs tried, NaN where at
+    none. Attributes: ``limit`` and ``twin``, the same with none and all; ``vouched`` and ``exact``, the points of the
+    planar limit by :func:`limit_point` and of the planar model; ``grip``, the twin's creep coefficient (N*s/m).
+    """
+    names = [factor.name for factor in FACTORS]
+    wanted: dict[str, list[list[str]]] = {"path": [names[: i + 1] for i in range(len(names))]}
+    if not quick:
+        wanted["alone"] = [[name] for name in names]
+        wanted["without"] = [[other for other in names if other != name] for name in names]
+    sets = [frozenset(), *(frozenset(on) for rows in wanted.values() for on in rows)]
+    points: dict[frozenset[str], float] = {}
+    for on in sets:
+        if on not in points:
+            progress(len(points) / len(set(sets)), ", ".join(sorted(on)) or "planar limit")
+            points[on] = onset(with_factors(robot, planar, sorted(on)), folder, quick)
+    data = xr.Dataset(coords={"factor": names})
+    for name in ("alone", "without", "path"):
+        values = [points[frozenset(on)] for on in wanted[name]] if name in wanted else [np.nan] * len(names)
+        data[name] = ("factor", np.array(values), {"units": PAPER_UNIT})
+    data["about"] = ("factor", np.array([factor.sentence for factor in FACTORS], dtype=object))
+    progress(1.0, "planar limit by growth")
+    data.attrs = {
+        "robot": robot.name,
+        "vouched": limit_point(robot, planar, PLANAR if quick else FINER, folder),
+        "exact": pitchfork(planar, normal_form=False).value,
+        "limit": points[frozenset()],
+        "twin": points[frozenset(names)],
+        "grip": foot_creep(robot).across,
+    }
+    return data
+
+
+def _shape(robot: Robot) -> Array:
+    """Of the bend that is started with: the paper's critical mode, or all joints alike."""
+    mode = np.array(printed()["pitchfork"]["joint_components"])
+    if robot.body.modules - 1 != len(mode):
+        mode = np.ones(robot.body.modules - 1)
+    return mode / np.linalg.norm(mode)
+
+
+def rows(data: xr.Dataset) -> list[RobotRow]:
+    """The line of the robot's table: whether the engines vouch for each other."""
+    off = data.attrs["vouched"] / data.attrs["exact"] - 1.0
+    return [
+        RobotRow(
+            "planar limit of the twin: where the straight walk is lost",
+            "no counterpart",
+            f"{data.attrs['vouched']:.2f} N*mm/deg ({100.0 * off:+.1f} %)",
+            f"{data.attrs['exact']:.4f} N*mm/deg",
+            CHECKED,
+            VERDICTS[abs(off) <= _VOUCHED],
+            f"{100.0 * _VOUCHED:.0f} % of the planar model",
+        )
+    ]

@@ -1,0 +1,138 @@
+"""What a section of the report is, and what sections find."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from chilopod.paper.table import RobotRow, Row
+from chilopod.progress import Progress
+from chilopod.robot import Robot, load_robot
+
+T = TypeVar("T")
+R = TypeVar("R", Row, RobotRow)
+
+
+@dataclass(frozen=True)
+class Context:
+    """What sections are computed from.
+
+    Attributes
+    ----------
+    robot
+        Of the planar model; the paper's numbers are those of ``aoi2022-planar``.
+    whole
+        Of the sections in three dimensions, with a twin.
+    quick
+        Coarser sweeps, fewer module counts, springs and repeats; what does not depend on chance is as exact as
+        otherwise.
+    folder
+        Where the records of trials are kept, so that what was stopped goes on where it was; without one nothing is
+        kept.
+    """
+
+    robot: Robot = field(default_factory=lambda: load_robot("aoi2022-planar"))
+    whole: Robot = field(default_factory=lambda: load_robot("aoi2022"))
+    quick: bool = False
+    folder: Path | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Section(Generic[T]):
+    """A part of the report: something that is computed, and its lines of the tables.
+
+    Attributes
+    ----------
+    name
+        What it is asked for by.
+    chapter
+        That it stands in.
+    sentence
+        What it is.
+    compute
+        Finds it, given the context, what the sections it needs have found, and where to say how far it is.
+    rows
+        Its lines of the tables, given what it found and what the sections it needs have found.
+    needs
+        Other sections whose results it uses where they were computed; they come before it.
+    beyond
+        Whether it goes beyond the paper's own experiments.
+    on_request
+        Whether it is computed only if it is asked for by name.
+    full
+        Whether it is left out of a quick report unless it is asked for by name.
+    """
+
+    name: str
+    chapter: str
+    sentence: str
+    compute: Callable[[Context, Found, Progress], T]
+    rows: Callable[[T, Found], Sequence[Row | RobotRow]] = lambda value, found: ()
+    needs: tuple[Section[Any], ...] = ()
+    beyond: bool = False
+    on_request: bool = False
+    full: bool = False
+
+
+@dataclass
+class Found:
+    """What was found, by section: ``found[section]`` is its result, None if there is none.
+
+    Attributes
+    ----------
+    context
+        What it was computed from.
+    values, rows, seconds
+        Of the sections that were computed: result, lines of the tables, and how long it took.
+    failures
+        Why others could not be.
+    """
+
+    context: Context = field(default_factory=Context)
+    values: dict[Section[Any], Any] = field(default_factory=dict)
+    rows: dict[Section[Any], Sequence[Row | RobotRow]] = field(default_factory=dict)
+    seconds: dict[Section[Any], float] = field(default_factory=dict)
+    failures: dict[Section[Any], Exception] = field(default_factory=dict)
+
+    def __getitem__(self, section: Section[T]) -> T | None:
+        return self.values.get(section)
+
+    def __contains__(self, section: Section[Any]) -> bool:
+        """Whether it was computed, or failed."""
+        return section in self.values or section in self.failures
+
+    def add(self, section: Section[T], value: T) -> None:
+        """Keep a result, and make its lines of the tables."""
+        rows = section.rows(value, self.seen_by(section.needs))
+        self.values[section], self.rows[section] = value, rows
+
+    def seen_by(self, needs: Iterable[Section[Any]]) -> Found:
+        """The results of some sections; asking for others fails."""
+        return _Seen(self.context, {section: self[section] for section in needs})
+
+    def copy(self) -> Found:
+        """As it is now, whatever is added later."""
+        return Found(self.context, {**self.values}, {**self.rows}, {**self.seconds}, {**self.failures})
+
+    def lines(self, kind: type[R], chapter: str | None = None) -> list[R]:
+        """All lines of one of the tables, or those of a chapter."""
+        chapters = dict.fromkeys(section.chapter for section in self.rows) if chapter is None else (chapter,)
+        return [
+            row
+            for each in chapters
+            for section, rows in self.rows.items()
+            if section.chapter == each
+            for row in rows
+            if isinstance(row, kind)
+        ]
+
+
+class _Seen(Found):
+    """Insists that what is used was said to be needed."""
+
+    def __getitem__(self, section: Section[T]) -> T | None:
+        if section not in self.values:
+            raise KeyError(f"{section.name} is not among the sections that are needed")
+        return super().__getitem__(section)

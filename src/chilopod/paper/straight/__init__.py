@@ -1,0 +1,1 @@
+"""The straight walk and where it bends."""

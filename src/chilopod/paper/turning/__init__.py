@@ -1,0 +1,1 @@
+"""Turning to targets with the planar model."""

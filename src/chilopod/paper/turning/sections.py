@@ -1,0 +1,32 @@
+"""Turning to a target: the sections of this chapter."""
+
+from __future__ import annotations
+
+from chilopod.analysis.parameters import stiffness
+from chilopod.paper.movies import Movie, movies
+from chilopod.paper.section import Context, Found, Section
+from chilopod.paper.turning.rows import rows
+from chilopod.paper.turning.study import Turning, turning
+from chilopod.progress import Progress
+
+CHAPTER = "Turning to a target"
+
+_FILMED = (stiffness(41.0), stiffness(11.0), stiffness(8.0))  # straight, curved a little, curved a lot
+# N*mm/deg: what `chilopod turn` finds for task A; the movie takes the best of the trials where there are any.
+_BEST = 9.8
+
+
+def _movies(context: Context, found: Found, report: Progress) -> list[Movie]:
+    tasks = found[TURNING]
+    best = _BEST if tasks is None else tasks.tasks["A"].best
+    return movies(context.robot, _FILMED, stiffness(best), context.folder, report)
+
+
+TURNING: Section[Turning] = Section(
+    "turning",
+    CHAPTER,
+    "turning to targets",
+    lambda context, found, report: turning(context.robot, context.folder, context.quick, report),
+    lambda tasks, found: rows(tasks),
+)
+MOVIES: Section[list[Movie]] = Section("movies", CHAPTER, "the paper's two movies", _movies, needs=(TURNING,))

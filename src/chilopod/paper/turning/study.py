@@ -1,0 +1,238 @@
+"""What the turning tasks show: all of them together, and why the best spring is not the law's."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from chilopod import trials
+from chilopod.analysis.parameters import ALL, PAPER_UNIT, stiffness
+from chilopod.analysis.radius_law import RadiusLaws, radius_laws
+from chilopod.analysis.straight_walk import first_loss
+from chilopod.paper.printed import printed
+from chilopod.paper.turning.trials import (
+    DURATION,
+    RATE,
+    SPRINGS,
+    UNIFORM_SPRINGS,
+    TurningTask,
+    turning_task,
+    without_leg_yaw,
+)
+from chilopod.progress import Progress, part, silent
+from chilopod.robot import Robot
+from chilopod.stability import Kind
+from chilopod.steering import STRATEGIES, Target, earliest_arrival, evaluate, steered
+from chilopod.trials import NONE, Disturbance, Trial
+
+ROUGH = 3.0
+"""Times the usual disturbance, for the check that conclusions do not hang on it."""
+
+FARTHER = (1.3, 2.0, 3.0, 4.5)
+"""m: targets in the direction of task A, for the check of what a longer way changes."""
+
+FARTHER_SPRINGS = (8, 9, 10, 11, 12, 12.5, 13, 14, 15, 17, 19, 21, 24, 28, 41)
+"""N*mm/deg."""
+
+QUICK_SPRINGS = (6, 7, 8, 9, 10, 11, 12, 21)
+"""N*mm/deg."""
+
+ROUGH_SPRINGS = (6, 7, 8, 8.5, 9, 9.5, 10, 11, 12, 13, 15, 21)
+"""N*mm/deg."""
+
+
+@dataclass(frozen=True)
+class Turning:
+    """Everything the turning studies found.
+
+    Attributes
+    ----------
+    robot
+        The robot.
+    laws
+        Its radius laws.
+    tasks
+        The paper's two, by letter.
+    hopf, rough
+        Task A with uniform springs, and with a disturbance :data:`ROUGH` times as large.
+    hopf_point
+        The Neimark-Sacker point of uniform springs, N*mm/deg.
+    without
+        Task A with and without leg yaw, at the best spring and at the law's.
+    settled
+        See :func:`settled_start`.
+    farther
+        See :func:`farther_targets`.
+    """
+
+    robot: Robot
+    laws: RadiusLaws
+    tasks: Mapping[str, TurningTask]
+    hopf: TurningTask
+    rough: TurningTask
+    hopf_point: float
+    without: xr.Dataset
+    settled: xr.Dataset
+    farther: xr.Dataset
+
+
+def turning(
+    robot: Robot, folder: str | Path | None = None, quick: bool = False, progress: Progress = silent
+) -> Turning:
+    """All turning studies of a robot.
+
+    Parameters
+    ----------
+    robot
+        The paper's numbers are those of ``aoi2022-planar``.
+    folder
+        Where trials are kept; without one nothing is kept.
+    quick
+        Fewer springs and fewer, nearer targets.
+    progress
+        Called with the part done (0 to 1) and a few words.
+    """
+    springs = QUICK_SPRINGS if quick else SPRINGS
+    laws = radius_laws(robot)
+    tasks: dict[str, TurningTask] = {}
+    for index, (letter, entry) in enumerate(printed()["turning"]["tasks"].items()):
+        told = part(progress, 0.25 * index, 0.25 * (index + 1), f"task {letter}")
+        tasks[letter] = turning_task(robot, Target.parse(entry["target"]), springs, folder=folder, progress=told)
+    task = tasks["A"]
+    hopf = turning_task(
+        robot,
+        task.target,
+        UNIFORM_SPRINGS[::3] if quick else UNIFORM_SPRINGS,
+        strategy="hopf",
+        time=task.time,
+        folder=folder,
+        progress=part(progress, 0.5, 0.65, "uniform springs"),
+    )
+    usual = Disturbance()
+    rough = turning_task(
+        robot,
+        task.target,
+        QUICK_SPRINGS if quick else ROUGH_SPRINGS,
+        disturbance=replace(usual, **{name: ROUGH * value for name, value in vars(usual).items()}),
+        folder=folder,
+        progress=part(progress, 0.65, 0.85, "larger disturbances"),
+    )
+    law, _ = laws.k_hat(task.target.radius)
+    without = without_leg_yaw(
+        robot,
+        task.target,
+        {"best spring": task.best, "spring of the law": law},
+        folder=folder,
+        progress=part(progress, 0.85, 0.9, "with and without leg yaw"),
+    )
+    settled = settled_start(robot, laws, {letter: each.target for letter, each in tasks.items()}, folder)
+    distances = FARTHER[:2] if quick else FARTHER
+    farther = farther_targets(robot, laws, task.target.bearing, distances, folder=folder)
+    progress(1.0, "turning tasks")
+    point = first_loss(robot, ALL, (stiffness(2.0), stiffness(75.0)), Kind.NEIMARK_SACKER, normal_form=False)
+    return Turning(robot, laws, tasks, hopf, rough, point.value, without, settled, farther)
+
+
+def settled_start(
+    robot: Robot, laws: RadiusLaws, targets: Mapping[str, Target], folder: str | Path | None = None
+) -> xr.Dataset:
+    """Whether the spring of the law leads to the target, if the walk need not find its curve first.
+
+    One undisturbed trial without leg yaw each, at the spring of the law by the path of module 1: from "straight", from
+    the settled walk "bent" already, and bent with the target seen not from where module 1 points but from where it
+    moves to ("bent, aimed").
+
+    Returns
+    -------
+    Dataset over (task, start): ``start_nearest`` (m); over task: ``law_spring`` (N*mm/deg) and ``slip``, the mean
+    angle from heading to motion of module 1 on the settled walk (rad).
+    """
+    starts = ("straight", "bent", "bent, aimed")
+    nearest, springs, slips = [], [], []
+    for target in targets.values():
+        _, spring = laws.k_hat(target.radius)
+        bent = laws.joint_angles(spring)
+        walker, _ = steered(robot, STRATEGIES["open-loop"], stiffness(spring))
+        model = Trial(walker, DURATION, target=target, disturbance=NONE, rate=RATE)
+        walks = [model, replace(model, joint_angles=bent)]
+        records = trials.run(walks, folder)
+        slip = _slip(records[1])
+        aimed = Target(target.bearing + slip, target.distance)
+        records += trials.run([replace(walks[1], target=aimed)], folder)
+        nearest.append([float(record.distance.min()) for record in records])
+        springs.append(spring)
+        slips.append(slip)
+    return xr.Dataset(
+        {
+            "start_nearest": (("task", "start"), np.array(nearest), {"units": "m"}),
+            "law_spring": ("task", np.array(springs), {"units": PAPER_UNIT}),
+            "slip": ("task", np.array(slips), {"units": "rad"}),
+        },
+        coords={"task": list(targets), "start": list(starts)},
+        attrs={"robot": robot.name},
+    )
+
+
+def _slip(record: xr.Dataset) -> float:
+    """Mean angle from heading to velocity of module 1, rad; over the second half of a walk."""
+    late = record.isel(robot=0, time=slice(record.sizes["time"] // 2, None))
+    moving = np.arctan2(late.velocity.sel(axis="y").values, late.velocity.sel(axis="x").values)
+    return float(np.mean((moving - late.heading.values + np.pi) % (2.0 * np.pi) - np.pi))
+
+
+def farther_targets(
+    robot: Robot,
+    laws: RadiusLaws,
+    bearing: float,
+    distances: Sequence[float] = FARTHER,
+    springs: Sequence[float] = FARTHER_SPRINGS,
+    folder: str | Path | None = None,
+) -> xr.Dataset:
+    """Targets in one direction, farther and farther: what the time that a bend needs to grow makes of the task.
+
+    One undisturbed trial each, with leg yaw, as much longer as the way is.
+
+    Returns
+    -------
+    Dataset over (away, spring): ``nearest`` (m), ``effort`` until the earliest arrival of that distance, and
+    ``effort_part`` of what legs at their limit all the time would make of it (1); over away: ``earliest`` (s),
+    ``k_hat`` by the law (N*mm/deg).
+    """
+    rows: dict[str, list[Any]] = {name: [] for name in ("nearest", "effort", "effort_part", "earliest", "k_hat")}
+    for away in distances:
+        target = Target(bearing, away)
+        asked = []
+        for spring in springs:
+            walker, controller = steered(robot, STRATEGIES["pitchfork"], stiffness(float(spring)))
+            duration = DURATION * away / distances[0]
+            asked.append(Trial(walker, duration, target=target, controller=controller, disturbance=NONE, rate=RATE))
+        record = trials.together(trials.run(asked, folder))
+        earliest = earliest_arrival(record)
+        result = evaluate(record, earliest)
+        limit = controller.limit if controller else 0.0
+        rows["nearest"].append(result.nearest)
+        rows["effort"].append(result.effort)
+        rows["effort_part"].append(result.effort / (2.0 * limit**2 * earliest))
+        rows["earliest"].append(earliest)
+        rows["k_hat"].append(laws.k_hat(target.radius)[0])
+    both = ("away", "spring")
+    return xr.Dataset(
+        {
+            "nearest": (both, np.array(rows["nearest"]), {"units": "m"}),
+            "effort": (both, np.array(rows["effort"]), {"units": "rad^2*s"}),
+            "effort_part": (both, np.array(rows["effort_part"]), {"units": "1"}),
+            "earliest": ("away", np.array(rows["earliest"]), {"units": "s"}),
+            "k_hat": ("away", np.array(rows["k_hat"]), {"units": PAPER_UNIT}),
+        },
+        coords={
+            "away": ("away", np.array(distances), {"units": "m"}),
+            "spring": ("spring", np.array(springs, float), {"units": PAPER_UNIT}),
+        },
+        attrs={"robot": robot.name, "bearing_deg": math.degrees(bearing)},
+    )

@@ -1,0 +1,296 @@
+"""Turning tasks: the paper's experiments with targets, as trials of the planar model (its section "Turning").
+
+A robot stands straight, a target lies ahead to its left, and the first spring is chosen before it walks; the legs of
+module 1 yaw towards the target. Each task is walked with many springs and several seeds and judged as the paper does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from chilopod import trials, units
+from chilopod.analysis.parameters import PAPER_UNIT, stiffness
+from chilopod.paper.printed import printed
+from chilopod.progress import Progress, silent
+from chilopod.robot import Robot
+from chilopod.steering import STRATEGIES, Outcome, Target, earliest_arrival, evaluate, steered
+from chilopod.steering.criteria import efforts
+from chilopod.steering.strategies import strategy_named
+from chilopod.trials import Disturbance, Trial
+
+Array = NDArray[np.float64]
+
+DURATION: float = units.parse(printed()["turning"]["evaluation_time"], "s")
+"""s: when the paper evaluates, and how long trials of the planar model are, which arrives well before."""
+
+REPEATS: int = printed()["turning"]["repeats"]
+
+SPRINGS = (5, 6, 7, 7.5, 8, 8.5, 9, 9.5, 10, 10.5, 11, 11.5, 12, 12.5, 13, 14, 15, 17, 21, 28, 41, 75)
+"""N*mm/deg: k1 of the turning tasks, close together where the planar model's criteria have their minima."""
+
+UNIFORM_SPRINGS = (2, 3, 4, 5, 6, 8, 11, 15, 21, 41)
+"""N*mm/deg: all springs, of the strategy by Hopf bifurcation; as far below and above its point as the paper's."""
+
+CRITERIA = ("distance", "angle", "effort", "effort_until_arrival")
+"""epsilon 1 to 3, and epsilon 3 integrated only until the robot has arrived."""
+
+RATE = 50.0
+"""Samples per second of these trials."""
+
+_PATH_STEP = 2
+"""Of the records' samples, every so many are kept of a path that is drawn."""
+
+
+@dataclass(frozen=True)
+class TurningTask:
+    """What became of a target with many springs.
+
+    Attributes
+    ----------
+    target
+        Where it is.
+    criteria
+        Over (instant, spring, repeat): ``distance`` (m), ``angle`` (rad) and ``effort`` (rad^2 s), epsilon 1 to 3, at
+        the ``seconds`` of the two instants "earliest arrival" and "paper" (:data:`DURATION`); means over repeats and
+        standard errors as
+        ``distance_mean``, ``distance_error`` and so on (NaN where a repeat did not walk so long). Over (spring,
+        repeat): ``effort_until_arrival`` (or until the end, rad^2 s), ``arrival`` (s, NaN if never), ``nearest`` (m),
+        ``outcome`` and ``status``.
+    paths
+        Over (shown, repeat, time): ``x`` and ``y`` (m) of module 1, ``distance`` (m) and ``bearing`` (rad, continuous)
+        of the target, of three springs: the best, and the grid's nearest to 15/21 and 41/21 of it as in the paper. The
+        best is that of the smallest mean ``nearest``, which needs no evaluation time.
+    """
+
+    target: Target
+    criteria: xr.Dataset
+    paths: xr.Dataset
+
+    @property
+    def time(self) -> float:
+        """The evaluation time, s."""
+        return float(self.criteria.seconds[0])
+
+    @property
+    def best(self) -> float:
+        """The spring that comes nearest to the target on average, N*mm/deg."""
+        return _best(self.criteria)
+
+
+def turning_task(
+    robot: Robot,
+    target: Target,
+    springs: Sequence[float] = SPRINGS,
+    repeats: int = REPEATS,
+    strategy: str = "pitchfork",
+    *,
+    time: float | None = None,
+    duration: float = DURATION,
+    disturbance: Disturbance | None = None,
+    shown: Sequence[float] | None = None,
+    engine: str = "planar",
+    folder: str | Path | None = None,
+    progress: Progress = silent,
+) -> TurningTask:
+    """Walk towards a target with every spring, several times.
+
+    Parameters
+    ----------
+    robot
+        Its other springs stay.
+    target
+        Where to go.
+    springs
+        N*mm/deg.
+    repeats
+        Trials with each, with the seeds 0, 1, ...
+    strategy
+        Of :data:`chilopod.steering.STRATEGIES`.
+    time
+        When epsilon 1 to 3 are taken, s; by default the earliest arrival of any of these trials, as in the paper, and
+        ``duration`` if none arrives.
+    duration
+        Of every trial, s, at least the paper's.
+    disturbance
+        How much differs from trial to trial; by default what all studies have.
+    shown
+        Springs of ``paths``, N*mm/deg.
+    engine
+        Of :data:`chilopod.engine.ENGINES`.
+    folder
+        Where records are kept, so that a study that was stopped goes on where it was.
+    progress
+        Called with the part done (0 to 1) and a few words.
+    """
+    plan = strategy_named(strategy)
+    asked = []
+    for spring in springs:
+        walker, controller = steered(robot, plan, stiffness(float(spring)))
+        walk = Trial(
+            walker,
+            duration,
+            target=target,
+            controller=controller,
+            disturbance=disturbance or Disturbance(),
+            rate=RATE,
+            engine=engine,
+        )
+        asked += [replace(walk, seed=seed) for seed in range(repeats)]
+    record = trials.together(trials.run(asked, folder, progress))
+    earliest = earliest_arrival(record)
+    when = time if time is not None else earliest if np.isfinite(earliest) else duration
+    criteria = _criteria(record, (when, DURATION), springs, repeats)
+    criteria.attrs = {
+        "robot": robot.name,
+        "target": str(target),
+        "strategy": strategy,
+        "duration_s": duration,
+        "earliest_arrival_s": earliest,
+        "radius_m": target.radius,
+    }
+    if shown is None:
+        shown = [_nearest(springs, _best(criteria) * part) for part in (15.0 / 21.0, 1.0, 41.0 / 21.0)]
+    paths = _paths(record, springs, repeats, shown)
+    paths.attrs = {**criteria.attrs, "target_x_m": target.position[0], "target_y_m": target.position[1]}
+    return TurningTask(target, criteria, paths)
+
+
+def _criteria(record: xr.Dataset, instants: tuple[float, float], springs: Sequence[float], repeats: int) -> xr.Dataset:
+    shape = (len(springs), repeats)
+    found = [evaluate(record, time) for time in instants]
+    last = float(record.time[-1])
+    until = np.array(
+        [
+            efforts(record.isel(robot=[index]), arrival if np.isfinite(arrival) else last)[0]
+            for index, arrival in enumerate(found[0].arrival)
+        ]
+    )
+    data = xr.Dataset(coords={"spring": ("spring", np.asarray(springs, float), {"units": PAPER_UNIT})})
+    data = data.assign_coords(instant=["earliest arrival", "paper"], repeat=np.arange(repeats))
+    data["seconds"] = ("instant", np.array(instants), {"units": "s"})
+    for name, unit in (("distance", "m"), ("angle", "rad"), ("effort", "rad^2*s")):
+        values = np.stack([getattr(each, name).reshape(shape) for each in found])
+        data[name] = (("instant", "spring", "repeat"), values, {"units": unit})
+    both = ("spring", "repeat")
+    data["effort_until_arrival"] = (both, until.reshape(shape), {"units": "rad^2*s"})
+    for name in CRITERIA:
+        data[f"{name}_mean"] = data[name].mean("repeat", skipna=False, keep_attrs=True)
+        error = data[name].std("repeat", ddof=1, skipna=False) / np.sqrt(repeats)
+        data[f"{name}_error"] = error.assign_attrs(units=data[name].attrs["units"])
+    data["arrival"] = (both, found[0].arrival.reshape(shape), {"units": "s"})
+    data["nearest"] = (both, found[0].nearest.reshape(shape), {"units": "m"})
+    labels = np.array([each.label for each in found[0].outcome], dtype=object)
+    data["outcome"] = (both, labels.reshape(shape))
+    data["status"] = (both, record.status.values.astype(object).reshape(shape))
+    return data
+
+
+def _paths(record: xr.Dataset, springs: Sequence[float], repeats: int, shown: Sequence[float]) -> xr.Dataset:
+    rows = [springs.index(spring) * repeats + repeat for spring in shown for repeat in range(repeats)]
+    some = record.isel(robot=rows, time=slice(None, None, _PATH_STEP))
+
+    def split(values: Array) -> tuple[tuple[str, ...], Array]:
+        return ("shown", "repeat", "time"), values.T.reshape(len(shown), repeats, -1)
+
+    position = some.position.transpose("axis", "time", "robot").values
+    bearing = np.unwrap(some.bearing.transpose("time", "robot").values, axis=0)
+    return xr.Dataset(
+        {
+            "x": (*split(position[0]), {"units": "m"}),
+            "y": (*split(position[1]), {"units": "m"}),
+            "distance": (*split(some.distance.transpose("time", "robot").values), {"units": "m"}),
+            "bearing": (*split(bearing), {"units": "rad"}),
+        },
+        coords={
+            "shown": ("shown", np.asarray(shown, float), {"units": PAPER_UNIT}),
+            "repeat": np.arange(repeats),
+            "time": ("time", some.time.values, {"units": "s"}),
+        },
+    )
+
+
+def _best(criteria: xr.Dataset) -> float:
+    return float(criteria.spring[int(np.argmin(criteria.nearest.mean("repeat").values))])
+
+
+def _nearest(springs: Sequence[float], wanted: float) -> float:
+    return min(springs, key=lambda spring: abs(np.log(spring / wanted)))
+
+
+def springs_by_outcome(criteria: xr.Dataset) -> dict[str, list[float]]:
+    """Springs (N*mm/deg) by what became of most of their trials."""
+    found: dict[str, list[float]] = {outcome.label: [] for outcome in Outcome}
+    for spring, labels in zip(criteria.spring.values, criteria.outcome.values, strict=True):
+        names, counts = np.unique(labels.astype(str), return_counts=True)
+        found[str(names[counts.argmax()])].append(float(spring))
+    return found
+
+
+def _last(data: xr.DataArray) -> Array:
+    """Of every robot, what it had before it ended."""
+    values = data.transpose("robot", "time").values
+    return np.array([row[np.isfinite(row)][-1] for row in values])
+
+
+def without_leg_yaw(
+    robot: Robot,
+    target: Target,
+    springs: Mapping[str, float],
+    *,
+    duration: float = DURATION,
+    engine: str = "planar",
+    folder: str | Path | None = None,
+    progress: Progress = silent,
+) -> xr.Dataset:
+    """The same task with and without leg yaw (Fig. "without": five trials and nine).
+
+    Parameters
+    ----------
+    robot, target, duration, engine, folder, progress
+        As for :func:`turning_task`.
+    springs
+        k1 by name, N*mm/deg.
+
+    Returns
+    -------
+    Dataset over (case, trial, time): ``x`` and ``y`` of module 1 (m); over (case, trial): ``arrived``, ``nearest`` (m)
+    and ``turned``, the last heading (rad, left positive). Cases are the names, each ``leg_yaw`` or not, with
+    ``spring``; where there are fewer trials than nine the rest is NaN.
+    """
+    cases, most = [], int(printed()["turning"]["open_loop_repeats"])
+    for index, ((name, spring), leg_yaw) in enumerate((item, with_) for item in springs.items() for with_ in (0, 1)):
+        strategy = "pitchfork" if leg_yaw else "open-loop"
+        walker, controller = steered(robot, STRATEGIES[strategy], stiffness(spring))
+        asked = [
+            Trial(walker, duration, seed, target=target, controller=controller, rate=RATE, engine=engine)
+            for seed in range(REPEATS if leg_yaw else most)
+        ]
+        record = trials.together(trials.run(asked, folder))
+        result = evaluate(record, duration)
+        some = record.isel(time=slice(None, None, _PATH_STEP))
+        over = ("trial", "time")
+        case = xr.Dataset(
+            {
+                "x": (over, some.position.sel(axis="x").transpose("robot", "time").values, {"units": "m"}),
+                "y": (over, some.position.sel(axis="y").transpose("robot", "time").values, {"units": "m"}),
+                "arrived": ("trial", np.isfinite(result.arrival).astype(float), {"units": "1"}),
+                "nearest": ("trial", result.nearest, {"units": "m"}),
+                "turned": ("trial", _last(record.heading), {"units": "rad"}),
+            },
+            coords={"time": ("time", some.time.values, {"units": "s"}), "trial": np.arange(len(asked))},
+        )
+        cases.append(case.reindex(trial=np.arange(most)))
+        progress((index + 1) / (2 * len(springs)), f"{name}, leg yaw {'on' if leg_yaw else 'off'}")
+    data = xr.concat(cases, dim="case")
+    data["leg_yaw"] = ("case", np.tile([False, True], len(springs)))
+    data["spring"] = ("case", np.repeat([float(each) for each in springs.values()], 2), {"units": PAPER_UNIT})
+    data = data.assign_coords(case=[f"{name}, {how}" for name in springs for how in ("without", "with")])
+    x, y = target.position
+    data.attrs = {"robot": robot.name, "target": str(target), "target_x_m": x, "target_y_m": y}
+    return data

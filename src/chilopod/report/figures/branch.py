@@ -1,0 +1,108 @@
+"""A branch of curved walks: bend, radius and cost over the parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from chilopod.report.kit import style
+from chilopod.report.kit.panel import Panel
+
+_LAYOUTS = (style.Layout("ABC", 3.7), style.Layout("A;B;C", 9.5))
+
+
+def panel(data: xr.Dataset) -> Panel:
+    """The figure of a branch from :func:`chilopod.analysis.branch.curved_walks`."""
+    shown = data.attrs["varied"]
+    return Panel(
+        name="branch",
+        title=f"Curved walks over {shown}",
+        draw=lambda narrow: _draw(data, narrow),
+        alt=f"Mean joint angles, radii of axis and path, and cost of transport over {shown}; unstable parts dashed.",
+        text=(),
+        data=data,
+    )
+
+
+def table(data: xr.Dataset) -> xr.Dataset:
+    """A branch with one line per point: what it goes on from is left to netCDF, every joint gets a column."""
+    angles = {f"mean_angle_{joint}": data.mean_angle.sel(joint=joint, drop=True) for joint in data.joint.values}
+    single = data[[name for name in data.data_vars if data[name].dims == ("point",)]].drop_vars("parameter_si")
+    found = single.assign(angles)
+    found.attrs = {name: value for name, value in data.attrs.items() if name != "robot_toml"}
+    return found
+
+
+def _draw(data: xr.Dataset, narrow: bool) -> Figure:
+    figure, axes = style.figure(*_LAYOUTS, narrow)
+    x = data.parameter.values
+    stable = data.stable.values
+    unit = data.parameter.attrs["units"].replace("*", "·")
+    label = f"{data.attrs['varied']} ({unit})"
+
+    for joint, color in zip(data.joint.values, (style.BLACK, *style.CURVES), strict=False):
+        angle = np.rad2deg(data.mean_angle.sel(joint=joint).values)
+        _curve(axes["A"], x, angle, stable, color, f"joint {joint}")
+    axes["A"].set_ylabel("mean joint angle (deg)")
+    axes["A"].set_title("Bend")
+
+    _curve(axes["B"], x, data.axis_radius.values, stable, style.BLUE, "body axis, (N−1) L / Σ|θ|")
+    _curve(axes["B"], x, data.path_radius.values, stable, style.ORANGE, "path of module 1")
+    axes["B"].set_ylabel("radius (m)")
+    axes["B"].set_title("Radius of the turn")
+    # The radius grows without bound towards the pitchfork; what matters is what a robot can turn in.
+    axes["B"].set_ylim(0.0, 2.0)
+
+    _curve(axes["C"], x, data.cost_of_transport.values, stable, style.GREEN, "")
+    axes["C"].set_ylabel("cost of transport (1)")
+    axes["C"].set_title("What it costs")
+
+    for axes_ in axes.values():
+        axes_.set_xlabel(label)
+        style.grid(axes_)
+    _mark(axes["A"], data)
+    bottom, top = axes["A"].get_ylim()
+    axes["A"].set_ylim(top=top + 0.4 * (top - bottom))  # room for the legend
+    axes["A"].legend(loc="upper right", ncols=2)
+    axes["B"].plot([], [], color=style.GREY, linestyle=(0, (4, 2)), label="unstable")
+    axes["B"].legend(loc="upper left")
+    return figure
+
+
+def _curve(
+    axes: Axes, x: NDArray[np.float64], y: NDArray[np.float64], stable: NDArray[np.bool_], color: str, name: str
+) -> None:
+    if name:
+        axes.plot([], [], color=color, label=name)  # the legend names the colour, whatever the stability
+    for first, last, solid in _stretches(stable):
+        axes.plot(x[first : last + 1], y[first : last + 1], color=color, linestyle="-" if solid else (0, (4, 2)))
+
+
+def _stretches(stable: NDArray[np.bool_]) -> Iterator[tuple[int, int, bool]]:
+    """First and last point of every stretch of equal stability; the next one starts where the last one ends."""
+    first = 0
+    # What a stretch is called is decided by its second point: its first may be the critical one in between.
+    for index in range(1, len(stable)):
+        last = index == len(stable) - 1
+        if last or stable[index + 1] != stable[index]:
+            yield first, index, bool(stable[index])
+            first = index
+
+
+def _mark(axes: Axes, data: xr.Dataset) -> None:
+    for special in sorted(set(data.special.values) - {""}):
+        here = data.special.values == special
+        axes.plot(
+            data.parameter.values[here],
+            np.rad2deg(data.mean_angle.values[here, 0]),
+            linestyle="none",
+            marker={"pitchfork": "o", "fold": "s"}.get(special, "D"),
+            color=style.VERMILLION,
+            label=special,
+            zorder=5,
+        )

@@ -1,0 +1,336 @@
+"""The page: everything in one HTML file that needs nothing else."""
+
+from __future__ import annotations
+
+import platform
+from base64 import b64encode
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from importlib.metadata import version
+from importlib.resources import files
+from typing import Any, Final
+
+import xarray as xr
+from jinja2 import Environment, StrictUndefined
+from markupsafe import Markup
+
+from chilopod import units
+from chilopod.errors import in_words
+from chilopod.paper.robot.table import PREDICTED
+from chilopod.paper.section import Found, Section
+from chilopod.paper.straight.sections import MODE, UNIFORM
+from chilopod.paper.table import RobotRow, Row
+from chilopod.paper.turning.sections import TURNING
+from chilopod.report.kit.panel import Panel
+from chilopod.report.kit.words import listing, minus, spring, typeset
+from chilopod.robot import Robot
+
+_TITLE: Final = "A robot that turns by bifurcation: the paper and the computation"
+_VERDICTS: Final[Mapping[str, tuple[str, str]]] = {
+    "agrees": ("agrees", "✓"),
+    "differs": ("differs", "≠"),
+    "undecided": ("undecided", "?"),
+    "not printed": ("open", "–"),
+}
+_ROBOT_VERDICTS: Final[Mapping[str, tuple[str, str]]] = {
+    "within": _VERDICTS["agrees"],
+    "outside": _VERDICTS["differs"],
+    "undecided": _VERDICTS["undecided"],
+}
+_MOST_LISTED: Final = 4
+_RELOAD: Final = 10  # s
+_LIBRARIES: Final = ("numpy", "numba", "scipy", "xarray", "matplotlib")
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A figure in both layouts, as SVG."""
+
+    panel: Panel
+    wide: bytes
+    narrow: bytes
+
+
+@dataclass(frozen=True)
+class Film:
+    """A film beside the page.
+
+    Attributes
+    ----------
+    name
+        Of its files.
+    title
+        What it shows.
+    speed
+        Seconds of the walk per second of the film.
+    encoded
+        Whether there is an mp4 beside the replay.
+    pictured
+        Whether there is a png with moments of it.
+    """
+
+    name: str
+    title: str
+    speed: float
+    encoded: bool
+    pictured: bool = False
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What is drawn of a section."""
+
+    section: Section[Any]
+    figures: Sequence[Drawn]
+    films: Sequence[Film]
+
+
+class State(Enum):
+    """Whether a report is still being computed, is complete, or was stopped before it was."""
+
+    RUNNING = "running"
+    DONE = "done"
+    STOPPED = "stopped"
+
+
+def page(
+    found: Found,
+    sections: Sequence[Section[Any]],
+    opening: Sequence[Drawn],
+    shown: Sequence[Shown],
+    failures: Mapping[Section[Any], Exception],
+    waiting: Collection[Section[Any]],
+    robot_file: str,
+    state: State = State.DONE,
+) -> str:
+    """The page as HTML.
+
+    Parameters
+    ----------
+    found
+        What was computed so far.
+    sections
+        That are to be shown in the end, in the order they are computed.
+    opening
+        Figures of the robot itself, at the beginning of the first chapter.
+    shown
+        What is drawn so far, in the order it stands within its chapter; figures with a letter come first, in the
+        order of their letters.
+    failures
+        Why sections could not be computed or drawn.
+    waiting
+        Sections that are still to be computed or drawn.
+    robot_file
+        What to type for this robot on the command line: a preset, or the path of a file.
+    state
+        While it is running, the page reloads itself.
+    """
+    folder = files("chilopod.report.kit")
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    template = environment.from_string(folder.joinpath("page.html.j2").read_text(encoding="utf-8"))
+    return template.render(
+        title=_TITLE,
+        css=Markup(folder.joinpath("page.css").read_text(encoding="utf-8")),
+        state=state.value,
+        reload=_RELOAD,
+        done=sum(section in found for section in sections),
+        count=len(sections),
+        summary=summary(found),
+        tables=_tables(found),
+        robot_rows=[_robot_row(row) for row in found.lines(RobotRow)],
+        chapters=_chapters(sections, opening, shown, failures, waiting),
+        commands=commands(robot_file, found[MODE]),
+        robots=_robots(found),
+        versions=listing(
+            [f"chilopod {version('chilopod')}", f"Python {platform.python_version()}"]
+            + [f"{name} {version(name)}" for name in _LIBRARIES]
+        ),
+        seconds=", ".join(f"{section.sentence} {value:.1f}" for section, value in found.seconds.items()),
+    )
+
+
+def summary(results: Found) -> str:
+    """What was found, in a few plain sentences."""
+    parts, mode, uniform, turning = [], results[MODE], results[UNIFORM], results[TURNING]
+    modules = results.context.robot.body.modules
+    parts.append(
+        f"A {modules}-module robot walks straight as long as the springs between its modules are "
+        "stiff enough. Below a critical stiffness the straight walk cannot hold, and the body bends by itself."
+    )
+    if mode is not None:
+        found = mode.attrs
+        parts.append(
+            f"Softening the front spring alone, that happens at {spring(found['value'], 5)}: a {found['criticality']} "
+            f"{found['kind']}, and the robot turns left or right."
+        )
+    if uniform is not None:
+        found = uniform.attrs
+        parts.append(
+            f"Softening all springs together, it happens at {spring(found['value'], 5)} and the body undulates, once "
+            f"in {found['oscillation_period_s']:.1f} s."
+        )
+    if turning is not None:
+        task = turning.tasks["A"]
+        parts.append(
+            f"Sent to a target at {task.target}, it arrives with a front spring of {spring(task.best, 3)}; stiffer "
+            "ones carry it past outside, softer ones inside."
+        )
+    if robot_rows := results.lines(RobotRow):
+        predicted = [row for row in robot_rows if row.kind == PREDICTED]
+        counted = {word: sum(row.verdict == word for row in predicted) for word in _ROBOT_VERDICTS}
+        open_ = counted["undecided"]
+        left = f"; {open_} more {'is' if open_ == 1 else 'are'} left open by the scatter of its trials" if open_ else ""
+        parts.append(
+            "The same robot in three dimensions, its unknown constants fitted to the paper's base series of walks and "
+            f"their speed alone, meets {counted['within']} of {len(predicted)} further statements about the robot that "
+            f"it was not fitted to{left}."
+        )
+    rows = results.lines(Row)
+    counted = {word: sum(row.verdict == word for row in rows) for word in _VERDICTS}
+    compared = sum(counted.values()) - counted["not printed"]
+    if compared:
+        differing = [typeset(row.quantity) for row in rows if row.verdict == "differs"]
+        said = [f"{counted['agrees']} agree"]
+        if counted["undecided"]:
+            said.append(f"{counted['undecided']} are left open by the scatter of the trials")
+        if differing:
+            listed = f": {listing(differing)}" if len(differing) <= _MOST_LISTED else ""
+            said.append(f"{len(differing)} differ{listed}. The reasons are given below")
+        parts.append(f"Of {compared} statements of the paper compared with the planar model, {listing(said)}.")
+    return " ".join(parts)
+
+
+def commands(robot: str, mode: xr.Dataset | None) -> list[dict[str, str]]:
+    """Commands that lead on from here."""
+    soft = 10.0 if mode is None else float(f"{0.8 * mode.attrs['value']:.2g}")
+    quoted = f'"{robot}"' if " " in robot else robot
+    both = '--between "2 N*mm/deg" "75 N*mm/deg"'
+    return [
+        {
+            "why": "See every exponent and its mode just below the critical spring.",
+            "line": f'chilopod stability {quoted} --set "springs.stiffness[0]={soft:g} N*mm/deg"',
+        },
+        {
+            "why": "Find every bifurcation of the front spring, with error bounds and verdicts, as JSON.",
+            "line": f'chilopod bifurcation {quoted} --parameter "springs.stiffness[0]" {both} --json',
+        },
+        {
+            "why": "The same with all springs softened together, at a longer stride.",
+            "line": f'chilopod bifurcation {quoted} --set "gait.stride=4 cm" --parameter springs.stiffness {both}',
+        },
+        {
+            "why": "Follow the curved walks: how tightly they turn, and at what cost.",
+            "line": f"chilopod branch {quoted} --out curved",
+        },
+        {
+            "why": "Send the robot to a target of your choice, and watch it go in a browser.",
+            "line": f'chilopod turn {quoted} --target "30 deg, 2 m" --out turn',
+        },
+        {
+            "why": "Let the whole robot walk in three dimensions, and see it in a browser.",
+            "line": 'chilopod turn aoi2022 --engine twin --target "45 deg, 1.3 m" --k1 "21 N*mm/deg" --out turn-3d',
+        },
+        {
+            "why": "Take the whole robot into another simulator.",
+            "line": "chilopod robot export aoi2022 --out aoi2022.xml",
+        },
+        {
+            "why": "Fit the constants that the paper does not print once more, on their own.",
+            "line": "chilopod identify planar",
+        },
+        {
+            "why": "Describe a robot of your own, and ask the same of it.",
+            "line": "chilopod robot new my-robot.toml\nchilopod stability my-robot.toml",
+        },
+    ]
+
+
+def _tables(found: Found) -> list[dict[str, Any]]:
+    """The table paper | computed, one part a chapter."""
+    chapters = dict.fromkeys(section.chapter for section in found.rows)
+    parts = {chapter: [_row(row) for row in found.lines(Row, chapter)] for chapter in chapters}
+    return [{"title": chapter, "rows": rows} for chapter, rows in parts.items() if rows]
+
+
+def _chapters(
+    sections: Sequence[Section[Any]],
+    opening: Sequence[Drawn],
+    shown: Sequence[Shown],
+    failures: Mapping[Section[Any], Exception],
+    waiting: Collection[Section[Any]],
+) -> list[dict[str, Any]]:
+    chapters: list[dict[str, Any]] = []
+    for number, title in enumerate(dict.fromkeys(section.chapter for section in sections), 1):
+        here = [each for each in shown if each.section.chapter == title]
+        figures = [drawn for each in here for drawn in each.figures]
+        planned = [section for section in sections if section.chapter == title]
+        chapters.append(
+            {
+                "title": title,
+                "anchor": f"chapter-{number}",
+                "figures": [_figure(drawn) for drawn in sorted(figures, key=lambda drawn: drawn.panel.letter)],
+                "films": [film for each in here for film in each.films],
+                "coming": [each.sentence for each in planned if each in waiting],
+                "failed": {each.sentence: in_words(failures[each]) for each in planned if each in failures},
+            }
+        )
+    for first in chapters[:1]:
+        first["figures"][:0] = [_figure(drawn) for drawn in opening]
+    return chapters
+
+
+def _row(row: Row) -> dict[str, str]:
+    kind, mark = _VERDICTS[row.verdict]
+    return {
+        "quantity": typeset(row.quantity),
+        "paper": typeset(row.paper),
+        "computed": typeset(row.computed),
+        "where": row.where,
+        "verdict": row.verdict,
+        "remark": typeset(row.remark),
+        "kind": kind,
+        "mark": mark,
+    }
+
+
+def _robot_row(row: RobotRow) -> dict[str, str]:
+    kind, mark = _ROBOT_VERDICTS[row.verdict]
+    words = {name: typeset(text) for name, text in row.as_json().items() if name not in ("verdict", "kind")}
+    return {**words, "origin": row.kind, "verdict": row.verdict, "kind": kind, "mark": mark}
+
+
+def _figure(drawn: Drawn) -> dict[str, Any]:
+    panel = drawn.panel
+    return {
+        "name": panel.name,
+        "letter": panel.letter,
+        "title": panel.title,
+        "alt": panel.alt,
+        "text": [paragraph for paragraph in panel.text if paragraph],
+        "wide": _embedded(drawn.wide),
+        "narrow": _embedded(drawn.narrow),
+    }
+
+
+def _embedded(svg: bytes) -> str:
+    return "data:image/svg+xml;base64," + b64encode(svg).decode("ascii")
+
+
+def _robots(results: Found) -> list[dict[str, Any]]:
+    """The robots of the report, with the files their numbers stand in."""
+    found = [("The robot of the planar model", results.context.robot, "robot.toml")]
+    if results.lines(RobotRow):
+        found.append(("The robot in three dimensions", results.context.whole, "robot-3d.toml"))
+    return [{"says": says, "name": robot.name, "file": file, "numbers": _numbers(robot)} for says, robot, file in found]
+
+
+def _numbers(robot: Robot) -> list[dict[str, str]]:
+    return [
+        {
+            "path": path,
+            "value": minus(units.format(robot.get(path), robot.unit_of(path), digits=6)).replace("*", "·"),
+            "origin": robot.provenance_of(path) or "not said",
+        }
+        for path in robot.parameters()
+    ]

@@ -1,0 +1,51 @@
+"""A movie as files: replay, film and stills."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from chilopod.errors import OutputError
+from chilopod.output import prepare_folder, write_atomic
+from chilopod.paper.movies import Movie
+from chilopod.report.kit.page import Film
+from chilopod.report.scene.film import has_encoder, movie
+from chilopod.report.scene.film_3d import film_3d, stills
+from chilopod.report.scene.replay import replay
+from chilopod.report.scene.replay_3d import replay_3d
+
+_FILM_SIZE = (1280, 320)  # three panels in a row
+
+
+def write_movie(shown: Movie, folder: Path) -> Film:
+    """Write a movie as ``NAME.html``, ``NAME.mp4`` where films can be encoded and, of some moments of it in 3-D,
+    ``NAME.png`` where it can be rendered.
+
+    Raises
+    ------
+    OutputError
+        If the folder cannot be written.
+    """
+    prepare_folder(folder)
+    solid = "pose" in shown.record
+    page_of = replay_3d if solid else replay
+    write_atomic(folder / f"{shown.name}.html", page_of(shown.record, titles=shown.titles, heading=shown.heading))
+    look: dict[str, Any] = {"titles": shown.titles, "heading": shown.heading, "speed": shown.speed}
+    file, encoded = folder / f"{shown.name}.mp4", has_encoder()
+    if encoded and not (solid and _rendered(lambda: film_3d(shown.record, file, **look))):
+        movie(shown.record, file, **look, size=_FILM_SIZE)
+    picture = folder / f"{shown.name}.png"
+    pictured = bool(shown.stills) and _rendered(
+        lambda: stills(shown.record, shown.stills, picture, titles=shown.titles)
+    )
+    return Film(shown.name, shown.heading, shown.speed, encoded, pictured)
+
+
+def _rendered(render: Callable[[], object]) -> bool:
+    """Render if there are graphics here; the film from above needs none, and `chilopod doctor` says what is missing."""
+    try:
+        render()
+    except OutputError:
+        return False
+    return True

@@ -1,0 +1,298 @@
+"""The robot's table, on made-up findings: what the paper prints is within, and what is not lies outside."""
+
+import dataclasses
+import runpy
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chilopod.paper.fit_data import walking_speed
+from chilopod.paper.robot import rows as robot_rows
+from chilopod.paper.robot.rows import duration_rows, walk_rows
+from chilopod.paper.robot.table import CHECKED, FITTED, PREDICTED
+from chilopod.paper.robot.turning_rows import turning_rows
+from chilopod.paper.robot.walks import SPRINGS, VARIANT_SPRINGS
+from chilopod.paper.turning.hopf import saturated
+
+MADE_UP = runpy.run_path(str(Path(__file__).with_name("made_up_robot.py")))
+series, walks, durations, AMPLITUDE = (MADE_UP[name] for name in ("series", "walks", "durations", "AMPLITUDE"))
+task, turning = MADE_UP["task"], MADE_UP["turning"]
+
+SOFT, SLOW, PHASE = "k2-5 = 28 N*mm/deg", "stride 1.8 cm", "module phase 180 deg"
+
+
+@pytest.fixture(autouse=True)
+def few_drawn(monkeypatch):
+    """Standard errors of ratios from fewer sets of trials than in the report, to be quick."""
+    monkeypatch.setattr(robot_rows, "radius_ratio", partial(robot_rows.radius_ratio, drawn=20))
+
+
+def verdicts(rows):
+    assert len({row.quantity for row in rows}) == len(rows)
+    return {row.quantity: row.verdict for row in rows}
+
+
+def row_of(rows, start):
+    (row,) = [row for row in rows if row.quantity.startswith(start)]
+    return row
+
+
+def test_what_the_paper_prints_is_within_in_every_row():
+    rows = walk_rows(walks(), {"curved": "up to 11.5", "sides": "3 and 4"}) + turning_rows(turning(), walks(), {})
+    assert set(verdicts(rows).values()) == {"within"}
+    assert not any("nan" in f"{row.twin}{row.robot}{row.asked}" for row in rows)
+    assert {row.quantity for row in rows if row.kind == FITTED} == {
+        "walks with k1 = 41 and 75 N*mm/deg",
+        "walks with k1 = 15, 17, 21 and 28 N*mm/deg",
+        "where curved walks set in (square-root fit)",
+        "radius at k1 = 21 N*mm/deg",
+        "radius at k1 = 26 N*mm/deg",
+        "speed of module 1 at k1 = 21 N*mm/deg",
+        "task A: earliest arrival",
+    }
+    assert {row.quantity for row in rows if row.kind == CHECKED} == {
+        row.quantity for row in duration_rows(walks().durations)
+    }
+    assert row_of(rows, "walks with k1 = 15").planar == "up to 11.5, 3 and 4"
+
+
+def base_with(**changes):
+    return walks(base=series(SPRINGS, **{"onset": 34.0, **changes}))
+
+
+@pytest.mark.parametrize(
+    ("found", "start", "verdict"),
+    [
+        (base_with(onset=34.0 * 1.08), "where curved walks set in (", "within"),
+        (base_with(onset=34.0 * 1.12), "where curved walks set in (", "outside"),
+        (base_with(onset=34.0 * 0.92), "where curved walks set in (", "within"),
+        (base_with(onset=34.0 * 0.88), "where curved walks set in (", "outside"),
+        (base_with(onset=34.0 * 1.095, scatter=0.05), "where curved walks set in (", "undecided"),
+        (base_with(amplitude=1.05 * AMPLITUDE), "radius at k1 = 21", "within"),
+        (base_with(amplitude=1.15 * AMPLITUDE), "radius at k1 = 21", "outside"),
+        (base_with(amplitude=0.85 * AMPLITUDE), "radius at k1 = 26", "outside"),
+        (base_with(speed=1.08 * walking_speed()), "speed of module 1", "within"),
+        (base_with(speed=1.12 * walking_speed()), "speed of module 1", "outside"),
+        (base_with(speed=0.88 * walking_speed()), "speed of module 1", "outside"),
+        (base_with(speed=1.1 * walking_speed() + 1e-6), "speed of module 1", "undecided"),
+        (base_with(onset=45.0), "walks with k1 = 41 and 75", "outside"),
+        (base_with(onset=27.0), "walks with k1 = 15", "outside"),
+        (base_with(scatter=1.0), "angle of joint 1", "undecided"),
+        (walks(base=series(SPRINGS, 34.0).assign_coords(spring=list(SPRINGS[::-1]))), "angle of", "outside"),
+    ],
+)
+def test_the_base_series_on_both_sides_of_what_is_asked(found, start, verdict):
+    assert row_of(walk_rows(found, {}), start).verdict == verdict
+
+
+@pytest.mark.parametrize(("scatter", "verdict"), [(0.01, "within"), (0.0, "undecided")])
+def test_fluctuation_that_grows_or_does_not(scatter, verdict):
+    assert row_of(walk_rows(base_with(scatter=scatter), {}), "fluctuation").verdict == verdict
+
+
+def test_fluctuation_that_falls_is_not_the_paper_s():
+    base = series(SPRINGS, 34.0)
+    wide = series(SPRINGS, 34.0, scatter=0.1)
+    stiff = base.spring > 27.0
+    mixed = base.assign(mean_angle=base.mean_angle.where(~stiff, wide.mean_angle))
+    assert row_of(walk_rows(walks(base=mixed), {}), "fluctuation").verdict == "outside"
+
+
+def test_curves_to_one_side_only_are_not_the_paper_s():
+    base = series(SPRINGS, 34.0)
+    right = base.assign(direction=base.direction.where(base.direction != "left", "right"))
+    assert row_of(walk_rows(walks(base=right), {}), "walks with k1 = 15").verdict == "outside"
+
+
+def test_a_walk_that_failed_is_not_straight():
+    base = series(SPRINGS, 34.0)
+    failed = base.assign(direction=base.direction.where(base.spring < 70.0, ""))
+    assert row_of(walk_rows(walks(base=failed), {}), "walks with k1 = 41").verdict == "outside"
+
+
+def variants_with(**changes):
+    found = walks()
+    return walks(variants={**found.variants, **changes}, lower_steps=found.lower_steps)
+
+
+@pytest.mark.parametrize(
+    ("name", "onset", "amplitude", "where", "radius"),
+    [
+        (SOFT, 23.0 * 1.08, 1.0, "within", "within"),
+        (SOFT, 23.0 * 1.12, 1.0, "outside", "within"),
+        (SOFT, 23.0 * 0.88, 1.0, "outside", "within"),
+        (SOFT, 23.0, 1.0 / 1.12, "within", "within"),
+        (SOFT, 23.0, 1.0 / 1.18, "within", "outside"),
+        (SOFT, 23.0, 1.0 / 0.88, "within", "within"),
+        (SOFT, 23.0, 1.0 / 0.82, "within", "outside"),
+        (PHASE, 31.0 * 0.88, 1.1, "outside", "within"),
+        (PHASE, 31.0, 1.05, "within", "within"),
+        (PHASE, 31.0, 0.95, "within", "outside"),
+        (PHASE, 31.0, 1.0, "within", "undecided"),
+    ],
+)
+def test_variants_on_both_sides_of_what_is_asked(name, onset, amplitude, where, radius):
+    found = variants_with(**{name: series(VARIANT_SPRINGS, onset, amplitude * AMPLITUDE, seed=5)})
+    rows = walk_rows(found, {})
+    assert row_of(rows, f"where curved walks set in, {name}").verdict == where
+    assert row_of(rows, f"radius, {name}").verdict == radius
+
+
+def test_swapped_variants_are_noticed():
+    """The radius with a module phase of 180 deg is smaller, that with softer springs is not."""
+    variants = walks().variants
+    rows = verdicts(walk_rows(variants_with(**{SOFT: variants[PHASE], PHASE: variants[SOFT]}), {}))
+    assert rows[f"where curved walks set in, {SOFT}"] == rows[f"where curved walks set in, {PHASE}"] == "outside"
+    assert rows[f"radius, {SOFT}"] == "outside"
+    assert rows[f"radius, {PHASE}"] != "within"
+
+
+def test_radii_are_judged_at_equal_distance_and_shown_at_equal_springs_too():
+    row = row_of(walk_rows(walks(), {}), f"radius, {SOFT}")
+    assert row.twin.startswith("+0 ± ")
+    assert "+58 ±" in row.twin
+    assert "the robot's onsets alone would make it +58 %" in row.twin
+    # At equal springs unchanged, that is: bent more at equal distance.
+    same = row_of(
+        walk_rows(variants_with(**{SOFT: series(VARIANT_SPRINGS, 23.0, 1.583 * AMPLITUDE)}), {}), f"radius, {SOFT}"
+    )
+    assert same.verdict == "outside"
+
+
+def test_both_readings_of_the_shorter_stride_have_their_rows():
+    found = walks(lower_steps={SLOW: series(VARIANT_SPRINGS, 29.0)})
+    rows = verdicts(walk_rows(found, {}))
+    assert rows[f"where curved walks set in, {SLOW} (steps as high)"] == "within"
+    assert rows[f"where curved walks set in, {SLOW} (steps lower in proportion)"] == "outside"
+    assert rows[f"radius, {SLOW} (steps lower in proportion)"] == "within"
+
+
+@pytest.mark.parametrize(
+    ("critical", "error", "verdict"),
+    [
+        (19.5, 0.1, "within"),
+        (20.5, 0.1, "outside"),
+        (15.5, 0.1, "outside"),
+        (19.7, 0.2, "undecided"),
+        (np.nan, 0.1, "outside"),
+    ],
+)
+def test_uniform_springs_on_both_sides(critical, error, verdict):
+    uniform = walks().uniform.assign_attrs(critical_k=critical, critical_k_error=error)
+    assert row_of(walk_rows(walks(uniform=uniform), {}), "where a body with springs all alike").verdict == verdict
+
+
+def test_what_hangs_on_the_duration_is_named():
+    rows = {row.quantity.partition(",")[0]: row for row in duration_rows(durations((27.0, 30.0, 32.0, 34.0, 34.0)))}
+    assert {row.verdict for row in rows.values()} == {"within", "outside"}
+    assert rows["onset"].verdict == "outside"
+    assert "outside after 20 and 30" in rows["onset"].twin
+    assert "within after 40, 60 and 90" in rows["onset"].twin
+    assert rows["walks curved at 28 N*mm/deg"].verdict == "outside"
+    assert rows["walks curved at 28 N*mm/deg"].twin.startswith("0, 100,")
+    assert rows["walks straight at 41 N*mm/deg"].verdict == "within"
+    assert all(row.kind == CHECKED for row in rows.values())
+
+
+def hopf_with(factors, wiggle=1e-3):
+    ours = turning().tasks["A"]
+    low = {name: float(ours.criteria[f"{name}_mean"].min()) for name in factors}
+    springs = (8.7, 11.0, 15.0)
+    theirs = {name: factor * low[name] for name, factor in factors.items()}
+    return turning(hopf=task(springs, 11.0, theirs, dict.fromkeys(springs, "arrived"), wiggle=wiggle, seed=1))
+
+
+@pytest.mark.parametrize(
+    ("factors", "wiggle", "verdict", "says"),
+    [
+        ((1.5, 1.5, 1.5), 1e-3, "within", ("lower", "lower", "lower")),
+        ((1.5, 0.7, 1.5), 1e-3, "outside", ("lower", "higher", "lower")),
+        ((1.5, 1.5, 1.0), 1e-2, "undecided", ("lower", "lower", "undecided")),
+        ((0.7, 1.5, 1.0), 1e-2, "outside", ("higher", "lower", "undecided")),
+    ],
+)
+def test_pitchfork_against_hopf(factors, wiggle, verdict, says):
+    found = hopf_with(dict(zip(("distance", "angle", "effort"), factors, strict=True)), wiggle)
+    row = row_of(turning_rows(found, None, {}), "task A, pitchfork against Hopf")
+    assert row.verdict == verdict
+    named = [part.rpartition(": ")[2] for part in row.twin.partition(" (with all springs")[0].split("; ")]
+    assert [part.split()[0] for part in named] == list(says)
+    assert all("standard errors" in part for part in named)
+
+
+def test_the_third_criterion_saturates_with_both_legs_at_their_limit():
+    assert saturated(23.0) == pytest.approx(2.0 * np.deg2rad(5.0) ** 2 * 23.0)
+    row = row_of(turning_rows(turning(), None, {}), "task A, pitchfork against Hopf")
+    assert f"of the {saturated(23.0):.3g} rad²·s of legs at their limit" in row.twin
+    assert "ε3 is 57 to " in row.twin  # 0.2 of 0.350
+
+
+@pytest.mark.parametrize(
+    ("time", "verdict"), [(20.0, "within"), (19.0, "outside"), (26.0, "within"), (27.0, "outside")]
+)
+def test_the_earliest_arrival_on_both_sides(time, verdict):
+    tasks = turning().tasks
+    criteria = tasks["A"].criteria.assign(seconds=("instant", [time, 23.0]))
+    found = turning(tasks={**tasks, "A": dataclasses.replace(tasks["A"], criteria=criteria)})
+    row = row_of(turning_rows(found, None, {}), "task A: earliest arrival")
+    assert (row.verdict, row.kind) == (verdict, FITTED)
+
+
+@pytest.mark.parametrize(
+    ("best", "wiggle", "verdict"), [(21.0, 1e-3, "within"), (36.0, 1e-3, "outside"), (29.0, 0.1, "undecided")]
+)
+def test_where_the_criteria_are_smallest(best, wiggle, verdict):
+    tasks = turning().tasks
+    outcomes = {
+        float(k): str(each[0])
+        for k, each in zip(tasks["A"].criteria.spring, tasks["A"].criteria.outcome.values, strict=True)
+    }
+    moved = task(tuple(outcomes), best, {}, outcomes, wiggle=wiggle)
+    rows = turning_rows(turning(tasks={**tasks, "A": moved}), None, {})
+    assert {row.verdict for row in rows if row.quantity.startswith("task A: smallest")} == {verdict}
+    assert all(row.kind == PREDICTED for row in rows if row.quantity.startswith("task A: smallest"))
+
+
+@pytest.mark.parametrize(("onset", "verdict"), [(34.0, "within"), (46.0, "outside")])
+def test_the_spring_of_the_circle_s_radius(onset, verdict):
+    found = walks(base=series(SPRINGS, onset))
+    row = row_of(turning_rows(turning(), found, {}), "task A: k1 whose walk")
+    assert row.verdict == verdict
+
+
+@pytest.mark.parametrize(
+    ("letter", "spring", "label", "verdict"),
+    [
+        ("A", 28.0, "bulged outside", "within"),
+        ("A", 41.0, "turned inside", "outside"),
+        ("A", 15.0, "bulged outside", "outside"),
+        ("A", 21.0, "bulged outside", "outside"),
+        ("B", 26.0, "turned inside", "outside"),
+        ("B", 15.0, "arrived", "outside"),
+        ("B", 41.0, "arrived", "outside"),
+    ],
+)
+def test_what_becomes_of_the_tasks(letter, spring, label, verdict):
+    tasks = turning().tasks
+    criteria = tasks[letter].criteria
+    changed = criteria.assign(outcome=criteria.outcome.where(criteria.spring != spring, label))
+    found = turning(tasks={**tasks, letter: dataclasses.replace(tasks[letter], criteria=changed)})
+    assert row_of(turning_rows(found, None, {}), f"task {letter}: what becomes").verdict == verdict
+
+
+def test_all_repeats_have_to_arrive_at_the_paper_s_spring():
+    tasks = turning().tasks
+    criteria = tasks["A"].criteria
+    late = (criteria.spring == 21.0) & (criteria.repeat == 4)
+    changed = criteria.assign(outcome=criteria.outcome.where(~late, "bulged outside"))
+    found = turning(tasks={**tasks, "A": dataclasses.replace(tasks["A"], criteria=changed)})
+    assert row_of(turning_rows(found, None, {}), "task A: what becomes").verdict == "outside"
+
+
+@pytest.mark.parametrize(("alone", "helped", "verdict"), [(4, 5, "within"), (5, 5, "outside"), (0, 4, "outside")])
+def test_without_leg_yaw_many_fail(alone, helped, verdict):
+    arrived = [[1.0] * alone + [0.0] * (9 - alone), [1.0] * helped + [0.0] * (5 - helped) + [np.nan] * 4]
+    data = turning().without.assign(arrived=(("case", "trial"), arrived))
+    assert row_of(turning_rows(turning(without=data), None, {}), "task A without leg yaw").verdict == verdict

@@ -1,0 +1,156 @@
+"""The whole robot's studies, shortened: what they find has the shape that rows and figures need."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from chilopod import load_robot
+from chilopod.paper.robot import rows as robot_rows
+from chilopod.paper.robot import turning_rows as robot_turning_rows
+from chilopod.paper.robot import walks as robot_walks
+from chilopod.paper.robot.turning import RobotTurning
+from chilopod.paper.robot.walk_measures import onset, radius_at, spring_for
+from chilopod.paper.robot.walks import (
+    RobotWalks,
+    by_duration,
+    lower_steps,
+    undulations,
+    walk_ends,
+    walk_records,
+)
+from chilopod.paper.turning.trials import turning_task, without_leg_yaw
+from chilopod.report.figures import robot_turning as turning_figures
+from chilopod.report.figures import robot_walks as walk_figures
+from chilopod.report.kit import style
+from chilopod.steering import Target
+from chilopod.tasks.radius_law import is_curved
+from chilopod.trials import Disturbance
+
+ROBOT = load_robot("aoi2022")
+
+BENT = Disturbance(joint_angle=float(np.deg2rad(5.0)))
+"""Walks that begin well bent settle within a minute."""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("trials")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def short():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(robot_walks, "DURATION", 60.0)
+        yield
+
+
+@pytest.fixture(scope="module")
+def records(folder):
+    return walk_records(ROBOT, robot_walks.SPRINGS, 2, disturbance=BENT, folder=folder)
+
+
+@pytest.fixture(scope="module")
+def base(records):
+    return walk_ends(records, ROBOT, robot_walks.SPRINGS)
+
+
+@pytest.fixture(scope="module")
+def walks(base, records, folder):
+    uniform = undulations(ROBOT, (8.7, 11.0, 15.0, 30.0), 1, folder=folder)
+    examples = xr.Dataset(
+        {"joint_angle": (("time", "spring", "joint"), np.linspace(-0.1, 0.3, 30).reshape(3, 2, 5))},
+        coords={"time": [0.0, 1.0, 2.0], "spring": [41.0, 15.0], "joint": np.arange(1, 6)},
+    )
+    names = list(robot_walks.variant_robots(ROBOT))[1:]
+    durations = by_duration(records, ROBOT, robot_walks.SPRINGS)
+    lower = {"stride 1.8 cm": base}
+    return RobotWalks(ROBOT, base, durations, dict.fromkeys(names, base), lower, examples, uniform)
+
+
+@pytest.fixture(scope="module")
+def tasks(folder):
+    target, springs = Target.parse("45 deg, 1.3 m"), (15.0, 21.0, 41.0)
+    task = turning_task(ROBOT, target, springs, 2, shown=springs, engine="twin", duration=27.0, folder=folder)
+    hopf = dataclasses.replace(task)
+    without = without_leg_yaw(ROBOT, target, {"paper's spring": 21.0}, duration=27.0, engine="twin", folder=folder)
+    return RobotTurning(ROBOT, {"A": task, "B": task}, hopf, without)
+
+
+@pytest.mark.slow
+def test_soft_springs_curve_and_stiff_ones_do_not(base):
+    curved = is_curved(base).mean(axis=1)
+    assert curved[0] == 1.0
+    assert (curved[-2:] == 0.0).all()
+    assert (base.status == "walked").all()
+    assert radius_at(base, 15.0)[0] < radius_at(base, 21.0)[0]
+    assert np.isnan(radius_at(base, 75.0)[0])
+    fit = onset(base)
+    assert fit is not None
+    assert 26.0 < fit.critical < 45.0
+    # The spring for the radius of a spring's own walks is that spring.
+    spring, error = spring_for(base, 5 * 0.225 / float(base.bend.sel(spring=21.0).mean()))
+    assert spring == pytest.approx(21.0)
+    assert 0.0 < error < 2.0
+    assert np.isnan(spring_for(base, 0.05)).all()
+
+
+@pytest.mark.slow
+def test_walks_cut_short_are_those_that_were_asked_shorter(walks, base, folder, monkeypatch):
+    found = walks.durations
+    assert found.duration.values.tolist() == [20.0, 30.0, 40.0, 60.0]
+    assert float(found.onset[-1]) == onset(base, settled=False).critical
+    assert found.axis_radius[-1].sel(spring=21.0) == radius_at(base, 21.0, settled=False)[0]
+    monkeypatch.setattr(robot_walks, "DURATION", 20.0)
+    short = walk_ends(walk_records(ROBOT, (15.0, 21.0), 2, disturbance=BENT), ROBOT, (15.0, 21.0))
+    for spring in (15.0, 21.0):
+        assert float(found.axis_radius.sel(duration=20.0, spring=spring)) == radius_at(short, spring, settled=False)[0]
+    assert (found.curved + found.straight <= 1.0).all()
+
+
+def test_the_other_reading_of_a_shorter_stride_lifts_the_feet_in_proportion():
+    variant = robot_walks.variant_robots(ROBOT)["stride 1.8 cm"]
+    lower = lower_steps(ROBOT, variant)
+    assert lower.twin.clearance == pytest.approx(0.6 * ROBOT.twin.clearance)
+    assert lower.with_value("twin.clearance", ROBOT.twin.clearance).twin == variant.twin
+    assert lower.gait == variant.gait
+
+
+@pytest.mark.slow
+def test_softer_uniform_springs_undulate_more(walks):
+    swing = np.rad2deg(walks.uniform.amplitude.values[:, 0])
+    assert (np.diff(swing) < 0.0).all()
+    assert swing[0] > 10.0
+    assert swing[-1] < 5.0
+    assert 15.0 < walks.uniform.attrs["critical_k"] < 26.0
+
+
+@pytest.mark.slow
+def test_rows_and_figures_of_the_walks(walks):
+    rows = robot_rows.walk_rows(walks, {"onset": "12"})
+    assert {row.verdict for row in rows} <= {"within", "outside", "undecided"}
+    assert {row.kind for row in rows} == {"fitted", "predicted", "checked"}
+    assert next(row for row in rows if row.quantity.startswith("where curved walks set in (")).planar == "12"
+    with style.house_style():
+        for panel in walk_figures.panels(walks):
+            assert style.svg(panel.draw(False), panel.name)
+            assert style.svg(panel.draw(True), panel.name)
+            assert all(panel.text)
+
+
+@pytest.mark.slow
+def test_rows_and_figures_of_the_tasks(tasks, walks):
+    outcome = tasks.tasks["A"].criteria.outcome
+    assert (outcome.sel(spring=21.0) == "arrived").all()
+    assert (outcome.sel(spring=41.0) == "bulged outside").any()
+    assert (outcome.sel(spring=15.0) == "turned inside").all()
+    rows = robot_turning_rows.turning_rows(tasks, walks, {})
+    assert [row.quantity for row in rows if row.kind != "predicted"] == ["task A: earliest arrival"]
+    # Of a strategy beside itself nothing is lower.
+    assert next(row for row in rows if "against Hopf" in row.quantity).verdict == "undecided"
+    assert rows[0].quantity.startswith("task A")
+    with style.house_style():
+        for panel in turning_figures.panels(tasks, walks):
+            assert style.svg(panel.draw(False), panel.name)
+            assert style.svg(panel.draw(True), panel.name)

@@ -1,0 +1,47 @@
+"""The studies against the paper's numbers and against what is known of them."""
+
+import numpy as np
+import pytest
+
+from chilopod.paper.straight import study as floquet
+from chilopod.robot import load_robot
+
+ROBOT = load_robot("aoi2022-planar")
+
+
+def test_each_curve_of_the_sweep_is_one_curve():
+    data = floquet.exponent_sweep(ROBOT, 40)
+    # The sum over all curves does not care how they are told apart; each curve has to be smooth besides.
+    real = data["real"].values
+    steps = np.abs(np.diff(real, axis=0)) / (1.0 + np.abs(real[:-1]))
+    assert steps.max() < 0.5
+    assert data.follows_critical.values.sum() == 1
+    critical = data["real"].values[:, data.follows_critical.values][:, 0]
+    stable = data.k1.values > 12.0011455
+    assert (critical[stable] < 0).all()
+    assert (critical[~stable] > 0).all()
+    assert np.allclose(data["imaginary"].values[:, data.follows_critical.values][~stable], 0.0)
+
+
+def test_variants_go_the_way_the_paper_says():
+    data = floquet.variants(ROBOT)
+    base, softer, slower, phase = data.critical_k1.values
+    assert base == pytest.approx(12.001, abs=0.002)
+    assert (softer, slower) < (base, base)
+    assert (softer, slower, phase) == pytest.approx((8.97, 10.8, 11.3), abs=0.05)
+    assert data.robot_printed.values.tolist() == pytest.approx([34, 23, 25, 31])
+
+
+def test_more_modules_of_the_same_size_change_little():
+    data = floquet.module_counts(ROBOT, range(6, 11))
+    assert data.critical_k1.values == pytest.approx([12.0, 12.1, 12.0, 12.3, 12.5], abs=0.05)
+    longer = floquet.with_modules(ROBOT, 9)
+    assert longer.module_length == pytest.approx(ROBOT.module_length, rel=1e-15)
+    assert longer.module_mass == pytest.approx(ROBOT.module_mass, rel=1e-15)
+
+
+def test_uniform_springs():
+    data = floquet.uniform_springs(ROBOT)
+    assert data.attrs["value"] == pytest.approx(6.5756, abs=5e-5)
+    assert data.attrs["frequency_rad_s"] == pytest.approx(0.5767, abs=5e-5)
+    assert np.linalg.norm(data.amplitude) == pytest.approx(1.0)

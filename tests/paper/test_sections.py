@@ -1,0 +1,96 @@
+"""The registry of sections, and how they are computed."""
+
+import pytest
+
+from chilopod.errors import ParameterError
+from chilopod.paper.section import Context, Found, Section
+from chilopod.paper.sections import SECTIONS, chosen, reproduce
+from chilopod.paper.straight.sections import MODE, UNIFORM
+from chilopod.paper.table import Row
+from chilopod.report.figures.drawings import DRAWINGS
+
+
+def names(sections):
+    return [section.name for section in sections]
+
+
+def test_every_section_is_drawn_and_everything_drawn_is_a_section():
+    assert {drawing.section for drawing in DRAWINGS} == set(SECTIONS)
+    assert {each for drawing in DRAWINGS for each in drawing.beside} <= set(SECTIONS)
+    assert len(set(names(SECTIONS))) == len(SECTIONS)
+
+
+def test_the_papers_own_experiments_come_first_and_what_is_needed_comes_before():
+    beyond = [section.beyond for section in SECTIONS]
+    assert beyond == sorted(beyond)
+    for index, section in enumerate(SECTIONS):
+        assert set(section.needs) <= set(SECTIONS[:index]), section.name
+
+
+def test_sections_come_in_their_own_order_and_misspelt_ones_are_refused():
+    assert names(chosen(["uniform", "mode"])) == ["mode", "uniform"]
+    with pytest.raises(ParameterError, match="uniform"):
+        chosen(["unifrom"])
+
+
+def test_what_is_left_out_unless_it_is_named():
+    everything = set(names(chosen()))
+    assert set(names(SECTIONS)) - everything == {"robot-structures"}
+    assert everything - set(names(chosen(quick=True))) == {"robot-spread"}
+    assert names(chosen(["robot-structures", "robot-spread"], quick=True)) == ["robot-spread", "robot-structures"]
+    paper = names(chosen(paper=True))
+    assert everything - set(paper) == {"identification", "robot-spread", "robot-numerics", "robot-why"}
+    with pytest.raises(ParameterError, match="robot-why"):
+        chosen(["robot-why"], paper=True)
+
+
+def test_rows_put_the_paper_beside_what_was_computed():
+    seen = []
+    found = reproduce([MODE, UNIFORM], progress=lambda what, done, words: seen.append((what, done)))
+    assert list(found.values) == [MODE, UNIFORM]
+    assert not found.failures
+    verdicts = {row.quantity: row.verdict for row in found.lines(Row)}
+    assert verdicts["critical k1 of the planar model"] == "agrees"
+    # Honest to the last digit: 0.6349 is not 0.64 within rounding.
+    assert verdicts["critical mode, joint 1"] == "differs"
+    assert seen[-1] == (UNIFORM.sentence, 1.0)
+
+
+def one(value):
+    return Row("one", "1", str(value), "here", "agrees")
+
+
+ONE = Section("one", "chapter", "one", lambda context, found, report: 1, lambda value, found: [one(value)])
+
+
+def test_a_section_sees_what_it_needs_where_that_was_computed():
+    two = Section("two", "chapter", "two", lambda context, found, report: (found[ONE] or 0) + 1, needs=(ONE,))
+    assert reproduce([ONE, two])[two] == 2
+    assert reproduce([two])[two] == 1
+
+
+def test_a_section_that_uses_what_it_did_not_say_fails():
+    two = Section("two", "chapter", "two", lambda context, found, report: found[ONE])
+    assert "one is not among" in str(reproduce([ONE, two]).failures[two])
+
+
+def test_one_that_fails_leaves_the_others_alone():
+    def fail(context, found, report):
+        raise ValueError("no luck")
+
+    broken = Section("broken", "chapter", "broken", fail)
+    after = Section("after", "chapter", "after", lambda context, found, report: found[broken], needs=(broken,))
+    told = []
+    found = reproduce([broken, ONE, after], Context(quick=True), told=lambda found, section: told.append(section))
+    assert told == [broken, ONE, after]
+    assert [str(error) for error in found.failures.values()] == ["no luck"]
+    assert found[ONE] == 1
+    assert after in found.values
+    assert found[after] is None
+    assert found.lines(Row) == [one(1)]
+
+
+def test_lines_stand_by_chapter():
+    rows = {MODE: [one(1)], ONE: [one(2)], UNIFORM: [one(3)]}
+    assert [row.computed for row in Found(rows=rows).lines(Row)] == ["1", "3", "2"]
+    assert [row.computed for row in Found(rows=rows).lines(Row, "chapter")] == ["2"]

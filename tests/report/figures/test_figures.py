@@ -1,0 +1,127 @@
+"""Figures show all of their text, in both layouts, for robots of many kinds."""
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.text import Text
+
+from chilopod import load_robot
+from chilopod.paper.straight.sections import EXPONENTS, MODE
+from chilopod.report.figures import exponents, overview, schematic
+from chilopod.report.figures.drawings import DRAWINGS
+from chilopod.report.kit import style, words
+from chilopod.report.scene.outline import chain, turned_about_tail
+
+PRESET = load_robot("aoi2022-planar")
+ROBOTS = {
+    "preset": PRESET,
+    "two modules": PRESET.with_value("body.modules", 2),
+    "twenty": PRESET.with_value("body.modules", 20).with_value("body.length", 4.5),
+    "feet behind": PRESET.override("legs.forward_offset", "-0.03 m"),
+    "feet at the middle": PRESET.override("legs.forward_offset", "0 m"),
+    "unequal springs": PRESET.set_from_text(["springs.stiffness[0]=12.345 N*mm/deg"]),
+    "wide": PRESET.override("legs.half_width", "0.3 m"),
+}
+
+
+def drawn_texts(drawn, monkeypatch) -> list[Text]:
+    """The texts that are really painted: not those of hidden axes or of ticks outside the limits."""
+    found = []
+    draw = Text.draw
+    with monkeypatch.context() as patch:
+        patch.setattr(Text, "draw", lambda self, renderer: (found.append(self), draw(self, renderer)))
+        FigureCanvasAgg(drawn).draw()
+    return [text for text in found if text.get_visible() and text.get_text().strip()]
+
+
+def clipped(drawn, monkeypatch) -> list[str]:
+    found = []
+    for text in drawn_texts(drawn, monkeypatch):
+        box, extent = drawn.bbox, text.get_window_extent()
+        if extent.x0 < -1 or extent.y0 < -1 or extent.x1 > box.x1 + 1 or extent.y1 > box.y1 + 1:
+            found.append(text.get_text())
+    return found
+
+
+def too_small(drawn, monkeypatch) -> list[str]:
+    return [text.get_text() for text in drawn_texts(drawn, monkeypatch) if text.get_fontsize() < style.SMALL]
+
+
+@pytest.mark.parametrize("narrow", [False, True])
+def test_no_text_is_cut_or_tiny(full, narrow, monkeypatch):
+    drawn = [each for each in DRAWINGS if each.section in full.values]
+    for panel in (panel for each in drawn for panel in each.panels(full[each.section], full)):
+        with style.house_style():
+            drawn = panel.draw(narrow)
+            assert clipped(drawn, monkeypatch) == [], panel.name
+            assert too_small(drawn, monkeypatch) == [], panel.name
+
+
+@pytest.mark.parametrize("narrow", [False, True])
+@pytest.mark.parametrize("kind", ROBOTS)
+def test_schematic_of_any_robot(kind, narrow, monkeypatch):
+    with style.house_style():
+        drawn = schematic.panel(ROBOTS[kind]).draw(narrow)
+        assert clipped(drawn, monkeypatch) == []
+
+
+def test_style_leaves_no_trace():
+    import matplotlib as mpl
+
+    before = dict(mpl.rcParams)
+    with style.house_style():
+        assert mpl.rcParams["font.size"] == 10.0
+    assert dict(mpl.rcParams) == before
+
+
+def test_feet_are_where_the_gait_has_them():
+    data = schematic.legs(PRESET)
+    gait = PRESET.gait
+    schedule = gait.schedule(6)
+    np.testing.assert_array_equal(data.stands.values, schedule.contact[0])
+    reach = data.foot_x.values - data.centre_x.values[:, None] - PRESET.legs.forward_offset
+    standing = schedule.contact[0]
+    np.testing.assert_allclose(reach[standing], schedule.stroke[0][standing], atol=1e-15)
+    assert np.isnan(reach[~standing]).all()
+    phase = (data.touch_down.values / gait.period + gait.leg_phases(6)) % 1.0
+    np.testing.assert_allclose(np.minimum(phase, 1.0 - phase), 0.0, atol=1e-12)
+
+
+def test_chain_hangs_together():
+    angles = np.array([0.3, -0.2, 0.5])
+    centres, headings, joints = turned_about_tail(*chain(angles, 0.2))
+    ahead = 0.1 * np.stack([np.cos(headings), np.sin(headings)], axis=-1)
+    np.testing.assert_allclose(centres[:-1] - ahead[:-1], joints, atol=1e-15)
+    np.testing.assert_allclose(centres[1:] + ahead[1:], joints, atol=1e-15)
+    np.testing.assert_allclose(np.diff(headings), angles, atol=1e-15)
+    np.testing.assert_allclose([*centres[-1], headings[-1]], 0.0, atol=1e-15)
+    # Positive joint angles: the front points to the right of the rear.
+    assert turned_about_tail(*chain([0.1, 0.1], 1.0))[0][0, 1] < 0.0
+
+
+def test_curves_meet_where_a_pair_becomes_real(results):
+    data = results[EXPONENTS]
+    k1 = data.k1.values
+    ks, real, imaginary = exponents._joined(data)
+    exact = np.sqrt((0.02 * np.log(13.0 / ks)).astype(complex))
+    np.testing.assert_allclose(real[:, 0] + 1j * imaginary[:, 0], -0.08 + exact, atol=1e-7)
+    np.testing.assert_allclose(real[:, 1] + 1j * imaginary[:, 1], -0.08 - exact, atol=1e-7)
+    assert np.abs(ks - 13.0).min() < 1e-9
+    assert set(np.round(k1, 9)) <= set(np.round(ks, 9))
+
+
+def test_overview_is_small(results, tmp_path):
+    path = overview.write_overview(results[MODE], results[EXPONENTS], tmp_path / "overview.png")
+    assert path.stat().st_size < 150_000
+
+
+def test_words():
+    assert words.spans([4, 7, 8, 9, 10, 20]) == "4, 7 to 10 and 20"
+    assert words.spans([3, 4]) == "3 and 4"
+    assert words.listing([]) == ""
+    assert words.k(12) == "k₁₂"
+    assert words.number(12.001145, 5) == "12.001"
+    assert words.number(41.0, 2) == "41"
+    assert words.number(-8e-5, 1) == "−8e−05"
+    assert words.typeset("-0.5 to 3e-10 N*mm/deg, k2-5") == "−0.5 to 3×10⁻¹⁰\u00a0N·mm/deg, k₂–k₅"
+    assert words.typeset("Neimark-Sacker") == "Neimark-Sacker"

@@ -1,0 +1,83 @@
+"""Films decode, are as long and as large as asked for, and show what the record holds."""
+
+import runpy
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+
+from chilopod.errors import OutputError, ParameterError
+from chilopod.report.kit import style
+from chilopod.report.scene.film import movie
+
+walk = runpy.run_path(str(Path(__file__).parents[1] / "walks.py"))["walk"]
+
+
+def decoded(path) -> np.ndarray:
+    """All frames, (T, height, width, 3)."""
+    with av.open(str(path)) as container:
+        (stream,) = container.streams.video
+        assert (stream.codec_context.name, stream.codec_context.pix_fmt) == ("h264", "yuv420p")
+        return np.stack([frame.to_ndarray(format="rgb24") for frame in container.decode(stream)])
+
+
+def right_end_of(frame, color) -> float:
+    """Pixels from the left to where something of nearly this colour ends, below the heading and above the key."""
+    near = np.abs(frame[30:-40].astype(float) - 255.0 * np.array(to_rgb(color))).max(axis=-1) < 40.0
+    return np.argwhere(near)[:, 1].max() if near.any() else np.nan
+
+
+@pytest.mark.parametrize(("fps", "speed", "count"), [(25, 1.0, 51), (25, 4.0, 13), (30, 0.5, 121)])
+def test_length_and_size(tmp_path, fps, speed, count):
+    path = movie(
+        walk(0.0, 0.5, duration=2.0),
+        tmp_path / "new" / "film.mp4",
+        titles=["a", "b"],
+        heading="h",
+        fps=fps,
+        speed=speed,
+        size=(480, 320),
+    )
+    assert decoded(path).shape == (count, 320, 480, 3)
+    with av.open(str(path)) as container:
+        assert container.streams.video[0].average_rate == fps
+    assert [each.name for each in path.parent.iterdir()] == ["film.mp4"]
+
+
+def test_index_stands_in_front(tmp_path):
+    content = movie(walk(0.0, duration=1.0), tmp_path / "a.mp4", titles=["a"], heading="h").read_bytes()
+    assert content.index(b"moov") < content.index(b"mdat")
+
+
+def test_module_1_moves_to_the_right_until_the_robot_stops(tmp_path):
+    record = walk(0.0, duration=4.0, stops=[(0, 2.01)])
+    frames = decoded(movie(record, tmp_path / "a.mp4", titles=["a"], heading="h", fps=10))
+    # Stopped robots are pale, so that only moving ones have the colour of module 1.
+    x = np.array([right_end_of(frame, style.BLUE) for frame in frames[:20]])
+    assert (np.diff(x) > 0.0).all()
+    assert np.isnan(right_end_of(frames[30], style.BLUE))
+    changed = np.abs(frames[25].astype(int) - frames[35])[30:].max()
+    assert changed < 30  # nothing but the noise of the encoder
+    assert np.abs(frames[15].astype(int) - frames[35])[30:].max() > 80
+
+
+def test_robot_that_never_started(tmp_path):
+    record = walk(0.0, 0.3, duration=0.4, stops=[(1, 0.0)], targets=[[0.3, 0.0], [np.nan, np.nan]])
+    path = movie(record, tmp_path / "a.mp4", titles=["x" * 200, "b"], heading="y" * 200, size=(240, 240))
+    assert decoded(path).shape == (11, 240, 240, 3)
+
+
+def test_what_cannot_be_filmed(tmp_path, monkeypatch):
+    record = walk(0.0, duration=0.2)
+    for wrong in ({"size": (481, 320)}, {"size": (480, 100)}, {"fps": 0}, {"speed": 0.0}, {"speed": float("nan")}):
+        with pytest.raises(ParameterError, match=next(iter(wrong))):
+            movie(record, tmp_path / "a.mp4", titles=["a"], heading="h", **wrong)
+    (tmp_path / "file").touch()
+    with pytest.raises(OutputError, match="file"):
+        movie(record, tmp_path / "file" / "a.mp4", titles=["a"], heading="h")
+    monkeypatch.setattr("chilopod.report.scene.film._ENCODER", "no-such-encoder")
+    with pytest.raises(OutputError, match="PyAV was built without the encoder"):
+        movie(record, tmp_path / "a.mp4", titles=["a"], heading="h")
+    assert [each.name for each in tmp_path.iterdir()] == ["file"]
