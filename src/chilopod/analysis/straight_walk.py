@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from chilopod import stability, units
 from chilopod.analysis.parameters import K1, stiffness
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import ReadOnlyArrays, read_only
 from chilopod.planar import PlanarModel
 from chilopod.robot import Robot
 from chilopod.stability import Kind
@@ -47,7 +47,7 @@ class StraightWalk(ReadOnlyArrays):
     @property
     def moduli(self) -> NDArray[np.float64]:
         """By what every mode has grown after one period, shape (2N+1,)."""
-        return np.exp(self.exponents.values.real * self.robot.gait.period)
+        return read_only(np.exp(self.exponents.values.real * self.robot.gait.period))
 
     def as_json(self) -> dict[str, Any]:
         """The result as plain numbers; complex ones as [real, imaginary]."""
