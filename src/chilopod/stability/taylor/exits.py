@@ -12,15 +12,6 @@ _DEEPEST = 48
 
 
 @njit(error_model="numpy")
-def horner(coefficients: Any, order: int, z: float) -> float:
-    """The polynomial at z."""
-    s = 0.0
-    for k in range(order, -1, -1):
-        s = s * z + coefficients[k]
-    return s
-
-
-@njit(error_model="numpy")
 def _bernstein(coefficients: Any, order: int, h: float, out: Any) -> None:
     """Bernstein coefficients on [0, h]: b_i = sum over k of C(i, k) / C(order, k) c_k h^k."""
     for i in range(order + 1):
