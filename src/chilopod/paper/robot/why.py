@@ -284,7 +284,8 @@ def ablation(
     Dataset over factor: ``alone``, the point in the planar limit with only this one (N*mm/deg); ``without``, in the
     twin without it; ``path``, with it and all before it. Infinite where walks curve at all springs tried, NaN where at
     none. Attributes: ``limit`` and ``twin``, the same with none and all; ``vouched`` and ``exact``, the points of the
-    planar limit by :func:`limit_point` and of the planar model; ``grip``, the twin's creep coefficient (N*s/m).
+    planar limit by :func:`limit_point` and of the planar model; ``grip``, the twin's creep coefficient, and
+    ``viscous``, the planar model's (N*s/m).
     """
     names = [factor.name for factor in FACTORS]
     wanted: dict[str, list[list[str]]] = {"path": [names[: i + 1] for i in range(len(names))]}
@@ -310,6 +311,7 @@ def ablation(
         "limit": points[frozenset()],
         "twin": points[frozenset(names)],
         "grip": foot_creep(robot).across,
+        "viscous": planar.ground.friction,
     }
     return data
 

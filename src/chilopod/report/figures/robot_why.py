@@ -49,9 +49,9 @@ def why(data: xr.Dataset) -> Panel:
             + f". The largest steps are {listing(largest)}. They are no independent contributions: B shows each "
             "alone in the planar limit and the twin without each. Where a bar runs out of the picture, walks "
             "curve at every spring tried, up to 50; where there is none, their bends determine no point.",
-            f"The viscous coefficient of the planar model's feet is 256.5\u00a0N·s/m. A foot of the twin that does not "
-            f"slide creeps like one of {number(data.attrs['grip'], 2)}\u00a0N·s/m: it is held, and lets go only beyond "
-            "the Coulomb limit.",
+            "The viscous coefficient of the planar model's feet is "
+            f"{number(data.attrs['viscous'], 4)}\u00a0N·s/m. A foot of the twin that does not slide creeps like one of "
+            f"{number(data.attrs['grip'], 2)}\u00a0N·s/m: it is held, and lets go only beyond the Coulomb limit.",
         ),
         data=data,
     )
