@@ -40,7 +40,7 @@ from chilopod.stability.settling import nearer_states
 Array = NDArray[np.float64]
 
 _ROUNDS = 30
-_ROUND_OFF = 4e-16
+_ROUND_OFF = 8e-16
 _NOTHING = 1e-13  # of the sizes of the states around a guess: a state that small may be zero
 _SETTLED = 1e-10  # residual, of the sizes of the states, below which it may stop falling
 _RESTS = 1e-8  # of the sizes at the guess: a motion that short is none
