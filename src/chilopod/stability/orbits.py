@@ -238,7 +238,7 @@ def from_known(
     image = return_map(system, x, with_error) if image is None else image
     moved = np.abs(image.state - x)
     # No state is smaller than its value, unless the system says so itself.
-    if (moved <= _RETURNED * np.abs(x)).all() and given_scale(system) is None:
+    if not moved.any() or (given_scale(system) is None and (moved <= _RETURNED * np.abs(x)).all()):
         return Orbit(x, image, np.zeros(x.size))
     size = sizes(system, x, image.period / image.returns)
     off = _relative(moved, size)
