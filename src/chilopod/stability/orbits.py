@@ -17,6 +17,7 @@ from chilopod.stability.capabilities import (
     FlowsFrames,
     FlowsTangents,
     SystemLike,
+    flows_tangents,
     given_scale,
     is_autonomous,
     known_orbit,
@@ -263,7 +264,7 @@ def _newton(
     size = sizes(system, x, return_duration(system) if section is None else section.duration)
     section = section_at(system, x, size) if section is None else section
     best = np.inf
-    if system.dimension >= LARGE and isinstance(system, FlowsTangents):
+    if system.dimension >= LARGE and flows_tangents(system):
         with contextlib.suppress(AnalysisError):
             closed, _ = closed_orbit(system, x, section, budget=budget)
             x, best = closed.point, 0.0  # nothing is left to improve
