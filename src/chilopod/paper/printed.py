@@ -158,6 +158,9 @@ CRITICAL_K1 = Number(12.0, PAPER_UNIT, 0.5)
 MODE = tuple(Number(value, "", 0.005) for value in (0.64, 0.36, 0.48, 0.46, 0.16))
 """Joint components of the planar model's critical mode, with two decimals."""
 
+MODE_ORDER = tuple(sorted(range(1, 6), key=lambda joint: -MODE[joint - 1].value))
+"""Joints by how far they bend in it, the most first."""
+
 KIND, UNIFORM_KIND = "pitchfork", "Neimark-Sacker"
 """Of bifurcation, of the planar model: with k1 alone, and with all springs alike."""
 

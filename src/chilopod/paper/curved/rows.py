@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from chilopod.paper import printed, statements
-from chilopod.paper.curved.study import CurvedStudy, axis_radius, bent, fluctuation
+from chilopod.paper.curved.study import CurvedStudy, axis_radius, bend_order, bent, fluctuation
 from chilopod.paper.equal_distance import change, radius_ratio
 from chilopod.paper.scatter import INCREASES, increases
 from chilopod.paper.table import AGREES, NOT_PRINTED, OfPlanar, Row
@@ -19,22 +19,19 @@ def rows(study: CurvedStudy) -> list[Row | OfPlanar]:
 def _model_rows(study: CurvedStudy) -> list[Row]:
     trials, law = study.trials, study.law
     exact = trials.attrs["critical_k1"]
-    curved = trials.isel(spring=bent(trials).any(axis=1))
-    softest = float(curved.spring[-1])
-    ratios = np.nanmean(np.abs(curved.mean_angle.values)[-1], axis=0)
-    # The largest first: joints by how far they bend, and by the size of their share in the mode.
-    order, mode = np.argsort(-ratios), np.argsort([-each.value for each in printed.MODE])
+    stiffest = trials.isel(spring=[np.flatnonzero(bent(trials).any(axis=1))[-1]])
+    order, ratios = bend_order(stiffest), np.abs(stiffest.mean_angle.values[bent(stiffest)]).mean(axis=0)
     below = law.sel(softest=0.99 * exact, method="nearest")
     unsettled = int((~trials.settled).sum())
     return [
         Row(
             "joints by how far they bend",
-            f"{', '.join(str(1 + j) for j in mode)} (mode)",
-            f"{', '.join(str(1 + j) for j in order)} (trials at {softest:g} N*mm/deg: "
+            f"{', '.join(map(str, printed.MODE_ORDER))} (mode)",
+            f"{', '.join(map(str, order))} (trials at {float(stiffest.spring[0]):g} N*mm/deg: "
             + " ".join(f"{value:.2f}" for value in ratios / np.linalg.norm(ratios))
             + ")",
             printed.ANALYSIS,
-            AGREES[list(order) == list(mode)],
+            AGREES[order == printed.MODE_ORDER],
         ),
         Row(
             "how the bend of joint 1 grows from the point",
@@ -60,7 +57,7 @@ def _model_rows(study: CurvedStudy) -> list[Row]:
 def _beside_robot(study: CurvedStudy) -> list[OfPlanar]:
     trials, here = study.trials, bent(study.trials)
     exact = trials.attrs["critical_k1"]
-    sides = [int((trials.direction == side).sum()) for side in ("left", "right")]
+    left, right = (int((trials.direction == side).sum()) for side in ("left", "right"))
     curving = [float(k) for k, row in zip(trials.spring.values, here, strict=True) if row.any()]
     straight = set(map(float, trials.spring.values)) - set(curving)
     angles = np.where(here, np.abs(trials.mean_angle.sel(joint=1).values), np.nan)
@@ -68,7 +65,9 @@ def _beside_robot(study: CurvedStudy) -> list[OfPlanar]:
     wider, softest, stiffest = fluctuation(trials)
     words = [
         OfPlanar(statements.STRAIGHT, f"straight from {min(straight):g} N*mm/deg up"),
-        OfPlanar(statements.CURVED, f"curved up to {max(curving):g} N*mm/deg, {sides[0]} and {sides[1]}"),
+        OfPlanar(
+            statements.CURVED, f"curved up to {max(curving):g} N*mm/deg, {left} to the left and {right} to the right"
+        ),
         OfPlanar(statements.ONSET, f"{study.fit.critical:.2f} N*mm/deg; the point is at {exact:.2f}"),
         OfPlanar(statements.RISING, INCREASES[rising]),
         OfPlanar(statements.FLUCTUATION, f"{wider} at {softest:g} than at {stiffest:g} N*mm/deg"),

@@ -130,6 +130,12 @@ def bent(trials: xr.Dataset) -> NDArray[np.bool_]:
     return np.isin(trials.direction.values, ("left", "right"))
 
 
+def bend_order(trials: xr.Dataset) -> tuple[int, ...]:
+    """Joints by how far they bend in trials that curve, the most first."""
+    angles = np.abs(trials.mean_angle.values[bent(trials)]).mean(axis=0)
+    return tuple(int(joint) + 1 for joint in np.argsort(-angles))
+
+
 def fluctuation(trials: xr.Dataset) -> tuple[Difference, float, float]:
     """How much farther the angle of joint 1 scatters among trials at the softest spring than at the stiffest that
     curves, and these springs, N*mm/deg."""

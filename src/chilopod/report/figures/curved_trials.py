@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from chilopod.paper import printed
-from chilopod.paper.curved.study import CurvedStudy, axis_radius, bent, fluctuation
+from chilopod.paper.curved.study import CurvedStudy, axis_radius, bend_order, bent, fluctuation
 from chilopod.paper.curved.trials import on_branch
 from chilopod.report.figures.compliance import JOINT_STYLES, draw_times, errorbars, means, over_compliance
 from chilopod.report.kit import style
@@ -81,8 +81,9 @@ def joints(study: CurvedStudy) -> Panel:
         draw=lambda narrow: _draw_joints(study, narrow),
         alt=f"Mean absolute angles of all joints over 1/{k(1)}: zero up to the critical spring, then rising steeply.",
         text=(
-            "Mean absolute angle of every joint, trials (means, standard errors) on the exact walks (lines). All "
-            "joints bend to one side and keep the order of the critical mode, whose proportions they start with.",
+            "Mean absolute angle of every joint, trials (means, standard errors) on the exact walks (lines). In the "
+            f"trials that curve the joints bend in the order {listing(map(str, bend_order(study.trials)))}, the most "
+            f"first; the critical mode of the paper's planar model has {listing(map(str, printed.MODE_ORDER))}.",
         ),
         data=_table(study.trials),
     )

@@ -84,7 +84,6 @@ def joints(found: RobotWalks) -> Panel:
     """The paper's Fig. "absolute"."""
     softest = np.abs(found.base.mean_angle.isel(spring=0)).mean("repeat").values
     order = [int(joint) + 1 for joint in np.argsort(-softest)]
-    mode = np.argsort([-each.value for each in printed.MODE])
     return Panel(
         name="robot-joints",
         title="The robot in three dimensions: all joints of the curved walk",
@@ -93,7 +92,7 @@ def joints(found: RobotWalks) -> Panel:
         text=(
             "Mean absolute angle of every joint (means and standard errors). At the softest spring the joints bend in "
             f"the order {listing(str(joint) for joint in order)}, the most first; the critical mode of the paper's "
-            f"planar model has {listing(str(1 + joint) for joint in mode)}.",
+            f"planar model has {listing(map(str, printed.MODE_ORDER))}.",
         ),
         data=found.base,
     )

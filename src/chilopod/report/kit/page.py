@@ -21,8 +21,9 @@ from chilopod.paper.section import Found, Section
 from chilopod.paper.straight.sections import MODE, UNIFORM
 from chilopod.paper.table import AGREES, NOT_COMPUTED, NOT_PRINTED, WITHIN, Kind, RobotRow, Row
 from chilopod.paper.turning.sections import TURNING
+from chilopod.paper.turning.trials import outcome_words, span
 from chilopod.report.kit.panel import Panel
-from chilopod.report.kit.words import listing, minus, spring, typeset
+from chilopod.report.kit.words import SPRING_UNIT, listing, minus, spring, typeset
 from chilopod.robot import Robot
 
 _TITLE: Final = "A robot that turns by bifurcation: the paper and the computation"
@@ -168,8 +169,8 @@ def summary(results: Found) -> str:
     if turning is not None:
         task = turning.tasks["A"]
         parts.append(
-            f"Sent to a target at {task.target}, it arrives with a front spring of {spring(task.best, 3)}; stiffer "
-            "ones carry it past outside, softer ones inside."
+            f"Sent to a target at {task.target}, it comes nearest with a front spring of {spring(task.best, 3)}; most "
+            f"walks have {outcome_words(task.criteria, span)}\u00a0{SPRING_UNIT}."
         )
     judged = [row for row in results.robot_rows() if row.verdict != NOT_COMPUTED]
     if judged:
