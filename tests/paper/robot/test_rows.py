@@ -202,6 +202,8 @@ def test_what_hangs_on_the_duration_is_named():
     assert "within after 40, 60 and 90" in rows["onset"].twin
     assert rows["walks curved at 28 N*mm/deg"].verdict == "outside"
     assert rows["walks curved at 28 N*mm/deg"].twin.startswith("0, 100,")
+    assert rows["walks curved at 28 N*mm/deg"].twin.endswith("within after 30, 40, 60 and 90, outside after 20")
+    assert rows["walks straight at 41 N*mm/deg"].twin.endswith("within after each")
     assert rows["walks straight at 41 N*mm/deg"].verdict == "within"
     assert all(row.kind == "checked" for row in rows.values())
 

@@ -43,7 +43,7 @@ def _model_rows(study: CurvedStudy) -> list[Row]:
         ),
         Row(
             "where trials settle",
-            "not printed",
+            NOT_PRINTED,
             f"within {float(study.agreement.max()):.0e} rad of the branch, "
             f"{int(study.agreement.notnull().sum())} trials",
             printed.EXPERIMENTS,

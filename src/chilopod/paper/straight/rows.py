@@ -86,7 +86,7 @@ def uniform_rows(data: xr.Dataset) -> list[Row | OfPlanar]:
     return [
         Row(
             "uniform springs: critical k",
-            "not printed",
+            NOT_PRINTED,
             f"{found['value']:.9f} ± {found['error_bound']:.0e} N*mm/deg",
             printed.COMPARISON,
             NOT_PRINTED,
@@ -112,7 +112,7 @@ def identification_rows(found: Identification) -> list[Row]:
     return [
         Row(
             "foot friction, half-width, forward offset",
-            "not printed",
+            NOT_PRINTED,
             f"{best.ground.friction:.1f} N*s/m, {1e3 * best.legs.half_width:.1f} mm, "
             f"{1e3 * best.legs.forward_offset:.1f} mm",
             printed.ANALYSIS,

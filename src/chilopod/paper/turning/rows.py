@@ -62,7 +62,7 @@ def _rough(found: Turning) -> Row:
     ]
     return Row(
         f"task A, disturbances {ROUGH:g} times as large: springs of the smallest criteria",
-        "not printed",
+        NOT_PRINTED,
         ", ".join(pairs) + f" {PAPER_UNIT}",
         printed.TURNING,
         NOT_PRINTED,

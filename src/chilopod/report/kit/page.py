@@ -187,7 +187,7 @@ def summary(results: Found) -> str:
     counted = {word: sum(row.verdict == word for row in rows) for word in AGREES.values()}
     compared = sum(counted.values())
     if compared:
-        differing = [typeset(row.quantity) for row in rows if row.verdict == "differs"]
+        differing = [typeset(row.quantity) for row in rows if row.verdict == AGREES[False]]
         said = [f"{counted['agrees']} agree"]
         if counted["undecided"]:
             said.append(f"{counted['undecided']} are left open by the scatter of the trials")
