@@ -229,6 +229,12 @@ def variant_robots(robot: Robot) -> dict[str, Robot]:
     return {AS_BUILT: robot, **{name: robot.set_from_text(each.overrides) for name, each in VARIANTS.items()}}
 
 
+def mode_shape(robot: Robot) -> tuple[float, ...]:
+    """Joint components of the planar model's critical mode; all alike for another number of joints."""
+    joints = robot.body.modules - 1
+    return tuple(each.value for each in MODE) if joints == len(MODE) else (1.0,) * joints
+
+
 def onset(variant: str) -> Number:
     """Where curved walks of the robot as built, or of a variant, set in."""
     return ONSET if variant == AS_BUILT else VARIANTS[variant].onset

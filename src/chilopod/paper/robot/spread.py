@@ -108,9 +108,7 @@ def predictions(robot: Robot, folder: str | Path | None = None, engine: str = "t
     By variant ``onset`` (N*mm/deg) and ``radius`` (over that as built, at an equal distance from each one's own onset),
     NaN where walks determine none; and ``uniform`` (N*mm/deg).
     """
-    shape = np.array([each.value for each in printed.MODE])
-    if robot.body.modules - 1 != len(shape):
-        shape = np.ones(robot.body.modules - 1)
+    shape = np.array(printed.mode_shape(robot))
     bend = tuple(_BENT * shape / shape.sum())
     variants = printed.variant_robots(robot)
     for name, variant in list(variants.items()):

@@ -316,10 +316,8 @@ def ablation(
 
 
 def _shape(robot: Robot) -> Array:
-    """Of the bend that is started with: the paper's critical mode, or all joints alike."""
-    mode = np.array([each.value for each in printed.MODE])
-    if robot.body.modules - 1 != len(mode):
-        mode = np.ones(robot.body.modules - 1)
+    """Of the bend that is started with."""
+    mode = np.array(printed.mode_shape(robot))
     return mode / np.linalg.norm(mode)
 
 
