@@ -7,9 +7,8 @@ from matplotlib.text import Text
 
 from chilopod import load_robot
 from chilopod.output import netcdf
+from chilopod.paper import printed
 from chilopod.paper.curved import study as curved_findings
-from chilopod.paper.curved import trials
-from chilopod.paper.curved.trials import variant_robots
 from chilopod.report.figures import curved_trials, curved_variants
 from chilopod.report.kit import style
 from chilopod.report.kit.tables import csv
@@ -30,9 +29,10 @@ def study():
         patch.setattr(curved_findings, "AGREEMENT_SPRINGS", (8.0,))
         # Two variants are enough to draw.
         robot = load_robot("aoi2022-planar")
-        two = {name: each for name, each in variant_robots(robot).items() if name in ("as built", "stride 1.8 cm")}
-        for module in (curved_findings, trials):
-            patch.setattr(module, "variant_robots", lambda robot: two)
+        two = {
+            name: each for name, each in printed.variant_robots(robot).items() if name in ("as built", "stride 1.8 cm")
+        }
+        patch.setattr(printed, "variant_robots", lambda robot: two)
         return curved_findings.curved_study(robot, 3, 2)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 from base64 import b64encode
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from enum import Enum
 from importlib.metadata import version
 from importlib.resources import files
@@ -17,27 +17,23 @@ from markupsafe import Markup
 
 from chilopod import units
 from chilopod.errors import in_words
-from chilopod.paper.robot.table import PREDICTED
 from chilopod.paper.section import Found, Section
 from chilopod.paper.straight.sections import MODE, UNIFORM
-from chilopod.paper.table import RobotRow, Row
+from chilopod.paper.table import AGREES, NOT_COMPUTED, NOT_PRINTED, WITHIN, Kind, RobotRow, Row
 from chilopod.paper.turning.sections import TURNING
+from chilopod.paper.turning.trials import outcome_words, span
 from chilopod.report.kit.panel import Panel
-from chilopod.report.kit.words import listing, minus, spring, typeset
+from chilopod.report.kit.words import SPRING_UNIT, listing, minus, spring, typeset
 from chilopod.robot import Robot
 
 _TITLE: Final = "A robot that turns by bifurcation: the paper and the computation"
-_VERDICTS: Final[Mapping[str, tuple[str, str]]] = {
-    "agrees": ("agrees", "✓"),
-    "differs": ("differs", "≠"),
-    "undecided": ("undecided", "?"),
-    "not printed": ("open", "–"),
+_MARKS: Final = {True: ("agrees", "✓"), False: ("differs", "≠"), None: ("undecided", "?")}
+_LOOKS: Final = {
+    **{words[answer]: mark for words in (AGREES, WITHIN) for answer, mark in _MARKS.items()},
+    **dict.fromkeys((NOT_PRINTED, NOT_COMPUTED), ("open", "–")),
 }
-_ROBOT_VERDICTS: Final[Mapping[str, tuple[str, str]]] = {
-    "within": _VERDICTS["agrees"],
-    "outside": _VERDICTS["differs"],
-    "undecided": _VERDICTS["undecided"],
-}
+"""Of verdicts: class and mark."""
+
 _MOST_LISTED: Final = 4
 _RELOAD: Final = 10  # s
 _LIBRARIES: Final = ("numpy", "numba", "scipy", "xarray", "matplotlib")
@@ -138,7 +134,7 @@ def page(
         count=len(sections),
         summary=summary(found),
         tables=_tables(found),
-        robot_rows=[_robot_row(row) for row in found.lines(RobotRow)],
+        robot_rows=[_row(row) for row in found.robot_rows()],
         chapters=_chapters(sections, opening, shown, failures, waiting),
         commands=commands(robot_file, found[MODE]),
         robots=_robots(found),
@@ -173,12 +169,13 @@ def summary(results: Found) -> str:
     if turning is not None:
         task = turning.tasks["A"]
         parts.append(
-            f"Sent to a target at {task.target}, it arrives with a front spring of {spring(task.best, 3)}; stiffer "
-            "ones carry it past outside, softer ones inside."
+            f"Sent to a target at {task.target}, it comes nearest with a front spring of {spring(task.best, 3)}; most "
+            f"walks have {outcome_words(task.criteria, span)}\u00a0{SPRING_UNIT}."
         )
-    if robot_rows := results.lines(RobotRow):
-        predicted = [row for row in robot_rows if row.kind == PREDICTED]
-        counted = {word: sum(row.verdict == word for row in predicted) for word in _ROBOT_VERDICTS}
+    judged = [row for row in results.robot_rows() if row.verdict != NOT_COMPUTED]
+    if judged:
+        predicted = [row for row in judged if row.kind == Kind.PREDICTED.value]
+        counted = {word: sum(row.verdict == word for row in predicted) for word in WITHIN.values()}
         open_ = counted["undecided"]
         left = f"; {open_} more {'is' if open_ == 1 else 'are'} left open by the scatter of its trials" if open_ else ""
         parts.append(
@@ -186,18 +183,18 @@ def summary(results: Found) -> str:
             f"their speed alone, meets {counted['within']} of {len(predicted)} further statements about the robot that "
             f"it was not fitted to{left}."
         )
-    rows = results.lines(Row)
-    counted = {word: sum(row.verdict == word for row in rows) for word in _VERDICTS}
-    compared = sum(counted.values()) - counted["not printed"]
+    rows = [row for part in results.planar_rows().values() for row in part]
+    counted = {word: sum(row.verdict == word for row in rows) for word in AGREES.values()}
+    compared = sum(counted.values())
     if compared:
-        differing = [typeset(row.quantity) for row in rows if row.verdict == "differs"]
+        differing = [typeset(row.quantity) for row in rows if row.verdict == AGREES[False]]
         said = [f"{counted['agrees']} agree"]
         if counted["undecided"]:
             said.append(f"{counted['undecided']} are left open by the scatter of the trials")
         if differing:
             listed = f": {listing(differing)}" if len(differing) <= _MOST_LISTED else ""
             said.append(f"{len(differing)} differ{listed}. The reasons are given below")
-        parts.append(f"Of {compared} statements of the paper compared with the planar model, {listing(said)}.")
+        parts.append(f"Of {compared} statements of the paper about its planar model, {listing(said)}.")
     return " ".join(parts)
 
 
@@ -248,9 +245,8 @@ def commands(robot: str, mode: xr.Dataset | None) -> list[dict[str, str]]:
 
 def _tables(found: Found) -> list[dict[str, Any]]:
     """The table paper | computed, one part a chapter."""
-    chapters = dict.fromkeys(section.chapter for section in found.rows)
-    parts = {chapter: [_row(row) for row in found.lines(Row, chapter)] for chapter in chapters}
-    return [{"title": chapter, "rows": rows} for chapter, rows in parts.items() if rows]
+    parts = found.planar_rows()
+    return [{"title": chapter, "rows": [_row(row) for row in rows]} for chapter, rows in parts.items()]
 
 
 def _chapters(
@@ -280,24 +276,9 @@ def _chapters(
     return chapters
 
 
-def _row(row: Row) -> dict[str, str]:
-    kind, mark = _VERDICTS[row.verdict]
-    return {
-        "quantity": typeset(row.quantity),
-        "paper": typeset(row.paper),
-        "computed": typeset(row.computed),
-        "where": row.where,
-        "verdict": row.verdict,
-        "remark": typeset(row.remark),
-        "kind": kind,
-        "mark": mark,
-    }
-
-
-def _robot_row(row: RobotRow) -> dict[str, str]:
-    kind, mark = _ROBOT_VERDICTS[row.verdict]
-    words = {name: typeset(text) for name, text in row.as_json().items() if name not in ("verdict", "kind")}
-    return {**words, "origin": row.kind, "verdict": row.verdict, "kind": kind, "mark": mark}
+def _row(row: Row | RobotRow) -> dict[str, str]:
+    look, mark = _LOOKS[row.verdict]
+    return {**{name: typeset(text) for name, text in asdict(row).items()}, "look": look, "mark": mark}
 
 
 def _figure(drawn: Drawn) -> dict[str, Any]:
@@ -320,7 +301,7 @@ def _embedded(svg: bytes) -> str:
 def _robots(results: Found) -> list[dict[str, Any]]:
     """The robots of the report, with the files their numbers stand in."""
     found = [("The robot of the planar model", results.context.robot, "robot.toml")]
-    if results.lines(RobotRow):
+    if any(row.twin for row in results.robot_rows()):
         found.append(("The robot in three dimensions", results.context.whole, "robot-3d.toml"))
     return [{"says": says, "name": robot.name, "file": file, "numbers": _numbers(robot)} for says, robot, file in found]
 
