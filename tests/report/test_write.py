@@ -21,7 +21,7 @@ from chilopod.paper.table import Kind, OfPlanar, OfTwin, Row, Statement
 from chilopod.report import write_identification, write_report
 from chilopod.report.figures import schematic
 from chilopod.report.figures.drawings import DRAWINGS
-from chilopod.report.kit.page import summary
+from chilopod.report.kit.story import summary
 
 Page = runpy.run_path(str(Path(__file__).with_name("html_page.py")))["Page"]
 

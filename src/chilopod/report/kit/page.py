@@ -18,12 +18,11 @@ from markupsafe import Markup
 from chilopod import units
 from chilopod.errors import in_words
 from chilopod.paper.section import Found, Section
-from chilopod.paper.straight.sections import MODE, UNIFORM
-from chilopod.paper.table import AGREES, NOT_COMPUTED, NOT_PRINTED, WITHIN, Kind, RobotRow, Row
-from chilopod.paper.turning.sections import TURNING
-from chilopod.paper.turning.trials import outcome_words, span
+from chilopod.paper.straight.sections import MODE
+from chilopod.paper.table import AGREES, NOT_COMPUTED, NOT_PRINTED, WITHIN, RobotRow, Row
 from chilopod.report.kit.panel import Panel
-from chilopod.report.kit.words import SPRING_UNIT, listing, minus, spring, typeset
+from chilopod.report.kit.story import facts, summary
+from chilopod.report.kit.words import listing, minus, typeset
 from chilopod.robot import Robot
 
 _TITLE: Final = "A robot that turns by bifurcation: the paper and the computation"
@@ -34,7 +33,6 @@ _LOOKS: Final = {
 }
 """Of verdicts: class and mark."""
 
-_MOST_LISTED: Final = 4
 _RELOAD: Final = 10  # s
 _LIBRARIES: Final = ("numpy", "numba", "scipy", "xarray", "matplotlib")
 
@@ -133,6 +131,8 @@ def page(
         done=sum(section in found for section in sections),
         count=len(sections),
         summary=summary(found),
+        facts=facts(found),
+        first=_first([film for each in shown for film in each.films]),
         tables=_tables(found),
         robot_rows=[_row(row) for row in found.robot_rows()],
         chapters=_chapters(sections, opening, shown, failures, waiting),
@@ -146,56 +146,11 @@ def page(
     )
 
 
-def summary(results: Found) -> str:
-    """What was found, in a few plain sentences."""
-    parts, mode, uniform, turning = [], results[MODE], results[UNIFORM], results[TURNING]
-    modules = results.context.robot.body.modules
-    parts.append(
-        f"A {modules}-module robot walks straight as long as the springs between its modules are "
-        "stiff enough. Below a critical stiffness the straight walk cannot hold, and the body bends by itself."
+def _first(films: Sequence[Film]) -> Film | None:
+    """The film that the page begins with: of the robot in three dimensions, if there is one."""
+    return next(
+        (film for film in reversed(films) if film.pictured), next((film for film in films if film.encoded), None)
     )
-    if mode is not None:
-        found = mode.attrs
-        parts.append(
-            f"Softening the front spring alone, that happens at {spring(found['value'], 5)}: a {found['criticality']} "
-            f"{found['kind']}, and the robot turns left or right."
-        )
-    if uniform is not None:
-        found = uniform.attrs
-        parts.append(
-            f"Softening all springs together, it happens at {spring(found['value'], 5)} and the body undulates, once "
-            f"in {found['oscillation_period_s']:.1f} s."
-        )
-    if turning is not None:
-        task = turning.tasks["A"]
-        parts.append(
-            f"Sent to a target at {task.target}, it comes nearest with a front spring of {spring(task.best, 3)}; most "
-            f"walks have {outcome_words(task.criteria, span)}\u00a0{SPRING_UNIT}."
-        )
-    judged = [row for row in results.robot_rows() if row.verdict != NOT_COMPUTED]
-    if judged:
-        predicted = [row for row in judged if row.kind == Kind.PREDICTED.value]
-        counted = {word: sum(row.verdict == word for row in predicted) for word in WITHIN.values()}
-        open_ = counted["undecided"]
-        left = f"; {open_} more {'is' if open_ == 1 else 'are'} left open by the scatter of its trials" if open_ else ""
-        parts.append(
-            "The same robot in three dimensions, its unknown constants fitted to the paper's base series of walks and "
-            f"their speed alone, meets {counted['within']} of {len(predicted)} further statements about the robot that "
-            f"it was not fitted to{left}."
-        )
-    rows = [row for part in results.planar_rows().values() for row in part]
-    counted = {word: sum(row.verdict == word for row in rows) for word in AGREES.values()}
-    compared = sum(counted.values())
-    if compared:
-        differing = [typeset(row.quantity) for row in rows if row.verdict == AGREES[False]]
-        said = [f"{counted['agrees']} agree"]
-        if counted["undecided"]:
-            said.append(f"{counted['undecided']} are left open by the scatter of the trials")
-        if differing:
-            listed = f": {listing(differing)}" if len(differing) <= _MOST_LISTED else ""
-            said.append(f"{len(differing)} differ{listed}. The reasons are given below")
-        parts.append(f"Of {compared} statements of the paper about its planar model, {listing(said)}.")
-    return " ".join(parts)
 
 
 def commands(robot: str, mode: xr.Dataset | None) -> list[dict[str, str]]:
