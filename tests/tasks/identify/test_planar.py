@@ -14,14 +14,16 @@ DATA = critical_mode_data()
 
 
 def test_identification_finds_constants_it_was_not_started_from():
-    # Data made with other constants than the preset's: the fit has to find those back.
     residuals = planar.residuals(ROBOT, DATA)
-    assert np.abs(residuals).max() == pytest.approx(1.016, abs=0.01)
+    assert np.abs(residuals).max() == pytest.approx(0.702, abs=0.001)
     fits = [planar._fit(ROBOT, DATA, np.array(start), fixed=0) for start in planar._STARTS]
     for constants, off in fits:
         assert constants == pytest.approx(fits[0][0], rel=1e-4)
         assert np.abs(off).max() < 1.0
         assert (off**2).sum() < (residuals**2).sum()
+    # The preset has what is found, to tenths of N*s/m and of mm.
+    tenths = np.array([1.0, 1e3, 1e3])
+    assert (fits[0][0] * tenths).round(1) == pytest.approx(tenths * [ROBOT.get(path) for path in planar.FREE])
 
 
 def test_the_profile_passes_through_the_best_fit_and_predicts():
