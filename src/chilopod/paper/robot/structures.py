@@ -22,9 +22,10 @@ from numpy.typing import NDArray
 from chilopod import twin
 from chilopod.paper import printed
 from chilopod.paper.fit_data import base_series_data
+from chilopod.paper.printed import CRITERION_NAMES
 from chilopod.paper.robot.spread import LOWER, predictions, printed_number
 from chilopod.paper.robot.turning import TASK_DURATION
-from chilopod.paper.turning.minima import NAMES, minima
+from chilopod.paper.turning.minima import minima
 from chilopod.paper.turning.trials import turning_task
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
@@ -220,7 +221,7 @@ def structures(
             "constant": [each.path for each in FREE],
             "prediction": names,
             "strategy": list(_SPRINGS),
-            "criterion": list(NAMES),
+            "criterion": list(CRITERION_NAMES),
         },
         attrs={"robot": robot.name},
     ).pipe(_with_chi_squared)
@@ -243,7 +244,7 @@ def _strategies(robot: Robot, folder: str | Path | None, engine: str) -> dict[st
             robot, target, springs, _REPEATS, strategy, time=time, duration=TASK_DURATION, engine=engine, folder=folder
         )
         time = task.time
-        rows.append(minima(task.criteria)["mean"].sel(criterion=list(NAMES)).values)
+        rows.append(minima(task.criteria)["mean"].sel(criterion=list(CRITERION_NAMES)).values)
     return {"criteria": np.array(rows)}
 
 
