@@ -135,7 +135,9 @@ def spectrum(image: ReturnMap) -> Spectrum:
     scaled = jacobian * units / units[:, None]
     values, right = np.linalg.eig(scaled)
     # Moduli that differ by round-off are equal; the two of a pair stand together, positive frequency first.
-    sizes = np.round(np.abs(values) / max(float(np.abs(values).max()), 1e-300), 12)
+    modulus = np.abs(values)
+    largest = float(modulus.max())
+    sizes = np.round(modulus / max(largest, 1e-300), 12)
     order = np.lexsort((-values.imag, -np.round(np.abs(values.imag), 12), -sizes))
     values, right = values[order].astype(np.complex128), right[:, order].astype(np.complex128)
     try:
@@ -152,11 +154,11 @@ def spectrum(image: ReturnMap) -> Spectrum:
     # d nu = left^H E right, of which a bound of every entry of E tells the most; with one number for all of them, that
     # err independently, |d nu| has the size e |left| |right|, and the factor 4 is for safety.
     if isinstance(image.error, np.ndarray):
-        error += np.einsum("ik,ij,jk->k", np.abs(left), image.error, np.abs(right))
+        error += (np.abs(left) * (image.error @ np.abs(right))).sum(axis=0)
     else:
         error += 4.0 * image.error * np.linalg.norm(left, axis=0)
     error = np.where(np.isfinite(error), error, np.inf)
-    if (error > FIRST_ORDER * np.abs(values).max(initial=0.0)).any():
+    if (error > FIRST_ORDER * largest).any():
         off = np.broadcast_to(image.error, image.jacobian.shape)
         off = off if section is None else np.abs(section[1]) @ off @ np.abs(section[0])
         error = np.minimum(error, eigenvalues_moved(values, jacobian, off))
@@ -214,13 +216,14 @@ def _multipliers(orbit: Orbit) -> Multipliers:
 
 def _of_period(nu: ComplexArray, error: Array, k: int, state: Array, period: float) -> Multipliers:
     """The multipliers mu = nu^k of the full period from those of the return map, with their errors."""
-    resolved = np.abs(nu) > RESOLVED
+    modulus = np.abs(nu)
+    resolved = modulus > RESOLVED
     bound = float(error[resolved].max()) if resolved.any() else float(error.min())
     if k == 1:
         return Multipliers(nu, None, bound, error, state, period)
     # By the mean value theorem, d mu is at most k (|nu| + d nu)^(k-1) d nu.
-    largest = max(float(np.abs(nu[0])), 0.5)
-    errors = error * k * (np.abs(nu) + error) ** (k - 1)
+    largest = max(float(modulus[0]), 0.5)
+    errors = error * k * (modulus + error) ** (k - 1)
     return Multipliers(nu**k, nu, bound * k * (largest + bound) ** (k - 1), errors, state, period)
 
 

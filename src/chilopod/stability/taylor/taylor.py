@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 
 from chilopod.cores import cores
 from chilopod.errors import AnalysisError
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import ReadOnlyArrays, read_only
 from chilopod.stability.taylor.evaluation import evaluate
 from chilopod.stability.taylor.tape import Tape
 
@@ -135,20 +135,24 @@ class TaylorFlow(ReadOnlyArrays):
         arrays = (t.program, t.terms, t.numbers, t.layout, t.slopes, t.switches, t.resets, t.clocks, directions)
         object.__setattr__(self, "_arrays", arrays)
 
-    @property
+    @functools.cached_property
     def order(self) -> int:
         """Order of the series, near the one of least work for its tolerance."""
         return max(8, math.ceil(-0.65 * math.log(self._epsilon)))
 
-    @property
+    @functools.cached_property
     def most_steps(self) -> int:
         """Budget of an integration: a few seconds."""
         nodes = self.tape.program.shape[1]
         return max(_FEWEST_STEPS, int(_MOST_WORK / (nodes * (1 + self.tape.dimension))))
 
-    @property
+    @functools.cached_property
     def _epsilon(self) -> float:
         return max(self.tolerance, _LEAST_TOLERANCE)
+
+    @functools.cached_property
+    def _shaken(self) -> Array:
+        return read_only(1.0 + _SHAKE * np.sign(np.cos(3.0 * np.arange(self.tape.dimension) + 1.0)))
 
     def advance(
         self, x: Array, t0: float, t1: float, params: Array, *, derived: bool = True, bounded: bool = False
@@ -173,7 +177,7 @@ class TaylorFlow(ReadOnlyArrays):
             derivative = np.eye(n) if derived else np.empty((n, 0))
             events, steps = self._run(x, t0, t1, params, derivative, _NOTHING, self.order, 0.0)
             return Passage(x, derivative, _NOTHING, events, steps)
-        other_x = x * (1.0 + _SHAKE * np.sign(np.cos(3.0 * np.arange(n) + 1.0)))
+        other_x = x * self._shaken
         derivative, bound, other = np.eye(n), np.zeros((n, n)), np.eye(n)
         events, steps = self._run(x, t0, t1, params, derivative, bound, self.order, 0.0)
         self._run(other_x, t0, t1, params, other, _NOTHING, self.order - _OTHER_ORDER, _SHAKE)
