@@ -12,6 +12,7 @@ import pytest
 import xarray as xr
 
 from chilopod.errors import ParameterError
+from chilopod.paper.size import Size
 from chilopod.paper.turning.minima import minima
 from chilopod.paper.turning.rows import rows
 from chilopod.paper.turning.study import turning
@@ -26,7 +27,7 @@ TASK_A = Target.parse("45 deg, 1.3 m")
 
 @pytest.fixture(scope="module")
 def found():
-    return turning(ROBOT, quick=True)
+    return turning(ROBOT, size=Size.QUICK)
 
 
 def test_stiff_springs_bulge_outside_soft_ones_turn_inside_and_those_between_arrive(found):

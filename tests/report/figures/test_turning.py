@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from chilopod import load_robot
+from chilopod.paper.size import Size
 from chilopod.paper.turning.study import turning
 from chilopod.report.figures.turning import panels
 from chilopod.report.kit import style, tables
@@ -16,7 +17,7 @@ CHECK = runpy.run_path(str(Path(__file__).parents[1] / "texts.py"))["check"]
 
 @pytest.fixture(scope="module")
 def drawn():
-    found = turning(load_robot("aoi2022-planar"), quick=True)
+    found = turning(load_robot("aoi2022-planar"), size=Size.QUICK)
     return list(panels(found))
 
 

@@ -26,7 +26,7 @@ CURVED: Section[CurvedStudy] = Section(
     CHAPTER,
     "walks from straight on, trial by trial",
     lambda context, found, report: curved_study(
-        context.robot, 3 if context.quick else 10, 2 if context.quick else 5, context.folder, report
+        context.robot, context.size.of(10, 3, 2), context.size.of(5, 2, 2), context.folder, report
     ),
     lambda study, found: rows(study),
 )
