@@ -1,7 +1,10 @@
 """Settings of all tests."""
 
 import os
+from pathlib import Path
+from types import SimpleNamespace
 
+import pytest
 from hypothesis import settings
 
 # In CI the same examples every time, so that a submission is judged by its own changes; at a desk new ones each run.
@@ -9,3 +12,39 @@ from hypothesis import settings
 settings.register_profile("desk", deadline=None)
 settings.register_profile("ci", derandomize=True, deadline=None)
 settings.load_profile("ci" if os.environ.get("CI") else "desk")
+
+
+@pytest.fixture(scope="session")
+def kept(tmp_path_factory) -> Path:
+    """Where all tests, in whatever process, keep the trials of studies: each is walked once a session."""
+    root = tmp_path_factory.getbasetemp()
+    folder = (root.parent if os.environ.get("PYTEST_XDIST_WORKER") else root) / "trials"
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def tiny(kept, tmp_path_factory) -> SimpleNamespace:
+    """The main job with every section, as small as it gets: its folder, what was found, and what failed."""
+    from chilopod.paper.section import Context
+    from chilopod.paper.sections import SECTIONS, reproduce
+    from chilopod.paper.size import Size
+    from chilopod.report import Report
+
+    context, folder = Context(size=Size.TINY, folder=kept), tmp_path_factory.mktemp("tiny")
+    with Report(SECTIONS, context, folder) as report:
+        found = reproduce(SECTIONS, context, told=lambda found, section: report.add(found, [section]))
+    return SimpleNamespace(folder=folder, found=found, failures=report.failures)
+
+
+def pytest_collection_modifyitems(config, items) -> None:
+    """Tests of one file run in one process, and so do all that look at the tiny report; what takes longest is begun
+    first, and beside what needs other compiled code."""
+
+    def place(item: pytest.Item) -> int:
+        return 0 if "tiny" in item.fixturenames else 1 if "truth" in item.path.parts else 2
+
+    items.sort(key=place)
+    for item in items if config.pluginmanager.hasplugin("xdist") else ():
+        group = "tiny" if "tiny" in item.fixturenames else str(item.path.relative_to(config.rootpath))
+        item.add_marker(pytest.mark.xdist_group(group))

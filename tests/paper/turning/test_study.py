@@ -26,8 +26,8 @@ TASK_A = Target.parse("45 deg, 1.3 m")
 
 
 @pytest.fixture(scope="module")
-def found():
-    return turning(ROBOT, size=Size.QUICK)
+def found(kept):
+    return turning(ROBOT, kept, Size.TINY)
 
 
 def test_stiff_springs_bulge_outside_soft_ones_turn_inside_and_those_between_arrive(found):

@@ -16,8 +16,8 @@ CHECK = runpy.run_path(str(Path(__file__).parents[1] / "texts.py"))["check"]
 
 
 @pytest.fixture(scope="module")
-def drawn():
-    found = turning(load_robot("aoi2022-planar"), size=Size.QUICK)
+def drawn(kept):
+    found = turning(load_robot("aoi2022-planar"), kept, Size.TINY)
     return list(panels(found))
 
 

@@ -6,8 +6,9 @@ import xarray as xr
 
 from chilopod.errors import AnalysisError
 from chilopod.paper.fit_data import critical_mode_data, variant_settings
+from chilopod.paper.straight.sections import IDENTIFICATION
 from chilopod.robot import load_robot
-from chilopod.tasks.identify import identify_planar, planar
+from chilopod.tasks.identify import planar
 
 ROBOT = load_robot("aoi2022-planar")
 DATA = critical_mode_data()
@@ -24,8 +25,8 @@ def test_identification_finds_constants_it_was_not_started_from():
         assert (off**2).sum() < (residuals**2).sum()
 
 
-def test_the_profile_passes_through_the_best_fit_and_predicts():
-    found = identify_planar(ROBOT, DATA, 5, variant_settings())
+def test_the_profile_passes_through_the_best_fit_and_predicts(tiny):
+    found = tiny.found[IDENTIFICATION]
     assert isinstance(found.profile, xr.Dataset)
     best = found.best.legs.forward_offset
     cost = np.interp(best, found.profile.forward_offset, found.profile.largest_residual)

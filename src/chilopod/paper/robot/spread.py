@@ -57,7 +57,7 @@ def twin_spread(
     folder
         Where trials are kept.
     size
-        If not full, two sets.
+        If not full, two sets, or one.
     progress
         Called as the work goes on.
 
@@ -68,7 +68,7 @@ def twin_spread(
     built, at an equal distance from each one's own onset), ``uniform`` (N*mm/deg), and over task ``best``, the spring
     that comes nearest to the target (N*mm/deg), and ``arrives``, whether that arrives.
     """
-    fits = unlike(known(), 2 if size is not Size.FULL else COUNT)
+    fits = unlike(known(), size.of(COUNT, 2, 1))
     rows: list[dict[str, Any]] = []
     for index, fit in enumerate(fits):
         progress(index / len(fits), f"set {index + 1} of {len(fits)}")
@@ -121,7 +121,7 @@ def predictions(
     for name, variant in list(variants.items()):
         if variant.gait.stride != robot.gait.stride:
             variants[f"{name}{LOWER}"] = lower_steps(robot, variant)
-    springs, uniform_springs = size.cut((SPRINGS, UNIFORM_SPRINGS), (SPRINGS[::3], UNIFORM_SPRINGS[::3]))
+    springs, uniform_springs = size.cut((SPRINGS, UNIFORM_SPRINGS), (SPRINGS[1::4], UNIFORM_SPRINGS[::3]))
     longest, swinging = size.cut((_DURATION, UNIFORM_DURATION), (16.0, 12.0))
     series = {}
     for name, variant in variants.items():
@@ -147,7 +147,7 @@ def nearest_springs(
     """For each of the paper's tasks the spring that comes ``best``, nearest to the target (N*mm/deg), undisturbed, and
     whether it ``arrives``."""
     found: dict[str, dict[str, Any]] = {"best": {}, "arrives": {}}
-    springs, duration = size.cut((TASK_SPRINGS, TASK_DURATION), (TASK_SPRINGS[::3], 3.0))
+    springs, duration = size.cut((TASK_SPRINGS, TASK_DURATION), (TASK_SPRINGS[::3], 2.0))
     plan = strategy_named("pitchfork")
     for letter, entry in printed()["turning"]["tasks"].items():
         walks = []

@@ -168,7 +168,7 @@ def structures(
     folder
         Where trials are kept.
     size
-        If tiny, two structures, whose constants are not fitted.
+        If tiny, one structure, whose constants are not fitted.
     progress
         Called as the work goes on.
 
@@ -182,7 +182,7 @@ def structures(
     by the nearer of its two readings.
     """
     data = base_series_data()
-    tried, rounds, duration = size.cut((STRUCTURES, _ROUNDS, DURATION), (STRUCTURES[:2], 0, 18.0))
+    tried, rounds, duration = size.cut((STRUCTURES, _ROUNDS, DURATION), (STRUCTURES[:1], 0, 18.0))
     law = _law(robot, data, part(progress, 0.0, 0.1)) if rounds else np.empty(0)
     rows: list[Mapping[str, Any]] = []
     for index, each in enumerate(tried):

@@ -35,7 +35,7 @@ MODULES: Section[xr.Dataset] = Section(
     "modules",
     CHAPTER,
     "critical k1 over the number of modules",
-    lambda context, found, report: study.module_counts(context.robot, range(3, context.size.of(21, 11, 7)), report),
+    lambda context, found, report: study.module_counts(context.robot, range(3, context.size.of(21, 11, 8)), report),
     lambda data, found: rows.module_rows(data),
 )
 UNIFORM: Section[xr.Dataset] = Section(
@@ -50,7 +50,7 @@ IDENTIFICATION: Section[Identification] = Section(
     CHAPTER,
     "the constants the paper does not print",
     lambda context, found, report: identify_planar(
-        context.robot, critical_mode_data(), context.size.of(25, 7, 3), variant_settings(), report
+        context.robot, critical_mode_data(), context.size.of(25, 7, 5), variant_settings(), report
     ),
     lambda fit, found: rows.identification_rows(fit),
     beyond=True,
