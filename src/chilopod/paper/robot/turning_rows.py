@@ -44,7 +44,7 @@ def turning_rows(found: RobotTurning, walks: RobotWalks | None, planar: Planar) 
                 RobotRow(
                     f"task {letter}: k1 whose walk has the radius of the circle",
                     entry["k_hat"],
-                    f"{with_error(own, error, 1)} {PAPER_UNIT}",
+                    f"{with_error(own, error, 1)} {PAPER_UNIT}" if np.isfinite(own) else "none of the springs walked",
                     planar.get(f"k_hat {letter}", ""),
                     PREDICTED,
                     VERDICTS[near(own, error, k_hat, K_HAT)],
@@ -104,14 +104,15 @@ def _outcomes(
 
 
 def _arrival(found: RobotTurning, planar: Planar) -> RobotRow:
-    paper, time = printed()["turning"]["evaluation_time"], found.tasks["A"].time
+    paper, task = printed()["turning"]["evaluation_time"], found.tasks["A"]
+    arrives, time = bool(np.isfinite(task.criteria.arrival).any()), task.time
     return RobotRow(
         "task A: earliest arrival",
         paper,
-        f"{time:.1f} s",
+        f"{time:.1f} s" if arrives else "none arrives",
         planar.get("arrival", ""),
         FITTED,
-        VERDICTS[near(time, 0.0, units.parse(paper, "s"), ARRIVAL)],
+        VERDICTS[arrives and near(time, 0.0, units.parse(paper, "s"), ARRIVAL)],
         percent(ARRIVAL),
     )
 
