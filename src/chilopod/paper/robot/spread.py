@@ -132,12 +132,11 @@ def predictions(
         ]
         series[name] = walk_ends(trials.run(walks, folder), variant, springs)
     base = next(iter(series.values()))
+    uniform = undulations(robot, uniform_springs, 1, duration=swinging, folder=folder, engine=engine)
     return {
         "onset": {name: onset_with_error(each)[0] for name, each in series.items()},
         "radius": {name: radius_ratio(base, each, drawn=0).distance for name, each in series.items()},
-        "uniform": undulations(robot, uniform_springs, 1, duration=swinging, folder=folder, engine=engine).attrs[
-            "critical_k"
-        ],
+        "uniform": uniform.attrs["critical_k"],
     }
 
 

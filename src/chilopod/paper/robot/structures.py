@@ -242,19 +242,10 @@ def _strategies(robot: Robot, folder: str | Path | None, engine: str, size: Size
     """The smallest criteria of task A, with one soft spring and with all springs alike."""
     target = Target.parse(printed()["turning"]["tasks"]["A"]["target"])
     repeats, duration = size.cut((_REPEATS, TASK_DURATION), (2, 3.0))
+    kept: Any = {"duration": duration, "engine": engine, "folder": folder}
     time, rows = None, []
     for strategy, springs in _SPRINGS.items():
-        task = turning_task(
-            robot,
-            target,
-            springs,
-            repeats,
-            strategy,
-            time=time,
-            duration=duration,
-            engine=engine,
-            folder=folder,
-        )
+        task = turning_task(robot, target, springs, repeats, strategy, time=time, **kept)
         time = task.time
         rows.append(minima(task.criteria)["mean"].sel(criterion=list(NAMES)).values)
     return {"criteria": np.array(rows)}

@@ -114,14 +114,8 @@ def robot_walks(
     springs = size.of(VARIANT_SPRINGS, VARIANT_SPRINGS[1::2], VARIANT_SPRINGS[1::4])
     uniform_springs = size.of(UNIFORM_SPRINGS, UNIFORM_SPRINGS[:4], UNIFORM_SPRINGS[:4:2])
     duration, swinging = size.cut((DURATION, UNIFORM_DURATION), (21.0, 12.0))
-    records = walk_records(
-        robot,
-        SPRINGS,
-        repeats,
-        duration=duration,
-        folder=folder,
-        progress=part(progress, 0.0, 0.31, "as built"),
-    )
+    told = part(progress, 0.0, 0.31, "as built")
+    records = walk_records(robot, SPRINGS, repeats, duration=duration, folder=folder, progress=told)
     base, durations = walk_ends(records, robot, SPRINGS), by_duration(records, robot, SPRINGS)
     robots = {name: each for name, each in variant_robots(robot).items() if name != "as built"}
     readings = {
@@ -136,14 +130,8 @@ def robot_walks(
         walked = walk_records(of[name], springs, fewer, duration=longer, folder=folder, progress=shown)
         found.append(walk_ends(walked, of[name], springs))
     variants, lower = dict(zip(robots, found, strict=False)), dict(zip(readings, found[len(robots) :], strict=True))
-    uniform = undulations(
-        robot,
-        uniform_springs,
-        fewest,
-        duration=swinging,
-        folder=folder,
-        progress=part(progress, 0.91, 1.0, "uniform springs"),
-    )
+    told = part(progress, 0.91, 1.0, "uniform springs")
+    uniform = undulations(robot, uniform_springs, fewest, duration=swinging, folder=folder, progress=told)
     return RobotWalks(robot, base, durations, variants, lower, _examples(robot, duration, folder), uniform)
 
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -226,18 +227,9 @@ def onset(robot: Robot, folder: str | Path | None = None, size: Size = Size.FULL
 def _bends(robot: Robot, springs: Sequence[float], duration: float, folder: str | Path | None) -> Array:
     """Mean angle of joint 1 at the end of walks, rad; 0 where the body is straight, or the walk failed."""
     bend = tuple(_BENT * _shape(robot))
-    asked = [
-        Trial(
-            robot.with_value(K1, stiffness(spring)),
-            duration,
-            0,
-            bend,
-            disturbance=NONE,
-            rate=_PER_SECOND,
-            engine="twin",
-        )
-        for spring in springs
-    ]
+    robots = [robot.with_value(K1, stiffness(spring)) for spring in springs]
+    same: Any = {"disturbance": NONE, "rate": _PER_SECOND, "engine": "twin"}
+    asked = [Trial(each, duration, 0, bend, **same) for each in robots]
     found = []
     for record in trials.run(asked, folder):
         last = np.abs(record.joint_angle.isel(robot=0).values[-round(_AVERAGED * _PER_SECOND) :].mean(axis=0))
