@@ -86,9 +86,9 @@ class Browser:
         return [what for kind, what in self.events if kind == name]
 
     def complaints(self) -> list[dict]:
-        """Errors and warnings of the console."""
+        """Errors, and what the page itself warns of; the browser warns of drawing without a graphics card."""
         said = [what for what in self.named("Runtime.consoleAPICalled") if what["type"] in ("error", "warning")]
-        logged = [what for what in self.named("Log.entryAdded") if what["entry"]["level"] in ("error", "warning")]
+        logged = [what for what in self.named("Log.entryAdded") if what["entry"]["level"] == "error"]
         return said + logged + self.named("Runtime.exceptionThrown")
 
     def requested(self) -> list[str]:

@@ -60,6 +60,8 @@ def panel(data: xr.Dataset) -> Panel:
 
 
 def _shown(value: float) -> str:
+    if np.isnan(value):
+        return "a prediction without a point"
     return f"{value:.0f}" if value >= 10.0 else f"{value:.1f}"
 
 
@@ -71,8 +73,9 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
     values = np.clip(np.nan_to_num(data.chi_squared.values, nan=0.0), 0.0, _MOST)
     axes["A"].barh(rows, values, 0.6, color=[style.BLUE if good else style.PALE for good in met])
     for row, value, end in zip(rows, data.chi_squared.values, values, strict=True):
-        text = "a prediction has no point" if np.isnan(value) else _shown(value)
-        axes["A"].annotate(text, (end, row), (4, 0), textcoords="offset points", va="center", fontsize=style.SMALL)
+        axes["A"].annotate(
+            _shown(value), (end, row), (4, 0), textcoords="offset points", va="center", fontsize=style.SMALL
+        )
     axes["A"].set_yticks(rows, names)
     axes["A"].set_xlim(0.0, 1.2 * _MOST)
     axes["A"].set_xlabel("chi squared")
