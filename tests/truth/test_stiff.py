@@ -147,7 +147,7 @@ def test_linear_flow_and_its_bound(scale):
             assert (bound <= 1e-9 * np.abs(basis) @ np.abs(np.linalg.inv(basis))).all()
 
 
-@pytest.mark.parametrize("rate", [1e2, 1e4, 1e6, 1e9])
+@pytest.mark.parametrize("rate", [1e2, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9])
 def test_prothero_robinson(rate):
     """x' = -rate (x^3 - p^3) + p' has the orbit p: where collocation loses its order, the bound has to see it."""
 
@@ -160,8 +160,9 @@ def test_prothero_robinson(rate):
 
     system = from_rhs(rhs, 1, 2.0 * np.pi, method="implicit")
     orbit = find_orbit(system, [1.9])
-    assert orbit.state[0] == pytest.approx(2.0, abs=1e-12)
-    assert abs(orbit.state[0] - 2.0) <= max(orbit.error[0], 1e-12)
+    # Steps are long, so their error may be thousands of times the tolerance; what counts is that it is known.
+    assert abs(orbit.state[0] - 2.0) <= orbit.error[0] + 1e-14
+    assert orbit.error[0] <= 1e-8
     for decay in (0.1, 1.0, 10.0, 100.0):
         end = decay / (12.0 * rate)
         _, derivative, bound = system.flow_with_error(np.array([2.0]), 0.0, end)

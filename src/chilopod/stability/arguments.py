@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import operator
 from collections.abc import Callable
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import ParameterError
+from chilopod.frozen import read_only
 
 Array = NDArray[np.float64]
 
@@ -121,24 +123,30 @@ Slopes = Callable[[Array, Array], Array]
 """``slopes(times, states) -> dx/dt``, shapes (samples,), (n, samples) and (n, samples); NaN where it is not defined."""
 
 
+@functools.lru_cache
+def _waves(n: int) -> Array:
+    """Displacements of all sizes, two of each, shape (n, 2 sizes)."""
+    waves = np.cos(3.0 * np.arange(n)[:, None] + np.arange(1.0, 3.0))
+    return read_only((waves[:, None] * np.array(_SIZES)[:, None]).reshape(n, -1))
+
+
 def check_symmetry(
     field: str, matrix: Array, shift: float, slopes: Slopes, times: Array, base: Array, period: float
 ) -> None:
     """Test S f(t, x) = f(t + shift, S x) at some times and states of all sizes: a wrong symmetry gives wrong
     multipliers in silence."""
-    n = base.size
-    turns, sizes = np.arange(1.0, 3.0), np.array(_SIZES)
-    # Axes: state, size, turn and time.
-    shape = (n, sizes.size, turns.size, times.size)
-    wave = np.cos(3.0 * np.arange(n)[:, None, None, None] + turns[:, None])
-    x = np.broadcast_to(base[:, None, None, None] + sizes[:, None, None] * wave, shape).reshape(n, -1)
-    t = np.broadcast_to(times, shape[1:]).ravel()
+    x = np.tile(base[:, None] + _waves(base.size), times.size)
+    t = np.repeat(times, x.shape[1] // times.size)
     both = slopes(np.concatenate([t, (t + shift) % period]), np.concatenate([x, matrix @ x], axis=1))
-    here, there = np.split(both, 2, axis=1)
+    here, there = both[:, : t.size], both[:, t.size :]
     off = np.abs(matrix @ here - there)
+    if np.isfinite(off).all() and (off <= _SAME * np.abs(there)).all():
+        return
     terms = np.abs(matrix) @ np.abs(here) + np.abs(there)
-    largest = np.where(np.isfinite(terms), terms, 0.0).reshape(shape).max(axis=(2, 3), keepdims=True)
-    wrong = (off.reshape(shape) > _SAME * largest).reshape(n, -1).any(axis=0)
+    # The largest among samples of the same size, of which there are some at every time.
+    alike = (base.size, times.size, len(_SIZES), -1)
+    largest = np.where(np.isfinite(terms), terms, 0.0).reshape(alike).max(axis=(1, 3), keepdims=True)
+    wrong = (off.reshape(alike) > _SAME * largest).reshape(off.shape).any(axis=0)
     if wrong.any():
         raise ParameterError(
             f"is no symmetry of the right-hand side, as at t = {t[wrong][0]:g}",

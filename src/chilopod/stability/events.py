@@ -65,6 +65,8 @@ def check_events(events: tuple[Event, ...], args: tuple[Any, ...], times: Array,
     orbit
         A state, shape (n,), or None.
     """
+    if not events:
+        return
     base = np.zeros(n) if orbit is None else orbit
     waves = [size * np.cos(3.0 * np.arange(n) + 1.0) for size in _SIZES]
     places = [(t, base + wave) for t in times.tolist() for wave in [np.zeros(n), *waves]]

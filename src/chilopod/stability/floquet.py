@@ -15,7 +15,7 @@ from chilopod.cores import cores
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.arguments import checked_count
-from chilopod.stability.capabilities import FlowsFrames, FlowsTangents, SystemLike, is_autonomous
+from chilopod.stability.capabilities import FlowsFrames, SystemLike, flows_tangents, is_autonomous
 from chilopod.stability.krylov.closing import LARGE
 from chilopod.stability.krylov.leading import leading_multipliers, whole_pairs
 from chilopod.stability.matrix_errors import DRAWN, FIRST_ORDER, eigenvalues_moved
@@ -246,7 +246,7 @@ def multipliers(system: SystemLike, orbit: ArrayLike | None = None, leading: int
     if leading is None:
         return _multipliers(find_orbit(system, orbit))
     count = checked_count("leading", leading, system.dimension - (system.period is None))
-    if isinstance(system, FlowsTangents) and system.dimension >= LARGE:
+    if flows_tangents(system) and system.dimension >= LARGE:
         image, size = find_large_orbit(system, orbit)
         found = leading_multipliers(image, size, count)
         result = _of_period(found.values, found.error, image.returns, image.point, image.returns * image.duration)

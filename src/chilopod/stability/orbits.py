@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,14 +14,19 @@ from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.arguments import finite_array
 from chilopod.stability.asked import ReturnBudget, SpentError
 from chilopod.stability.capabilities import (
+    FlowsFrames,
     FlowsTangents,
     SystemLike,
+    flows_tangents,
+    given_scale,
     is_autonomous,
     known_orbit,
 )
 from chilopod.stability.krylov.closing import LARGE, closed_orbit
 from chilopod.stability.krylov.tangent_map import TangentMap, tangent_map, tangent_sizes
+from chilopod.stability.matrix_errors import DRAWN
 from chilopod.stability.returns import (
+    CUTS,
     ReturnMap,
     Section,
     carried,
@@ -35,7 +41,7 @@ from chilopod.stability.settling import nearer_states
 Array = NDArray[np.float64]
 
 _ROUNDS = 30
-_ROUND_OFF = 4e-16
+_ROUND_OFF = 8e-16
 _NOTHING = 1e-13  # of the sizes of the states around a guess: a state that small may be zero
 _SETTLED = 1e-10  # residual, of the sizes of the states, below which it may stop falling
 _RESTS = 1e-8  # of the sizes at the guess: a motion that short is none
@@ -46,6 +52,7 @@ _KNOWN = 1e-4  # of a known orbit: it is one, if not to the last digit
 _SETTLING = 100  # return maps that letting the motion settle is counted as: without derivatives it costs less
 _MOST_PARTS = 8  # of a return: a guess of the period may be so many times too long
 _CLOSES = 1e-8  # of the motion, and of the sizes of the states: an orbit that closes so nearly is solved for once more
+_CHANCE = 1e-13  # of the sizes of the states: two computations of a stiff motion may agree by chance
 _BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
 
 
@@ -231,7 +238,8 @@ def from_known(
         return find_orbit(system, x, with_error, budget=budget)
     image = return_map(system, x, with_error) if image is None else image
     moved = np.abs(image.state - x)
-    if not moved.any():
+    # No state is smaller than its value, unless the system says so itself.
+    if not moved.any() or (given_scale(system) is None and (moved <= _RETURNED * np.abs(x)).all()):
         return Orbit(x, image, np.zeros(x.size))
     size = sizes(system, x, image.period / image.returns)
     off = _relative(moved, size)
@@ -256,7 +264,7 @@ def _newton(
     size = sizes(system, x, return_duration(system) if section is None else section.duration)
     section = section_at(system, x, size) if section is None else section
     best = np.inf
-    if system.dimension >= LARGE and isinstance(system, FlowsTangents):
+    if system.dimension >= LARGE and flows_tangents(system):
         with contextlib.suppress(AnalysisError):
             closed, _ = closed_orbit(system, x, section, budget=budget)
             x, best = closed.point, 0.0  # nothing is left to improve
@@ -354,12 +362,21 @@ def bounded(system: SystemLike, x: Array, image: ReturnMap, error: Array | None 
     if error is None:
         # The state is as uncertain as the flow, of which the derivative's error tells, times what H - 1 makes of it.
         wrong = np.abs(image.state - x) + (_matrix(image.error, size) @ size)
+        if isinstance(system, FlowsFrames) and system.is_stiff():  # whose derivative may be nothing, and err by nothing
+            wrong += DRAWN * np.abs(_in_parts(system, x, image.period / image.returns) - image.state) + _CHANCE * size
         error = size * (np.abs(np.linalg.pinv(scaled, rcond=_SINGULAR)) @ (wrong / size))
     # The derivative is that of a state so far off: along the direction in which the orbit is least sure.
     weakest = size * np.linalg.svd(scaled)[2][-1]
     beside = return_map(system, x + _BESIDE * weakest, with_error=False, section=section)
     bend = np.abs(beside.jacobian - image.jacobian) * (_relative(error, size) / _BESIDE)
     return Orbit(x, replace(image, error=_matrix(image.error, size) + bend), error)
+
+
+def _in_parts(system: SystemLike, x: Array, duration: float) -> Array:
+    """Where a state returns to, by other steps than those of the flow over the whole return."""
+    for part, following in itertools.pairwise((*CUTS, 1.0)):
+        x = carried(system, x[None], part * duration, following * duration)[0]
+    return np.asarray(turned(system, x[None])[0])
 
 
 def _matrix(error: float | Array, size: Array) -> Array:

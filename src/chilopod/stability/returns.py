@@ -19,10 +19,10 @@ from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.capabilities import (
     Autonomous,
     FlowsMany,
-    FlowsStates,
-    FlowsTangents,
-    FlowsWithError,
     SystemLike,
+    flows_states,
+    flows_tangents,
+    flows_with_error,
     given_scale,
     is_autonomous,
     returns_per_period,
@@ -104,9 +104,9 @@ class _WholePeriod:
         symmetries = spatial_symmetries(system)
         self.spatial_symmetry = np.stack(symmetries) if symmetries else None
         self.scale = given_scale(system)
-        self.flow_with_error = system.flow_with_error if isinstance(system, FlowsWithError) else None
-        self.flow_states = system.flow_states if isinstance(system, FlowsStates) else None
-        self.flow_tangents = system.flow_tangents if isinstance(system, FlowsTangents) else None
+        self.flow_with_error = system.flow_with_error if flows_with_error(system) else None
+        self.flow_states = system.flow_states if flows_states(system) else None
+        self.flow_tangents = system.flow_tangents if flows_tangents(system) else None
         self.velocity = None
         if is_autonomous(system):
             self.guess_period = periods * system.guess_period
@@ -171,7 +171,7 @@ def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple
     sound bound; a flow of fixed steps that ignores how it is called cannot be seen through this way and should bring
     its own.
     """
-    if isinstance(system, FlowsWithError):
+    if flows_with_error(system):
         return system.flow_with_error(x, t0, t1)
     state, derivative = system.flow(x, t0, t1)
     _check_shapes(state, derivative, x.size)
@@ -325,9 +325,9 @@ def _time_to_section(system: Autonomous, before: Array, section: Section, rest: 
 
 def carried(system: SystemLike, states: Array, t0: float, t1: float) -> Array:
     """States at t1 of those at t0, shape (states, n) both, in the cheapest way that a system has."""
-    if isinstance(system, FlowsStates):
+    if flows_states(system):
         return np.asarray(system.flow_states(states, t0, t1))
-    if isinstance(system, FlowsTangents):
+    if flows_tangents(system):
         return np.array([system.flow_tangents(np.array(x), np.zeros((x.size, 1)), t0, t1)[0] for x in states])
     return np.array([system.flow(np.array(x), t0, t1)[0] for x in states])
 

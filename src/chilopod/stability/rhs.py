@@ -288,6 +288,8 @@ def _check_jacobian(
 
 
 def _edges(switch_times: Sequence[float], period: float) -> Array:
+    if isinstance(switch_times, tuple) and not switch_times:
+        return np.array([0.0, period])
     try:
         switches = np.unique(np.array(switch_times, dtype=np.float64))
         valid = np.ndim(switch_times) == 1 and bool(((switches >= 0) & (switches < period)).all())

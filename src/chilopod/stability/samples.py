@@ -34,6 +34,9 @@ _SURE = 1e-4  # singular value of H - 1, in units, above which the orbit is as g
 _BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
 _FORESEEN, _SMALL = 0.3, 0.01  # of a change of the orbit, and of the sizes: what a prediction may miss
 _HALFWAY = 0.25  # of a change: an orbit halfway between two is as near as that to their mean
+_BEYOND, _APART = 8, 0.1  # samples beyond two to choose from, and how far from these, of the distance of the two
+_BEHIND = 4  # samples by which the next one is foreseen
+_BENT = 0.3  # of the distance of two orbits: how far from the straight line the one between them may be
 _JUMP = 0.3  # of the orbit between prediction and correction, relative to its size
 
 
@@ -287,20 +290,42 @@ class Samples:
     def _between(self, value: float) -> Sample:
         """A sample between two that are there, from their orbits."""
         right = min(max(bisect.bisect(self._values, value), 1), len(self._values) - 1)
-        a, b = (self._by_value[self._values[i]] for i in (right - 1, right))
-        t = (value - a.value) / (b.value - a.value)
+        around = self._around(right)
         try:
-            return self._sampled(value, (1 - t) * a.orbit + t * b.orbit, a)
+            return self._sampled(value, self._foreseen(around, value), around[0])
         except SpentError:
             raise
         except AnalysisError:
-            reached = self._follow([a], value, _ATTEMPTS)
+            reached = self._follow(around[:1], value, _ATTEMPTS)
             for sample in reached:
                 if sample.value != value:
                     self._keep(sample)
             if not reached or reached[-1].value != value:
                 raise
             return reached[-1]
+
+    def _around(self, right: int) -> list[Sample]:
+        """Two samples that follow each other, the second of which is number ``right``, and one beyond either."""
+        left = right - 1
+        a, b = self._values[left], self._values[right]
+        # Not so close to the two that a polynomial through them would be told by round-off.
+        before = [v for v in self._values[max(left - _BEYOND, 0) : left][::-1] if a - v >= _APART * (b - a)]
+        after = [v for v in self._values[right + 1 : right + 1 + _BEYOND] if v - b >= _APART * (b - a)]
+        return [self._by_value[v] for v in (a, b, *before[:1], *after[:1])]
+
+    def _foreseen(self, samples: list[Sample], value: float) -> Array:
+        """The orbit at a value by the polynomial through samples; by the straight line through the first two where
+        that is very different."""
+        if len(samples) == 1:
+            return samples[0].orbit
+        orbits = np.array([sample.orbit for sample in samples])
+        nodes = [sample.value for sample in samples]
+        t = (value - nodes[0]) / (nodes[1] - nodes[0])
+        line = (1.0 - t) * orbits[0] + t * orbits[1]
+        weights = [np.prod([(value - w) / (v - w) for w in nodes if w != v]) for v in nodes]
+        curve = np.array(weights) @ orbits
+        allowed = _BENT * float((np.abs(orbits[1] - orbits[0]) / self.size).max())
+        return curve if (np.abs(curve - line) <= allowed * self.size).all() else line
 
     def _followed(self, low: float, high: float) -> list[Sample]:
         """Follow the orbit from the lower end."""
@@ -321,17 +346,14 @@ class Samples:
 
         They end early where the orbit does, the budget, or the attempts.
         """
-        behind = behind[-2:]
+        behind = behind[-_BEHIND:]
         reached: list[Sample] = []
         smallest = _SHORTEST * abs(value - behind[-1].value)
         target = value
         while attempts > 0 and (np.isfinite(attempts) or self.count + len(reached) < self._budget):
             attempts -= 1
             last = behind[-1]
-            guess = last.orbit
-            if len(behind) > 1:
-                slope = (last.orbit - behind[-2].orbit) / (last.value - behind[-2].value)
-                guess = guess + (target - last.value) * slope
+            guess = self._foreseen(behind[::-1], target)
             try:
                 found = self._sampled(target, guess, last)
             except SpentError:
@@ -347,8 +369,9 @@ class Samples:
             reached.append(found)
             if target == value:
                 return reached
+            behind = [*behind, found][-_BEHIND:]
             longer = target + 2.0 * (target - last.value)
-            behind, target = [last, found], longer if abs(value - longer) > smallest and longer < value else value
+            target = longer if abs(value - longer) > smallest and longer < value else value
         return reached
 
     def _connected(self, last: Sample, guess: Array, found: Sample) -> bool:

@@ -50,13 +50,14 @@ def ordered(
     order = [*graph.states, graph.time, *graph.parameters, *numbers, *constant, *moving, *later]
     place = {node: i for i, node in enumerate(order)}
     live = _live(graph, [*slopes, *guards, *(node for reset in resets for node in reset)], every, flat)
-    program = np.zeros((5, len(order)), dtype=np.int64)
+    linear = _linear_in_time(graph, every, flat)
+    program = np.zeros((6, len(order)), dtype=np.int64)
     terms: list[tuple[int, int]] = []
     switches: list[tuple[int, int, int]] = []
     for i, node in enumerate(order):
         code, operands = graph.nodes[node]
         program[0, i] = code
-        program[4, i] = node in live
+        program[4, i], program[5, i] = node in live, node in linear
         if code == LINEAR:
             program[1, i] = len(terms)
             terms += [(place[weight], place[term]) for weight, term in flat[node]]
@@ -150,8 +151,17 @@ def _live(graph: Graph, roots: Sequence[int], every: Sequence[int], flat: Terms)
     return live
 
 
+def _linear_in_time(graph: Graph, every: Sequence[int], flat: Terms) -> set[int]:
+    linear = {graph.time}
+    for node in every:
+        if node in flat and all(graph.depends[term] == CONSTANT or term in linear for _, term in flat[node]):
+            linear.add(node)
+    return linear
+
+
 def _clocks(graph: Graph, every: Sequence[int], flat: Terms) -> list[int]:
     plain: set[int] = set()  # what a Taylor series sees from everywhere
+    linear = _linear_in_time(graph, every, flat)
     for node in every:
         code, operands = graph.nodes[node]
         if code == TIME:
@@ -161,11 +171,7 @@ def _clocks(graph: Graph, every: Sequence[int], flat: Terms) -> list[int]:
             if code in (LINEAR, PRODUCT, SQUARE, SELECT):
                 simple = all(part in plain or graph.depends[part] == CONSTANT for part in parts)
             elif code in (SIN, COS):
-                inner = operands[0]
-                simple = inner == graph.time or (
-                    graph.nodes[inner][0] == LINEAR
-                    and all(graph.depends[term] == CONSTANT or term == graph.time for _, term in flat[inner])
-                )
+                simple = operands[0] in linear
             else:
                 simple = code in (STEP, FLOOR) and operands[0] in plain
             if simple:

@@ -64,8 +64,15 @@ def values_at(program: Any, terms: Any, start: int, stop: int, k: int, values: A
             for j in range(a, b):
                 s += values[terms[0, j], 0] * values[terms[1, j], k]
         elif code == PRODUCT:
-            for j in range(k + 1):
+            # Two sums, as every product would have to wait for the last one.
+            half = (k + 1) // 2
+            odd = 0.0
+            for j in range(half):
                 s += values[a, j] * values[b, k - j]
+                odd += values[a, half + j] * values[b, k - half - j]
+            if 2 * half == k:
+                s += values[a, k] * values[b, 0]
+            s += odd
         elif code == SQUARE:
             for j in range((k + 1) // 2):
                 s += values[a, j] * values[a, k - j]
@@ -86,7 +93,7 @@ def values_at(program: Any, terms: Any, start: int, stop: int, k: int, values: A
             s = _function(code, values[a, 0], values[b, 0])
         else:
             w = program[3, i]
-            for j in range(1, k + 1):
+            for j in range(1, (1 if program[5, a] != 0 else k) + 1):
                 s += j * values[a, j] * values[w, k - j]
             s /= -k if code == COS else k
         values[i, k] = s

@@ -53,25 +53,32 @@ def _allowed(coefficients: Any, order: int, h: float, epsilon: float) -> float:
         last = abs(coefficients[q])
         if last < _UNDERFLOW:
             continue
-        power = 1.0
-        biggest = 0.0
-        first = -1
-        for k in range(q // 2 + 1):
-            size = abs(coefficients[k])
-            if first < 0 and size > 0.0:
-                first = k
-            biggest = max(biggest, size * power)
-            power *= h
-        for _ in range(q // 2 + 1, q):
-            power *= h
+        first = 0
+        while first < 3 and coefficients[first] == 0.0:
+            first += 1
         # What starts with a high power (the far end of a chain) is small within a step, and no matter of accuracy.
-        if first < 0 or first > 2 or last * power <= 2.0 * epsilon * biggest:
+        if first == 3:
             continue
+        # Newton's method for the logarithms, which are convex: from below after one round, in a few rounds.
         best = 0.0
-        for k in range(first, q // 2 + 1):
-            size = abs(coefficients[k])
-            if size > 0.0:
-                best = max(best, (epsilon * size / last) ** (1.0 / (q - k)))
+        while True:
+            z = best if best > 0.0 else h
+            power = z**first
+            biggest = 0.0
+            at = first
+            for k in range(first, q // 2 + 1):
+                size = abs(coefficients[k]) * power
+                if size > biggest:
+                    biggest = size
+                    at = k
+                power *= z
+            if best == 0.0 and last * z**q <= 2.0 * epsilon * biggest:
+                best = h
+                break
+            better = (epsilon * abs(coefficients[at]) / last) ** (1.0 / (q - at))
+            if better <= best:
+                break
+            best = better
         h = min(h, best)
     return h
 

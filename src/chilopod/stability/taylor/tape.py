@@ -44,9 +44,9 @@ class Tape(ReadOnlyArrays):
     Attributes
     ----------
     program
-        Shape (5, nodes): operation, its three operands (of ``LINEAR`` the first and past-last of its terms; of ``STEP``
-        and ``FLOOR`` the second is the number of the switch; of functions the third is w), and whether tangents of the
-        node are needed.
+        Shape (6, nodes): operation, its three operands (of ``LINEAR`` the first and past-last of its terms; of ``STEP``
+        and ``FLOOR`` the second is the number of the switch; of functions the third is w), whether tangents of the
+        node are needed, and whether it is linear in time.
     terms
         Shape (2, terms): weight and node of each term of the ``LINEAR`` operations.
     numbers
