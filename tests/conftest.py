@@ -25,7 +25,10 @@ def kept(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="session")
 def tiny(kept, tmp_path_factory) -> SimpleNamespace:
-    """The main job with every section, as small as it gets: its folder, what was found, and what failed."""
+    """The main job with every section, as small as it gets: its folder, what was found, and what failed.
+
+    Tests of one file run in one process, so all that need it are in one.
+    """
     from chilopod.paper.section import Context
     from chilopod.paper.sections import SECTIONS, reproduce
     from chilopod.paper.size import Size
@@ -37,14 +40,6 @@ def tiny(kept, tmp_path_factory) -> SimpleNamespace:
     return SimpleNamespace(folder=folder, found=found, failures=report.failures)
 
 
-def pytest_collection_modifyitems(config, items) -> None:
-    """Tests of one file run in one process, and so do all that look at the tiny report; what takes longest is begun
-    first, and beside what needs other compiled code."""
-
-    def place(item: pytest.Item) -> int:
-        return 0 if "tiny" in item.fixturenames else 1 if "truth" in item.path.parts else 2
-
-    items.sort(key=place)
-    for item in items if config.pluginmanager.hasplugin("xdist") else ():
-        group = "tiny" if "tiny" in item.fixturenames else str(item.path.relative_to(config.rootpath))
-        item.add_marker(pytest.mark.xdist_group(group))
+def pytest_collection_modifyitems(items) -> None:
+    """What takes longest is begun first, and beside what needs other compiled code."""
+    items.sort(key=lambda item: 0 if "tiny" in item.fixturenames else 1 if "truth" in item.path.parts else 2)

@@ -1,14 +1,19 @@
 """The main job from end to end: every section, computed, drawn and written; and its page, as a reader opens it."""
 
+import base64
 import json
 import re
 import runpy
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from chilopod.cli import main
+from chilopod.paper.fit_data import critical_mode_data, variant_settings
 from chilopod.paper.sections import SECTIONS
+from chilopod.paper.straight.sections import IDENTIFICATION
+from chilopod.tasks.identify import planar
 
 HERE = Path(__file__).parent
 PAGE = runpy.run_path(str(HERE / "html_page.py"))["Page"]
@@ -45,7 +50,16 @@ def test_every_section_is_computed_and_on_the_page(tiny):
     page = PAGE((tiny.folder / "index.html").read_text(encoding="utf-8"))
     shown = [attrs["id"] for tag, attrs in page.tags if tag == "section" and attrs.get("class") == "figure"]
     assert drawn == {each for each in shown if not each.startswith("movies-")}
-    assert [section.chapter for section in tiny.found.rows if tiny.found.rows[section]] != []
+    without = {section.name for section, rows in tiny.found.rows.items() if not rows}
+    assert without == {
+        "exponents",
+        "branch",
+        "undulation",
+        "movies",
+        "robot-movies",
+        "robot-spread",
+        "robot-structures",
+    }
 
 
 def test_nothing_of_the_page_is_missing_or_empty(tiny):
@@ -68,7 +82,9 @@ def test_replays_stand_on_their_own_and_have_frames_that_differ(tiny, name):
     data = json.loads(PAGE(html).data)
     assert data["time"]["count"] > 10
     for robot in data["robots"]:
-        assert len({value for value in robot.values() if isinstance(value, str)}) > 0
+        packed = base64.b64decode(robot["pose"] if "pose" in robot else robot["points"])
+        frames = np.frombuffer(packed, "<i2").reshape(data["time"]["count"], -1)
+        assert (np.diff(frames, axis=0) != 0).any(axis=1).all()
 
 
 def test_a_browser_finds_nothing_broken(tiny, browser):
@@ -97,6 +113,32 @@ def test_a_browser_sees_replays_move(tiny, browser, name):
     assert browser.picture() != first
     assert {address.partition(":")[0] for address in browser.requested()} <= {"file", "data"}
     assert browser.complaints() == []
+
+
+def test_identification_finds_constants_it_was_not_started_from(tiny):
+    # Data made with other constants than the preset's: the fit has to find those back, wherever it starts.
+    data = critical_mode_data()
+    residuals = planar.residuals(tiny.found.context.robot, data)
+    assert np.abs(residuals).max() == pytest.approx(1.016, abs=0.01)
+    starts = tiny.found[IDENTIFICATION].starts
+    assert len(starts) == 3
+    for constants in starts:
+        off = planar.residuals(planar.with_constants(tiny.found.context.robot, constants), data)
+        assert constants == pytest.approx(starts[0], rel=1e-4)
+        assert np.abs(off).max() < 1.0
+        assert (off**2).sum() < (residuals**2).sum()
+
+
+def test_the_profile_passes_through_the_best_fit_and_predicts(tiny):
+    found = tiny.found[IDENTIFICATION]
+    best = found.best.legs.forward_offset
+    cost = np.interp(best, found.profile.forward_offset, found.profile.largest_residual)
+    assert cost == pytest.approx(np.abs(found.residuals).max(), abs=0.1)
+    assert found.allowed("forward_offset")[0] < best < found.allowed("forward_offset")[1]
+    assert np.isfinite(found.profile.uniform).all()
+    assert set(variant_settings()) < set(found.profile.data_vars)
+    result = found.as_json()
+    assert set(result["constants"]) == set(planar.FREE)
 
 
 def test_from_the_command_line(capsys, tmp_path):
