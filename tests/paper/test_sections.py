@@ -50,8 +50,9 @@ def test_rows_put_the_paper_beside_what_was_computed():
     found = reproduce([MODE, UNIFORM], progress=lambda what, done, words: seen.append((what, done)))
     assert list(found.values) == [MODE, UNIFORM]
     assert not found.failures
-    verdicts = {row.quantity: row.verdict for row in found.lines(Row)}
-    assert verdicts["critical k1 of the planar model"] == "agrees"
+    (rows,) = found.planar_rows().values()
+    verdicts = {row.quantity: row.verdict for row in rows}
+    assert verdicts["critical k1"] == "agrees"
     # Honest to the last digit: 0.6349 is not 0.64 within rounding.
     assert verdicts["critical mode, joint 1"] == "differs"
     assert seen[-1] == (UNIFORM.sentence, 1.0)
@@ -88,10 +89,9 @@ def test_one_that_fails_leaves_the_others_alone():
     assert found[ONE] == 1
     assert after in found.values
     assert found[after] is None
-    assert found.lines(Row) == [one(1)]
+    assert found.planar_rows() == {"chapter": [one(1)]}
 
 
 def test_lines_stand_by_chapter():
     rows = {MODE: [one(1)], ONE: [one(2)], UNIFORM: [one(3)]}
-    assert [row.computed for row in Found(rows=rows).lines(Row)] == ["1", "3", "2"]
-    assert [row.computed for row in Found(rows=rows).lines(Row, "chapter")] == ["2"]
+    assert Found(rows=rows).planar_rows() == {MODE.chapter: [one(1), one(3)], "chapter": [one(2)]}

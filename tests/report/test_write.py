@@ -13,14 +13,15 @@ import xarray as xr
 
 from chilopod import load_robot
 from chilopod.errors import OutputError
+from chilopod.paper.printed import Said
 from chilopod.paper.robot.sections import WALKS
 from chilopod.paper.section import Context, Found
 from chilopod.paper.straight.sections import IDENTIFICATION, MODE
-from chilopod.paper.table import RobotRow, Row
+from chilopod.paper.table import Kind, OfPlanar, OfTwin, Row, Statement
 from chilopod.report import write_identification, write_report
 from chilopod.report.figures import schematic
 from chilopod.report.figures.drawings import DRAWINGS
-from chilopod.report.kit.page import summary
+from chilopod.report.kit.story import summary
 
 Page = runpy.run_path(str(Path(__file__).with_name("html_page.py")))["Page"]
 
@@ -182,17 +183,18 @@ def test_unwritable_folder(results, tmp_path):
 
 
 def test_what_scatter_leaves_open_has_its_own_mark_and_is_counted(results, tmp_path):
-    def row(kind, verdict):
-        return RobotRow(f"{kind}, {verdict}", "1", "2", "", kind, verdict, "10 %")
+    def row(kind, answer, words="2"):
+        return OfTwin(Statement(f"{kind}, {answer}, {words}", Said("1", "10 %"), kind), words, answer)
 
-    verdicts = ("within", "within", "outside", "undecided")
-    rows = [*(row("predicted", each) for each in verdicts), row("fitted", "undecided"), row("checked", "within")]
+    answers = ((True, "2"), (True, "3"), (False, "2"), (None, "2"))
+    rows = [*(row(Kind.PREDICTED, *each) for each in answers), row(Kind.FITTED, None), row(Kind.CHECKED, True)]
+    rows.append(OfPlanar(Statement("of the planar model alone", Said("1", "10 %"), Kind.PREDICTED), "4"))
     planar = [Row(each, "1", "2", "here", each) for each in ("agrees", "differs", "undecided", "not printed")]
     found = Found(rows={MODE: planar, WALKS: rows})
     page = Page(write_report(found, tmp_path).read_text(encoding="utf-8"))
     text = " ".join(page.text.split())
     assert "meets 2 of 4 further statements about the robot that it was not fitted to; 1 more is left open" in text
-    assert "Of 3 statements of the paper compared with the planar model, 1 agree, 1 are left open" in text
+    assert "Of 3 statements of the paper about its planar model, 1 agree, 1 are left open" in text
     assert text.count("? undecided") == 3
     assert [tag for tag, attrs in page.tags if attrs.get("class") == "verdict undecided"] == ["span"] * 3
     alone = summary(Found(rows={MODE: planar[2:3]}))
@@ -200,8 +202,13 @@ def test_what_scatter_leaves_open_has_its_own_mark_and_is_counted(results, tmp_p
 
 
 def test_the_robot_has_a_table_and_its_numbers(results, tmp_path):
-    row = RobotRow("where <it> bends", "34 N*mm/deg", "33.2 N*mm/deg (-2 %)", "", "predicted", "outside", "10 %")
-    found = Found(rows={WALKS: [row]})
+    said = Statement("where <it> bends", Said("34 N*mm/deg", "10 %"), Kind.PREDICTED)
+    planar = Found(rows={WALKS: [OfPlanar(said, "12 N*mm/deg")]})
+    page = Page(write_report(planar, tmp_path / "planar").read_text(encoding="utf-8"))
+    assert "– not computed" in " ".join(page.text.split())
+    assert "further statements about the robot" not in page.text
+    assert "twin.clearance" not in page.text
+    found = Found(rows={WALKS: [OfPlanar(said, "12 N*mm/deg"), OfTwin(said, "33.2 N*mm/deg (-2 %)", False)]})
     page = Page(write_report(found, tmp_path).read_text(encoding="utf-8"))
     assert "robot-table" in [attrs.get("id") for tag, attrs in page.tags if tag == "section"]
     assert "33.2 N·mm/deg (−2 %)" in page.text.replace("\u00a0", " ")

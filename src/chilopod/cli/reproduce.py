@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import traceback
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -90,7 +91,6 @@ def reproduce(
     from chilopod.paper import sections as computed
     from chilopod.paper.section import Context
     from chilopod.paper.size import Size
-    from chilopod.paper.table import RobotRow, Row
     from chilopod.report import Report
 
     size = Size.TINY if tiny else Size.QUICK if quick else Size.FULL
@@ -98,15 +98,15 @@ def reproduce(
     with walking_on(cluster), progress_bar() as show, Report(sections, context, out, show) as report:
         typer.echo(f"The page is {report.page.resolve()}", err=as_json)
         found = computed.reproduce(sections, context, show, lambda found, section: report.add(found, [section]))
-    rows, robot_rows = found.lines(Row), found.lines(RobotRow)
+    rows, robot_rows = [row for part in found.planar_rows().values() for row in part], found.robot_rows()
     if as_json:
         print_json(
             {
                 "robot": context.robot.name,
                 "whole_robot": context.whole.name,
                 "report": str(report.page),
-                "rows": [row.as_json() for row in rows],
-                "robot_rows": [row.as_json() for row in robot_rows],
+                "rows": [asdict(row) for row in rows],
+                "robot_rows": [asdict(row) for row in robot_rows],
                 "seconds": {section.name: value for section, value in found.seconds.items()},
                 "failures": {section.name: in_words(error) for section, error in report.failures.items()},
             }
@@ -129,7 +129,8 @@ def _print(rows: list[Row], robot_rows: list[RobotRow], page: Path) -> None:
     for line in robot_rows:
         typer.echo(f"{line.verdict:<12} {line.quantity} ({line.kind})")
         typer.echo(f"{'':<12}   robot:  {line.robot}")
-        typer.echo(f"{'':<12}   twin:   {line.twin}")
+        if line.twin:
+            typer.echo(f"{'':<12}   twin:   {line.twin}")
         if line.planar:
             typer.echo(f"{'':<12}   planar: {line.planar}")
     typer.echo("")

@@ -10,12 +10,13 @@ import xarray as xr
 
 from chilopod import units
 from chilopod.analysis.parameters import K1
+from chilopod.paper import printed
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
-from chilopod.steering import LegYawController, Target
+from chilopod.steering import LegYawController
 from chilopod.trials import NONE, Trial, run, together
 
-TASK_A = Target(float(np.deg2rad(45.0)), 1.3)
+TASK_A = printed.TASKS["A"].target
 
 _WALK = 45.0  # s
 _ROBOT_STILLS = ((2.0, 30.0, 60.0, 88.0), (0.5, 8.0, 16.0, 24.0))  # s

@@ -1,24 +1,240 @@
-"""What the paper prints, as data with its source."""
+"""What the paper prints, and beside each number what is asked of one that is to agree with it.
+
+S. Aoi et al., "Advanced turning maneuver of a many-legged robot using pitchfork bifurcation", IEEE Transactions on
+Robotics, 2022: of its planar model, and of its robot. Springs are in N*mm/deg, as it has them.
+"""
 
 from __future__ import annotations
 
-import tomllib
-from functools import cache
-from importlib.resources import files
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass
 
-from chilopod import units
-
-
-@cache
-def printed() -> dict[str, Any]:
-    """The table of printed values (``printed.toml``)."""
-    return tomllib.loads(files("chilopod.paper").joinpath("printed.toml").read_text(encoding="utf-8"))
+from chilopod.analysis.parameters import PAPER_UNIT
+from chilopod.paper.scatter import Answer, between
+from chilopod.robot import Robot
+from chilopod.steering import Outcome, Target
 
 
-def printed_stiffness(*keys: str) -> float:
-    """A printed spring constant, N*m/rad."""
-    entry: Any = printed()
-    for key in keys:
-        entry = entry[key]
-    return units.parse(entry, "N*m/rad")
+@dataclass(frozen=True)
+class Said:
+    """Something that is printed.
+
+    Attributes
+    ----------
+    words
+        What is said.
+    asked
+        What counts as agreeing with it.
+    """
+
+    words: str
+    asked: str
+
+
+@dataclass(frozen=True)
+class Band(Said):
+    """Something that is printed and that a number agrees with if it lies between two bounds.
+
+    Attributes
+    ----------
+    low, high
+        The bounds.
+    """
+
+    low: float
+    high: float
+
+    @property
+    def middle(self) -> float:
+        """Between the bounds."""
+        return 0.5 * (self.low + self.high)
+
+    def answer(self, value: float, error: float = 0.0) -> Answer:
+        """Whether a number with a standard error lies between the bounds."""
+        return between(value, error, self.low, self.high)
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number that is printed.
+
+    Attributes
+    ----------
+    value, unit
+        As printed.
+    tolerance
+        How far one that agrees may be off, in the same unit.
+    """
+
+    value: float
+    unit: str
+    tolerance: float
+
+    def __str__(self) -> str:
+        return f"{self.value:g} {self.unit}"
+
+    @property
+    def band(self) -> Band:
+        """What is asked of a number that is to agree."""
+        low, high = self.value - self.tolerance, self.value + self.tolerance
+        return Band(str(self), f"{100.0 * self.tolerance / self.value:.0f} %", low, high)
+
+    def answer(self, value: float, error: float = 0.0) -> Answer:
+        """Whether a number with a standard error agrees."""
+        return self.band.answer(value, error)
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A change of the robot.
+
+    Attributes
+    ----------
+    overrides
+        Of the robot's description, as ``--set`` takes them.
+    model
+        The planar model's critical k1, over that as built.
+    onset, radius
+        Of the robot: where curved walks set in, and their radius over that as built.
+    """
+
+    overrides: tuple[str, ...]
+    model: Band
+    onset: Number
+    radius: Band
+
+
+@dataclass(frozen=True)
+class Task:
+    """A target.
+
+    Attributes
+    ----------
+    target
+        Where it is.
+    radius
+        Of the circle to it, in so many digits.
+    k_hat
+        The spring whose walk has this radius.
+    minima
+        Where all three criteria are smallest.
+    outcomes
+        What became of walks with some springs.
+    source
+        Where it stands.
+    """
+
+    target: Target
+    radius: Number
+    k_hat: Number
+    minima: Band
+    outcomes: Mapping[Outcome, float]
+    source: str
+
+
+ONSETS = 0.10
+"""Relative tolerance of every spring at which straight walks of the robot end."""
+
+
+def _onset(value: float) -> Number:
+    return Number(value, PAPER_UNIT, ONSETS * value)
+
+
+def _k_hat(value: float) -> Number:
+    return Number(value, PAPER_UNIT, 0.15 * value)
+
+
+def _around(k_hat: float) -> Band:
+    """Around it is between the paper's own neighbours of 21."""
+    low, high = 17.0 / 21.0 * k_hat, 28.0 / 21.0 * k_hat
+    asked = f"{low:.3g} to {high:.3g} {PAPER_UNIT}, with all that are no worse"
+    return Band(f"around k1 = {k_hat:g} {PAPER_UNIT}", asked, low, high)
+
+
+ANALYSIS = "section Verification by Floquet analysis"
+CRITICAL_K1 = Number(12.0, PAPER_UNIT, 0.5)
+"""Of the planar model, without decimals."""
+
+MODE = tuple(Number(value, "", 0.005) for value in (0.64, 0.36, 0.48, 0.46, 0.16))
+"""Joint components of the planar model's critical mode, with two decimals."""
+
+MODE_ORDER = tuple(sorted(range(1, 6), key=lambda joint: -MODE[joint - 1].value))
+"""Joints by how far they bend in it, the most first."""
+
+KIND, UNIFORM_KIND = "pitchfork", "Neimark-Sacker"
+"""Of bifurcation, of the planar model: with k1 alone, and with all springs alike."""
+
+LOWER = Band("lower", "5 % lower", 0.0, 0.95)
+LITTLE_CHANGE = Band("little change", "10 %", 0.9, 1.1)
+"""Of the planar model's critical k1, over that as built: also with more modules."""
+
+_UNCHANGED = Band("almost unchanged", "15 %, at equal distance", 0.85, 1.15)
+_SMALLER = Band("smaller", "not wider than as built, at equal distance", 0.0, 1.0)
+
+ONSET = _onset(34.0)
+"""Of the robot, by a square-root fit to its walks."""
+
+VARIANTS: Mapping[str, Variant] = {
+    "k2-5 = 28 N*mm/deg": Variant(("springs.stiffness=28 N*mm/deg",), LOWER, _onset(23.0), _UNCHANGED),
+    "stride 1.8 cm": Variant(("gait.stride=1.8 cm",), LOWER, _onset(25.0), _UNCHANGED),
+    "module phase 180 deg": Variant(("gait.module_phase=180 deg",), LITTLE_CHANGE, _onset(31.0), _SMALLER),
+}
+
+AS_BUILT = "as built"
+"""The robot beside its variants."""
+
+STRAIGHT, CURVED = (41.0, 75.0), (15.0, 17.0, 21.0, 28.0)
+"""k1 with which the robot walks straight, and with which it curves."""
+
+EXPERIMENTS = "section Pitchfork bifurcation of straight walk, experimental results of the robot"
+RADII = {21.0: Number(0.88, "m", 0.088), 26.0: Number(1.2, "m", 0.12)}
+"""Of the robot's curved walks, by k1."""
+
+UNIFORM = _onset(18.0)
+"""Of the robot with all springs alike, its Hopf point; the planar model's own is not printed."""
+
+COMPARISON = "section Comparison with previous strategy"
+TURNING = "section Turning maneuverability"
+ARRIVAL = Number(23.0, "s", 0.15 * 23.0)
+"""The robot's earliest, in task A."""
+
+SPEED = 0.10
+"""Relative tolerance of the walking speed, which follows from the earliest arrival (:mod:`chilopod.paper.fit_data`)."""
+
+REPEATS, WITHOUT_LEG_YAW = 5, 9
+"""Walks to the target with each spring, and without leg yaw."""
+
+TASKS: Mapping[str, Task] = {
+    "A": Task(
+        Target.parse("45 deg, 1.3 m"),
+        Number(0.88, "m", 0.005),
+        _k_hat(21.0),
+        _around(21.0),
+        {Outcome.OUTSIDE: 41.0, Outcome.ARRIVED: 21.0, Outcome.INSIDE: 15.0},
+        "figure Turning task",
+    ),
+    "B": Task(
+        Target.parse("40 deg, 1.5 m"),
+        Number(1.2, "m", 0.05),
+        _k_hat(26.0),
+        _around(26.0),
+        {},
+        "figure Evaluation criteria for different conditions",
+    ),
+}
+
+
+def variant_robots(robot: Robot) -> dict[str, Robot]:
+    """The robot as built and with each of the paper's changes."""
+    return {AS_BUILT: robot, **{name: robot.set_from_text(each.overrides) for name, each in VARIANTS.items()}}
+
+
+def mode_shape(robot: Robot) -> tuple[float, ...]:
+    """Joint components of the planar model's critical mode; all alike for another number of joints."""
+    joints = robot.body.modules - 1
+    return tuple(each.value for each in MODE) if joints == len(MODE) else (1.0,) * joints
+
+
+def onset(variant: str) -> Number:
+    """Where curved walks of the robot as built, or of a variant, set in."""
+    return ONSET if variant == AS_BUILT else VARIANTS[variant].onset

@@ -90,6 +90,11 @@ def mean_and_error(values: ArrayLike) -> tuple[float, float]:
     return mean, float(finite.std(ddof=1) / np.sqrt(finite.size)) if finite.size > 1 else float("nan")
 
 
+def with_error(value: float, error: float, digits: int) -> str:
+    """A number and, if it is known and not zero, its standard error, with so many decimals."""
+    return f"{value:.{digits}f}" + (f" ± {error:.{digits}f}" if error > 0.0 else "")
+
+
 def between(value: float, error: float, low: float, high: float) -> Answer:
     """Whether a mean lies between two bounds: undecided within :data:`SURE` standard errors of the nearer bound.
 
@@ -101,11 +106,6 @@ def between(value: float, error: float, low: float, high: float) -> Answer:
     if margin == 0.0 or abs(margin) > SURE * error:
         return bool(margin >= 0.0)
     return None
-
-
-def near(value: float, error: float, wanted: float, tolerance: float) -> Answer:
-    """Whether a mean is within a relative tolerance of a positive number, see :func:`between`."""
-    return between(value, error, wanted * (1.0 - tolerance), wanted * (1.0 + tolerance))
 
 
 def every(answers: Iterable[Answer]) -> Answer:

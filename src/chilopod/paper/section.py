@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from chilopod.paper.size import Size
-from chilopod.paper.table import RobotRow, Row
+from chilopod.paper.statements import ORDER
+from chilopod.paper.table import OfPlanar, OfTwin, RobotRow, Row, robot_rows
 from chilopod.progress import Progress
 from chilopod.robot import Robot, load_robot
 
 T = TypeVar("T")
-R = TypeVar("R", Row, RobotRow)
+Line = Row | OfTwin | OfPlanar
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ class Section(Generic[T]):
     chapter: str
     sentence: str
     compute: Callable[[Context, Found, Progress], T]
-    rows: Callable[[T, Found], Sequence[Row | RobotRow]] = lambda value, found: ()
+    rows: Callable[[T, Found], Sequence[Line]] = lambda value, found: ()
     needs: tuple[Section[Any], ...] = ()
     beyond: bool = False
     on_request: bool = False
@@ -92,7 +93,7 @@ class Found:
 
     context: Context = field(default_factory=Context)
     values: dict[Section[Any], Any] = field(default_factory=dict)
-    rows: dict[Section[Any], Sequence[Row | RobotRow]] = field(default_factory=dict)
+    rows: dict[Section[Any], Sequence[Line]] = field(default_factory=dict)
     seconds: dict[Section[Any], float] = field(default_factory=dict)
     failures: dict[Section[Any], Exception] = field(default_factory=dict)
 
@@ -116,17 +117,16 @@ class Found:
         """As it is now, whatever is added later."""
         return Found(self.context, {**self.values}, {**self.rows}, {**self.seconds}, {**self.failures})
 
-    def lines(self, kind: type[R], chapter: str | None = None) -> list[R]:
-        """All lines of one of the tables, or those of a chapter."""
-        chapters = dict.fromkeys(section.chapter for section in self.rows) if chapter is None else (chapter,)
-        return [
-            row
-            for each in chapters
-            for section, rows in self.rows.items()
-            if section.chapter == each
-            for row in rows
-            if isinstance(row, kind)
-        ]
+    def planar_rows(self) -> dict[str, list[Row]]:
+        """The table paper | planar model, by chapter."""
+        found: dict[str, list[Row]] = {}
+        for section, rows in self.rows.items():
+            found.setdefault(section.chapter, []).extend(row for row in rows if isinstance(row, Row))
+        return {chapter: rows for chapter, rows in found.items() if rows}
+
+    def robot_rows(self) -> list[RobotRow]:
+        """The table robot | twin | planar model."""
+        return robot_rows((row for rows in self.rows.values() for row in rows), ORDER)
 
 
 class _Seen(Found):

@@ -24,17 +24,7 @@ def files_of_identification(folder: str | Path) -> list[Path]:
 
 
 def write_identification(found: Identification, folder: str | Path) -> list[Path]:
-    """Write the profile of an identification as ``identification`` with ``.png``, ``.svg``, ``.csv`` and ``.nc``.
-
-    Returns
-    -------
-    The files.
-
-    Raises
-    ------
-    OutputError
-        If the folder cannot be written.
-    """
+    """Write the profile of an identification as ``identification``, with the same endings as :func:`write_branch`."""
     return _write_alone(identification.panel(found), folder)
 
 
@@ -63,17 +53,7 @@ def write_branch(data: xr.Dataset, folder: str | Path) -> list[Path]:
 
 
 def write_undulation(data: xr.Dataset, folder: str | Path) -> list[Path]:
-    """Write undulating walks as ``undulation`` with ``.png``, ``.svg``, ``.csv`` and ``.nc``.
-
-    Returns
-    -------
-    The files.
-
-    Raises
-    ------
-    OutputError
-        If the folder cannot be written.
-    """
+    """Write undulating walks as ``undulation``, with the same endings as :func:`write_branch`."""
     return _write_alone(undulation.panel(data), folder)
 
 

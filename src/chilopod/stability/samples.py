@@ -315,7 +315,9 @@ class Samples:
 
     def _foreseen(self, samples: list[Sample], value: float) -> Array:
         """The orbit at a value by the polynomial through samples; by the straight line through the first two where
-        that is very different."""
+        that is very different, or the states are anywhere on their orbits."""
+        if not self.timed:
+            samples = samples[:2]
         if len(samples) == 1:
             return samples[0].orbit
         orbits = np.array([sample.orbit for sample in samples])

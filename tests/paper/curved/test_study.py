@@ -6,10 +6,13 @@ import pytest
 from chilopod import stability
 from chilopod.analysis.branch import curved_walks
 from chilopod.analysis.parameters import K1, stiffness
+from chilopod.paper import statements
 from chilopod.paper.curved import rows as curved_rows
 from chilopod.paper.curved import study as curved_findings
-from chilopod.paper.curved.trials import curved_trials, off_branch, on_branch, variant_robots
+from chilopod.paper.curved.trials import curved_trials, off_branch, on_branch
+from chilopod.paper.printed import variant_robots
 from chilopod.paper.size import Size
+from chilopod.paper.table import OfPlanar, Row
 from chilopod.planar import PlanarModel
 from chilopod.robot import load_robot
 from chilopod.stability.returns import whole_period
@@ -137,9 +140,18 @@ def test_a_small_study_says_what_it_found(kept):
     study = curved_findings.curved_study(ROBOT, kept, Size.TINY, progress=lambda done, words: seen.append(done))
     assert seen == sorted(seen)
     assert seen[-1] == 1.0
-    said = {row.quantity: row for row in curved_rows.rows(study)}
-    assert said["curved walks to the left and to the right"].verdict == "agrees"
-    assert said["critical k1 from the square-root fit to trials"].verdict == "differs"
+    found = curved_rows.rows(study)
+    said = {row.quantity: row for row in found if isinstance(row, Row)}
+    assert said["joints by how far they bend"].verdict == "agrees"
+    beside = {row.statement: row.words for row in found if isinstance(row, OfPlanar)}
+    assert beside[statements.STRAIGHT] == "straight from 41 N*mm/deg up"
+    assert beside[statements.CURVED].startswith("curved up to 10 N*mm/deg, ")
+    assert beside[statements.ONSET].endswith("; the point is at 12.00")
+    points = [beside[each.onset].rpartition(" ")[2] for each in statements.VARIANTS.values()]
+    assert points == ["8.97", "10.83", "11.32"]
+    alike = [100 * (float(study.comparison.equal_spring[row]) - 1) for row in (1, 2, 3)]
+    shown = [beside[each.radius].rpartition("; ")[2] for each in statements.VARIANTS.values()]
+    assert shown == [f"{value:+.0f} % at the same spring" for value in alike]
     assert study.comparison.criticality.values.tolist() == ["supercritical"] + ["subcritical"] * 3
     assert study.comparison.stiffest_k1.values[-1] == pytest.approx(11.49, abs=0.01)
     assert study.comparison.exact_k1.values == pytest.approx([12.001, 8.967, 10.834, 11.323], abs=1e-3)

@@ -8,9 +8,9 @@ import xarray as xr
 
 from chilopod import load_robot
 from chilopod.paper.robot.turning import RobotTurning
-from chilopod.paper.robot.walk_measures import onset_with_error, radius_at, shares
 from chilopod.paper.robot.walks import SHORTER, SPRINGS, UNIFORM_SPRINGS, VARIANT_SPRINGS, RobotWalks
 from chilopod.paper.turning.trials import CRITERIA, TurningTask
+from chilopod.paper.walk_measures import onset_with_error, radius_at, shares
 from chilopod.steering import Outcome, Target
 
 ROBOT = load_robot("aoi2022")
@@ -149,7 +149,9 @@ def turning(**changes):
             "leg_yaw": ("case", [False, True]),
             "arrived": (("case", "trial"), [[0.0] * 9, [1.0] * 5 + [np.nan] * 4]),
             "turned": (("case", "trial"), [[1.0, -1.0] * 4 + [1.0], [1.0] * 9]),
-        }
+            "spring": ("case", [21.0, 21.0]),
+        },
+        coords={"case": ["paper's spring, without", "paper's spring, with"]},
     )
     given = {
         "robot": ROBOT,

@@ -7,11 +7,11 @@ import pytest
 import xarray as xr
 
 from chilopod import load_robot
-from chilopod.paper.robot import rows as robot_rows
-from chilopod.paper.robot import turning_rows as robot_turning_rows
+from chilopod.paper import printed, statements
 from chilopod.paper.robot import walks as robot_walks
+from chilopod.paper.robot.rows import walk_rows
 from chilopod.paper.robot.turning import RobotTurning
-from chilopod.paper.robot.walk_measures import onset, radius_at, spring_for
+from chilopod.paper.robot.turning_rows import turning_rows
 from chilopod.paper.robot.walks import (
     RobotWalks,
     by_duration,
@@ -20,7 +20,9 @@ from chilopod.paper.robot.walks import (
     walk_ends,
     walk_records,
 )
+from chilopod.paper.table import Kind
 from chilopod.paper.turning.trials import turning_task, without_leg_yaw
+from chilopod.paper.walk_measures import onset, radius_at, spring_for
 from chilopod.report.figures import robot_turning as turning_figures
 from chilopod.report.figures import robot_walks as walk_figures
 from chilopod.steering import Target
@@ -55,7 +57,7 @@ def walks(base, records, folder):
         {"joint_angle": (("time", "spring", "joint"), np.linspace(-0.1, 0.3, 30).reshape(3, 2, 5))},
         coords={"time": [0.0, 1.0, 2.0], "spring": [41.0, 15.0], "joint": np.arange(1, 6)},
     )
-    names = list(robot_walks.variant_robots(ROBOT))[1:]
+    names = list(printed.variant_robots(ROBOT))[1:]
     durations = by_duration(records, ROBOT, robot_walks.SPRINGS)
     lower = {"stride 1.8 cm": base}
     return RobotWalks(ROBOT, base, durations, dict.fromkeys(names, base), lower, examples, uniform)
@@ -101,7 +103,7 @@ def test_walks_cut_short_are_those_that_were_asked_shorter(walks, base):
 
 
 def test_the_other_reading_of_a_shorter_stride_lifts_the_feet_in_proportion():
-    variant = robot_walks.variant_robots(ROBOT)["stride 1.8 cm"]
+    variant = printed.variant_robots(ROBOT)["stride 1.8 cm"]
     lower = lower_steps(ROBOT, variant)
     assert lower.twin.clearance == pytest.approx(0.6 * ROBOT.twin.clearance)
     assert lower.with_value("twin.clearance", ROBOT.twin.clearance).twin == variant.twin
@@ -119,10 +121,7 @@ def test_softer_uniform_springs_undulate_more(walks):
 
 @pytest.mark.slow
 def test_rows_and_words_of_the_walks(walks):
-    rows = robot_rows.walk_rows(walks, {"onset": "12"})
-    assert {row.verdict for row in rows} <= {"within", "outside", "undecided"}
-    assert {row.kind for row in rows} == {"fitted", "predicted", "checked"}
-    assert next(row for row in rows if row.quantity.startswith("where curved walks set in (")).planar == "12"
+    assert {row.statement.kind for row in walk_rows(walks)} == set(Kind)
     assert all(text for panel in walk_figures.panels(walks) for text in panel.text)
 
 
@@ -132,9 +131,9 @@ def test_rows_and_words_of_the_tasks(tasks, walks):
     assert (outcome.sel(spring=21.0) == "arrived").all()
     assert (outcome.sel(spring=41.0) == "bulged outside").any()
     assert (outcome.sel(spring=15.0) == "turned inside").all()
-    rows = robot_turning_rows.turning_rows(tasks, walks, {})
-    assert [row.quantity for row in rows if row.kind != "predicted"] == ["task A: earliest arrival"]
+    rows = turning_rows(tasks, walks)
+    assert [row.statement for row in rows if row.statement.kind is not Kind.PREDICTED] == [statements.ARRIVAL]
     # Of a strategy beside itself nothing is lower.
-    assert next(row for row in rows if "against Hopf" in row.quantity).verdict == "undecided"
-    assert rows[0].quantity.startswith("task A")
+    assert next(row for row in rows if row.statement == statements.HOPF).answer is None
+    assert rows[0].statement == statements.TASKS["A"].k_hat
     assert all(text for panel in turning_figures.panels(tasks, walks) for text in panel.text)

@@ -12,7 +12,9 @@ import pytest
 import xarray as xr
 
 from chilopod.errors import ParameterError
+from chilopod.paper import statements
 from chilopod.paper.size import Size
+from chilopod.paper.table import NOT_PRINTED, OfPlanar, Row
 from chilopod.paper.turning.minima import minima
 from chilopod.paper.turning.rows import rows
 from chilopod.paper.turning.study import turning
@@ -34,10 +36,10 @@ def test_stiff_springs_bulge_outside_soft_ones_turn_inside_and_those_between_arr
     """The paper's picture for both tasks; in the planar model at 8 to 11 and at 10 to 13 N*mm/deg."""
     for letter, softest, stiffest in (("A", 8.0, 11.0), ("B", 10.0, 12.0)):
         springs = springs_by_outcome(found.tasks[letter].criteria)
-        arrived = springs[Outcome.ARRIVED.label]
+        arrived = springs[Outcome.ARRIVED]
         assert (min(arrived), max(arrived)) == (softest, stiffest), letter
-        assert min(springs[Outcome.OUTSIDE.label]) > stiffest
-        assert max(springs[Outcome.INSIDE.label]) < softest
+        assert min(springs[Outcome.OUTSIDE]) > stiffest
+        assert max(springs[Outcome.INSIDE]) < softest
 
 
 def test_the_evaluation_time_is_the_earliest_arrival_of_all(found):
@@ -49,9 +51,10 @@ def test_the_evaluation_time_is_the_earliest_arrival_of_all(found):
 
 def test_minima_lie_between_bulging_outside_and_turning_inside(found):
     for task in found.tasks.values():
-        low = minima(task.criteria)
-        assert low.between.sel(criterion=["distance", "angle"]).all()
-        assert bool(low.inside.sel(criterion="effort_until_arrival"))
+        at, springs = minima(task.criteria)["at"], springs_by_outcome(task.criteria)
+        for name in ("distance", "angle"):
+            assert max(springs[Outcome.INSIDE]) < float(at.sel(criterion=name)) < min(springs[Outcome.OUTSIDE])
+        assert float(task.criteria.spring[0]) < float(at.sel(criterion="effort_until_arrival"))
 
 
 def test_every_minimum_of_the_pitchfork_lies_below_that_of_hopf(found):
@@ -126,15 +129,14 @@ def test_a_parabola_in_compliance_is_found_exactly():
     low = minima(made_up(springs, 0.2 + 30.0 * (1.0 / springs - 1.0 / 9.7) ** 2, 1e-4)).sel(criterion="distance")
     assert float(low["at"]) == pytest.approx(9.7, rel=1e-9)
     assert float(low.spring) == 9.0
-    assert (bool(low.inside), bool(low.between)) == (True, True)
     assert float(low["mean"]) == pytest.approx(0.2 + 30.0 * (1.0 / 9.0 - 1.0 / 9.7) ** 2)
     assert (float(low.softest), float(low.stiffest)) == (9.0, 9.0)  # the repeats differ in step: told apart
 
 
-def test_a_minimum_at_the_end_of_the_springs_is_not_inside():
+def test_a_minimum_at_the_end_of_the_springs_is_there():
     springs = np.array([5.0, 7.0, 9.0, 11.0])
     low = minima(made_up(springs, springs, 0.1)).sel(criterion="angle")
-    assert (float(low["at"]), bool(low.inside), bool(low.between)) == (5.0, False, False)
+    assert float(low["at"]) == 5.0
 
 
 def test_springs_where_a_walk_failed_have_no_mean():
@@ -144,18 +146,33 @@ def test_springs_where_a_walk_failed_have_no_mean():
     assert np.isnan(minima(made_up([5.0, 7.0, 9.0], [np.nan] * 3, 0.0))["at"]).all()
 
 
-def test_rows_say_what_the_paper_says_and_whether_it_agrees(found):
+def test_geometry_is_held_against_the_paper_and_walks_stand_beside_the_robot(found):
     table = rows(found)
-    by_start = {row.quantity: row for row in table}
-    assert {row.verdict for row in table} == {"agrees", "differs", "not printed", "undecided"}
-    assert by_start["task A: what becomes of it"].verdict == "agrees"
+    judged = [row for row in table if isinstance(row, Row) and row.verdict != NOT_PRINTED]
+    assert [(row.paper, row.computed, row.verdict) for row in judged] == [
+        ("0.88 m", "0.919 m", "differs"),
+        ("1.2 m", "1.167 m", "agrees"),
+    ]
+    beside = {row.statement: row.words for row in table if isinstance(row, OfPlanar)}
+    tasks = [each for task in statements.TASKS.values() for each in (task.k_hat, task.outcomes, *task.minima.values())]
+    others = {statements.ARRIVAL, statements.WITHOUT, statements.HOPF, statements.HOPF_SPRINGS}
+    assert set(beside) == {*tasks, *others}
+    assert not any("nan" in words for words in beside.values())
     # Of two strategies whose legs are at their limit nearly all the time, the effort is the same but for the scatter.
-    assert by_start["task A, pitchfork against Hopf: smallest criteria"].verdict == "undecided"
-    assert by_start["task A without leg yaw, best spring"].verdict == "agrees"
-    radius = by_start["task A (45 deg, 1.3 m): radius of the circle to the target"]
-    assert (radius.paper, radius.computed, radius.verdict) == ("0.88 m", "0.919 m", "differs")
-    assert all(row.remark for row in table if row.verdict == "differs")
-    assert not any("nan" in row.computed for row in table)
+    assert beside[statements.HOPF] == "2 of 3 lower, 1 of 3 undecided"
+    assert beside[statements.WITHOUT].startswith("0 of 9 arrive")
+
+
+def test_tasks_that_are_swapped_are_noticed(found):
+    swapped = replace(found, tasks={"A": found.tasks["B"], "B": found.tasks["A"]})
+    here, there = (
+        {row.statement: row.words for row in rows(each) if isinstance(row, OfPlanar)} for each in (found, swapped)
+    )
+    first, second = statements.TASKS.values()
+    for one, other in ((first.k_hat, second.k_hat), (first.outcomes, second.outcomes)):
+        assert (there[one], there[other]) == (here[other], here[one])
+        assert there[one] != here[one]
+    assert [row.verdict for row in rows(swapped)[:2]] == ["differs", "differs"]
 
 
 STUDY = """
@@ -230,8 +247,6 @@ def test_a_damaged_record_is_walked_again(tmp_path):
 def test_findings_of_another_robot(found):
     """Where nothing arrives the words still hold."""
     stiff = turning_task(ROBOT, TASK_A, (60.0, 75.0), repeats=2, duration=5.0, shown=(60.0, 60.0, 75.0))
-    assert springs_by_outcome(stiff.criteria)[Outcome.ARRIVED.label] == []
-    low = minima(stiff.criteria)
-    assert not low.inside.any()
+    assert springs_by_outcome(stiff.criteria)[Outcome.ARRIVED] == []
     table = rows(replace(found, tasks={"A": stiff, "B": found.tasks["B"]}))
-    assert next(row for row in table if row.quantity == "task A: what becomes of it").verdict == "differs"
+    assert next(row.words for row in table if getattr(row, "statement", None) == statements.TASKS["A"].outcomes)

@@ -1,167 +1,94 @@
-"""What the paper says of its curved walks beside what the trials of the planar model show."""
+"""What the trials of curved walks show of the planar model: beside the paper's model, and beside its robot."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 
-from chilopod.paper.curved.study import CurvedStudy, axis_radius, bent
-from chilopod.paper.printed import printed
-from chilopod.paper.scatter import INCREASES, Difference, between, increases, near, spread_difference
-from chilopod.paper.table import Row, agrees
+from chilopod.paper import printed, statements
+from chilopod.paper.curved.study import CurvedStudy, axis_radius, bend_order, bent, fluctuation
+from chilopod.paper.equal_distance import change, radius_ratio
+from chilopod.paper.scatter import INCREASES, increases
+from chilopod.paper.table import AGREES, NOT_PRINTED, OfPlanar, Row
 
 
-def rows(study: CurvedStudy) -> list[Row]:
-    """The table paper | computed."""
-    text: Mapping[str, Any] = printed()["curved"]
-    trials, exact = study.trials, study.trials.attrs["critical_k1"]
-    here = bent(trials)
-    curved = trials.isel(spring=here.any(axis=1))
-    sides = {name: int((trials.direction == name).sum()) for name in ("left", "right")}
-    unsettled = int((~trials.settled).sum())
-    stiff = trials.spring.values > exact
-    straight = bool((trials.direction.values[stiff] == "straight").all())
-    angles = np.where(bent(curved)[..., None], np.abs(curved.mean_angle.values), np.nan)
-    spread = np.nanstd(angles, axis=1, ddof=1)
-    joint_1 = angles[..., 0]
-    rising, wider = increases(joint_1[::-1]), spread_difference(joint_1[0], joint_1[-1])
-    ratios = np.nanmean(np.abs(curved.mean_angle.values)[-1], axis=0)
-    # The largest first: joints by how far they bend, and by the size of their share in the mode.
-    order, mode = np.argsort(-ratios), np.argsort(-np.array(printed()["pitchfork"]["joint_components"]))
-    fit = study.fit
-    closest, law = study.fits.isel(softest=0), study.law
+def rows(study: CurvedStudy) -> list[Row | OfPlanar]:
+    """Lines of both tables."""
+    return [*_model_rows(study), *_beside_robot(study), *_variants_beside_robot(study)]
+
+
+def _model_rows(study: CurvedStudy) -> list[Row]:
+    trials, law = study.trials, study.law
+    exact = trials.attrs["critical_k1"]
+    stiffest = trials.isel(spring=[np.flatnonzero(bent(trials).any(axis=1))[-1]])
+    order, ratios = bend_order(stiffest), np.abs(stiffest.mean_angle.values[bent(stiffest)]).mean(axis=0)
     below = law.sel(softest=0.99 * exact, method="nearest")
-    where = text["source"]
-    springs = ", ".join(f"{value:g}" for value in trials.spring.values)
-    found = [
-        Row(
-            "walks from straight on: which springs end in a curve",
-            f"k1 = {text['curved']} curve, {text['straight']} do not",
-            f"of {springs} N*mm/deg, {', '.join(f'{value:g}' for value in curved.spring.values)} curve",
-            where,
-            agrees(straight and bool(here[~stiff].any(axis=1).all())),
-            "springs are spread about the planar model's 12 as the paper's about the robot's 34"
-            + (f"; {unsettled} of {trials.settled.size} trials had not settled and count nowhere" if unsettled else ""),
-        ),
-        Row(
-            "curved walks to the left and to the right",
-            "both",
-            f"{sides['left']} and {sides['right']}",
-            where,
-            agrees(min(sides.values()) > 0),
-        ),
-        Row(
-            "angle of joint 1 over 1/k1",
-            "increases",
-            INCREASES[rising],
-            where,
-            agrees(rising),
-        ),
-        Row(
-            "fluctuation among trials over 1/k1",
-            "increases",
-            f"{np.rad2deg(spread[-1, 0]):.2f} deg at k1 = {curved.spring.values[-1]:g}, "
-            f"{np.rad2deg(spread[0, 0]):.2f} deg at {curved.spring.values[0]:g} N*mm/deg (standard deviation, joint "
-            f"1): {wider}",
-            where,
-            agrees(wider.higher),
-            "in the model uneven feet move the critical spring of a trial, which shows most beside it, where the angle "
-            "rises steeply; a straight walk they leave straight",
-        ),
+    unsettled = int((~trials.settled).sum())
+    return [
         Row(
             "joints by how far they bend",
-            f"{', '.join(str(1 + j) for j in mode)} (mode)",
-            f"{', '.join(str(1 + j) for j in order)} (trials at {curved.spring.values[-1]:g} N*mm/deg: "
+            f"{', '.join(map(str, printed.MODE_ORDER))} (mode)",
+            f"{', '.join(map(str, order))} (trials at {float(stiffest.spring[0]):g} N*mm/deg: "
             + " ".join(f"{value:.2f}" for value in ratios / np.linalg.norm(ratios))
             + ")",
-            printed()["pitchfork"]["source"],
-            agrees(list(order) == list(mode)),
-        ),
-        Row(
-            "critical k1 from the square-root fit to trials",
-            f"{printed()['pitchfork']['robot_critical_k1']} (robot)",
-            f"{fit.critical:.2f} ± {fit.bootstrap_error:.2f} N*mm/deg; the point itself is at {exact:.4f}",
-            where,
-            "differs",
-            f"{100 * (fit.critical / exact - 1):+.1f} % off, {(fit.critical - exact) / fit.bootstrap_error:.0f} of its "
-            "standard errors: the law holds beside the point only. Over the two stiffest curved springs alone it gives "
-            f"{float(closest.critical_k1):.2f} ± {float(closest.bootstrap_error):.2f}",
+            printed.ANALYSIS,
+            AGREES[order == printed.MODE_ORDER],
         ),
         Row(
             "how the bend of joint 1 grows from the point",
-            "square root of 1/k1",
+            "not printed (robot: fitted by a square root of 1/k1)",
             f"power {float(below.power):.2f} of the distance {100 * (1 - float(below.softest) / exact):.1f} % below, "
             f"{float(law.power[0]):.2f} at {100 * (1 - float(law.softest[0]) / exact):.2g} %",
-            where,
-            "differs",
-            "the pitchfork is close to turning subcritical: its cubic coefficient is so small that the square root "
-            "gives way to a fourth root almost at once",
+            printed.EXPERIMENTS,
+            NOT_PRINTED,
         ),
         Row(
             "where trials settle",
-            "not printed",
+            NOT_PRINTED,
             f"within {float(study.agreement.max()):.0e} rad of the branch, "
             f"{int(study.agreement.notnull().sum())} trials",
-            where,
-            "not printed",
-            "with even feet: uneven ones make each trial's robot another one",
+            printed.EXPERIMENTS,
+            NOT_PRINTED,
+            "with even feet: uneven ones make each trial's robot another one"
+            + (f"; of uneven ones {unsettled} of {trials.settled.size} had not settled" if unsettled else ""),
         ),
     ]
-    robot = float(printed()["pitchfork"]["robot_critical_k1"].split()[0])
-    for spring, radius in text["radius"].items():
-        ratio = float(spring) / robot
-        model = axis_radius(study.branch, ratio * exact)
-        found.append(
-            Row(
-                f"radius at {ratio:.2f} of the critical k1 (robot: {spring} N*mm/deg)",
-                f"{radius} (robot)",
-                f"{model:.3f} m (k1 = {ratio * exact:.2f} N*mm/deg)",
-                where,
-                "differs",
-                f"the planar model bends {float(radius.split()[0]) / model:.1f} times as tightly",
-            )
-        )
-    return found + _variant_rows(study)
 
 
-def _variant_rows(study: CurvedStudy) -> list[Row]:
-    found, data, table = [], study.comparison, printed()
-    where = table["curved"]["different"]
-    for name in data.variant.values[1:]:
-        at, base = data.sel(variant=name), data.isel(variant=0)
-        apart = Difference(float(at.fitted_k1 - base.fitted_k1), float(np.hypot(at.error, base.error)))
-        robot_lower = float(at.robot_k1) < float(base.robot_k1)
-        found.append(
-            Row(
-                f"square-root fit to trials, {name}",
-                f"{float(at.robot_k1):g} N*mm/deg, {100 * float(at.robot_k1 / base.robot_k1 - 1):+.0f} % (robot)",
-                f"{float(at.fitted_k1):.2f} ± {float(at.error):.2f} N*mm/deg, "
-                f"{100 * float(at.fitted_k1 / base.fitted_k1 - 1):+.0f} %; exact {float(at.exact_k1):.3f}, "
-                f"{100 * float(at.exact_k1 / base.exact_k1 - 1):+.0f} %",
-                where,
-                agrees(apart.lower if robot_lower else apart.higher),
-                f"{at.criticality.item()}"
-                + (
-                    f": curved walks last up to {float(at.stiffest_k1):.3f} N*mm/deg, and no square root sets in"
-                    if float(at.stiffest_k1) > float(at.exact_k1) * (1.0 + 1e-9)
-                    else ""
-                ),
-            )
-        )
-        says = table["variants"][name]["radius"]
-        ratio, error = float(at.equal_ratio), float(at.equal_ratio_error)
-        fits = between(ratio, error, 0.0, 0.98) if says == "smaller" else near(ratio, error, 1.0, 0.05)
-        found.append(
-            Row(
-                f"radius, {name}",
-                says,
-                f"{100 * (ratio - 1):+.1f} ± {100 * error:.1f} % at the same k1 over its critical value",
-                where,
-                agrees(fits),
-                "the paper does not say at which springs it compares; "
-                f"at the same k1, {data.attrs['spring']:.2f} N*mm/deg: {100 * (float(at.equal_spring) - 1):+.0f} %",
-            )
-        )
-    return found
+def _beside_robot(study: CurvedStudy) -> list[OfPlanar]:
+    trials, here = study.trials, bent(study.trials)
+    exact = trials.attrs["critical_k1"]
+    left, right = (int((trials.direction == side).sum()) for side in ("left", "right"))
+    curving = [float(k) for k, row in zip(trials.spring.values, here, strict=True) if row.any()]
+    straight = set(map(float, trials.spring.values)) - set(curving)
+    angles = np.where(here, np.abs(trials.mean_angle.sel(joint=1).values), np.nan)
+    rising = increases([row for row in angles if np.isfinite(row).any()][::-1])
+    wider, softest, stiffest = fluctuation(trials)
+    words = [
+        OfPlanar(statements.STRAIGHT, f"straight from {min(straight):g} N*mm/deg up"),
+        OfPlanar(
+            statements.CURVED, f"curved up to {max(curving):g} N*mm/deg, {left} to the left and {right} to the right"
+        ),
+        OfPlanar(statements.ONSET, f"{study.fit.critical:.2f} N*mm/deg; the point is at {exact:.2f}"),
+        OfPlanar(statements.RISING, INCREASES[rising]),
+        OfPlanar(statements.FLUCTUATION, f"{wider} at {softest:g} than at {stiffest:g} N*mm/deg"),
+    ]
+    for spring, statement in statements.RADII.items():
+        radius = axis_radius(study.branch, spring / printed.ONSET.value * exact)
+        words.append(OfPlanar(statement, f"{radius:.2f} m at the same share of its point"))
+    return words
+
+
+def _variants_beside_robot(study: CurvedStudy) -> list[OfPlanar]:
+    words = []
+    for name, statement in statements.VARIANTS.items():
+        at = study.comparison.sel(variant=name)
+        ratio = radius_ratio(study.variants[printed.AS_BUILT], study.variants[name])
+        words += [
+            OfPlanar(statement.onset, f"{float(at.fitted_k1):.2f} N*mm/deg; the point is at {float(at.exact_k1):.2f}"),
+            OfPlanar(
+                statement.radius,
+                f"{change(ratio.distance, ratio.distance_error)} at equal distance from its own onset; "
+                f"{change(float(at.equal_spring))} at the same spring",
+            ),
+        ]
+    return words

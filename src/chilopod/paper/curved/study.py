@@ -16,17 +16,18 @@ from numpy.typing import NDArray
 from chilopod.analysis.branch import curved_walks
 from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
 from chilopod.analysis.square_root import SquareRootFit, square_root_fit
+from chilopod.paper import printed
 from chilopod.paper.curved.trials import (
+    EXAMPLES,
     SPRINGS,
     curved_trials,
-    example_walks,
     off_branch,
     on_branch,
-    variant_robots,
     variant_trials,
 )
-from chilopod.paper.printed import printed
+from chilopod.paper.scatter import Difference, spread_difference
 from chilopod.paper.size import Size
+from chilopod.paper.walk_measures import example_walks
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.trials import Disturbance
@@ -51,7 +52,7 @@ class CurvedStudy:
     trials
         See :func:`chilopod.paper.curved.trials.curved_trials`.
     examples
-        See :func:`chilopod.paper.curved.trials.example_walks`.
+        See :func:`chilopod.paper.walk_measures.example_walks`.
     branch
         The exact curved walks, turning right, see :func:`chilopod.analysis.branch.curved_walks`.
     fits
@@ -110,14 +111,14 @@ def curved_study(
     trials = curved_trials(robot, springs, repeats, folder=folder, progress=part(progress, 0.0, 0.3))
     variants = variant_trials(robot, trials, variant_repeats, folder=folder, progress=part(progress, 0.3, 0.8))
     progress(0.8, "branches")
-    branches = {name: _branch(variant, variants[name]) for name, variant in variant_robots(robot).items()}
+    branches = {name: _branch(variant, variants[name]) for name, variant in printed.variant_robots(robot).items()}
     progress(0.9, "trials beside the branch")
     even = Disturbance(friction=0.0)
     settled = curved_trials(robot, agreement_springs, 3, disturbance=even, e_folds=25.0, folder=folder)
-    branch = branches["as built"]
+    branch = branches[printed.AS_BUILT]
     study = CurvedStudy(
         trials=trials,
-        examples=example_walks(robot, folder=folder),
+        examples=example_walks(robot, EXAMPLES, 120.0, (0, 0), folder=folder),
         branch=branch,
         fits=onset_fits(trials, branch),
         law=law_along_branch(branch),
@@ -133,6 +134,20 @@ def curved_study(
 def bent(trials: xr.Dataset) -> NDArray[np.bool_]:
     """Which trials settled on a curved walk, shape (spring, repeat)."""
     return np.isin(trials.direction.values, ("left", "right"))
+
+
+def bend_order(trials: xr.Dataset) -> tuple[int, ...]:
+    """Joints by how far they bend in trials that curve, the most first."""
+    angles = np.abs(trials.mean_angle.values[bent(trials)]).mean(axis=0)
+    return tuple(int(joint) + 1 for joint in np.argsort(-angles))
+
+
+def fluctuation(trials: xr.Dataset) -> tuple[Difference, float, float]:
+    """How much farther the angle of joint 1 scatters among trials at the softest spring than at the stiffest that
+    curves, and these springs, N*mm/deg."""
+    curved = trials.isel(spring=bent(trials).any(axis=1))
+    angles = np.where(bent(curved), np.abs(curved.mean_angle.sel(joint=1).values), np.nan)
+    return spread_difference(angles[0], angles[-1]), float(curved.spring[0]), float(curved.spring[-1])
 
 
 def fitted(trials: xr.Dataset, joint: int = 1) -> SquareRootFit:
@@ -210,31 +225,26 @@ def compared(variants: Mapping[str, xr.Dataset], branches: Mapping[str, xr.Datas
     bootstrap), ``exact_k1``, ``robot_k1`` as printed, ``stiffest_k1``, up to which curved walks exist (above
     ``exact_k1`` where the branch folds back), all in N*mm/deg; ``criticality``; ``radius`` with ``radius_error``, mean
     and standard error over the trials that settled on a curved walk (m; NaN where there are fewer than two);
-    ``equal_ratio``, the radius over that as built at the same ratio, mean over all ratios, with ``equal_ratio_error``,
-    its standard error from that of the radii; ``equal_spring``, over that
+    ``equal_ratio``, the radius over that as built at the same ratio, mean over all ratios; ``equal_spring``, over that
     at the same k1, along the branches, at ``spring``.
     """
-    base = branches["as built"]
+    base = branches[printed.AS_BUILT]
     exact = np.array([trials.attrs["critical_k1"] for trials in variants.values()])
     fits = [fitted(trials) for trials in variants.values()]
     statistics = np.array([_statistics(trials) for trials in variants.values()])
     curved = np.isfinite(statistics[:, 0]).all(axis=0)
-    ratios = variants["as built"].spring.values / exact[0]
+    ratios = variants[printed.AS_BUILT].spring.values / exact[0]
     radius = statistics[:, 0]
     ratio = (radius / radius[0])[:, curved]
-    # Of independent trials; the base is one with itself, which is not asked.
-    off = np.hypot(*((statistics[each, 1] / radius[each])[..., curved] for each in (slice(None), slice(1))))
     # Every variant walks a curve there: softer than all critical springs, stiffer than where a branch ends.
     spring = float(0.9 * exact.min())
     there = np.array([axis_radius(branch, spring) for branch in branches.values()])
-    table = printed()
-    robots = [table["variants"].get(name, table["pitchfork"])["robot_critical_k1"] for name in variants]
     return xr.Dataset(
         {
             "fitted_k1": ("variant", np.array([fit.critical for fit in fits]), {"units": PAPER_UNIT}),
             "error": ("variant", np.array([fit.bootstrap_error for fit in fits]), {"units": PAPER_UNIT}),
             "exact_k1": ("variant", exact, {"units": PAPER_UNIT}),
-            "robot_k1": ("variant", np.array([float(each.split()[0]) for each in robots]), {"units": PAPER_UNIT}),
+            "robot_k1": ("variant", np.array([printed.onset(name).value for name in variants]), {"units": PAPER_UNIT}),
             "stiffest_k1": (
                 "variant",
                 np.array([float(branch.parameter.max()) for branch in branches.values()]),
@@ -247,7 +257,6 @@ def compared(variants: Mapping[str, xr.Dataset], branches: Mapping[str, xr.Datas
             "radius": (("variant", "ratio"), radius, {"units": "m"}),
             "radius_error": (("variant", "ratio"), statistics[:, 1], {"units": "m"}),
             "equal_ratio": ("variant", ratio.mean(axis=1), {"units": "1"}),
-            "equal_ratio_error": ("variant", np.linalg.norm(ratio * off, axis=1) / off.shape[1], {"units": "1"}),
             "equal_spring": ("variant", there / axis_radius(base, spring), {"units": "1"}),
         },
         coords={"variant": np.array(list(variants), dtype=object), "ratio": ratios},

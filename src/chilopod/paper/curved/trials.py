@@ -19,12 +19,13 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from chilopod import stability
-from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
+from chilopod.analysis.parameters import K1, stiffness
 from chilopod.analysis.straight_walk import pitchfork
 from chilopod.engine import Status
-from chilopod.paper.printed import printed
+from chilopod.paper import printed
+from chilopod.paper.walk_measures import by_spring
 from chilopod.planar import PlanarModel
-from chilopod.progress import Progress, silent
+from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.stability.returns import whole_period
 from chilopod.trials import AVERAGED, Disturbance, Trial, run
@@ -103,11 +104,7 @@ def curved_trials(
         folder,
         progress,
     )
-    outcomes = [_outcome(record, robot) for record in records]
-    rows = [xr.concat(outcomes[i : i + repeats], "repeat") for i in range(0, len(outcomes), repeats)]
-    data = xr.concat(rows, "spring").assign_coords(
-        spring=("spring", np.asarray(springs, dtype=np.float64), {"units": PAPER_UNIT}), repeat=np.arange(repeats)
-    )
+    data = by_spring([_outcome(record, robot) for record in records], springs)
     data["duration"] = ("spring", np.array(durations), {"units": "s"})
     data.attrs = {
         "robot": robot.name,
@@ -116,29 +113,6 @@ def curved_trials(
         "averaged_s": AVERAGED,
         "about": "walks from straight on, averaged at their end",
     }
-    return data
-
-
-def example_walks(
-    robot: Robot,
-    springs: Sequence[float] = EXAMPLES,
-    duration: float = 120.0,
-    seed: int = 0,
-    folder: str | Path | None = None,
-) -> xr.Dataset:
-    """Joint angles over time of one walk at each of some springs.
-
-    Returns
-    -------
-    Dataset over (time, spring, joint): ``joint_angle`` (rad).
-    """
-    records = run(
-        [Trial(robot.with_value(K1, stiffness(float(value))), duration, seed, rate=50.0) for value in springs], folder
-    )
-    angles = xr.concat([record.joint_angle.isel(robot=0, drop=True) for record in records], dim="spring")
-    data = angles.transpose("time", "spring", "joint").to_dataset(name="joint_angle")
-    data = data.assign_coords(spring=("spring", np.asarray(springs, dtype=np.float64), {"units": PAPER_UNIT}))
-    data.attrs = {"robot": robot.name, "varied": K1, "about": "yaw joint angles over time"}
     return data
 
 
@@ -195,12 +169,6 @@ def on_branch(branch: xr.Dataset, name: str, spring: float) -> Array:
     return values
 
 
-def variant_robots(robot: Robot) -> dict[str, Robot]:
-    """The robot as built and with each of the paper's changes."""
-    changed = {name: robot.set_from_text(entry["set"]) for name, entry in printed()["variants"].items()}
-    return {"as built": robot, **changed}
-
-
 def variant_trials(
     robot: Robot,
     base: xr.Dataset,
@@ -230,16 +198,10 @@ def variant_trials(
     """
     ratios = base.spring.values / base.attrs["critical_k1"]
     ratios = ratios[ratios < 1.2]
-    robots = variant_robots(robot)
-    found = {"as built": base.isel(spring=slice(len(ratios)), repeat=slice(repeats))}
-    for name, variant in robots.items():
-        if name in found:
-            continue
-        part = len(found) - 1
-
-        def shown(done: float, words: str, part: int = part, name: str = name) -> None:
-            progress((part + done) / (len(robots) - 1), f"{name}: {words}")
-
+    robots = {name: each for name, each in printed.variant_robots(robot).items() if name != printed.AS_BUILT}
+    found = {printed.AS_BUILT: base.isel(spring=slice(len(ratios)), repeat=slice(repeats))}
+    for index, (name, variant) in enumerate(robots.items()):
+        shown = part(progress, index / len(robots), (index + 1) / len(robots), name)
         springs = ratios * pitchfork(variant, normal_form=False).value
         found[name] = curved_trials(variant, springs.tolist(), repeats, folder=folder, progress=shown)
     return found

@@ -8,9 +8,9 @@ import xarray as xr
 from chilopod.analysis.square_root import square_root_fit
 from chilopod.errors import AnalysisError
 from chilopod.paper.fit_data import base_series_data
-from chilopod.paper.robot.table import CHECKED, VERDICTS
 from chilopod.paper.size import Size
-from chilopod.paper.table import RobotRow
+from chilopod.paper.statements import NUMERICS
+from chilopod.paper.table import OfTwin, of_twin
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.tasks.identify.twin_series import DURATION, base_series
@@ -21,8 +21,6 @@ SPRINGS = (15.0, 17.0, 21.0, 26.0, 28.0)
 
 CASES = {"2 ms": (2e-3, TOLERANCE), "1 ms": (1e-3, TOLERANCE), "0.5 ms": (5e-4, TOLERANCE), "tight": (2e-3, 1e-13)}
 """Step (s) and tolerance of the contact solver, the first what all studies have."""
-
-ALLOWED = 0.05
 
 
 def twin_numerics(robot: Robot, size: Size = Size.FULL, progress: Progress = silent) -> xr.Dataset:
@@ -73,7 +71,7 @@ def largest_move(data: xr.Dataset) -> float:
     return float(max(np.abs(each).max() for each in moves))
 
 
-def rows(data: xr.Dataset) -> list[RobotRow]:
+def rows(data: xr.Dataset) -> list[OfTwin]:
     """The line of the robot's table."""
     moved = data.onset.values / data.onset.values[0] - 1.0
     at_21 = [data[name].sel(spring=21.0).values for name in ("axis_radius", "speed")]
@@ -82,15 +80,6 @@ def rows(data: xr.Dataset) -> list[RobotRow]:
         f"{name}: onset {100.0 * onset:+.1f} %, radius at 21 {100.0 * radius:+.1f} %, speed {100.0 * speed:+.1f} %"
         for name, onset, radius, speed in zip(data.case.values[1:], moved[1:], radii[1:], speeds[1:], strict=True)
     )
-    return [
-        RobotRow(
-            "numerics: finer steps, tight contact solver",
-            "no counterpart",
-            f"{said}; largest move of onset, and radii and speeds at 15 to 28 N*mm/deg, "
-            f"{100.0 * largest_move(data):.1f} %",
-            "",
-            CHECKED,
-            VERDICTS[largest_move(data) < ALLOWED],
-            f"less than {100.0 * ALLOWED:.0f} %",
-        )
-    ]
+    move = largest_move(data)
+    words = f"{said}; largest move of onset, and radii and speeds at 15 to 28 N*mm/deg, {100.0 * move:.1f} %"
+    return [of_twin(NUMERICS, words, move)]

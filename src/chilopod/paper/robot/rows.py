@@ -8,142 +8,76 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from chilopod import units
 from chilopod.analysis.parameters import PAPER_UNIT
-from chilopod.paper.fit_data import walking_speed
-from chilopod.paper.printed import printed
-from chilopod.paper.robot.equal_distance import change, law_ratio, radius_ratio
-from chilopod.paper.robot.table import (
-    CHECKED,
-    FITTED,
-    ONSET,
-    PREDICTED,
-    RADIUS,
-    SPEED,
-    UNCHANGED,
-    VERDICTS,
-    Planar,
-    percent,
-    printed_spring,
-    spring_row,
-    with_error,
-)
-from chilopod.paper.robot.turning import PAPER_SPRING
-from chilopod.paper.robot.walk_measures import onset_with_error, radius_at, shares
+from chilopod.paper import printed, statements
+from chilopod.paper.equal_distance import change, law_ratio, radius_ratio
+from chilopod.paper.printed import Band, Said
 from chilopod.paper.robot.walks import RobotWalks
 from chilopod.paper.scatter import (
     INCREASES,
     Answer,
-    between,
     every,
     increases,
     mean_and_error,
-    near,
     spread_difference,
+    with_error,
 )
-from chilopod.paper.table import RobotRow
+from chilopod.paper.statements import listed
+from chilopod.paper.table import WITHIN, OfTwin, Statement, listing, of_twin
+from chilopod.paper.walk_measures import onset_with_error, radius_at, shares
 from chilopod.tasks.radius_law import in_settled_curve
 
-STRAIGHT, CURVED = (41.0, 75.0), (15.0, 17.0, 21.0, 28.0)
-"""N*mm/deg: springs at which the paper's robot walks straight, and those at which it curves."""
+PAPER_SPRING = printed.TASKS["A"].k_hat.value
 
 
-def walk_rows(found: RobotWalks, planar: Planar) -> list[RobotRow]:
+def walk_rows(found: RobotWalks) -> list[OfTwin]:
     """Where walks curve, how tightly and how fast, and what of it hangs on how long they last."""
-    base = found.base
+    base, uniform = found.base, found.uniform.attrs
+    speed, error = mean_and_error(base.speed.sel(spring=PAPER_SPRING).values)
     rows = [
-        _straight(base, planar),
-        _curved(base, planar),
-        spring_row(
-            "where curved walks set in (square-root fit)",
-            printed_spring("pitchfork", "robot_critical_k1"),
-            onset_with_error(base),
-            ONSET,
-            FITTED,
-            planar.get("onset", ""),
-        ),
-        *(_radius(base, spring, planar) for spring in printed_radii()),
-        _speed(base, planar),
-        _rising(base, planar),
-        _fluctuation(base, planar),
+        _straight(base),
+        _curved(base),
+        _spring(statements.ONSET, onset_with_error(base)),
+        *(_radius(base, spring, statement) for spring, statement in statements.RADII.items()),
+        of_twin(statements.SPEED, f"{with_error(speed, error, 4)} m/s", speed, error),
+        _rising(base),
+        _fluctuation(base),
+        _spring(statements.UNIFORM, (uniform["critical_k"], uniform["critical_k_error"])),
     ]
     for name, data in found.variants.items():
-        if name not in found.lower_steps:
-            rows += variant_rows(base, data, name, name, planar)
-            continue
-        rows += variant_rows(base, data, name, f"{name} (steps as high)", planar)
-        rows += variant_rows(base, found.lower_steps[name], name, f"{name} (steps lower in proportion)", planar)
-    uniform = found.uniform.attrs
-    rows.append(
-        spring_row(
-            "where a body with springs all alike undulates",
-            printed_spring("uniform", "robot_critical_k"),
-            (uniform["critical_k"], uniform["critical_k_error"]),
-            ONSET,
-            PREDICTED,
-            planar.get("uniform", ""),
-        )
-    )
+        lower = found.lower_steps.get(name)
+        rows += variant_rows(base, data, name, "" if lower is None else "steps as high")
+        if lower is not None:
+            rows += variant_rows(base, lower, name, "steps lower in proportion")
     return rows + duration_rows(found.durations)
 
 
-def printed_radii() -> dict[float, float]:
-    """Radii (m) that the paper prints, by k1 (N*mm/deg)."""
-    return {float(key): units.parse(text, "m") for key, text in printed()["curved"]["radius"].items()}
+def _spring(statement: Statement[Band], twin: tuple[float, float], reading: str = "") -> OfTwin:
+    """A spring (N*mm/deg) that is to be near the paper's; NaN if the trials determine none, or no error."""
+    value, error = twin
+    off = f"{with_error(value, error, 1)} {PAPER_UNIT} ({100.0 * (value / statement.said.middle - 1.0):+.0f} %)"
+    words = off if np.isfinite(value) else "not determined by trials"
+    return of_twin(statement, words, value, error, reading)
 
 
-def _straight(base: xr.Dataset, planar: Planar) -> RobotRow:
-    return RobotRow(
-        f"walks with k1 = {_listed(STRAIGHT)} {PAPER_UNIT}",
-        "straight",
-        f"straight: {_counts(base, 'straight', STRAIGHT)}",
-        planar.get("straight", ""),
-        FITTED,
-        VERDICTS[_most(shares(base), "straight", STRAIGHT)],
-        "most trials",
-    )
+def _straight(base: xr.Dataset) -> OfTwin:
+    springs = printed.STRAIGHT
+    words = f"straight: {_counts(base, 'straight', springs)}"
+    return OfTwin(statements.STRAIGHT, words, _most(shares(base).straight, springs))
 
 
-def _curved(base: xr.Dataset, planar: Planar) -> RobotRow:
-    directions = base.direction.sel(spring=list(CURVED)).values
+def _curved(base: xr.Dataset) -> OfTwin:
+    springs = printed.CURVED
+    directions = base.direction.sel(spring=list(springs)).values
     left, right = (int((directions == side).sum()) for side in ("left", "right"))
-    both = ", ".join(planar[key] for key in ("curved", "sides") if key in planar)
-    return RobotRow(
-        f"walks with k1 = {_listed(CURVED)} {PAPER_UNIT}",
-        "curved, to both sides",
-        f"curved: {_counts(base, 'curved', CURVED)}; {left} to the left, {right} to the right",
-        both,
-        FITTED,
-        VERDICTS[_most(shares(base), "curved", CURVED) and min(left, right) > 0],
-        "most trials at each; both sides",
-    )
+    words = f"curved: {_counts(base, 'curved', springs)}; {left} to the left, {right} to the right"
+    return OfTwin(statements.CURVED, words, _most(shares(base).curved, springs) and min(left, right) > 0)
 
 
-def _radius(base: xr.Dataset, spring: float, planar: Planar) -> RobotRow:
-    (mean, error), paper = radius_at(base, spring), printed_radii()[spring]
-    return RobotRow(
-        f"radius at k1 = {spring:g} {PAPER_UNIT}",
-        f"{paper:g} m",
-        "no two trials curve" if np.isnan(mean) else f"{with_error(mean, error, 2)} m",
-        planar.get(f"radius {spring:g}", ""),
-        FITTED,
-        VERDICTS[near(mean, error, paper, RADIUS)],
-        percent(RADIUS),
-    )
-
-
-def _speed(base: xr.Dataset, planar: Planar) -> RobotRow:
-    entry = printed()["turning"]
-    mean, error = mean_and_error(base.speed.sel(spring=PAPER_SPRING).values)
-    return RobotRow(
-        f"speed of module 1 at k1 = {PAPER_SPRING:g} {PAPER_UNIT}",
-        f"{walking_speed():.3f} m/s, from {entry['evaluation_time']} to {entry['tasks']['A']['target']}",
-        f"{with_error(mean, error, 4)} m/s",
-        planar.get("speed", ""),
-        FITTED,
-        VERDICTS[near(mean, error, walking_speed(), SPEED)],
-        percent(SPEED),
-    )
+def _radius(base: xr.Dataset, spring: float, statement: Statement[Band]) -> OfTwin:
+    mean, error = radius_at(base, spring)
+    words = "no two trials curve" if np.isnan(mean) else f"{with_error(mean, error, 2)} m"
+    return of_twin(statement, words, mean, error)
 
 
 def _curved_angles(base: xr.Dataset) -> dict[float, NDArray[np.float64]]:
@@ -154,40 +88,23 @@ def _curved_angles(base: xr.Dataset) -> dict[float, NDArray[np.float64]]:
     return {float(spring): row[np.isfinite(row)] for spring, row in pairs if np.isfinite(row).any()}
 
 
-def _rising(base: xr.Dataset, planar: Planar) -> RobotRow:
+def _rising(base: xr.Dataset) -> OfTwin:
     rising = increases(_curved_angles(base).values())
-    return RobotRow(
-        "angle of joint 1 over 1/k1",
-        "increases",
-        INCREASES[rising],
-        planar.get("rising", ""),
-        PREDICTED,
-        VERDICTS[rising],
-        "from every spring to the next",
-    )
+    return OfTwin(statements.RISING, INCREASES[rising], rising)
 
 
-def _fluctuation(base: xr.Dataset, planar: Planar) -> RobotRow:
+def _fluctuation(base: xr.Dataset) -> OfTwin:
     several = {spring: row for spring, row in _curved_angles(base).items() if row.size > 1}
     if len(several) < 2:
-        said, answer = "no two springs at which two trials curve", None
-    else:
-        (stiff, one), *_, (soft, other) = several.items()
-        wider = spread_difference(other, one)
-        spreads = [f"{np.rad2deg(row.std(ddof=1)):.2f} deg at {k:g}" for k, row in ((stiff, one), (soft, other))]
-        said, answer = f"{' and '.join(spreads)} {PAPER_UNIT} (standard deviation): {wider}", wider.higher
-    return RobotRow(
-        "fluctuation among trials over 1/k1, joint 1",
-        "increases",
-        said,
-        planar.get("fluctuation", ""),
-        PREDICTED,
-        VERDICTS[answer],
-        "from the stiffest spring that curves to the softest",
-    )
+        return OfTwin(statements.FLUCTUATION, "no two springs at which two trials curve", None)
+    (stiff, one), *_, (soft, other) = several.items()
+    wider = spread_difference(other, one)
+    spreads = [f"{np.rad2deg(row.std(ddof=1)):.2f} deg at {k:g}" for k, row in ((stiff, one), (soft, other))]
+    words = f"{' and '.join(spreads)} {PAPER_UNIT} (standard deviation): {wider}"
+    return OfTwin(statements.FLUCTUATION, words, wider.higher)
 
 
-def variant_rows(base: xr.Dataset, data: xr.Dataset, name: str, title: str, planar: Planar) -> list[RobotRow]:
+def variant_rows(base: xr.Dataset, data: xr.Dataset, name: str, reading: str = "") -> list[OfTwin]:
     """Onset and radius of a variant.
 
     Parameters
@@ -196,49 +113,27 @@ def variant_rows(base: xr.Dataset, data: xr.Dataset, name: str, title: str, plan
         Trials of the robot as built and of the variant.
     name
         Of the variant, as the paper's.
-    title
-        What the rows call it: its name, and if there are several, which reading of it.
-    planar
-        What the planar model does.
+    reading
+        Of the variant, if there are several.
     """
-    own = printed_spring("variants", name, "robot_critical_k1")
-    says = printed()["variants"][name]["radius"]
+    said = statements.VARIANTS[name]
     ratio = radius_ratio(base, data)
-    law = law_ratio(ratio.compared, printed_spring("pitchfork", "robot_critical_k1"), own)
-    if says == "smaller":
-        answer, asked = between(ratio.distance, ratio.distance_error, 0.0, 1.0), "not wider than as built"
-    else:
-        answer, asked = near(ratio.distance, ratio.distance_error, 1.0, UNCHANGED), percent(UNCHANGED)
-    said = [f"{change(ratio.distance, ratio.distance_error)} at equal distance from its own onset, 1/k1 - 1/k1*"]
+    law = law_ratio(ratio.compared, printed.ONSET.value, printed.onset(name).value)
+    words = [f"{change(ratio.distance, ratio.distance_error)} at equal distance from its own onset, 1/k1 - 1/k1*"]
     if np.isnan(ratio.distance):
-        said = ["no distance from the onset in common with the robot as built"]
+        words = ["no distance from the onset in common with the robot as built"]
     if ratio.compared:
-        said.append(
-            f"{change(ratio.springs, ratio.springs_error)} at equal springs, {_listed(ratio.compared)}"
+        words.append(
+            f"{change(ratio.springs, ratio.springs_error)} at equal springs, {listed(ratio.compared)}"
             + ("" if np.isnan(law) else f" (the robot's onsets alone would make it {change(law)})")
         )
     return [
-        spring_row(
-            f"where curved walks set in, {title}",
-            own,
-            onset_with_error(data),
-            ONSET,
-            PREDICTED,
-            planar.get(name, ""),
-        ),
-        RobotRow(
-            f"radius, {title}",
-            says,
-            "; ".join(said),
-            planar.get(f"radius {name}", ""),
-            PREDICTED,
-            VERDICTS[answer],
-            f"{asked}, at equal distance",
-        ),
+        _spring(said.onset, onset_with_error(data), reading),
+        of_twin(said.radius, "; ".join(words), ratio.distance, ratio.distance_error, reading),
     ]
 
 
-def duration_rows(data: xr.Dataset) -> list[RobotRow]:
+def duration_rows(data: xr.Dataset) -> list[OfTwin]:
     """Which quantities of the base series would be judged otherwise if its walks were shorter.
 
     Parameters
@@ -246,60 +141,36 @@ def duration_rows(data: xr.Dataset) -> list[RobotRow]:
     data
         From :func:`chilopod.paper.robot.walks.by_duration`.
     """
-    paper = printed_spring("pitchfork", "robot_critical_k1")
-    each = [data.isel(duration=index) for index in range(data.sizes["duration"])]
-    rows = [
-        _duration_row(
-            data,
-            "onset",
-            f"{_numbers(data.onset.values, 1)} {PAPER_UNIT}",
-            [near(float(at.onset), float(at.onset_error), paper, ONSET) for at in each],
-        )
-    ]
-    for spring, radius in printed_radii().items():
+    answers = [printed.ONSET.answer(*pair) for pair in zip(data.onset.values, data.onset_error.values, strict=True)]
+    values = f"{_numbers(data.onset.values, 1)} {PAPER_UNIT}"
+    rows = [_duration_row(data, statements.ONSET_BY_DURATION, values, answers)]
+    for spring, statement in statements.RADII_BY_DURATION.items():
         pairs = data[["axis_radius", "axis_radius_error"]].sel(spring=spring).to_array("part").values.T
-        rows.append(
-            _duration_row(
-                data,
-                f"radius at {spring:g} {PAPER_UNIT}",
-                f"{_numbers(pairs[:, 0], 2)} m",
-                [near(mean, error, radius, RADIUS) for mean, error in pairs],
-            )
-        )
-    # The springs next to the onset are those that need the longest.
-    for what, spring in (("curved", max(CURVED)), ("straight", min(STRAIGHT))):
-        rows.append(
-            _duration_row(
-                data,
-                f"walks {what} at {spring:g} {PAPER_UNIT}",
-                f"{_numbers(100.0 * data[what].sel(spring=spring).values, 0)} %",
-                [_most(at, what, (spring,)) for at in each],
-            )
-        )
+        answers = [printed.RADII[spring].answer(mean, error) for mean, error in pairs]
+        rows.append(_duration_row(data, statement, f"{_numbers(pairs[:, 0], 2)} m", answers))
+    for what, statement in statements.WALKS_BY_DURATION.items():
+        part = data[what].sel(spring=statements.SLOWEST[what]).values
+        rows.append(_duration_row(data, statement, f"{_numbers(100.0 * part, 0)} %", list(map(bool, part > 0.5))))
     return rows
 
 
-def _duration_row(data: xr.Dataset, name: str, values: str, answers: Sequence[Answer]) -> RobotRow:
+def _duration_row(data: xr.Dataset, statement: Statement[Said], values: str, answers: Sequence[Answer]) -> OfTwin:
     """Whether a quantity is judged alike after every duration."""
     times, last = [f"{each:g}" for each in data.duration.values], answers[-1]
-    by = {word: [t for t, each in zip(times, answers, strict=True) if each is key] for key, word in VERDICTS.items()}
+    by = {word: [t for t, each in zip(times, answers, strict=True) if each is key] for key, word in WITHIN.items()}
     judged = [
-        f"{word} after {_joined(those) if len(those) < len(times) else 'each'}" for word, those in by.items() if those
+        f"{word} after {listing(those) if len(those) < len(times) else 'each'}" for word, those in by.items() if those
     ]
-    return RobotRow(
-        f"{name}, by how long the walks last",
-        "not printed how long",
-        f"{values} after {_joined(times)} s: {', '.join(judged)}",
-        "",
-        CHECKED,
-        VERDICTS[every(None if None in (each, last) else each == last for each in answers)],
-        "the same verdict after each",
+    return OfTwin(
+        statement,
+        f"{values} after {listing(times)} s: {', '.join(judged)}",
+        every(None if None in (each, last) else each == last for each in answers),
     )
 
 
-def _most(shares: xr.Dataset, what: str, springs: tuple[float, ...]) -> bool:
-    """Whether most walks at each of some springs are "curved" or "straight"."""
-    return bool((shares[what].sel(spring=list(springs)) > 0.5).all())
+def _most(share: xr.DataArray, springs: tuple[float, ...]) -> bool:
+    """Whether most walks at each of some springs are counted."""
+    return bool((share.sel(spring=list(springs)) > 0.5).all())
 
 
 def _counts(data: xr.Dataset, what: str, springs: tuple[float, ...]) -> str:
@@ -311,12 +182,3 @@ def _counts(data: xr.Dataset, what: str, springs: tuple[float, ...]) -> str:
 
 def _numbers(values: NDArray[np.float64], digits: int) -> str:
     return ", ".join(f"{value:.{digits}f}" if np.isfinite(value) else "none" for value in values)
-
-
-def _listed(springs: tuple[float, ...]) -> str:
-    """15, 17 and 21."""
-    return _joined([f"{spring:g}" for spring in sorted(springs)])
-
-
-def _joined(names: Sequence[str]) -> str:
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)

@@ -2,39 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import xarray as xr
 
 from chilopod.analysis.parameters import stiffness
-from chilopod.paper.curved.sections import CURVED
 from chilopod.paper.movies import Movie, robot_movies
 from chilopod.paper.robot import numerics, why
-from chilopod.paper.robot.beside import planar_words
 from chilopod.paper.robot.rows import walk_rows
 from chilopod.paper.robot.spread import twin_spread
 from chilopod.paper.robot.structures import structures
 from chilopod.paper.robot.turning import RobotTurning, robot_turning
 from chilopod.paper.robot.turning_rows import turning_rows
 from chilopod.paper.robot.walks import RobotWalks, robot_walks
-from chilopod.paper.section import Found, Section
-from chilopod.paper.straight.sections import UNIFORM
-from chilopod.paper.table import RobotRow
-from chilopod.paper.turning.sections import TURNING
+from chilopod.paper.section import Section
 
 CHAPTER = "The whole robot in three dimensions"
 
-_PLANAR = (UNIFORM, CURVED, TURNING)
 _FILMED = (stiffness(41.0), stiffness(26.0), stiffness(15.0))  # the paper's large, small and very small
 _TRIED = (stiffness(41.0), stiffness(21.0), stiffness(15.0))  # the paper's of task A
-
-
-def _words(found: Found) -> dict[str, str]:
-    return planar_words(found[UNIFORM], found[CURVED], found[TURNING])
-
-
-def _turning_rows(tasks: RobotTurning, found: Found) -> Sequence[RobotRow]:
-    return turning_rows(tasks, found[WALKS], _words(found))
 
 
 WALKS: Section[RobotWalks] = Section(
@@ -42,16 +26,15 @@ WALKS: Section[RobotWalks] = Section(
     CHAPTER,
     "the whole robot in 3-D: its walks",
     lambda context, found, report: robot_walks(context.whole, context.folder, context.size, report),
-    lambda walks, found: walk_rows(walks, _words(found)),
-    needs=_PLANAR,
+    lambda walks, found: walk_rows(walks),
 )
 TASKS: Section[RobotTurning] = Section(
     "robot-turning",
     CHAPTER,
     "the whole robot in 3-D: turning to targets",
     lambda context, found, report: robot_turning(context.whole, context.folder, context.size, report),
-    _turning_rows,
-    needs=(*_PLANAR, WALKS),
+    lambda tasks, found: turning_rows(tasks, found[WALKS]),
+    needs=(WALKS,),
 )
 FILMS: Section[list[Movie]] = Section(
     "robot-movies",

@@ -13,19 +13,18 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from chilopod import trials, units
-from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
-from chilopod.paper.curved.trials import variant_robots
+from chilopod import trials
+from chilopod.analysis.parameters import K1, stiffness
+from chilopod.paper import printed
+from chilopod.paper.equal_distance import radius_ratio
 from chilopod.paper.fit_data import base_series_data
-from chilopod.paper.printed import printed
-from chilopod.paper.robot.equal_distance import radius_ratio
 from chilopod.paper.robot.turning import TASK_DURATION
-from chilopod.paper.robot.walk_measures import onset_with_error
 from chilopod.paper.robot.walks import UNIFORM_DURATION, lower_steps, undulations, walk_ends
 from chilopod.paper.size import Size
+from chilopod.paper.walk_measures import onset_with_error
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
-from chilopod.steering import ARRIVAL_RADIUS, Target, steered, strategy_named
+from chilopod.steering import ARRIVAL_RADIUS, steered, strategy_named
 from chilopod.tasks.identify.twin import known, unlike
 from chilopod.tasks.identify.twin_constants import FREE, with_constants
 from chilopod.trials import NONE, Trial
@@ -89,15 +88,14 @@ def twin_spread(
     )
     for name, over, keys in (("onset", "variant", names), ("radius", "variant", names), ("best", "task", tasks)):
         data[name] = (("set", over), np.array([[row[name][key] for key in keys] for row in rows]))
-    data["paper"] = ("variant", [printed_onset(name) for name in names], {"units": "N*mm/deg"})
+    data["paper"] = ("variant", [printed_number(name).value for name in names], {"units": "N*mm/deg"})
     data["arrives"] = (("set", "task"), np.array([[row["arrives"][task] for task in tasks] for row in rows]))
     return data
 
 
-def printed_onset(variant: str) -> float:
-    """Where the paper's curved walks of a variant set in, N*mm/deg."""
-    entry = printed()["variants"].get(variant.removesuffix(LOWER), printed()["pitchfork"])
-    return units.from_si(units.parse(entry["robot_critical_k1"], "N*m/rad"), PAPER_UNIT)
+def printed_number(reading: str) -> printed.Number:
+    """Where the paper's curved walks of a variant, in one of its readings, set in."""
+    return printed.onset(reading.removesuffix(LOWER))
 
 
 def predictions(
@@ -113,11 +111,9 @@ def predictions(
     By variant ``onset`` (N*mm/deg) and ``radius`` (over that as built, at an equal distance from each one's own onset),
     NaN where walks determine none; and ``uniform`` (N*mm/deg).
     """
-    shape = np.array(printed()["pitchfork"]["joint_components"])
-    if robot.body.modules - 1 != len(shape):
-        shape = np.ones(robot.body.modules - 1)
+    shape = np.array(printed.mode_shape(robot))
     bend = tuple(_BENT * shape / shape.sum())
-    variants = variant_robots(robot)
+    variants = printed.variant_robots(robot)
     for name, variant in list(variants.items()):
         if variant.gait.stride != robot.gait.stride:
             variants[f"{name}{LOWER}"] = lower_steps(robot, variant)
@@ -148,12 +144,13 @@ def nearest_springs(
     found: dict[str, dict[str, Any]] = {"best": {}, "arrives": {}}
     springs, duration = size.cut((TASK_SPRINGS, TASK_DURATION), (TASK_SPRINGS[::3], 2.0))
     plan = strategy_named("pitchfork")
-    for letter, entry in printed()["turning"]["tasks"].items():
+    for letter, task in printed.TASKS.items():
         walks = []
         for k in springs:
             walker, controller = steered(robot, plan, stiffness(k))
-            target = Target.parse(entry["target"])
-            walks.append(Trial(walker, duration, 0, (), target, controller, disturbance=NONE, rate=20.0, engine="twin"))
+            walks.append(
+                Trial(walker, duration, 0, (), task.target, controller, disturbance=NONE, rate=20.0, engine="twin")
+            )
         nearest = [float(record.distance.min()) for record in trials.run(walks, folder)]
         found["best"][letter] = springs[int(np.argmin(nearest))]
         found["arrives"][letter] = bool(min(nearest) < ARRIVAL_RADIUS)

@@ -20,17 +20,15 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chilopod import twin
+from chilopod.paper import printed
 from chilopod.paper.fit_data import base_series_data
-from chilopod.paper.printed import printed
-from chilopod.paper.robot.spread import LOWER, predictions, printed_onset
-from chilopod.paper.robot.table import printed_spring
+from chilopod.paper.robot.spread import LOWER, predictions, printed_number
 from chilopod.paper.robot.turning import TASK_DURATION
 from chilopod.paper.size import Size
 from chilopod.paper.turning.minima import NAMES, minima
 from chilopod.paper.turning.trials import turning_task
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
-from chilopod.steering import Target
 from chilopod.tasks.identify.data import BaseSeries
 from chilopod.tasks.identify.twin import corrected, damped_step
 from chilopod.tasks.identify.twin_constants import FREE, constants_of, parts_of, values_at, with_constants
@@ -38,7 +36,7 @@ from chilopod.tasks.identify.twin_series import DURATION, base_series, residuals
 
 Array = NDArray[np.float64]
 
-AS_BUILT, PHASE, UNIFORM = "as built", "module phase 180 deg", "all springs alike"
+PHASE, UNIFORM = "module phase 180 deg", "all springs alike"
 """Of the variants, and of the predictions."""
 
 TOLERANCE = 0.05
@@ -193,7 +191,7 @@ def structures(
         rows.append(
             {"given": given, "fitted": fitted, "robot": anew, **found, **_strategies(anew, folder, each.engine, size)}
         )
-    variants = [name for name in rows[0]["onset"] if name != AS_BUILT]
+    variants = [name for name in rows[0]["onset"] if name != printed.AS_BUILT]
     names = [*variants, UNIFORM]
     predicted = [[*(row["onset"][name] for name in variants), row["uniform"]] for row in rows]
     return xr.Dataset(
@@ -207,7 +205,7 @@ def structures(
             ),
             "paper": (
                 "prediction",
-                [*map(printed_onset, variants), printed_spring("uniform", "robot_critical_k")],
+                [*(printed_number(name).value for name in variants), printed.UNIFORM.value],
                 {"units": "N*mm/deg"},
             ),
             "tighter": ("structure", np.array([row["radius"][PHASE] for row in rows])),
@@ -240,7 +238,7 @@ def _with_chi_squared(data: xr.Dataset) -> xr.Dataset:
 
 def _strategies(robot: Robot, folder: str | Path | None, engine: str, size: Size) -> dict[str, Array]:
     """The smallest criteria of task A, with one soft spring and with all springs alike."""
-    target = Target.parse(printed()["turning"]["tasks"]["A"]["target"])
+    target = printed.TASKS["A"].target
     repeats, duration = size.cut((_REPEATS, TASK_DURATION), (2, 3.0))
     kept: Any = {"duration": duration, "engine": engine, "folder": folder}
     time, rows = None, []

@@ -8,12 +8,11 @@ from pathlib import Path
 
 import xarray as xr
 
-from chilopod.paper.printed import printed
+from chilopod.paper import printed
 from chilopod.paper.size import Size
-from chilopod.paper.turning.trials import DURATION, REPEATS, TurningTask, turning_task, without_leg_yaw
+from chilopod.paper.turning.trials import DURATION, TurningTask, turning_task, without_leg_yaw
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
-from chilopod.steering import Target
 
 SPRINGS = (10.0, 15.0, 17.0, 21.0, 26.0, 28.0, 34.0, 41.0, 75.0)
 """k1 of the tasks, N*mm/deg: the paper's and some between."""
@@ -27,9 +26,6 @@ HOPF_SPRINGS = (8.7, 11.0, 15.0, 21.0, 41.0)
 TASK_DURATION = 1.5 * DURATION
 """s: the paper does not print how long its tasks last, but longer than the earliest arrival of any of its robots; half
 as long again lets a robot that is as fast arrive, or pass the target."""
-
-PAPER_SPRING = 21.0
-"""N*mm/deg: of the walks without leg yaw."""
 
 
 @dataclass(frozen=True)
@@ -72,14 +68,14 @@ def robot_turning(
     """
 
     repeats, springs, duration = size.of(
-        (REPEATS, SPRINGS, TASK_DURATION), (2, SPRINGS[1::2], TASK_DURATION), (2, SHOWN, 6.0)
+        (printed.REPEATS, SPRINGS, TASK_DURATION), (2, SPRINGS[1::2], TASK_DURATION), (2, SHOWN, 6.0)
     )
     springs = tuple(sorted({*springs, *SHOWN}))
     tasks = {}
-    for index, (letter, entry) in enumerate(printed()["turning"]["tasks"].items()):
+    for index, (letter, task) in enumerate(printed.TASKS.items()):
         tasks[letter] = turning_task(
             robot,
-            Target.parse(entry["target"]),
+            task.target,
             springs,
             repeats,
             duration=duration,
@@ -103,7 +99,7 @@ def robot_turning(
     without = without_leg_yaw(
         robot,
         tasks["A"].target,
-        {"paper's spring": PAPER_SPRING},
+        {"paper's spring": printed.TASKS["A"].k_hat.value},
         duration=duration,
         engine="twin",
         folder=folder,

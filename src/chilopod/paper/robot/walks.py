@@ -19,9 +19,9 @@ from chilopod import trials
 from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT, stiffness
 from chilopod.analysis.square_root import SquareRootFit, square_root_fit
 from chilopod.errors import AnalysisError
-from chilopod.paper.curved.trials import variant_robots
-from chilopod.paper.robot.walk_measures import onset, onset_with_error, radius_at, shares
+from chilopod.paper import printed
 from chilopod.paper.size import Size
+from chilopod.paper.walk_measures import by_spring, example_walks, onset, onset_with_error, radius_at, shares
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.tasks.radius_law import DURATION, end_of_walk
@@ -117,7 +117,7 @@ def robot_walks(
     told = part(progress, 0.0, 0.31, "as built")
     records = walk_records(robot, SPRINGS, repeats, duration=duration, folder=folder, progress=told)
     base, durations = walk_ends(records, robot, SPRINGS), by_duration(records, robot, SPRINGS)
-    robots = {name: each for name, each in variant_robots(robot).items() if name != "as built"}
+    robots = {name: each for name, each in printed.variant_robots(robot).items() if name != printed.AS_BUILT}
     readings = {
         name: lower_steps(robot, each) for name, each in robots.items() if each.gait.stride != robot.gait.stride
     }
@@ -132,7 +132,9 @@ def robot_walks(
     variants, lower = dict(zip(robots, found, strict=False)), dict(zip(readings, found[len(robots) :], strict=True))
     told = part(progress, 0.91, 1.0, "uniform springs")
     uniform = undulations(robot, uniform_springs, fewest, duration=swinging, folder=folder, progress=told)
-    return RobotWalks(robot, base, durations, variants, lower, _examples(robot, duration, folder), uniform)
+    seeds = [int(_SEEDS * spring) for spring in _EXAMPLES]
+    examples = example_walks(robot, _EXAMPLES, duration, seeds, "twin", folder)
+    return RobotWalks(robot, base, durations, variants, lower, examples, uniform)
 
 
 def lower_steps(robot: Robot, variant: Robot) -> Robot:
@@ -203,13 +205,9 @@ def walk_ends(
     -------
     Dataset over spring (N*mm/deg), repeat and joint: what :func:`chilopod.tasks.radius_law.end_of_walk` makes of each.
     """
-    repeats = len(records) // len(springs)
     last = float(records[0].time[-1]) if duration is None else duration
     ends = [end_of_walk(record.sel(time=record.time <= last + 1e-9), robot) for record in records]
-    rows = [xr.concat(ends[i : i + repeats], "repeat") for i in range(0, len(ends), repeats)]
-    data = xr.concat(rows, "spring").assign_coords(
-        spring=("spring", np.asarray(springs, dtype=np.float64), {"units": PAPER_UNIT}), repeat=np.arange(repeats)
-    )
+    data = by_spring(ends, springs)
     data.attrs = {"robot": robot.name, "varied": K1, "averaged_s": AVERAGED, "duration_s": last}
     return data
 
@@ -304,16 +302,4 @@ def undulations(
     except AnalysisError:
         critical = dict.fromkeys(("critical_k", "critical_k_error"), float("nan"))
     data.attrs = {"robot": robot.name, **critical}
-    return data
-
-
-def _examples(robot: Robot, duration: float, folder: str | Path | None) -> xr.Dataset:
-    walks = [
-        Trial(robot.with_value(K1, stiffness(spring)), duration, int(_SEEDS * spring), rate=_RATE, engine="twin")
-        for spring in _EXAMPLES
-    ]
-    angles = xr.concat([each.joint_angle.isel(robot=0, drop=True) for each in trials.run(walks, folder)], dim="spring")
-    data = angles.transpose("time", "spring", "joint").to_dataset(name="joint_angle")
-    data = data.assign_coords(spring=("spring", np.array(_EXAMPLES), {"units": PAPER_UNIT}))
-    data.attrs = {"robot": robot.name, "varied": K1, "about": "yaw joint angles over time"}
     return data

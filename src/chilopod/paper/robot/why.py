@@ -26,10 +26,10 @@ from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
 from chilopod.analysis.square_root import square_root_fit
 from chilopod.analysis.straight_walk import pitchfork
 from chilopod.errors import AnalysisError
-from chilopod.paper.printed import printed
-from chilopod.paper.robot.table import CHECKED, VERDICTS
+from chilopod.paper import printed
 from chilopod.paper.size import Size
-from chilopod.paper.table import RobotRow
+from chilopod.paper.statements import PLANAR_LIMIT
+from chilopod.paper.table import OfPlanar, OfTwin, of_twin
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot, Twin
 from chilopod.tasks.radius_law import CURVED
@@ -107,7 +107,6 @@ _DURATION, _SKIPPED = 18.0, 6.0  # s
 _SAMPLES = 6  # per period
 _BENT, _WALK = 0.5, 60.0  # rad (root of the sum of squares) and s, of the walks that a square root is fitted to
 _AVERAGED, _PER_SECOND = 12.0, 10.0  # s, a cycle of the undulation that the twin has besides; Hz
-_VOUCHED = 0.03
 _BESIDE = (0.75, 0.85, 0.95)  # of a point, springs for a finer one
 _SOFT_STEP = 2e-3  # s, enough for soft legs
 
@@ -288,7 +287,8 @@ def ablation(
     Dataset over factor: ``alone``, the point in the planar limit with only this one (N*mm/deg); ``without``, in the
     twin without it; ``path``, with it and all before it. Infinite where walks curve at all springs tried, NaN where at
     none. Attributes: ``limit`` and ``twin``, the same with none and all; ``vouched`` and ``exact``, the points of the
-    planar limit by :func:`limit_point` and of the planar model; ``grip``, the twin's creep coefficient (N*s/m).
+    planar limit by :func:`limit_point` and of the planar model; ``grip``, the twin's creep
+    coefficient, and ``viscous``, the planar model's (N*s/m).
     """
     names = [factor.name for factor in FACTORS]
     wanted: dict[str, list[list[str]]] = {"path": [names[: i + 1] for i in range(len(names))]}
@@ -314,29 +314,19 @@ def ablation(
         "limit": points[frozenset()],
         "twin": points[frozenset(names)],
         "grip": foot_creep(robot).across,
+        "viscous": planar.ground.friction,
     }
     return data
 
 
 def _shape(robot: Robot) -> Array:
-    """Of the bend that is started with: the paper's critical mode, or all joints alike."""
-    mode = np.array(printed()["pitchfork"]["joint_components"])
-    if robot.body.modules - 1 != len(mode):
-        mode = np.ones(robot.body.modules - 1)
+    """Of the bend that is started with."""
+    mode = np.array(printed.mode_shape(robot))
     return mode / np.linalg.norm(mode)
 
 
-def rows(data: xr.Dataset) -> list[RobotRow]:
+def rows(data: xr.Dataset) -> list[OfTwin | OfPlanar]:
     """The line of the robot's table: whether the engines vouch for each other."""
-    off = data.attrs["vouched"] / data.attrs["exact"] - 1.0
-    return [
-        RobotRow(
-            "planar limit of the twin: where the straight walk is lost",
-            "no counterpart",
-            f"{data.attrs['vouched']:.2f} N*mm/deg ({100.0 * off:+.1f} %)",
-            f"{data.attrs['exact']:.4f} N*mm/deg",
-            CHECKED,
-            VERDICTS[abs(off) <= _VOUCHED],
-            f"{100.0 * _VOUCHED:.0f} % of the planar model",
-        )
-    ]
+    point, exact = data.attrs["vouched"], data.attrs["exact"]
+    words = f"{point:.2f} N*mm/deg ({100.0 * (point / exact - 1.0):+.1f} %)"
+    return [of_twin(PLANAR_LIMIT, words, point / exact), OfPlanar(PLANAR_LIMIT, f"{exact:.4f} N*mm/deg")]

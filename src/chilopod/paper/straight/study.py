@@ -11,11 +11,11 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from chilopod import stability, units
+from chilopod import stability
 from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT, stiffness
 from chilopod.analysis.straight_walk import WalkBifurcation, first_loss, pitchfork
 from chilopod.errors import AnalysisError
-from chilopod.paper.printed import printed, printed_stiffness
+from chilopod.paper import printed
 from chilopod.planar import PlanarModel
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
@@ -75,8 +75,8 @@ def critical_mode(robot: Robot) -> xr.Dataset:
     attributes.
     """
     point = pitchfork(robot)
-    paper = np.array(printed()["pitchfork"]["joint_components"])
     components = point.joint_components.real
+    paper = np.array([each.value for each in printed.MODE])
     if len(components) != len(paper):
         paper = np.full(len(components), np.nan)
     return xr.Dataset(
@@ -94,36 +94,18 @@ def variants(robot: Robot, progress: Progress = silent) -> xr.Dataset:
 
     Returns
     -------
-    Dataset over variant: ``critical_k1``, ``error_bound``, ``robot_printed`` (N*mm/deg), ``paper_says``.
+    Dataset over variant: ``critical_k1``, ``error_bound``, ``robot_printed`` (N*mm/deg).
     """
-    table = printed()
-    names, values, bounds, robots, says = (
-        ["as built"],
-        [],
-        [],
-        [printed_stiffness("pitchfork", "robot_critical_k1")],
-        ["12"],
-    )
-    point = pitchfork(robot)
-    values.append(point.value)
-    bounds.append(point.error_bound)
-    for index, (name, entry) in enumerate(table["variants"].items()):
-        point = pitchfork(robot.set_from_text(entry["set"]))
-        names.append(name)
-        values.append(point.value)
-        bounds.append(point.error_bound)
-        robots.append(printed_stiffness("variants", name, "robot_critical_k1"))
-        says.append(entry["model"])
-        progress((index + 1) / len(table["variants"]), name)
-    robot_values = [units.from_si(value, PAPER_UNIT) for value in robots]
+    robots = printed.variant_robots(robot)
+    found = []
+    for index, (name, each) in enumerate(robots.items()):
+        progress(index / len(robots), name)
+        point = pitchfork(each)
+        found.append((point.value, point.error_bound, printed.onset(name).value))
+    names, columns = ("critical_k1", "error_bound", "robot_printed"), np.array(found).T
     return xr.Dataset(
-        {
-            "critical_k1": (("variant",), np.array(values), {"units": PAPER_UNIT}),
-            "error_bound": (("variant",), np.array(bounds), {"units": PAPER_UNIT}),
-            "robot_printed": (("variant",), np.array(robot_values), {"units": PAPER_UNIT}),
-            "paper_says": (("variant",), np.array(says, dtype=object)),
-        },
-        coords={"variant": np.array(names, dtype=object)},
+        {name: ("variant", each, {"units": PAPER_UNIT}) for name, each in zip(names, columns, strict=True)},
+        coords={"variant": np.array(list(robots), dtype=object)},
         attrs={"robot": robot.name},
     )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.paper.scatter import Answer, Difference, difference, every
 from chilopod.paper.turning.minima import NAMES, SCALES, minima
 from chilopod.paper.turning.trials import TurningTask
@@ -42,6 +43,14 @@ def counted(pitchfork: TurningTask, hopf: TurningTask) -> str:
     named = {"lower": True, "higher": False, "undecided": None}
     counts = {word: sum(each is answer for each in answers) for word, answer in named.items()}
     return ", ".join(f"{count} of {len(answers)} {word}" for word, count in counts.items() if count)
+
+
+def softest_minima(hopf: TurningTask, point: float) -> tuple[str, bool]:
+    """Where the criteria are smallest with all springs alike, beside the point below which the body undulates, and
+    whether all of them are below it, in the unstable region."""
+    at = minima(hopf.criteria).spring.sel(criterion=list(NAMES)).values
+    places = " and ".join(f"{spring:g}" for spring in np.unique(at))
+    return f"{places} {PAPER_UNIT}, the body undulates below {point:.2f}", bool((at < point).all())
 
 
 def saturated(time: float) -> float:

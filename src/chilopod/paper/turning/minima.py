@@ -9,14 +9,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from chilopod.paper.printed import Band
 from chilopod.paper.scatter import SURE, Answer
-from chilopod.paper.turning.trials import CRITERIA, springs_by_outcome
-from chilopod.steering import Outcome
+from chilopod.paper.turning.trials import CRITERIA
 
 Array = NDArray[np.float64]
-
-AROUND = (17.0 / 21.0, 28.0 / 21.0)
-"""Between these parts of the law's spring a minimum counts as "around" it: the paper's own neighbours of 21."""
 
 NAMES = {"distance": "ε1, distance", "angle": "ε2, angle", "effort": "ε3, leg yaw"}
 """The paper's criteria."""
@@ -40,15 +37,10 @@ def minima(criteria: xr.Dataset, instant: int = 0) -> xr.Dataset:
     Dataset over criterion: the ``spring`` of the smallest mean, ``at``, where a parabola in 1/k1 through it and its
     neighbours has its vertex (the spring itself at an end of the grid), ``softest`` and ``stiffest``, between which lie
     the springs that are no worse by more than two standard errors of the difference (seed by seed), all in N*mm/deg;
-    ``mean`` and ``error`` of the smallest; ``inside``, whether it lies inside the grid; and ``between``, whether it
-    lies between the stiffest spring that turns inside and the softest that bulges outside.
+    ``mean`` and ``error`` of the smallest.
     """
     at_instant = criteria.isel(instant=instant)
     springs = criteria.spring.values
-    outcomes = springs_by_outcome(criteria)
-    outside = min(outcomes[Outcome.OUTSIDE.label], default=np.inf)
-    # Softer than those that turn inside are those that curl up altogether.
-    within = max(outcomes[Outcome.INSIDE.label] + outcomes[Outcome.FAILED.label], default=0.0)
     rows: dict[str, list[Any]] = {name: [] for name in ("spring", "at", "softest", "stiffest", "mean", "error")}
     for name in CRITERIA:
         mean, each = at_instant[f"{name}_mean"].values, at_instant[name].values
@@ -66,32 +58,28 @@ def minima(criteria: xr.Dataset, instant: int = 0) -> xr.Dataset:
         rows["stiffest"].append(alike.max())
         rows["mean"].append(mean[lowest])
         rows["error"].append(at_instant[f"{name}_error"].values[lowest])
-    data = xr.Dataset(
+    return xr.Dataset(
         {name: ("criterion", np.array(column, float)) for name, column in rows.items()},
         coords={"criterion": list(CRITERIA)},
-        attrs={"seconds": float(at_instant.seconds), "stiffest_inside": within, "softest_outside": outside},
+        attrs={"seconds": float(at_instant.seconds)},
     )
-    data["inside"] = (data.spring > springs.min()) & (data.spring < springs.max())
-    data["between"] = (data["at"] > within) & (data["at"] < outside)
-    return data
 
 
-def around(low: xr.Dataset, k_hat: float) -> Answer:
-    """Whether a criterion is smallest around a spring: undecided if springs that are no worse lie within as well as
-    without.
+def around(low: xr.Dataset, said: Band) -> Answer:
+    """Whether a criterion is smallest where it is said to be: undecided if springs that are no worse lie within as well
+    as without.
 
     Parameters
     ----------
     low
         One criterion of :func:`minima`.
-    k_hat
-        The spring, N*mm/deg; what counts as around it says :data:`AROUND`.
+    said
+        Between which springs, N*mm/deg.
     """
-    least, most = (part * k_hat for part in AROUND)
     low_end, high_end = min(float(low.softest), float(low["at"])), max(float(low.stiffest), float(low["at"]))
-    if least <= low_end and high_end <= most:
+    if said.low <= low_end and high_end <= said.high:
         return True
-    return None if low_end <= most and least <= high_end else False
+    return None if low_end <= said.high and said.low <= high_end else False
 
 
 def _vertex(springs: Array, mean: Array, lowest: int) -> float:

@@ -15,7 +15,7 @@ from chilopod import trials
 from chilopod.analysis.parameters import ALL, PAPER_UNIT, stiffness
 from chilopod.analysis.radius_law import RadiusLaws, radius_laws
 from chilopod.analysis.straight_walk import first_loss
-from chilopod.paper.printed import printed
+from chilopod.paper import printed
 from chilopod.paper.size import Size
 from chilopod.paper.turning.trials import (
     DURATION,
@@ -103,9 +103,9 @@ def turning(
     springs = QUICK_SPRINGS if quick else SPRINGS
     laws = radius_laws(robot)
     tasks: dict[str, TurningTask] = {}
-    for index, (letter, entry) in enumerate(printed()["turning"]["tasks"].items()):
+    for index, (letter, said) in enumerate(printed.TASKS.items()):
         told = part(progress, 0.25 * index, 0.25 * (index + 1), f"task {letter}")
-        tasks[letter] = turning_task(robot, Target.parse(entry["target"]), springs, folder=folder, progress=told)
+        tasks[letter] = turning_task(robot, said.target, springs, folder=folder, progress=told)
     task = tasks["A"]
     hopf = turning_task(
         robot,

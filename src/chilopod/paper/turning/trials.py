@@ -6,7 +6,7 @@ module 1 yaw towards the target. Each task is walked with many springs and sever
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,9 +14,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from chilopod import trials, units
+from chilopod import trials
 from chilopod.analysis.parameters import PAPER_UNIT, stiffness
-from chilopod.paper.printed import printed
+from chilopod.paper import printed
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import STRATEGIES, Outcome, Target, earliest_arrival, evaluate, steered
@@ -26,10 +26,8 @@ from chilopod.trials import Disturbance, Trial
 
 Array = NDArray[np.float64]
 
-DURATION: float = units.parse(printed()["turning"]["evaluation_time"], "s")
+DURATION = printed.ARRIVAL.value
 """s: when the paper evaluates, and how long trials of the planar model are, which arrives well before."""
-
-REPEATS: int = printed()["turning"]["repeats"]
 
 SPRINGS = (5, 6, 7, 7.5, 8, 8.5, 9, 9.5, 10, 10.5, 11, 11.5, 12, 12.5, 13, 14, 15, 17, 21, 28, 41, 75)
 """N*mm/deg: k1 of the turning tasks, close together where the planar model's criteria have their minima."""
@@ -87,7 +85,7 @@ def turning_task(
     robot: Robot,
     target: Target,
     springs: Sequence[float] = SPRINGS,
-    repeats: int = REPEATS,
+    repeats: int = printed.REPEATS,
     strategy: str = "pitchfork",
     *,
     time: float | None = None,
@@ -223,12 +221,63 @@ def _nearest(springs: Sequence[float], wanted: float) -> float:
     return min(springs, key=lambda spring: abs(np.log(spring / wanted)))
 
 
-def springs_by_outcome(criteria: xr.Dataset) -> dict[str, list[float]]:
+def springs_by_outcome(criteria: xr.Dataset) -> dict[Outcome, list[float]]:
     """Springs (N*mm/deg) by what became of most of their trials."""
     found: dict[str, list[float]] = {outcome.label: [] for outcome in Outcome}
     for spring, labels in zip(criteria.spring.values, criteria.outcome.values, strict=True):
         names, counts = np.unique(labels.astype(str), return_counts=True)
         found[str(names[counts.argmax()])].append(float(spring))
+    return {outcome: found[outcome.label] for outcome in Outcome}
+
+
+def outcome_words(criteria: xr.Dataset, written: Callable[[list[float]], str]) -> str:
+    """What became of walks to a target, from stiff springs to soft ones."""
+    found = springs_by_outcome(criteria)
+    shown = (Outcome.OUTSIDE, Outcome.ARRIVED, Outcome.INSIDE, Outcome.FAILED)
+    return "; ".join(f"{outcome.label} at {written(found[outcome])}" for outcome in shown if found[outcome])
+
+
+def span(springs: list[float]) -> str:
+    """From the softest to the stiffest."""
+    return f"{min(springs):g}" + (f" to {max(springs):g}" if len(springs) > 1 else "")
+
+
+@dataclass(frozen=True)
+class LegYaw:
+    """Walks to a target at one spring, see :func:`without_leg_yaw`.
+
+    Attributes
+    ----------
+    name, spring
+        The spring's, N*mm/deg.
+    alone, helped
+        Walks without leg yaw and with it.
+    """
+
+    name: str
+    spring: float
+    alone: xr.Dataset
+    helped: xr.Dataset
+
+    def __str__(self) -> str:
+        """How many arrive."""
+        (few, without), (many, with_) = (arrivals(each) for each in (self.alone, self.helped))
+        left = int((self.alone.turned > 0.0).sum())
+        return f"{few} of {without} arrive ({left} turn left), with it {many} of {with_}"
+
+
+def arrivals(walks: xr.Dataset) -> tuple[int, int]:
+    """How many of some walks arrive, and how many there are."""
+    return int(np.nansum(walks.arrived)), int(np.isfinite(walks.arrived).sum())
+
+
+def by_leg_yaw(data: xr.Dataset) -> list[LegYaw]:
+    """What :func:`without_leg_yaw` found, by spring."""
+    found = []
+    for case in np.flatnonzero(~data.leg_yaw.values):
+        alone, helped = data.isel(case=int(case)), data.isel(case=int(case) + 1)
+        name = str(alone.case.values).partition(",")[0]
+        found.append(LegYaw(name, float(alone.spring), alone, helped))
     return found
 
 
@@ -263,13 +312,13 @@ def without_leg_yaw(
     and ``turned``, the last heading (rad, left positive). Cases are the names, each ``leg_yaw`` or not, with
     ``spring``; where there are fewer trials than nine the rest is NaN.
     """
-    cases, most = [], int(printed()["turning"]["open_loop_repeats"])
+    cases, most = [], printed.WITHOUT_LEG_YAW
     for index, ((name, spring), leg_yaw) in enumerate((item, with_) for item in springs.items() for with_ in (0, 1)):
         strategy = "pitchfork" if leg_yaw else "open-loop"
         walker, controller = steered(robot, STRATEGIES[strategy], stiffness(spring))
         asked = [
             Trial(walker, duration, seed, target=target, controller=controller, rate=RATE, engine=engine)
-            for seed in range(REPEATS if leg_yaw else most)
+            for seed in range(printed.REPEATS if leg_yaw else most)
         ]
         record = trials.together(trials.run(asked, folder))
         result = evaluate(record, duration)

@@ -48,19 +48,16 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
     for joint, color in zip(data.joint.values, (style.BLACK, *style.CURVES), strict=False):
         angle = np.rad2deg(data.mean_angle.sel(joint=joint).values)
         _curve(axes["A"], x, angle, stable, color, f"joint {joint}")
-    axes["A"].set_ylabel("mean joint angle (deg)")
-    axes["A"].set_title("Bend")
+    axes["A"].set(ylabel="mean joint angle (deg)", title="Bend")
 
     _curve(axes["B"], x, data.axis_radius.values, stable, style.BLUE, "body axis, (N−1) L / Σ|θ|")
     _curve(axes["B"], x, data.path_radius.values, stable, style.ORANGE, "path of module 1")
-    axes["B"].set_ylabel("radius (m)")
-    axes["B"].set_title("Radius of the turn")
+    axes["B"].set(ylabel="radius (m)", title="Radius of the turn")
     # The radius grows without bound towards the pitchfork; what matters is what a robot can turn in.
     axes["B"].set_ylim(0.0, 2.0)
 
     _curve(axes["C"], x, data.cost_of_transport.values, stable, style.GREEN, "")
-    axes["C"].set_ylabel("cost of transport (1)")
-    axes["C"].set_title("What it costs")
+    axes["C"].set(ylabel="cost of transport (1)", title="What it costs")
 
     for axes_ in axes.values():
         axes_.set_xlabel(label)

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from chilopod.paper import printed
 from chilopod.report.kit import style
 from chilopod.report.kit.panel import Panel
 from chilopod.report.kit.words import SPRING_UNIT, k, listing, number, signed, spans, spring, typeset
@@ -44,10 +45,11 @@ def variants(data: xr.Dataset) -> Panel:
             f"{listing(names)}. Filled dots are computed here for the planar model. Open diamonds are not: they are "
             "what the paper reports of its robot, from a square-root law fitted to trials.",
             f"Why {number(model[0], 2)} and not {robot[0]:.0f}? The planar model bends at {spring(model[0])}, the "
-            f"real robot at about {spring(robot[0], 2)}. The paper's own planar model has {data.paper_says.values[0]} "
-            "as well, so this is no failure to reproduce it: the simple model needs a softer spring than the robot "
-            "does, and the paper leaves open why. In the model feet follow their path exactly, never touch the floor "
-            "in the air, and rub like dampers; a robot's legs give way, may drag, and rub dry.",
+            f"real robot at about {spring(robot[0], 2)}. The paper's own planar model has "
+            f"{printed.CRITICAL_K1.value:g} as well, so this is no failure to reproduce it: the simple model needs a "
+            "softer spring than the robot does, and the paper leaves open why. In the model feet follow their path "
+            "exactly, never touch the floor in the air, and rub like dampers; a robot's legs give way, may drag, and "
+            "rub dry.",
             "What carries over is the direction of the changes, drawn in the second panel: "
             + listed
             + (". Model and robot put the four in the same order." if same_order else "."),
@@ -65,8 +67,8 @@ def modules(data: xr.Dataset, robot: Robot) -> Panel:
     missing = [int(count) for count in counts[~found]]
     long = values[found & (counts > 6)]
     level = (
-        f"From 7 modules on it stays between {number(long.min())} and {spring(long.max(), 3)}, as the paper says: the "
-        "number of modules hardly matters. "
+        f"From 7 modules on it stays between {number(long.min())} and {spring(long.max(), 3)}; the paper says "
+        f"{printed.LITTLE_CHANGE.words}. "
         if long.size
         else ""
     )
@@ -121,20 +123,17 @@ def _draw_variants(data: xr.Dataset, narrow: bool) -> Figure:
             for value, row in zip(shown, rows + shift, strict=True):
                 if not (relative and row < 0.5):
                     text = f"{signed(value)} %" if relative else number(value, 3 if fill == "full" else 2)
-                    axes_.annotate(
+                    style.note(
+                        axes_,
                         text,
                         (value, row),
                         (-9 if relative else 9, 0),
-                        textcoords="offset points",
                         ha="right" if relative else "left",
                         va="center",
-                        fontsize=style.SMALL,
                     )
         axes_.set_yticks(rows, names)
         axes_.tick_params(axis="y", length=0)
-        axes_.set_ylim(rows[-1] + 0.55, -0.55)
-        axes_.set_title(title)
-        axes_.set_xlabel(label)
+        axes_.set(ylim=(rows[-1] + 0.55, -0.55), title=title, xlabel=label)
         style.grid(axes_, "x")
     axes["A"].set_xlim(0.0, 1.2 * max(values.max() for values in both))
     lowest = min(100.0 * (values / values[0] - 1.0).min() for values in both)
@@ -197,12 +196,10 @@ def _draw_modules(data: xr.Dataset, built: int, narrow: bool) -> Figure:
             clip_on=False,
             label="no pitchfork",
         )
-    axes.set_ylim(0.0, 1.3 * np.nanmax(values))
-    axes.set_xlim(counts[0] - 0.6, counts[-1] + 0.6)
+    axes.set(ylim=(0.0, 1.3 * np.nanmax(values)), xlim=(counts[0] - 0.6, counts[-1] + 0.6))
     axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
     axes.xaxis.set_major_locator(MaxNLocator(9 if narrow else 20, integer=True))
-    axes.set_xlabel("number of modules")
-    axes.set_ylabel(f"critical {k(1)} ({SPRING_UNIT})")
+    axes.set(xlabel="number of modules", ylabel=f"critical {k(1)} ({SPRING_UNIT})")
     axes.legend(loc="upper right", ncols=1 if narrow else 3)
     style.grid(axes, "y")
     return figure

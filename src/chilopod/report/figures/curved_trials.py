@@ -6,24 +6,22 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from chilopod.paper.curved.study import CurvedStudy, axis_radius, bent
+from chilopod.paper import printed
+from chilopod.paper.curved.study import CurvedStudy, axis_radius, bend_order, bent, fluctuation
 from chilopod.paper.curved.trials import on_branch
-from chilopod.paper.printed import printed
+from chilopod.report.figures.compliance import JOINT_STYLES, draw_times, errorbars, means, over_compliance
 from chilopod.report.kit import style
 from chilopod.report.kit.panel import Panel
-from chilopod.report.kit.words import SPRING_UNIT, k, number, spring
+from chilopod.report.kit.words import SPRING_UNIT, k, listing, number, spring, typeset
 from chilopod.trials import Disturbance
 
 Array = NDArray[np.float64]
 
-INVERSE_UNIT = "deg/(N·mm)"
-
 _WALKS = (style.Layout("AB;CD", 7.4), style.Layout("A;B;C;D", 13.6))
 _JOINTS = (style.Layout("A", 4.0), style.Layout("A", 4.4))
 _ONSET = (style.Layout("AB", 3.9), style.Layout("A;B", 7.4))
-_JOINT_STYLES = tuple(zip((style.BLACK, *style.CURVES), "os^vD", strict=False))
 _DASHED = (0, (4, 2))
 _MARKED = (41.0, 15.0, 11.0, 9.0, 7.0)  # springs on a short scale
 
@@ -35,8 +33,13 @@ def walks(study: CurvedStudy) -> Panel:
     lefts, rights = (int((trials.direction == side).sum()) for side in ("left", "right"))
     unsettled = int((~trials.settled).sum())
     straight, curved = (float(value) for value in study.examples.spring.values)
-    robot = _robot_radii()
-    ours = [axis_radius(study.branch, exact / relative) for relative, _ in robot]
+    stiff = trials.spring.values > exact
+    if here.any():
+        wider, softest, stiffest = fluctuation(trials)
+    tighter = [
+        number(radius.value / axis_radius(study.branch, exact * at / printed.ONSET.value), 2)
+        for at, radius in printed.RADII.items()
+    ]
     return Panel(
         name="curved-walks",
         title="Curved walks below the critical spring",
@@ -47,8 +50,9 @@ def walks(study: CurvedStudy) -> Panel:
         text=(
             f"{trials.sizes['repeat']} walks from straight on at each of {trials.sizes['spring']} springs, every one "
             "with small errors of its joints and heading at the start and feet that differ by "
-            f"{100.0 * Disturbance().friction:g} %. Stiffer than {spring(exact)} all end straight; softer, all bend, "
-            f"{lefts} to the left and {rights} to the right."
+            f"{100.0 * Disturbance().friction:g} %. Of {here[stiff].size} walks with springs stiffer than "
+            f"{spring(exact)} {int(here[stiff].sum())} end in a curve, of {here[~stiff].size} with softer ones "
+            f"{int(here[~stiff].sum())}: {lefts} to the left and {rights} to the right."
             + (f" {unsettled} had not settled and are left out." if unsettled else " All had settled."),
             f"Panels A and B are single walks at {k(1)} = {number(straight, 2)} and {spring(curved, 2)}; the body "
             "sways within every gait cycle, hence the thick lines. In C and D dots and bars are means and standard "
@@ -57,10 +61,11 @@ def walks(study: CurvedStudy) -> Panel:
             f"{number(fit.critical)}, {number(100 * (fit.critical / exact - 1), 2)} % too stiff.",
             "The open diamonds in D are the two radii that the paper prints of its robot, placed by their springs' "
             "share of the robot's own critical one. They are the robot's, not the model's: the model bends "
-            f"{number(robot[0][1] / ours[0], 2)} and {number(robot[1][1] / ours[1], 2)} times as tightly there.",
-            "One thing differs from the robot: the paper sees its trials scatter more as the spring gets softer, here "
-            "they scatter most beside the critical spring. Uneven feet leave a straight walk straight and only move "
-            "the critical spring of a trial a little, and the bend depends on that most where it rises steeply.",
+            f"{listing(tighter)} times as tightly there.",
+            "The paper sees its trials scatter more as the spring gets softer. Here that is "
+            f"{wider} at {number(softest, 2)} than at {spring(stiffest)}: uneven feet leave a straight walk straight "
+            "and only move the critical spring of a trial a little, and the bend depends on that most where it rises "
+            "steeply, beside the critical spring.",
         )
         if here.any()
         else ("No trial ended in a curve.",),
@@ -76,8 +81,9 @@ def joints(study: CurvedStudy) -> Panel:
         draw=lambda narrow: _draw_joints(study, narrow),
         alt=f"Mean absolute angles of all joints over 1/{k(1)}: zero up to the critical spring, then rising steeply.",
         text=(
-            "Mean absolute angle of every joint, trials (means, standard errors) on the exact walks (lines). All "
-            "joints bend to one side and keep the order of the critical mode, whose proportions they start with.",
+            "Mean absolute angle of every joint, trials (means, standard errors) on the exact walks (lines). In the "
+            f"trials that curve the joints bend in the order {listing(map(str, bend_order(study.trials)))}, the most "
+            f"first; the critical mode of the paper's planar model has {listing(map(str, printed.MODE_ORDER))}.",
         ),
         data=_table(study.trials),
     )
@@ -87,6 +93,8 @@ def onset(study: CurvedStudy) -> Panel:
     """How far the paper's square-root fit lies from the point, and why."""
     fits, law, exact = study.fits, study.law, study.fits.attrs["exact_k1"]
     wide, near = fits.isel(softest=-1), fits.isel(softest=0)
+    kinds = study.comparison.criticality
+    other = [typeset(str(name)) for name in kinds.variant[kinds != kinds[0]].values]
     power = float(law.power.sel(softest=0.98 * exact, method="nearest"))
     return Panel(
         name="curved-onset",
@@ -94,7 +102,7 @@ def onset(study: CurvedStudy) -> Panel:
         draw=lambda narrow: _draw_onset(study, narrow),
         alt=f"Critical spring by the fit over ranges of springs, from {number(float(near.critical_k1), 4)} to "
         f"{number(float(wide.critical_k1), 4)}, beside the exact {number(exact, 4)}; and the power with which the bend "
-        "grows, about 0.3 instead of one half.",
+        f"grows, {number(power, 1)} instead of one half.",
         text=(
             "A square root is what a supercritical pitchfork promises close by. How close? Fitted to all trials it "
             f"gives {number(float(wide.critical_k1), 4)} ± {number(float(wide.bootstrap_error), 1)} {SPRING_UNIT}, to "
@@ -104,61 +112,16 @@ def onset(study: CurvedStudy) -> Panel:
             "walks of the same springs, without any noise, it is off as much (open dots). More trials do not help, "
             "only springs closer to the point do.",
             "The second panel shows why: 2 % below the point the bend of joint 1 grows with the power "
-            f"{number(power, 2)} of the distance, not one half. The cubic term of this pitchfork is nearly zero (the "
-            "paper's variants have it on the other side of zero), so the next one takes over at once, and with it a "
-            "fourth root.",
+            f"{number(power, 2)} of the distance, not one half. The cubic term of this pitchfork is nearly zero"
+            + (f" (with {listing(other)} it is on the other side of zero)" if other else "")
+            + ", so the next one takes over at once, which alone would make it a fourth root.",
         ),
         data=xr.merge([fits, law.rename({name: f"law_{name}" for name in (*law.data_vars, "softest")})]),
     )
 
 
-def errorbars(axes: Axes, x: Array, y: Array, error: Array, color: str, marker: str, name: str = "") -> None:
-    """Means with standard errors."""
-    axes.errorbar(
-        x,
-        y,
-        error,
-        color=color,
-        marker=marker,
-        markersize=5,
-        linestyle="none",
-        capsize=2.5,
-        elinewidth=1.2,
-        label=name or None,
-        zorder=4,
-    )
-
-
-def springs_above(axes: Axes, values: tuple[float, ...]) -> None:
-    """A second scale along the top of an axis of 1/k1: the springs themselves."""
-    top = axes.secondary_xaxis("top", functions=(_inverse, _inverse))
-    top.set_xticks(values, [f"{value:g}" for value in values])
-    top.tick_params(length=3, pad=1)
-    top.set_xlabel(f"{k(1)} ({SPRING_UNIT})", labelpad=6, fontsize=style.SMALL)
-    top.spines["top"].set_visible(False)
-
-
-def _inverse(x: ArrayLike) -> Array:
-    return 1.0 / np.maximum(np.asarray(x, dtype=np.float64), 1e-9)
-
-
-def _robot_radii() -> list[tuple[float, float]]:
-    """The paper's robot: critical over actual spring, and radius in m."""
-    critical = float(printed()["pitchfork"]["robot_critical_k1"].split()[0])
-    return [(critical / float(at), float(text.split()[0])) for at, text in printed()["curved"]["radius"].items()]
-
-
 def _table(trials: xr.Dataset) -> xr.Dataset:
     return trials.drop_vars("end_state")
-
-
-def _means(values: Array, here: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Mean and standard error of the trials chosen at every spring; NaN without two of them."""
-    chosen = [row[mask] for row, mask in zip(values, here, strict=True)]
-    return (
-        np.array([row.mean() if row.size > 1 else np.nan for row in chosen]),
-        np.array([row.std(ddof=1) / np.sqrt(row.size) if row.size > 1 else np.nan for row in chosen]),
-    )
 
 
 def _along(study: CurvedStudy, softest: float) -> tuple[Array, Array]:
@@ -172,13 +135,12 @@ def _draw_walks(study: CurvedStudy, narrow: bool) -> Figure:
     figure, axes = style.figure(*_WALKS, narrow)
     straight, curved = study.examples.spring.values
     limits = (
-        _draw_times(axes["A"], study.examples.sel(spring=straight)),
-        _draw_times(axes["B"], study.examples.sel(spring=curved)),
+        draw_times(axes["A"], study.examples.sel(spring=straight)),
+        draw_times(axes["B"], study.examples.sel(spring=curved)),
     )
     low, high = min(limits[0][0], limits[1][0]), max(limits[0][1], limits[1][1])
     for letter, what in (("A", f"Straight, {k(1)} = {straight:g}"), ("B", f"Curved, {k(1)} = {curved:g}")):
-        axes[letter].set_ylim(low, high)
-        axes[letter].set_title(f"{letter}  {what} {SPRING_UNIT}")
+        axes[letter].set(ylim=(low, high), title=f"{letter}  {what} {SPRING_UNIT}")
     axes["A"].legend(loc="upper left", ncols=2 if narrow else 3)
 
     trials, exact = study.trials, study.trials.attrs["critical_k1"]
@@ -187,7 +149,7 @@ def _draw_walks(study: CurvedStudy, narrow: bool) -> Figure:
     grid, angles = _along(study, softest)
     _draw_fork(axes["C"], study, grid, angles[:, 0])
 
-    radius, error = _means(trials.axis_radius.values, here)
+    radius, error = means(trials.axis_radius.values, here)
     axes["D"].plot(
         exact * grid[1:],
         [axis_radius(study.branch, float(1.0 / value)) for value in grid[1:]],
@@ -195,10 +157,10 @@ def _draw_walks(study: CurvedStudy, narrow: bool) -> Figure:
         label="model, exact",
     )
     errorbars(axes["D"], exact * inverse, radius, error, style.BLUE, "o", "model, trials")
-    relative, robot = np.array(_robot_radii()).T
+    robot = {printed.ONSET.value / spring: radius.value for spring, radius in printed.RADII.items()}
     axes["D"].plot(
-        relative,
-        robot,
+        list(robot),
+        list(robot.values()),
         "D",
         color=style.ORANGE,
         markerfacecolor="white",
@@ -206,29 +168,18 @@ def _draw_walks(study: CurvedStudy, narrow: bool) -> Figure:
         markersize=8,
         label="robot, paper",
     )
-    for at, value, (name, _) in zip(relative, robot, printed()["curved"]["radius"].items(), strict=True):
-        axes["D"].annotate(
-            f"{k(1)} = {name}", (at, value), (0, 9), textcoords="offset points", ha="center", fontsize=style.SMALL
-        )
-    axes["D"].set_xlim(0.97, exact / softest + 0.04)
-    axes["D"].set_ylim(0.0, 1.6)
-    axes["D"].set_xlabel(f"critical {k(1)} / {k(1)}")
-    axes["D"].set_ylabel("radius of the body axis (m)")
-    axes["D"].set_title("D  Radius")
+    for (at, value), name in zip(robot.items(), printed.RADII, strict=True):
+        style.note(axes["D"], f"{k(1)} = {name:g}", (at, value), (0, 9), ha="center")
+    axes["D"].set(
+        xlim=(0.97, exact / softest + 0.04),
+        ylim=(0.0, 1.6),
+        xlabel=f"critical {k(1)} / {k(1)}",
+        ylabel="radius of the body axis (m)",
+        title="D  Radius",
+    )
     axes["D"].legend(loc="upper right")
     style.grid(axes["D"])
     return figure
-
-
-def _draw_times(axes: Axes, walk: xr.Dataset) -> tuple[float, float]:
-    for joint, (color, _) in zip(walk.joint.values, _JOINT_STYLES, strict=False):
-        angle = np.rad2deg(walk.joint_angle.sel(joint=joint).values)
-        axes.plot(walk.time.values, angle, color=color, lw=0.9, label=f"joint {joint}")
-    axes.set_xlabel("time (s)")
-    axes.set_ylabel("yaw joint angle (deg)")
-    style.grid(axes)
-    axes.margins(x=0.0)
-    return axes.get_ylim()
 
 
 def _draw_fork(axes: Axes, study: CurvedStudy, grid: Array, exact_angle: Array) -> None:
@@ -250,14 +201,12 @@ def _draw_fork(axes: Axes, study: CurvedStudy, grid: Array, exact_angle: Array) 
     axes.plot([1.0 / exact, grid[-1]], [0.0, 0.0], color=style.BLUE, lw=1.0, linestyle=(0, (1, 2)), label="unstable")
     angle = np.rad2deg(trials.mean_angle.sel(joint=1).values)
     for side in ("right", "left", "straight"):
-        mean, error = _means(angle, trials.direction.values == side)
+        mean, error = means(angle, trials.direction.values == side)
         errorbars(axes, inverse, mean, error, style.BLACK, "o", "trials" if side == "right" else "")
     axes.plot(1.0 / exact, 0.0, "D", color=style.VERMILLION, label="pitchfork", zorder=5)
     axes.set_xlim(start, grid[-1] + 0.004)
-    springs_above(axes, _MARKED)
-    axes.set_xlabel(f"1/{k(1)} ({INVERSE_UNIT})")
-    axes.set_ylabel("mean angle of joint 1 (deg)")
-    axes.set_title("C  Joint 1")
+    over_compliance(axes, _MARKED)
+    axes.set(ylabel="mean angle of joint 1 (deg)", title="C  Joint 1")
     axes.legend(loc="upper left")
     style.grid(axes)
 
@@ -268,14 +217,13 @@ def _draw_joints(study: CurvedStudy, narrow: bool) -> Figure:
     trials, here = study.trials, bent(study.trials)
     inverse = 1.0 / trials.spring.values
     grid, angles = _along(study, float(trials.spring.values[here.any(axis=1)].min()))
-    for index, (joint, (color, marker)) in enumerate(zip(trials.joint.values, _JOINT_STYLES, strict=False)):
+    for index, (joint, (color, marker)) in enumerate(zip(trials.joint.values, JOINT_STYLES, strict=False)):
         axes.plot(grid, np.abs(angles[:, index]), color=color, lw=1.3)
         counted = here | (trials.direction.values == "straight")
-        mean, error = _means(np.abs(np.rad2deg(trials.mean_angle.sel(joint=joint).values)), counted)
+        mean, error = means(np.abs(np.rad2deg(trials.mean_angle.sel(joint=joint).values)), counted)
         errorbars(axes, inverse, mean, error, color, marker, f"joint {joint}")
     axes.set_xlim(0.9 * inverse.min(), grid[-1] + 0.005)
-    springs_above(axes, _MARKED if narrow else (41.0, 20.0, 15.0, 13.0, 11.0, 10.0, 9.0, 8.0, 7.0))
-    axes.set_xlabel(f"1/{k(1)} ({INVERSE_UNIT})")
+    over_compliance(axes, _MARKED if narrow else (41.0, 20.0, 15.0, 13.0, 11.0, 10.0, 9.0, 8.0, 7.0))
     axes.set_ylabel("mean absolute angle (deg)")
     axes.legend(loc="upper left")
     style.grid(axes)
@@ -302,18 +250,19 @@ def _draw_onset(study: CurvedStudy, narrow: bool) -> Figure:
         label="the same springs, exact walks",
     )
     axes["A"].axhline(exact, color=style.VERMILLION, lw=1.2, label=f"pitchfork, {number(exact, 5)}")
-    axes["A"].set_ylabel(f"critical {k(1)} ({SPRING_UNIT})")
-    axes["A"].set_title("A  What the fit gives")
+    axes["A"].set(ylabel=f"critical {k(1)} ({SPRING_UNIT})", title="A  What the fit gives")
     axes["A"].legend(loc="upper left")
     axes["A"].set_xlabel(f"softest spring fitted, below critical {k(1)} by (%)")
     axes["B"].semilogx(along, law.power.values, color=style.BLUE)
     for value, name in ((0.5, "square root"), (0.25, "fourth root")):
         axes["B"].axhline(value, color=style.GREY, lw=1.0, linestyle=_DASHED)
-        axes["B"].annotate(name, (along[0], value), (0, 4), textcoords="offset points", fontsize=style.SMALL)
-    axes["B"].set_ylim(0.2, 0.56)
-    axes["B"].set_ylabel("power that the bend grows with")
-    axes["B"].set_xlabel(f"{k(1)} below its critical value by (%)")
-    axes["B"].set_title("B  Why")
+        style.note(axes["B"], name, (along[0], value), (0, 4))
+    axes["B"].set(
+        ylim=(0.2, 0.56),
+        ylabel="power that the bend grows with",
+        xlabel=f"{k(1)} below its critical value by (%)",
+        title="B  Why",
+    )
     for each in axes.values():
         each.xaxis.set_major_formatter(lambda value, position: f"{value:g}")
         style.grid(each)

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from chilopod.paper.curved.study import CurvedStudy, axis_radius
-from chilopod.report.figures.curved_trials import INVERSE_UNIT, errorbars
+from chilopod.report.figures.compliance import INVERSE_UNIT, errorbars
 from chilopod.report.kit import style
 from chilopod.report.kit.panel import Panel
 from chilopod.report.kit.words import SPRING_UNIT, k, listing, number, signed, spring, typeset
@@ -31,6 +31,8 @@ def panel(study: CurvedStudy) -> Panel:
         f"(robot {number(float(at.robot_k1), 2)})"
         for name, at in ((name, data.isel(variant=i)) for i, name in enumerate(names))
     )
+    most = names[int(np.abs(data.equal_ratio.values - 1.0).argmax())]
+    stiff = int((data.fitted_k1 > data.exact_k1).sum())
     folded = [
         f"{name} (up to {spring(float(at.stiffest_k1), 4)})"
         for name, at in ((name, data.isel(variant=i)) for i, name in enumerate(names))
@@ -46,9 +48,9 @@ def panel(study: CurvedStudy) -> Panel:
             "The paper finds that softer rear springs and slower walking move the onset and leave the radius almost as "
             "it is, and that a module phase of 180° leaves the onset and makes the radius smaller. In the model the "
             "radius depends on how far a spring lies below the critical one and on little else: at the same share of "
-            f"each variant's own critical spring it changes by {changes}, the phase most, as in the paper.",
-            f"Fitted like the robot's, the critical springs come out as {fits}, in {SPRING_UNIT}: all too stiff, for "
-            "the reason given above.",
+            f"each variant's own critical spring it changes by {changes}, most for {most}.",
+            f"Fitted like the robot's, the critical springs come out as {fits}, in {SPRING_UNIT}: {stiff} of "
+            f"{len(names)} too stiff, for the reason given above.",
             f"In {listing(folded)} the pitchfork is subcritical: the bend does not grow from zero but jumps, and for "
             "springs a little stiffer than the critical one straight and curved walks are both stable."
             if folded
@@ -77,10 +79,7 @@ def _draw(study: CurvedStudy, narrow: bool) -> Figure:
         ("A", f"1/{k(1)} ({INVERSE_UNIT})", f"A  Over 1/{k(1)}"),
         ("B", f"critical {k(1)} / {k(1)}", "B  Over its own critical spring"),
     ):
-        axes[letter].set_ylim(0.2, 1.0)
-        axes[letter].set_xlabel(label)
-        axes[letter].set_ylabel("radius of the body axis (m)")
-        axes[letter].set_title(title)
+        axes[letter].set(ylim=(0.2, 1.0), xlabel=label, ylabel="radius of the body axis (m)", title=title)
         style.grid(axes[letter])
     axes["B"].legend(loc="upper right")
     _draw_onsets(axes["C"], study, narrow)
@@ -113,8 +112,6 @@ def _draw_onsets(axes: Axes, study: CurvedStudy, narrow: bool) -> None:
     )
     axes.set_yticks(rows, [re.sub(r" (?=\d)", "\n", typeset(str(name))) for name in data.variant.values])
     axes.tick_params(axis="y", length=0)
-    axes.set_ylim(rows[-1] + 0.6, -0.6)
-    axes.set_xlabel(f"critical {k(1)} ({SPRING_UNIT})")
-    axes.set_title("C  Where the bend sets in")
+    axes.set(ylim=(rows[-1] + 0.6, -0.6), xlabel=f"critical {k(1)} ({SPRING_UNIT})", title="C  Where the bend sets in")
     axes.legend(loc="upper left", bbox_to_anchor=(-0.3 if narrow else 0.0, -0.26), ncols=1 if narrow else 3)
     style.grid(axes, "x")

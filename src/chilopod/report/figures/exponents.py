@@ -169,15 +169,13 @@ def _near(axes: Axes, real: Array, imaginary: Array, lead: int, colors: list[str
     low, high = real[:, lead].min(), real[:, lead].max()
     margin = 0.16 * (high - low)
     reach = 1.45 * max(np.abs(imaginary[:, lead]).max(), 0.1 * (high - low))
-    axes.set_xlim(low - 1.6 * margin, max(high, 0.0) + margin)
-    axes.set_ylim(-reach, reach)
+    axes.set(xlim=(low - 1.6 * margin, max(high, 0.0) + margin), ylim=(-reach, reach))
     _half_planes(axes)
     for index in _back_to_front(real.shape[1], lead):
         axes.plot(real[:, index], imaginary[:, index], color=colors[index], lw=2.6 if index == lead else 1.8)
         for share in (0.2, 0.55, 0.86):
             _arrow(axes, real[:, index], imaginary[:, index], share, colors[index])
-    axes.set_xlabel("real part (1/s): dies out ← | → grows")
-    axes.set_ylabel("imaginary part (rad/s)")
+    axes.set(xlabel="real part (1/s): dies out ← | → grows", ylabel="imaginary part (rad/s)")
 
 
 def _labels(axes: Axes, ks: Array, real: Array, imaginary: Array, marked: tuple[float, ...]) -> None:
@@ -189,14 +187,13 @@ def _labels(axes: Axes, ks: Array, real: Array, imaginary: Array, marked: tuple[
         axes.plot(x, y, "o", color="white", markeredgecolor=style.VERMILLION, markersize=5.5, zorder=6)
         swings = abs(y) > 1e-3
         stiffest = k1 == max(marked)
-        axes.annotate(
+        style.note(
+            axes,
             f"k₁ =\n{k1:g}" if stiffest else f"{k1:g}",
             (x, y),
             (-8, 0) if stiffest else (4, 7) if swings else (0, -8),
-            textcoords="offset points",
             ha="right" if stiffest else "left" if swings else "center",
             va="center" if stiffest else "bottom" if swings else "top",
-            fontsize=style.SMALL,
         )
 
 
@@ -216,8 +213,7 @@ def _all(axes: Axes, real: Array, imaginary: Array, colors: list[str], ks: Array
         axes.plot(real[:, index], imaginary[:, index], color=colors[index], lw=2.2)
         axes.plot(real[0, index], imaginary[0, index], "o", color="white", markeredgecolor=colors[index], markersize=6)
         axes.plot(real[-1, index], imaginary[-1, index], "o", color=colors[index], markersize=3.5)
-    axes.set_xlabel("real part (1/s)")
-    axes.set_ylabel("imaginary part (rad/s)")
+    axes.set(xlabel="real part (1/s)", ylabel="imaginary part (rad/s)")
     axes.legend(
         handles=[
             Line2D(
@@ -266,8 +262,7 @@ def over_k1(axes: Axes, data: xr.Dataset, crossing: float | None) -> None:
     axes.xaxis.set_major_locator(FixedLocator(shown))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.set_xlabel(f"k₁ ({SPRING_UNIT}), softer →")
-    axes.set_ylabel("real part (1/s)")
+    axes.set(xlabel=f"k₁ ({SPRING_UNIT}), softer →", ylabel="real part (1/s)")
     style.grid(axes)
 
 

@@ -128,8 +128,7 @@ def _draw(fit: Identification, narrow: bool) -> Figure:
     for one in axes.values():
         if inside.any():
             one.axvspan(x[inside].min(), x[inside].max(), color=style.PALE, lw=0, label="rounding allows")
-        one.set_xlim(x[0], x[-1])
-        one.set_xlabel("forward offset (mm)")
+        one.set(xlim=(x[0], x[-1]), xlabel="forward offset (mm)")
     _fitted(axes["A"], x, data.largest_residual.values, "How well the six fit", "largest residual")
     axes["A"].axhline(1.0, color=style.BLACK, lw=1.0, linestyle=":")
     axes["A"].set_ylim(0.0, 1.15 * max(data.largest_residual.values.max(), 1.0))
@@ -147,8 +146,7 @@ def _draw(fit: Identification, narrow: bool) -> Figure:
 
 def _fitted(axes: Axes, x: Array, values: Array, title: str, label: str) -> None:
     axes.plot(x, values, color=style.BLACK)
-    axes.set_title(title)
-    axes.set_ylabel(label)
+    axes.set(title=title, ylabel=label)
 
 
 def _mark(axes: dict[str, Axes], robot: Robot, residuals: Array, **look: Any) -> None:
@@ -168,18 +166,16 @@ def _variants(axes: Axes, x: Array, data: xr.Dataset) -> None:
         # Curves rise: there is room above the left of the highest and below the right of the others.
         top = name == max(_others(data), key=lambda each: float(data[each].mean()))
         place = int(0.75 * len(x)) if top else len(x) // 3
-        axes.annotate(
+        style.note(
+            axes,
             typeset(name),
             (x[place], values[place]),
             (0, 5 if top else -5),
-            textcoords="offset points",
             ha="right" if top else "left",
             va="bottom" if top else "top",
-            fontsize=style.SMALL,
         )
     values = np.array([data[name].values for name in _others(data)])
-    axes.set_ylim(np.nanmin(values) - 0.5, np.nanmax(values) + 0.5)
-    axes.set_ylabel(f"critical k₁ ({SPRING_UNIT})")
+    axes.set(ylim=(np.nanmin(values) - 0.5, np.nanmax(values) + 0.5), ylabel=f"critical k₁ ({SPRING_UNIT})")
 
 
 def _coefficient(axes: Axes, x: Array, data: xr.Dataset) -> None:
@@ -191,9 +187,7 @@ def _coefficient(axes: Axes, x: Array, data: xr.Dataset) -> None:
         axes.plot(x[those], values[those], marker, color=style.BLACK, markerfacecolor=fill, markersize=4)
     for place in 1e3 * _changes(data):
         axes.axvline(place, color=style.VERMILLION, lw=1.2, linestyle="--")
-        axes.annotate(
-            f"changes at\n{place:.1f} mm", (place, 0.0), (6, 10), textcoords="offset points", fontsize=style.SMALL
-        )
+        style.note(axes, f"changes at\n{place:.1f} mm", (place, 0.0), (6, 10))
     high = np.nanmax(np.abs(values))
     axes.set_ylim(-1.5 * high, 1.5 * high)
     axes.text(0.97, 0.97, "subcritical", transform=axes.transAxes, ha="right", va="top", fontsize=style.SMALL)

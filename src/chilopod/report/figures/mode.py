@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from chilopod.paper.fit_data import MODE_ROUNDING
+from chilopod.paper.printed import MODE
 from chilopod.report.kit import style
 from chilopod.report.kit.panel import Panel
 from chilopod.report.kit.words import listing, number, spring
@@ -17,6 +17,7 @@ from chilopod.tasks.identify import Identification
 
 _WIDE = style.Layout("AC;BC", 5.2, heights=(1.5, 1.0), widths=(1.15, 1.0))
 _NARROW = style.Layout("A;B;C", 10.8, heights=(1.2, 0.9, 1.9))
+_ROUNDING = MODE[0].tolerance
 _DRAWN_BEND = 75.0  # degrees from head to tail: the mode leaves the size free
 
 
@@ -28,12 +29,12 @@ def panel(data: xr.Dataset, fit: Identification | None) -> Panel:
     if not known.any():
         compared = f"The paper prints no mode for {len(computed) + 1} modules."
     else:
-        beyond = [joint for joint, value in zip(data.joint.values[known], off, strict=True) if value > MODE_ROUNDING]
+        beyond = [joint for joint, value in zip(data.joint.values[known], off, strict=True) if value > _ROUNDING]
         compared = (
-            f"The paper prints two decimals, so {MODE_ROUNDING:g} either way is what rounding allows (the grey band). "
+            f"The paper prints two decimals, so {_ROUNDING:g} either way is what rounding allows (the grey band). "
         )
         if beyond:
-            worst = float(off.max() - MODE_ROUNDING)
+            worst = float(off.max() - _ROUNDING)
             compared += (
                 f"Joint {listing(str(joint) for joint in beyond)} of this robot lies outside, by {worst:.4f} at "
                 "most"
@@ -89,14 +90,7 @@ def _components(axes: Axes, joints: np.ndarray, computed: np.ndarray, printed: n
     axes.set_title("Shares of the joints")
     axes.bar(joints, computed, width=0.55, color=style.SKY, label="computed")
     for joint, value in zip(joints, computed, strict=True):
-        axes.annotate(
-            number(value),
-            (joint, max(value, 0.0)),
-            (0, 7),
-            textcoords="offset points",
-            ha="center",
-            fontsize=style.SMALL,
-        )
+        style.note(axes, number(value), (joint, max(value, 0.0)), (0, 7), ha="center")
     if not np.isnan(printed).all():
         axes.plot(joints, printed, "_", color=style.BLACK, markersize=26, markeredgewidth=2, label="paper")
     axes.axhline(0.0, color=style.BLACK, lw=0.8)
@@ -110,14 +104,14 @@ def _differences(axes: Axes, data: xr.Dataset, fit: Identification | None) -> No
     axes.set_title("Computed less printed")
     joints = data.joint.values
     difference = data.computed.values - data.printed.values
-    axes.axhspan(-1e3 * MODE_ROUNDING, 1e3 * MODE_ROUNDING, color=style.PALE, label="rounding")
+    axes.axhspan(-1e3 * _ROUNDING, 1e3 * _ROUNDING, color=style.PALE, label="rounding")
     axes.axhline(0.0, color=style.BLACK, lw=0.8)
     if not np.isnan(difference).all():
         axes.plot(joints, 1e3 * difference, "o", color=style.BLUE, markersize=7, label="this robot")
         if fit is not None:
             axes.plot(
                 joints,
-                1e3 * MODE_ROUNDING * fit.residuals[1:],
+                1e3 * _ROUNDING * fit.residuals[1:],
                 "D",
                 color=style.VERMILLION,
                 markerfacecolor="white",
@@ -125,15 +119,13 @@ def _differences(axes: Axes, data: xr.Dataset, fit: Identification | None) -> No
                 markeredgewidth=1.6,
                 label="best fit",
             )
-    reach = 1e3 * MODE_ROUNDING * 1.4
+    reach = 1e3 * _ROUNDING * 1.4
     if not np.isnan(difference).all():
         reach = max(reach, 1.2e3 * np.nanmax(np.abs(difference)))
-    axes.set_ylim(-reach, reach)
-    axes.set_xlim(joints[0] - 0.6, joints[-1] + 0.6)
+    axes.set(ylim=(-reach, reach), xlim=(joints[0] - 0.6, joints[-1] + 0.6))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xticks(joints)
-    axes.set_xlabel("joint, from the front")
-    axes.set_ylabel("difference (thousandths)")
+    axes.set(xlabel="joint, from the front", ylabel="difference (thousandths)")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.32), ncols=3, columnspacing=1.0, handletextpad=0.3)
 
 
@@ -168,5 +160,4 @@ def bent_body(axes: Axes, components: np.ndarray, total: float) -> None:
     draw_heading(axes, straight[0][0], 0.0, 1.0, style.GREY)
     axes.text(straight[0][0, 0] + 0.6, -0.3, "straight,\nunstable", va="top", ha="left", fontsize=style.SMALL)
     top = max(abs(tip[1]) for tip in heads)
-    axes.set_xlim(-0.7, len(components) + 2.0)
-    axes.set_ylim(-top - 1.3, top + 1.3)
+    axes.set(xlim=(-0.7, len(components) + 2.0), ylim=(-top - 1.3, top + 1.3))

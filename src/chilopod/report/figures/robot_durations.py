@@ -6,9 +6,9 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from chilopod.paper.robot.rows import CURVED, STRAIGHT, duration_rows, printed_radii
-from chilopod.paper.robot.table import ONSET, RADIUS, printed_spring
-from chilopod.report.figures.curved_trials import errorbars
+from chilopod.paper import printed, statements
+from chilopod.paper.robot.rows import duration_rows
+from chilopod.report.figures.compliance import errorbars
 from chilopod.report.kit import style
 from chilopod.report.kit.panel import Panel
 from chilopod.report.kit.words import SPRING_UNIT, k, listing, typeset
@@ -20,7 +20,7 @@ _STYLES = tuple(zip((style.BLUE, style.VERMILLION, style.GREEN, style.ORANGE), "
 def panel(data: xr.Dataset) -> Panel:
     """Onset, radii and shares of curved walks over the duration of the walks."""
     times = listing(f"{each:g}" for each in data.duration.values)
-    said = "; ".join(f"{row.quantity.partition(',')[0]} {row.twin}" for row in duration_rows(data))
+    said = "; ".join(f"{row.statement.quantity.partition(',')[0]} {row.words}" for row in duration_rows(data))
     return Panel(
         name="robot-durations",
         title="The robot in three dimensions: what if its walks had been shorter",
@@ -40,30 +40,24 @@ def panel(data: xr.Dataset) -> Panel:
 def _draw(data: xr.Dataset, narrow: bool) -> Figure:
     figure, axes = style.figure(*_LAYOUTS, narrow)
     times = data.duration.values
-    paper = printed_spring("pitchfork", "robot_critical_k1")
-    axes["A"].axhspan(paper * (1.0 - ONSET), paper * (1.0 + ONSET), color=style.PALE, zorder=0)
+    axes["A"].axhspan(printed.ONSET.band.low, printed.ONSET.band.high, color=style.PALE, zorder=0)
     errorbars(axes["A"], times, data.onset.values, data.onset_error.values, style.BLUE, "o")
     axes["A"].plot(times, data.onset.values, color=style.BLUE, lw=1.0)
-    axes["A"].set_ylabel(f"onset ({SPRING_UNIT})")
-    axes["A"].set_title("A  Where curved walks set in")
-    for (spring, radius), (color, marker) in zip(printed_radii().items(), _STYLES, strict=False):
+    axes["A"].set(ylabel=f"onset ({SPRING_UNIT})", title="A  Where curved walks set in")
+    for (spring, radius), (color, marker) in zip(printed.RADII.items(), _STYLES, strict=False):
         at = data.sel(spring=spring)
-        axes["B"].axhspan(radius * (1.0 - RADIUS), radius * (1.0 + RADIUS), color=style.PALE, zorder=0)
+        axes["B"].axhspan(radius.band.low, radius.band.high, color=style.PALE, zorder=0)
         label = f"{k(1)} = {spring:g}"
         errorbars(axes["B"], times, at.axis_radius.values, at.axis_radius_error.values, color, marker, label)
         axes["B"].plot(times, at.axis_radius.values, color=color, lw=1.0)
-    axes["B"].set_ylabel("radius of the body axis (m)")
-    axes["B"].set_title("B  Radius")
-    springs = sorted({*printed_radii(), max(CURVED), min(STRAIGHT)})
+    axes["B"].set(ylabel="radius of the body axis (m)", title="B  Radius")
+    springs = sorted({*printed.RADII, *statements.SLOWEST.values()})
     for spring, (color, marker) in zip(springs, _STYLES, strict=False):
         share = 100.0 * data.curved.sel(spring=spring).values
         axes["C"].plot(times, share, color=color, marker=marker, lw=1.0, label=f"{k(1)} = {spring:g}")
-    axes["C"].set_ylabel("walks that curve (%)")
-    axes["C"].set_ylim(-4.0, 104.0)
-    axes["C"].set_title("C  Share that curves")
+    axes["C"].set(ylabel="walks that curve (%)", ylim=(-4.0, 104.0), title="C  Share that curves")
     for letter, each in axes.items():
-        each.set_xlabel("walks last (s)")
-        each.set_xlim(0.0, 1.05 * times.max())
+        each.set(xlabel="walks last (s)", xlim=(0.0, 1.05 * times.max()))
         if letter != "C":
             each.set_ylim(0.0, 1.1 * max(each.dataLim.y1, np.nextafter(0.0, 1.0)))
         if letter != "A":

@@ -6,8 +6,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from chilopod.paper import printed
 from chilopod.paper.robot.structures import TOLERANCE
-from chilopod.paper.robot.table import ONSET
 from chilopod.report.kit import style
 from chilopod.report.kit.panel import Panel
 from chilopod.report.kit.words import listing, typeset
@@ -73,15 +73,11 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
     values = np.clip(np.nan_to_num(data.chi_squared.values, nan=0.0), 0.0, _MOST)
     axes["A"].barh(rows, values, 0.6, color=[style.BLUE if good else style.PALE for good in met])
     for row, value, end in zip(rows, data.chi_squared.values, values, strict=True):
-        axes["A"].annotate(
-            _shown(value), (end, row), (4, 0), textcoords="offset points", va="center", fontsize=style.SMALL
-        )
+        style.note(axes["A"], _shown(value), (end, float(row)), (4, 0), va="center")
     axes["A"].set_yticks(rows, names)
-    axes["A"].set_xlim(0.0, 1.2 * _MOST)
-    axes["A"].set_xlabel("chi squared")
-    axes["A"].set_title("A  From the paper's")
+    axes["A"].set(xlim=(0.0, 1.2 * _MOST), xlabel="chi squared", title="A  From the paper's")
     off = 100.0 * (data.predicted / data.paper - 1.0)
-    axes["B"].axvspan(-100.0 * ONSET, 100.0 * ONSET, color=style.PALE, zorder=0)
+    axes["B"].axvspan(-100.0 * printed.ONSETS, 100.0 * printed.ONSETS, color=style.PALE, zorder=0)
     for column, name in enumerate(data.prediction.values):
         axes["B"].plot(
             np.clip(off.values[:, column], -_FARTHEST, _FARTHEST),
@@ -92,9 +88,9 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
             label=typeset(str(name)),
         )
     axes["B"].set_yticks(rows, names if narrow else [""] * len(names))
-    axes["B"].set_xlim(-_FARTHEST - 3.0, _FARTHEST + 3.0)
-    axes["B"].set_xlabel("onset relative to the paper's (%)")
-    axes["B"].set_title("B  Predictions")
+    axes["B"].set(
+        xlim=(-_FARTHEST - 3.0, _FARTHEST + 3.0), xlabel="onset relative to the paper's (%)", title="B  Predictions"
+    )
     for letter in "AB":
         axes[letter].invert_yaxis()
         style.grid(axes[letter], "x")

@@ -10,13 +10,20 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from chilopod.paper.robot.equal_distance import onset_of_bend
-from chilopod.paper.robot.rows import printed_radii
-from chilopod.paper.robot.table import ONSET, percent, printed_spring
-from chilopod.paper.robot.walk_measures import onset_with_error, radius_at
+from chilopod.paper import printed
+from chilopod.paper.equal_distance import onset_of_bend
 from chilopod.paper.robot.walks import RobotWalks
+from chilopod.paper.walk_measures import onset_with_error, radius_at
 from chilopod.report.figures import robot_durations
-from chilopod.report.figures.curved_trials import INVERSE_UNIT, errorbars, springs_above
+from chilopod.report.figures.compliance import (
+    INVERSE_UNIT,
+    JOINT_STYLES,
+    draw_asked,
+    draw_times,
+    errorbars,
+    means,
+    over_compliance,
+)
 from chilopod.report.kit import style
 from chilopod.report.kit.panel import Panel
 from chilopod.report.kit.words import SPRING_UNIT, k, listing, number, typeset
@@ -27,7 +34,6 @@ Array = NDArray[np.float64]
 _WALKS = (style.Layout("AB;CD", 7.4), style.Layout("A;B;C;D", 13.6))
 _ONE = (style.Layout("A", 4.0), style.Layout("A", 4.4))
 _THREE = (style.Layout("AB;CC", 7.6), style.Layout("A;B;C", 12.6))
-_JOINTS = tuple(zip((style.BLACK, *style.CURVES), "os^vD", strict=False))
 _VARIANTS = tuple(zip((style.BLACK, style.BLUE, style.GREEN, style.ORANGE, style.GREY), "os^Dv", strict=True))
 _MARKED = (75.0, 41.0, 28.0, 21.0, 17.0, 15.0)
 _DASHED = (0, (4, 2))
@@ -60,7 +66,7 @@ def walks(found: RobotWalks) -> Panel:
             f"at each of {base.sizes['spring']} values of {k(1)}, 90\u00a0s each, angles averaged over the last "
             f"5\u00a0s as in the paper. {int(here.sum())} of {here.size} end in a curve, {lefts} to the left and "
             f"{rights} to the right. The square-root fit puts the onset at {said} {SPRING_UNIT}; the paper's "
-            f"estimate for its robot is {printed_spring('pitchfork', 'robot_critical_k1'):g}.",
+            f"estimate for its robot is {printed.ONSET.value:g}.",
             "These are the data that the twin's unknown constants were fitted to (the printed onset, the two printed "
             "radii, which springs walk straight and which do not; and the walking speed), so agreement here is no "
             "surprise. What follows was not fitted."
@@ -85,8 +91,8 @@ def joints(found: RobotWalks) -> Panel:
         alt=f"Mean absolute angles of all joints over 1/{k(1)}.",
         text=(
             "Mean absolute angle of every joint (means and standard errors). At the softest spring the joints bend in "
-            f"the order {listing(str(joint) for joint in order)}, the most first; the critical mode of the planar "
-            "model has 1, 3, 4, 2 and 5.",
+            f"the order {listing(str(joint) for joint in order)}, the most first; the critical mode of the paper's "
+            f"planar model has {listing(map(str, printed.MODE_ORDER))}.",
         ),
         data=found.base,
     )
@@ -96,7 +102,7 @@ def different(found: RobotWalks) -> Panel:
     """The paper's Fig. "different"."""
     said = []
     for title, (name, data) in _variants(found).items():
-        point, paper = onset_with_error(data)[0], printed_spring("variants", name, "robot_critical_k1")
+        point, paper = onset_with_error(data)[0], printed.onset(name).value
         said.append(f"{typeset(title)} {number(point, 3) if np.isfinite(point) else 'none'} (robot: {paper:g})")
     return Panel(
         name="robot-different",
@@ -107,9 +113,9 @@ def different(found: RobotWalks) -> Panel:
         text=(
             "Nothing here was fitted. Where curved walks set in by the paper's method, in "
             f"{SPRING_UNIT}: {listing(said)}. "
-            f"Bars in C are what counts as within, {percent(ONSET)}; with all springs alike the body undulates. At "
-            "equal springs (A) a variant that sets in at a softer spring turns more widely by that alone; so the table "
-            f"compares radii at equal distance from each one's own onset {k(1)}* (B)."
+            f"Bars in C are what counts as within, {printed.ONSET.band.asked}; with all springs alike the body "
+            "undulates. At equal springs (A) a variant that sets in at a softer spring turns more widely by that "
+            f"alone; so the table compares radii at equal distance from each one's own onset {k(1)}* (B)."
             + (
                 " The paper does not say whether the leg tips swing as high with the shorter stride, or lower in "
                 "proportion: both are shown."
@@ -146,16 +152,8 @@ def _draw_walks(found: RobotWalks, narrow: bool) -> Figure:
     straight, curved = (float(value) for value in examples.spring.values)
     high = 1.05 * float(np.rad2deg(np.abs(examples.joint_angle)).max())
     for letter, spring, what in (("A", straight, "Straight"), ("B", curved, "Curved")):
-        walk = examples.sel(spring=spring)
-        for joint, (color, _) in zip(walk.joint.values, _JOINTS, strict=False):
-            angle = np.rad2deg(walk.joint_angle.sel(joint=joint).values)
-            axes[letter].plot(walk.time.values, angle, color=color, lw=0.9, label=f"joint {joint}")
-        axes[letter].set_ylim(-high, high)
-        axes[letter].set_xlabel("time (s)")
-        axes[letter].set_ylabel("yaw joint angle (deg)")
-        axes[letter].set_title(f"{letter}  {what}, {k(1)} = {spring:g} {SPRING_UNIT}")
-        axes[letter].margins(x=0.0)
-        style.grid(axes[letter])
+        draw_times(axes[letter], examples.sel(spring=spring))
+        axes[letter].set(ylim=(-high, high), title=f"{letter}  {what}, {k(1)} = {spring:g} {SPRING_UNIT}")
     axes["A"].legend(loc="upper left", ncols=2 if narrow else 3)
     _draw_fork(axes["C"], found)
     _draw_radius(axes["D"], found)
@@ -168,7 +166,7 @@ def _draw_fork(axes: Axes, found: RobotWalks) -> None:
     angles = np.rad2deg(base.mean_angle.sel(joint=1).values)
     for side, sign, marker in (("left", -1.0, "o"), ("right", 1.0, "s")):
         here = base.direction.values == side
-        mean, error = means(np.where(here, angles, np.nan))
+        mean, error = means(angles, here)
         errorbars(axes, inverse, mean, error, style.BLUE, marker, f"to the {side}")
         if fit:
             grid = np.linspace(1.0 / fit.critical, inverse.max(), 200)
@@ -177,15 +175,13 @@ def _draw_fork(axes: Axes, found: RobotWalks) -> None:
                 grid, sign * np.rad2deg(fit.angle(grid)), color=style.VERMILLION, linestyle=_DASHED, lw=1.3, label=label
             )
     here = base.direction.values == "straight"
-    mean, error = means(np.where(here, angles, np.nan))
+    mean, error = means(angles, here)
     errorbars(axes, inverse, mean, error, style.GREY, "D", "straight")
-    onset_ = printed_spring("pitchfork", "robot_critical_k1")
+    onset_ = printed.ONSET.value
     axes.axvline(1.0 / onset_, color=style.ORANGE, lw=1.4, label=f"robot's onset, {onset_:g}")
     axes.set_xlim(0.0, 1.06 * inverse.max())
-    springs_above(axes, (75.0, 41.0, 28.0, 21.0, 15.0))
-    axes.set_xlabel(f"1/{k(1)} ({INVERSE_UNIT})")
-    axes.set_ylabel("mean angle of joint 1 (deg)")
-    axes.set_title("C  Joint 1")
+    over_compliance(axes, (75.0, 41.0, 28.0, 21.0, 15.0))
+    axes.set(ylabel="mean angle of joint 1 (deg)", title="C  Joint 1")
     axes.legend(loc="upper left")
     style.grid(axes)
 
@@ -193,9 +189,9 @@ def _draw_fork(axes: Axes, found: RobotWalks) -> None:
 def _draw_radius(axes: Axes, found: RobotWalks) -> None:
     base = found.base
     inverse = 1.0 / base.spring.values
-    radius, error = means(np.where(in_settled_curve(base), base.axis_radius.values, np.nan))
+    radius, error = means(base.axis_radius.values, in_settled_curve(base))
     errorbars(axes, inverse, radius, error, style.BLUE, "o", "twin")
-    wanted = printed_radii()
+    wanted = {spring: radius.value for spring, radius in printed.RADII.items()}
     axes.plot(
         [1.0 / key for key in wanted],
         list(wanted.values()),
@@ -207,12 +203,12 @@ def _draw_radius(axes: Axes, found: RobotWalks) -> None:
         label="robot, paper",
         zorder=5,
     )
-    axes.set_ylim(0.0, 1.1 * np.nanmax([*(radius + np.nan_to_num(error)), *wanted.values()]))
-    axes.set_xlim(0.02, 1.06 * inverse.max())
-    springs_above(axes, (41.0, 28.0, 21.0, 17.0, 15.0))
-    axes.set_xlabel(f"1/{k(1)} ({INVERSE_UNIT})")
-    axes.set_ylabel("radius of the body axis (m)")
-    axes.set_title("D  Radius")
+    axes.set(
+        ylim=(0.0, 1.1 * np.nanmax([*(radius + np.nan_to_num(error)), *wanted.values()])),
+        xlim=(0.02, 1.06 * inverse.max()),
+    )
+    over_compliance(axes, (41.0, 28.0, 21.0, 17.0, 15.0))
+    axes.set(ylabel="radius of the body axis (m)", title="D  Radius")
     axes.legend(loc="upper right")
     style.grid(axes)
 
@@ -221,14 +217,13 @@ def _draw_joints(found: RobotWalks, narrow: bool) -> Figure:
     figure, by_letter = style.figure(*_ONE, narrow)
     axes, base = by_letter["A"], found.base
     inverse = 1.0 / base.spring.values
-    for joint, (color, marker) in zip(base.joint.values, _JOINTS, strict=False):
+    for joint, (color, marker) in zip(base.joint.values, JOINT_STYLES, strict=False):
         mean, error = means(np.abs(np.rad2deg(base.mean_angle.sel(joint=joint).values)))
         errorbars(axes, inverse, mean, error, color, marker, f"joint {joint}")
         axes.plot(inverse, mean, color=color, lw=1.0)
     axes.set_xlim(0.0, 1.06 * inverse.max())
     axes.set_ylim(bottom=0.0)
-    springs_above(axes, _MARKED)
-    axes.set_xlabel(f"1/{k(1)} ({INVERSE_UNIT})")
+    over_compliance(axes, _MARKED)
     axes.set_ylabel("mean absolute angle (deg)")
     axes.legend(loc="upper left")
     style.grid(axes)
@@ -245,15 +240,12 @@ def _draw_different(found: RobotWalks, narrow: bool) -> Figure:
             errorbars(axes[letter], place[shown], radius[shown], error[shown], color, marker, typeset(name))
             axes[letter].plot(place[shown], radius[shown], color=color, lw=1.0)
     for letter in "AB":
-        axes[letter].set_ylim(0.0, 3.0)
-        axes[letter].set_ylabel("radius of the body axis (m)")
+        axes[letter].set(ylim=(0.0, 3.0), ylabel="radius of the body axis (m)")
         style.grid(axes[letter])
-    springs_above(axes["A"], (34.0, 28.0, 21.0, 17.0, 15.0, 12.0))
-    axes["A"].set_xlabel(f"1/{k(1)} ({INVERSE_UNIT})")
+    over_compliance(axes["A"], (34.0, 28.0, 21.0, 17.0, 15.0, 12.0))
     axes["A"].set_title("A  Radius over the spring")
     axes["B"].set_xlim(left=0.0)
-    axes["B"].set_xlabel(f"1/{k(1)} − 1/{k(1)}* ({INVERSE_UNIT})")
-    axes["B"].set_title("B  Radius, like with like")
+    axes["B"].set(xlabel=f"1/{k(1)} − 1/{k(1)}* ({INVERSE_UNIT})", title="B  Radius, like with like")
     handles, labels = axes["A"].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2 if narrow else 5)
     _draw_onsets(axes["C"], found)
@@ -261,35 +253,13 @@ def _draw_different(found: RobotWalks, narrow: bool) -> Figure:
 
 
 def _draw_onsets(axes: Axes, found: RobotWalks) -> None:
-    lines = [
-        ("base series (fitted)", printed_spring("pitchfork", "robot_critical_k1"), onset_with_error(found.base)[0]),
-        *(
-            (title, printed_spring("variants", name, "robot_critical_k1"), onset_with_error(data)[0])
-            for title, (name, data) in _variants(found).items()
-        ),
-        ("all springs alike", printed_spring("uniform", "robot_critical_k"), found.uniform.attrs["critical_k"]),
+    found_at = [
+        ("base series (fitted)", printed.ONSET, onset_with_error(found.base)[0]),
+        *((title, printed.onset(name), onset_with_error(data)[0]) for title, (name, data) in _variants(found).items()),
+        ("all springs alike", printed.UNIFORM, found.uniform.attrs["critical_k"]),
     ]
-    for row, (_, paper, twin) in enumerate(lines):
-        ends = [paper * (1.0 - ONSET), paper * (1.0 + ONSET)]
-        axes.plot(ends, [row, row], color=style.PALE, lw=9, zorder=1, solid_capstyle="butt")
-        axes.plot(paper, row, "D", color=style.ORANGE, markersize=7, label=None if row else "robot, paper")
-        if np.isfinite(twin):
-            axes.plot(twin, row, "o", color=style.BLUE, markersize=7, label=None if row else "twin")
-    axes.set_yticks(range(len(lines)), [typeset(name) for name, *_ in lines])
-    axes.invert_yaxis()
-    axes.set_xlim(0.0, 45.0)
-    axes.set_ylim(len(lines) - 0.5, -0.7)
-    axes.set_xlabel(f"onset ({SPRING_UNIT})")
-    axes.set_title("C  Onset of curved walks")
+    draw_asked(axes, [(title, paper.value, paper.band) for title, paper, _ in found_at])
+    twin = [at for *_, at in found_at]
+    axes.plot(twin, range(len(twin)), "o", color=style.BLUE, markersize=7, label="twin")
+    axes.set(xlim=(0.0, 45.0), xlabel=f"onset ({SPRING_UNIT})", title="C  Onset of curved walks")
     axes.legend(loc="upper left")
-    style.grid(axes, "x")
-
-
-def means(values: Array) -> tuple[Array, Array]:
-    """Mean and standard error over the last axis, of what is not NaN; the error is NaN for fewer than two."""
-    counts = np.isfinite(values).sum(axis=-1)
-    filled = np.where(np.isfinite(values), values, 0.0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        mean = np.where(counts > 0, filled.sum(axis=-1) / counts, np.nan)
-        spread = np.where(np.isfinite(values), (values - mean[..., None]) ** 2, 0.0).sum(axis=-1) / (counts - 1)
-        return mean, np.where(counts > 1, np.sqrt(spread / counts), np.nan)

@@ -9,13 +9,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from chilopod import units
-from chilopod.paper.printed import printed
-from chilopod.paper.robot.table import ONSET, printed_spring
+from chilopod.paper import printed
+from chilopod.paper.robot.spread import printed_number
 from chilopod.paper.robot.walks import SPRINGS
-from chilopod.paper.turning.minima import AROUND
+from chilopod.paper.robot.why import SPRINGS as TRIED
+from chilopod.report.figures.compliance import draw_asked
 from chilopod.report.kit import style
 from chilopod.report.kit.panel import Panel
-from chilopod.report.kit.words import SPRING_UNIT, listing, number, typeset
+from chilopod.report.kit.words import SPRING_UNIT, listing, number
 from chilopod.robot import Robot
 from chilopod.tasks.identify.twin_constants import FREE, parts_of
 
@@ -32,7 +33,7 @@ def why(data: xr.Dataset) -> Panel:
     largest = [str(data.factor.values[i]) for i in np.argsort(-np.abs(moves))[:2]]
     return Panel(
         name="robot-why",
-        title="Why 34 and not 12: from the planar model to the robot",
+        title=f"Why {printed.ONSET.value:g} and not {printed.CRITICAL_K1.value:g}: from the planar model to the robot",
         draw=lambda narrow: _draw_why(data, narrow),
         alt="A: where curved walks set in, from the planar limit to the twin, one assumption after the other. B: each "
         "of them alone, and the twin without each.",
@@ -48,10 +49,10 @@ def why(data: xr.Dataset) -> Panel:
             )
             + f". The largest steps are {listing(largest)}. They are no independent contributions: B shows each "
             "alone in the planar limit and the twin without each. Where a bar runs out of the picture, walks "
-            "curve at every spring tried, up to 50; where there is none, their bends determine no point.",
-            f"The viscous coefficient of the planar model's feet is 256.5\u00a0N·s/m. A foot of the twin that does not "
-            f"slide creeps like one of {number(data.attrs['grip'], 2)}\u00a0N·s/m: it is held, and lets go only beyond "
-            "the Coulomb limit.",
+            f"curve at every spring tried, up to {max(TRIED):g}; where there is none, their bends determine no point.",
+            f"The viscous coefficient of the planar model's feet is {number(data.attrs['viscous'], 4)}\u00a0N·s/m. A "
+            f"foot of the twin that does not slide creeps like one of {number(data.attrs['grip'], 2)}\u00a0N·s/m: it "
+            "is held, and lets go only beyond the Coulomb limit.",
         ),
         data=data,
     )
@@ -77,17 +78,14 @@ def _draw_why(data: xr.Dataset, narrow: bool) -> Figure:
     axes["B"].set_yticks(rows, [str(name) for name in data.factor.values])
     axes["B"].set_title("B  Each by itself")
     for letter in "AB":
-        axes[letter].axvline(12.0, color=style.GREY, lw=1.2, linestyle=(0, (4, 2)), label="planar model, 12")
-        axes[letter].axvline(
-            printed_spring("pitchfork", "robot_critical_k1"),
-            color=style.VERMILLION,
-            lw=1.2,
-            linestyle=(0, (4, 2)),
-            label="robot, paper, 34",
-        )
+        for value, color, name in (
+            (data.attrs["exact"], style.GREY, "planar model"),
+            (printed.ONSET.value, style.VERMILLION, "robot, paper"),
+        ):
+            label = f"{name}, {number(value, 2)}"
+            axes[letter].axvline(value, color=color, lw=1.2, linestyle=(0, (4, 2)), label=label)
         axes[letter].invert_yaxis()
-        axes[letter].set_xlim(0.0, _BEYOND)
-        axes[letter].set_xlabel(f"point ({SPRING_UNIT})")
+        axes[letter].set(xlim=(0.0, _BEYOND), xlabel=f"point ({SPRING_UNIT})")
         style.grid(axes[letter], "x")
     handles, labels = axes["B"].get_legend_handles_labels()
     handles += [Patch(color=style.SKY), Patch(color=style.ORANGE)]
@@ -102,14 +100,13 @@ def _bars(axes: Axes, rows: np.ndarray, values: np.ndarray, colors: list[str], h
             continue
         axes.barh(row, min(value, _BEYOND), height, color=color)
         inside = value > 0.8 * _BEYOND
-        axes.annotate(
+        style.note(
+            axes,
             "all springs tried" if np.isinf(value) else number(value, 3),
             (min(value, _BEYOND), row),
             (-4 if inside else 4, 0),
-            textcoords="offset points",
             va="center",
             ha="right" if inside else "left",
-            fontsize=style.SMALL,
             color="white" if inside else style.BLACK,
         )
 
@@ -165,24 +162,18 @@ def _draw_spread(data: xr.Dataset, robot: Robot, narrow: bool) -> Figure:
             markeredgewidth=1.6,
         )
     axes["A"].set_yticks(rows, [each.path.partition(".")[2].replace("_", " ") for each in FREE])
-    axes["A"].set_xlim(-0.03, 1.03)
-    axes["A"].set_xlabel("part of the range searched")
-    axes["A"].set_title("A  Constants")
+    axes["A"].set(xlim=(-0.03, 1.03), xlabel="part of the range searched", title="A  Constants")
     axes["A"].invert_yaxis()
     style.grid(axes["A"])
 
-    near = (1.0 - ONSET, 1.0 + ONSET)
-    lines = [("base series (fitted)", printed_spring("pitchfork", "robot_critical_k1"), near, data.onset.values[:, 0])]
-    for column, name in enumerate(data.variant.values[1:], 1):
-        lines.append((str(name), float(data.paper[column]), near, data.onset.values[:, column]))
-    lines.append(("all springs alike", printed_spring("uniform", "robot_critical_k"), near, data.uniform.values))
-    for task in data.task.values:
-        paper = float(printed()["turning"]["tasks"][str(task)]["k_hat"].split()[0])
-        lines.append((f"best spring, task {task}", paper, AROUND, data.best.sel(task=task).values))
-    for row, (_, paper, within, values) in enumerate(lines):
-        ends = [part * paper for part in within]
-        axes["B"].plot(ends, [row, row], color=style.PALE, lw=9, zorder=1, solid_capstyle="butt")
-        axes["B"].plot(paper, row, "D", color=style.ORANGE, markersize=8, label=None if row else "robot, paper")
+    names = [str(name) for name in data.variant.values[1:]]
+    asked = [("base series (fitted)", printed.ONSET), *((name, printed_number(name)) for name in names)]
+    rows_asked = [(name, paper.value, paper.band) for name, paper in (*asked, ("all springs alike", printed.UNIFORM))]
+    for task in map(str, data.task.values):
+        rows_asked.append((f"best spring, task {task}", printed.TASKS[task].k_hat.value, printed.TASKS[task].minima))
+    draw_asked(axes["B"], rows_asked)
+    found = [*data.onset.values.T, data.uniform.values, *data.best.values.T]
+    for row, values in enumerate(found):
         for index, value in enumerate(values):
             axes["B"].plot(
                 value,
@@ -194,11 +185,10 @@ def _draw_spread(data: xr.Dataset, robot: Robot, narrow: bool) -> Figure:
                 markeredgewidth=1.6,
                 label="preset" if row == 0 and index == 0 else None,
             )
-    axes["B"].set_yticks(range(len(lines)), [typeset(name) for name, *_ in lines])
-    axes["B"].set_xlim(10.0, max(45.0, max(SPRINGS[:-1])))
-    axes["B"].set_ylim(len(lines) - 0.5, -0.8)
-    axes["B"].set_xlabel(f"{SPRING_UNIT}")
-    axes["B"].set_title("B  Predictions")
+    axes["B"].set(
+        xlim=(10.0, max(45.0, max(SPRINGS[:-1]))),
+        xlabel=f"{SPRING_UNIT}",
+        title="B  Predictions",
+    )
     axes["B"].legend(loc="upper left")
-    style.grid(axes["B"], "x")
     return figure

@@ -131,8 +131,10 @@ def _whole(axes: Axes, robot: Robot, data: xr.Dataset, narrow: bool) -> None:
     axes.text(0.0, y, "walks this way →", ha="right", va="center", fontsize=style.SMALL)
     low = y - (1.3 * reach if narrow else 0.0)
     axes.text(-0.5 * robot.body.length, low, _springs(robot), ha="center", va="center", fontsize=style.SMALL)
-    axes.set_xlim(-robot.body.length - 0.02 * robot.body.length, 0.08 * robot.body.length)
-    axes.set_ylim(low - 0.6 * reach, 2.3 * reach)
+    axes.set(
+        xlim=(-robot.body.length - 0.02 * robot.body.length, 0.08 * robot.body.length),
+        ylim=(low - 0.6 * reach, 2.3 * reach),
+    )
 
 
 def _springs(robot: Robot) -> str:
@@ -223,8 +225,7 @@ def _one_module(axes: Axes, robot: Robot) -> None:
         left=True,
     )
     axes.plot([side, x0 - 0.5 * stride], [b, b], color=style.GREY, lw=0.7, linestyle=":", zorder=0)
-    axes.set_xlim(-0.66 * length, 0.66 * length)
-    axes.set_ylim(low - 1.6 * step, top + 1.6 * step)
+    axes.set(xlim=(-0.66 * length, 0.66 * length), ylim=(low - 1.6 * step, top + 1.6 * step))
 
 
 def _measure(

@@ -73,14 +73,8 @@ def draw(done: Turn, narrow: bool = False) -> Figure:
         angle[1:][np.abs(np.diff(angle)) > 180.0] = np.nan
         axes["C"].plot(walk.time, angle, color=color)
     axes["B"].axhline(ARRIVAL_RADIUS, color=style.GREY, linestyle=(0, (4, 2)), linewidth=1.2)
-    axes["B"].annotate(
-        "arrived below",
-        (0.02, ARRIVAL_RADIUS),
-        (0, 3),
-        xycoords=("axes fraction", "data"),
-        textcoords="offset points",
-        color=style.GREY,
-        fontsize=style.SMALL,
+    style.note(
+        axes["B"], "arrived below", (0.02, ARRIVAL_RADIUS), (0, 3), xycoords=("axes fraction", "data"), color=style.GREY
     )
     axes["B"].set_ylim(bottom=0.0)
     axes["B"].set_ylabel("target distance (m)")
@@ -123,8 +117,7 @@ def _floor(axes: Axes, done: Turn) -> None:
         Circle((float(target[0]), float(target[1])), ARRIVAL_RADIUS, fill=False, ec=style.VERMILLION, lw=1.5)
     )
     axes.plot(*target, "+", color=style.VERMILLION, markersize=9, markeredgewidth=2, label="target", linestyle="none")
-    axes.set_xlabel("x (m)")
-    axes.set_ylabel("y (m)")
+    axes.set(xlabel="x (m)", ylabel="y (m)")
     axes.legend(loc="best")
     style.grid(axes)
 

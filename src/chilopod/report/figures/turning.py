@@ -12,13 +12,14 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Arc, Circle
 from numpy.typing import NDArray
 
-from chilopod.paper.printed import printed
+from chilopod.paper import printed
+from chilopod.paper.statements import listed
 from chilopod.paper.turning.study import Turning
-from chilopod.paper.turning.trials import TurningTask, springs_by_outcome
+from chilopod.paper.turning.trials import LegYaw, TurningTask, arrivals, by_leg_yaw, springs_by_outcome
 from chilopod.report.figures.turning_criteria import another, comparison, criteria
 from chilopod.report.kit import style
 from chilopod.report.kit.panel import Panel
-from chilopod.report.kit.words import SPRING_UNIT, k, listing, number, spring
+from chilopod.report.kit.words import SPRING_UNIT, k, listing, number, spring, typeset
 from chilopod.report.scene.outline import draw_modules
 from chilopod.robot import Robot
 from chilopod.steering import ARRIVAL_RADIUS
@@ -50,38 +51,37 @@ def panels(found: Turning) -> Iterator[Panel]:
 def turning(found: Turning) -> Panel:
     """Fig. "turning" A to D."""
     task = found.tasks["A"]
-    springs = [float(each) for each in task.paths.shown.values]
-    by_outcome = springs_by_outcome(task.criteria)
-    said = [
-        f"most {label} with {spring(each, 2)}"
-        for each in springs
-        for label, those in by_outcome.items()
-        if each in those
-    ]
-    entry = printed()["turning"]["tasks"]["A"]
-    by_axis, _ = found.laws.k_hat(task.target.radius)
+    best, entry = float(task.paths.shown[1]), printed.TASKS["A"]
+    by_axis, point = (found.laws.k_hat(radius)[0] for radius in (task.target.radius, np.inf))
     psi, away = np.rad2deg(task.target.bearing), task.target.distance
     return Panel(
         name="turning",
         title="Turning task A: a target ahead to the left",
         draw=lambda narrow: draw_turning(found.robot, task, narrow),
         alt=f"A circle from the robot to a target {away:g} m away at {psi:g} degrees; walks with three springs, "
-        f"of which that with {number(springs[1])} {SPRING_UNIT} comes nearest; distance and angle of the target over "
+        f"of which that with {number(best)} {SPRING_UNIT} comes nearest; distance and angle of the target over "
         "time.",
         text=(
             f"A target {away:g}\u00a0m away, {psi:g}° to the left, asks for a circle of radius R/(2 sin ψ) = "
-            f"{number(task.target.radius)}\u00a0m (the paper prints {entry['radius'].replace(' ', chr(160))}). The "
+            f"{number(task.target.radius)}\u00a0m (the paper prints {typeset(str(entry.radius))}). The "
             f"robot starts straight; {k(1)} is chosen before it walks, the legs of module 1 yaw towards the target by "
             f"at most 5°. {task.criteria.sizes['repeat']} walks with each of three springs, each with its own small "
-            f"disturbance: {listing(said)}. Lines are pale after the target has been reached.",
-            f"The paper shows the same of its robot with 15, 21 and 41\u00a0{SPRING_UNIT}, around the "
-            f"{entry['k_hat'].split()[0]} that its radius law gives. The planar model bends at softer springs "
-            f"(its pitchfork is at 12 instead of 34) and its law gives {spring(by_axis)}. It also walks faster: its "
-            f"earliest arrival, the time at which the paper's criteria are taken, is {number(task.time)}\u00a0s, not "
-            f"{printed()['turning']['evaluation_time'].replace(' ', chr(160))}.",
+            f"disturbance: {became(task)}. Lines are pale after the target has been reached.",
+            f"The paper shows the same of its robot with {listed(list(entry.outcomes.values()))}\u00a0{SPRING_UNIT}, "
+            f"around the {entry.k_hat.value:g} that its radius law gives. The planar model bends at softer springs "
+            f"(its pitchfork is at {number(point, 2)} instead of {printed.ONSET.value:g}) and its law gives "
+            f"{spring(by_axis)}. Its earliest arrival, the time at which the paper's criteria are taken, is "
+            f"{number(task.time)}\u00a0s; the robot's was {typeset(str(printed.ARRIVAL))}.",
         ),
         data=task.paths,
     )
+
+
+def became(task: TurningTask) -> str:
+    """What became of most walks with each spring that is shown."""
+    by_outcome = springs_by_outcome(task.criteria).items()
+    shown = [float(each) for each in task.paths.shown.values]
+    return listing(f"most {what.label} with {spring(k, 2)}" for k in shown for what, those in by_outcome if k in those)
 
 
 def draw_turning(robot: Robot, task: TurningTask, narrow: bool) -> Figure:
@@ -111,35 +111,18 @@ def draw_turning(robot: Robot, task: TurningTask, narrow: bool) -> Figure:
         title_fontsize=style.SMALL,
     )
     axes["C"].axhline(ARRIVAL_RADIUS, color=style.BLACK, lw=0.9, linestyle=(0, (4, 2)))
-    axes["C"].annotate(
-        f"arrived, {ARRIVAL_RADIUS:g} m",
-        (0.4, ARRIVAL_RADIUS),
-        (0, 3),
-        textcoords="offset points",
-        va="bottom",
-        fontsize=style.SMALL,
-    )
-    axes["C"].set_ylim(0.0, 1.45)
-    axes["C"].set_ylabel("target distance (m)")
-    axes["C"].set_title("C  Distance of the target")
+    style.note(axes["C"], f"arrived, {ARRIVAL_RADIUS:g} m", (0.4, ARRIVAL_RADIUS), (0, 3), va="bottom")
+    axes["C"].set(ylim=(0.0, 1.45), ylabel="target distance (m)", title="C  Distance of the target")
     axes["D"].axhline(0.0, color=style.BLACK, lw=0.9)
     axes["D"].set_ylabel("target angle (deg)")
     axes["D"].set_yticks([-270, -180, -90, 0, 90, 180])
-    axes["D"].set_ylim(-290.0, 200.0)
-    axes["D"].set_title("D  Angle of the target")
+    axes["D"].set(ylim=(-290.0, 200.0), title="D  Angle of the target")
     for letter in "CD":
         axes[letter].axvline(task.time, color=style.GREY, lw=1.0, linestyle=(0, (1, 1.5)))
-        axes[letter].set_xlim(0.0, float(data.time[-1]))
-        axes[letter].set_xlabel("time (s)")
+        axes[letter].set(xlim=(0.0, float(data.time[-1])), xlabel="time (s)")
         style.grid(axes[letter])
-    axes["D"].annotate(
-        f"earliest arrival, {number(task.time)} s",
-        (task.time, -250.0),
-        (-4, 0),
-        textcoords="offset points",
-        ha="right",
-        va="center",
-        fontsize=style.SMALL,
+    style.note(
+        axes["D"], f"earliest arrival, {number(task.time)} s", (task.time, -250.0), (-4, 0), ha="right", va="center"
     )
     return figure
 
@@ -162,8 +145,7 @@ def _target(axes: Axes, data: xr.Dataset) -> None:
 
 def _floor(axes: Axes) -> None:
     axes.set_aspect("equal", adjustable="datalim")
-    axes.set_xlabel("x, ahead at the start (m)")
-    axes.set_ylabel("y, to its left (m)")
+    axes.set(xlabel="x, ahead at the start (m)", ylabel="y, to its left (m)")
     style.grid(axes)
 
 
@@ -189,24 +171,26 @@ def _geometry(axes: Axes, robot: Robot, x: float, y: float) -> None:
     axes.text(-0.04, 0.5 * radius, "r̂", ha="right", va="center", color=style.BLUE)
     axes.set_aspect("equal")
     axes.axis("off")
-    axes.set_title("A  The circle to the target, to scale")
-    axes.set_xlim(-robot.body.length, 1.15 * away)
-    axes.set_ylim(-0.15, 2.05 * radius)
+    axes.set(
+        title="A  The circle to the target, to scale",
+        xlim=(-robot.body.length, 1.15 * away),
+        ylim=(-0.15, 2.05 * radius),
+    )
 
 
 def without(found: Turning) -> Panel:
     """Fig. "without": trajectories with and without leg yaw."""
-    data = found.without
-    cases = [data.isel(case=int(case)) for case in np.flatnonzero(~data.leg_yaw.values)]
+    data, cases = found.without, by_leg_yaw(found.without)
     said = []
-    for alone in cases:
-        trials, left = int(np.isfinite(alone.arrived).sum()), int((alone.turned > 0.0).sum())
-        said.append(
-            f"with {spring(float(alone.spring), 3)} {int(alone.arrived.sum())} of {trials} arrive, {left} turn left "
-            f"and {trials - left} right"
-        )
-    largest = float(np.rad2deg(np.abs(xr.concat(cases, "case").turned)).max())
-    helped = data.isel(case=np.flatnonzero(data.leg_yaw.values))
+    for case in cases:
+        arrived, trials = arrivals(case.alone)
+        said.append(f"with {spring(case.spring, 3)} {arrived} of {trials} arrive, {sides(case)}")
+    largest = float(np.rad2deg(max(np.abs(case.alone.turned).max() for case in cases)))
+    helped = [
+        f"{arrived} of {trials} arrive with {spring(case.spring, 3)}"
+        for case in cases
+        for arrived, trials in (arrivals(case.helped),)
+    ]
     return Panel(
         name="turning-without",
         title="With and without leg yaw",
@@ -219,11 +203,7 @@ def without(found: Turning) -> Panel:
             "The paper found the same with its robot: many of nine walks failed, because the bend took long to come or "
             "went the wrong way, and all five with leg yaw arrived.",
             "With leg yaw "
-            + listing(
-                f"{int(one.arrived.sum())} of {int(np.isfinite(one.arrived).sum())} arrive with "
-                f"{spring(float(one.spring), 3)}"
-                for one in (helped.isel(case=i) for i in range(helped.sizes["case"]))
-            )
+            + listing(helped)
             + ". The first is the spring that comes nearest to the target, the second that of the radius law, so close "
             "to the pitchfork that its bend hardly grows within the task.",
         ),
@@ -231,24 +211,26 @@ def without(found: Turning) -> Panel:
     )
 
 
+def sides(case: LegYaw) -> str:
+    """To which side the walks without leg yaw turn."""
+    left = int((case.alone.turned > 0.0).sum())
+    return f"{left} turn left and {arrivals(case.alone)[1] - left} right"
+
+
 def draw_without(data: xr.Dataset, narrow: bool) -> Figure:
     """Paths with and without leg yaw, a panel for each spring."""
-    alone = np.flatnonzero(~data.leg_yaw.values)
-    figure, axes = style.figure(*(_WITHOUT if len(alone) > 1 else _WITHOUT_ONE), narrow)
-    for case, letter in zip(map(int, alone), "AB", strict=False):
-        for index, color in ((case, style.ORANGE), (case + 1, style.GREEN)):
-            one = data.isel(case=index)
-            for trial in range(data.sizes["trial"]):
-                axes[letter].plot(one.x.values[trial], one.y.values[trial], color=color, lw=1.1)
+    cases = by_leg_yaw(data)
+    figure, axes = style.figure(*(_WITHOUT if len(cases) > 1 else _WITHOUT_ONE), narrow)
+    for case, letter in zip(cases, "AB", strict=False):
+        for walks, color in ((case.alone, style.ORANGE), (case.helped, style.GREEN)):
+            axes[letter].plot(walks.x.values.T, walks.y.values.T, color=color, lw=1.1)
         _target(axes[letter], data)
         _floor(axes[letter])
-        name = str(data.case.values[case]).partition(",")[0]
-        axes[letter].set_title(f"{letter}  {name.capitalize()}, {number(float(data.spring[case]), 3)} {SPRING_UNIT}")
+        axes[letter].set_title(f"{letter}  {case.name.capitalize()}, {number(case.spring, 3)} {SPRING_UNIT}")
     handles = [Line2D([], [], color=color) for color in (style.ORANGE, style.GREEN)]
-    walks = np.isfinite(data.arrived.values).sum(axis=1)
     figure.legend(
         handles,
-        [f"without leg yaw, {walks[0]} walks", f"with leg yaw, {walks[1]} walks"],
+        [f"without leg yaw, {arrivals(case.alone)[1]} walks", f"with leg yaw, {arrivals(case.helped)[1]} walks"],
         loc="outside lower center",
         ncols=1 if narrow else 2,
     )
@@ -302,20 +284,11 @@ def _draw_why(settled: xr.Dataset, farther: xr.Dataset, narrow: bool) -> Figure:
         values = settled.start_nearest.sel(task=task).values
         axes["A"].barh(rows + shift, values, 0.3, color=color, label=f"task {task}")
         for row, value in zip(rows, values, strict=True):
-            axes["A"].annotate(
-                f"{value:.2f}",
-                (value, row + shift),
-                (4, 0),
-                textcoords="offset points",
-                va="center",
-                fontsize=style.SMALL,
-            )
+            style.note(axes["A"], f"{value:.2f}", (value, row + shift), (4, 0), va="center")
     axes["A"].set_yticks(rows, [str(start).replace(", ", ",\n") for start in settled.start.values])
-    axes["A"].set_ylim(rows[-1] + 0.55, -0.55)
-    axes["A"].set_xlim(0.0, 1.2 * float(settled.start_nearest.max()))
+    axes["A"].set(ylim=(rows[-1] + 0.55, -0.55), xlim=(0.0, 1.2 * float(settled.start_nearest.max())))
     axes["A"].axvline(ARRIVAL_RADIUS, color=style.BLACK, lw=0.9, linestyle=(0, (4, 2)))
-    axes["A"].set_xlabel("nearest distance of the target (m)")
-    axes["A"].set_title("A  Start, no leg yaw")
+    axes["A"].set(xlabel="nearest distance of the target (m)", title="A  Start, no leg yaw")
     axes["A"].legend(loc="lower right")
     for index, (color, dash) in zip(range(farther.sizes["away"]), _CURVES, strict=False):
         axes["B"].plot(
@@ -327,10 +300,12 @@ def _draw_why(settled: xr.Dataset, farther: xr.Dataset, narrow: bool) -> Figure:
             markersize=4,
             label=f"R = {float(farther.away[index]):g} m",
         )
-    axes["B"].set_ylim(0.0, 135.0)
-    axes["B"].set_xlabel("1/k₁ (deg/(N·mm))")
-    axes["B"].set_ylabel("ε3 / legs always at 5° (%)")
-    axes["B"].set_title("B  Leg yaw needed, farther targets")
+    axes["B"].set(
+        ylim=(0.0, 135.0),
+        xlabel="1/k₁ (deg/(N·mm))",
+        ylabel="ε3 / legs always at 5° (%)",
+        title="B  Leg yaw needed, farther targets",
+    )
     axes["B"].legend(loc="upper center", ncols=2)
     for letter in "AB":
         style.grid(axes[letter], "x" if letter == "A" else "both")

@@ -8,11 +8,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from chilopod.paper.printed import printed
+from chilopod.paper import printed
 from chilopod.paper.turning import hopf
 from chilopod.paper.turning.minima import NAMES, SCALES, minima
 from chilopod.paper.turning.study import Turning
-from chilopod.paper.turning.trials import TurningTask, springs_by_outcome
+from chilopod.paper.turning.trials import TurningTask, outcome_words, span, springs_by_outcome
 from chilopod.report.kit import style
 from chilopod.report.kit.panel import Panel
 from chilopod.report.kit.words import SPRING_UNIT, listing, number, spring, typeset
@@ -75,25 +75,26 @@ def comparison(found: Turning) -> Panel:
         text=(
             "The earlier strategy softens all springs together, so that the straight walk gives way to an undulation "
             f"(below {spring(found.hopf_point, 3)} in the planar model, the robot's Hopf point is "
-            f"{printed()['turning']['hopf']['point'].split()[0]}). Same task, same time, same disturbances: "
+            f"{printed.UNIFORM.value:g}). Same task, same time, same disturbances: "
             f"at best, pitchfork against Hopf: {typeset(hopf.words(task, found.hopf))}. "
             + {
                 True: "Every minimum of the pitchfork is lower, as in the paper.",
                 False: "Not every minimum of the pitchfork is lower, unlike in the paper.",
                 None: "Whether every minimum of the pitchfork is lower, as in the paper, these walks leave open.",
             }[hopf.all_lower(task, found.hopf)],
-            f"With uniform springs {ever} of {found.hopf.criteria.arrival.size} walks arrive. Their ε1 and ε2 are "
-            "smallest at the softest springs, in the unstable region as the paper found, but there the walks scatter: "
+            f"With uniform springs {ever} of {found.hopf.criteria.arrival.size} walks arrive. Their criteria are "
+            f"smallest at {typeset(hopf.softest_minima(found.hopf, found.hopf_point)[0])}; there the walks scatter: "
             "how the body swings when it passes the target decides. ε3 tells the two apart least: "
             f"{typeset(hopf.saturation(task, found.hopf))} (its axis does not start at zero).",
         ),
-        data=xr.concat(
-            [each.criteria.assign_coords(strategy=each.criteria.attrs["strategy"]) for each in (task, found.hopf)],
-            dim="strategy",
-            join="outer",
-            combine_attrs="drop_conflicts",
-        ),
+        data=both_strategies(task, found.hopf),
     )
+
+
+def both_strategies(*tasks: TurningTask) -> xr.Dataset:
+    """The criteria of several tasks in one table."""
+    each = [task.criteria.assign_coords(strategy=task.criteria.attrs["strategy"]) for task in tasks]
+    return xr.concat(each, dim="strategy", join="outer", combine_attrs="drop_conflicts")
 
 
 def _shown(low: xr.Dataset, name: str) -> float:
@@ -110,32 +111,35 @@ def _alt(found: Turning, letter: str) -> str:
 
 
 def _said(found: Turning, letter: str) -> str:
-    task, entry = found.tasks[letter], printed()["turning"]["tasks"][letter]
-    low = minima(task.criteria)
-    k_hat = found.laws.k_hat(task.target.radius)[0]
-    arrived = springs_by_outcome(task.criteria)[Outcome.ARRIVED.label]
-    places = listing(
-        f"{title.partition(',')[0]} at {number(float(low['at'].sel(criterion=name)), 3)}"
-        for name, title in NAMES.items()
-    )
+    task = found.tasks[letter]
+    low, k_hat = minima(task.criteria), found.laws.k_hat(task.target.radius)[0]
+    arrived = springs_by_outcome(task.criteria)[Outcome.ARRIVED]
     if not arrived:
         return f"No robot arrives within {task.criteria.attrs['duration_s']:g}\u00a0s."
     parts = [float(low["at"].sel(criterion=name)) / k_hat for name in NAMES]
     return (
         f"Means and standard errors of {task.criteria.sizes['repeat']} walks, at {number(task.time)}\u00a0s. Robots "
-        f"arrive with {min(arrived):g} to {max(arrived):g}\u00a0{SPRING_UNIT} (shaded), stiffer ones bulge outside, "
-        f"softer ones turn inside. The minima (parabola through the lowest mean and its neighbours): {places}"
-        f"\u00a0{SPRING_UNIT}. The dashed line is the spring of the radius law, {spring(k_hat)}; for the robot the "
-        f"paper's is {entry['k_hat'].split()[0]}, with all three minima around it. In the model they lie at "
-        f"{listing(number(part, 2) for part in parts)} of the law's spring: next to the pitchfork a bend that starts "
-        "from straight grows too slowly for the task. The axis of ε3 does not start at zero."
+        f"arrive with {min(arrived):g} to {max(arrived):g}\u00a0{SPRING_UNIT} (shaded); most have "
+        f"{outcome_words(task.criteria, span)}. The minima (parabola through the lowest mean and its neighbours): "
+        f"{places(task)}\u00a0{SPRING_UNIT}. The dashed line is the spring of the radius law, {spring(k_hat)}; "
+        f"for the robot the paper's is {printed.TASKS[letter].k_hat.value:g}, with all three minima around it. In the "
+        f"model they lie at {listing(number(part, 2) for part in parts)} of the law's spring: next to the pitchfork a "
+        "bend that starts from straight grows too slowly for the task. The axis of ε3 does not start at zero."
+    )
+
+
+def places(task: TurningTask) -> str:
+    """Where the criteria are smallest."""
+    at = minima(task.criteria)["at"]
+    return listing(
+        f"{title.partition(',')[0]} at {number(float(at.sel(criterion=name)), 3)}" for name, title in NAMES.items()
     )
 
 
 def draw_criteria(task: TurningTask, k_hat: float, narrow: bool, top: tuple[float, ...] = _TOP) -> Figure:
     """The three criteria over 1/k1, with the spring of a radius law (N*mm/deg) and springs to mark on the top axis."""
     figure, axes = style.figure(*_LAYOUTS, narrow)
-    arrived = springs_by_outcome(task.criteria)[Outcome.ARRIVED.label]
+    arrived = springs_by_outcome(task.criteria)[Outcome.ARRIVED]
     for place, name in zip("ABC", NAMES, strict=True):
         if arrived:
             axes[place].axvspan(1.0 / max(arrived), 1.0 / min(arrived), color=style.PALE, zorder=0)
@@ -193,9 +197,11 @@ def _points(axes: Axes, data: xr.Dataset, name: str, color: str, marker: str) ->
 
 
 def _finish(axes: Axes, name: str, place: str, top: tuple[float, ...] = _TOP) -> None:
-    axes.set_title(f"{place}  {_AXES[name].partition(' (')[0]}")
-    axes.set_ylabel(_AXES[name].partition(": ")[2])
-    axes.set_xlabel("1/k₁ (deg/(N·mm))")
+    axes.set(
+        title=f"{place}  {_AXES[name].partition(' (')[0]}",
+        ylabel=_AXES[name].partition(": ")[2],
+        xlabel="1/k₁ (deg/(N·mm))",
+    )
     axes.set_xlim(left=0.0)
     if name == "effort":
         # It hardly differs: not from zero, as the text says.

@@ -44,8 +44,7 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
     root = np.interp(fine, np.append(0.0, distance), np.append(0.0, data.predicted_amplitude.values**2)) ** 0.5
     axes["A"].plot(data.attrs["value"] * (1.0 - fine), np.rad2deg(root), color=style.ORANGE, label="normal form")
     _dots(axes["A"], k, np.rad2deg(data.amplitude.values), "simulated")
-    axes["A"].set_ylabel("amplitude, norm over the joints (deg)")
-    axes["A"].set_title("How far the body swings")
+    axes["A"].set(ylabel="amplitude, norm over the joints (deg)", title="How far the body swings")
 
     first = data.attrs["frequency_rad_s"]
     at = np.append(data.attrs["value"], k)
@@ -58,8 +57,7 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
         label="small undulation",
     )
     _dots(axes["B"], k, data.frequency.values, "simulated")
-    axes["B"].set_ylabel("frequency (rad/s)")
-    axes["B"].set_title("How fast")
+    axes["B"].set(ylabel="frequency (rad/s)", title="How fast")
 
     amplitude_off = np.abs(data.predicted_amplitude.values / data.amplitude.values - 1.0)
     shift = data.frequency.values - first
@@ -73,9 +71,9 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
         linestyle=(0, (1, 2)),
         label="in proportion",
     )
-    axes["C"].set_xlabel("distance below the point (%)")
-    axes["C"].set_ylabel("normal form is off by (%)")
-    axes["C"].set_title("How sure the normal form is")
+    axes["C"].set(
+        xlabel="distance below the point (%)", ylabel="normal form is off by (%)", title="How sure the normal form is"
+    )
 
     for letter in "AB":
         axes[letter].plot(

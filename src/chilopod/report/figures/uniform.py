@@ -55,18 +55,14 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
     axes["A"].set_title("How far each joint swings")
     axes["A"].bar(joints, data.amplitude.values, width=0.55, color=style.SKY)
     for joint, value in zip(joints, data.amplitude.values, strict=True):
-        axes["A"].annotate(
-            f"{value:.3f}", (joint, value), (0, 3), textcoords="offset points", ha="center", fontsize=style.SMALL
-        )
+        style.note(axes["A"], f"{value:.3f}", (joint, value), (0, 3), ha="center")
     axes["A"].margins(y=0.15)
     axes["A"].set_ylabel("amplitude (unit norm)")
     axes["B"].set_title("Phase relative to joint 1")
     degrees = np.degrees(data.phase.values)
     axes["B"].plot(joints, degrees, "o-", color=style.BLUE, markersize=7)
     for joint, value in zip(joints, degrees, strict=True):
-        axes["B"].annotate(
-            minus(f"{value:.0f}°"), (joint, value), (7, 4), textcoords="offset points", fontsize=style.SMALL
-        )
+        style.note(axes["B"], minus(f"{value:.0f}°"), (joint, value), (7, 4))
     axes["B"].margins(x=0.14, y=0.16)
     axes["B"].set_ylabel("phase (degrees)")
     style.grid(axes["B"], "y")
@@ -99,5 +95,7 @@ def _snapshots(axes: Axes, data: xr.Dataset, columns: int) -> None:
             va="center",
             fontsize=style.SMALL,
         )
-    axes.set_xlim(-0.5 * modules - 2.2, (columns - 1) * across + 0.5 * modules + 1.0)
-    axes.set_ylim(-(rows - 1) * down - 0.7 * down, 0.7 * down)
+    axes.set(
+        xlim=(-0.5 * modules - 2.2, (columns - 1) * across + 0.5 * modules + 1.0),
+        ylim=(-(rows - 1) * down - 0.7 * down, 0.7 * down),
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 from base64 import b64encode
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from enum import Enum
 from importlib.metadata import version
 from importlib.resources import files
@@ -17,28 +17,22 @@ from markupsafe import Markup
 
 from chilopod import units
 from chilopod.errors import in_words
-from chilopod.paper.robot.table import PREDICTED
 from chilopod.paper.section import Found, Section
-from chilopod.paper.straight.sections import MODE, UNIFORM
-from chilopod.paper.table import RobotRow, Row
-from chilopod.paper.turning.sections import TURNING
+from chilopod.paper.straight.sections import MODE
+from chilopod.paper.table import AGREES, NOT_COMPUTED, NOT_PRINTED, WITHIN, RobotRow, Row
 from chilopod.report.kit.panel import Panel
-from chilopod.report.kit.words import listing, minus, spring, typeset
+from chilopod.report.kit.story import facts, summary
+from chilopod.report.kit.words import listing, minus, typeset
 from chilopod.robot import Robot
 
 _TITLE: Final = "A robot that turns by bifurcation: the paper and the computation"
-_VERDICTS: Final[Mapping[str, tuple[str, str]]] = {
-    "agrees": ("agrees", "✓"),
-    "differs": ("differs", "≠"),
-    "undecided": ("undecided", "?"),
-    "not printed": ("open", "–"),
+_MARKS: Final = {True: ("agrees", "✓"), False: ("differs", "≠"), None: ("undecided", "?")}
+_LOOKS: Final = {
+    **{words[answer]: mark for words in (AGREES, WITHIN) for answer, mark in _MARKS.items()},
+    **dict.fromkeys((NOT_PRINTED, NOT_COMPUTED), ("open", "–")),
 }
-_ROBOT_VERDICTS: Final[Mapping[str, tuple[str, str]]] = {
-    "within": _VERDICTS["agrees"],
-    "outside": _VERDICTS["differs"],
-    "undecided": _VERDICTS["undecided"],
-}
-_MOST_LISTED: Final = 4
+"""Of verdicts: class and mark."""
+
 _RELOAD: Final = 10  # s
 _LIBRARIES: Final = ("numpy", "numba", "scipy", "xarray", "matplotlib")
 
@@ -137,8 +131,10 @@ def page(
         done=sum(section in found for section in sections),
         count=len(sections),
         summary=summary(found),
+        facts=facts(found),
+        first=_first([film for each in shown for film in each.films]),
         tables=_tables(found),
-        robot_rows=[_robot_row(row) for row in found.lines(RobotRow)],
+        robot_rows=[_row(row) for row in found.robot_rows()],
         chapters=_chapters(sections, opening, shown, failures, waiting),
         commands=commands(robot_file, found[MODE]),
         robots=_robots(found),
@@ -150,55 +146,11 @@ def page(
     )
 
 
-def summary(results: Found) -> str:
-    """What was found, in a few plain sentences."""
-    parts, mode, uniform, turning = [], results[MODE], results[UNIFORM], results[TURNING]
-    modules = results.context.robot.body.modules
-    parts.append(
-        f"A {modules}-module robot walks straight as long as the springs between its modules are "
-        "stiff enough. Below a critical stiffness the straight walk cannot hold, and the body bends by itself."
+def _first(films: Sequence[Film]) -> Film | None:
+    """The film that the page begins with: of the robot in three dimensions, if there is one."""
+    return next(
+        (film for film in reversed(films) if film.pictured), next((film for film in films if film.encoded), None)
     )
-    if mode is not None:
-        found = mode.attrs
-        parts.append(
-            f"Softening the front spring alone, that happens at {spring(found['value'], 5)}: a {found['criticality']} "
-            f"{found['kind']}, and the robot turns left or right."
-        )
-    if uniform is not None:
-        found = uniform.attrs
-        parts.append(
-            f"Softening all springs together, it happens at {spring(found['value'], 5)} and the body undulates, once "
-            f"in {found['oscillation_period_s']:.1f} s."
-        )
-    if turning is not None:
-        task = turning.tasks["A"]
-        parts.append(
-            f"Sent to a target at {task.target}, it arrives with a front spring of {spring(task.best, 3)}; stiffer "
-            "ones carry it past outside, softer ones inside."
-        )
-    if robot_rows := results.lines(RobotRow):
-        predicted = [row for row in robot_rows if row.kind == PREDICTED]
-        counted = {word: sum(row.verdict == word for row in predicted) for word in _ROBOT_VERDICTS}
-        open_ = counted["undecided"]
-        left = f"; {open_} more {'is' if open_ == 1 else 'are'} left open by the scatter of its trials" if open_ else ""
-        parts.append(
-            "The same robot in three dimensions, its unknown constants fitted to the paper's base series of walks and "
-            f"their speed alone, meets {counted['within']} of {len(predicted)} further statements about the robot that "
-            f"it was not fitted to{left}."
-        )
-    rows = results.lines(Row)
-    counted = {word: sum(row.verdict == word for row in rows) for word in _VERDICTS}
-    compared = sum(counted.values()) - counted["not printed"]
-    if compared:
-        differing = [typeset(row.quantity) for row in rows if row.verdict == "differs"]
-        said = [f"{counted['agrees']} agree"]
-        if counted["undecided"]:
-            said.append(f"{counted['undecided']} are left open by the scatter of the trials")
-        if differing:
-            listed = f": {listing(differing)}" if len(differing) <= _MOST_LISTED else ""
-            said.append(f"{len(differing)} differ{listed}. The reasons are given below")
-        parts.append(f"Of {compared} statements of the paper compared with the planar model, {listing(said)}.")
-    return " ".join(parts)
 
 
 def commands(robot: str, mode: xr.Dataset | None) -> list[dict[str, str]]:
@@ -248,9 +200,8 @@ def commands(robot: str, mode: xr.Dataset | None) -> list[dict[str, str]]:
 
 def _tables(found: Found) -> list[dict[str, Any]]:
     """The table paper | computed, one part a chapter."""
-    chapters = dict.fromkeys(section.chapter for section in found.rows)
-    parts = {chapter: [_row(row) for row in found.lines(Row, chapter)] for chapter in chapters}
-    return [{"title": chapter, "rows": rows} for chapter, rows in parts.items() if rows]
+    parts = found.planar_rows()
+    return [{"title": chapter, "rows": [_row(row) for row in rows]} for chapter, rows in parts.items()]
 
 
 def _chapters(
@@ -280,24 +231,9 @@ def _chapters(
     return chapters
 
 
-def _row(row: Row) -> dict[str, str]:
-    kind, mark = _VERDICTS[row.verdict]
-    return {
-        "quantity": typeset(row.quantity),
-        "paper": typeset(row.paper),
-        "computed": typeset(row.computed),
-        "where": row.where,
-        "verdict": row.verdict,
-        "remark": typeset(row.remark),
-        "kind": kind,
-        "mark": mark,
-    }
-
-
-def _robot_row(row: RobotRow) -> dict[str, str]:
-    kind, mark = _ROBOT_VERDICTS[row.verdict]
-    words = {name: typeset(text) for name, text in row.as_json().items() if name not in ("verdict", "kind")}
-    return {**words, "origin": row.kind, "verdict": row.verdict, "kind": kind, "mark": mark}
+def _row(row: Row | RobotRow) -> dict[str, str]:
+    look, mark = _LOOKS[row.verdict]
+    return {**{name: typeset(text) for name, text in asdict(row).items()}, "look": look, "mark": mark}
 
 
 def _figure(drawn: Drawn) -> dict[str, Any]:
@@ -320,7 +256,7 @@ def _embedded(svg: bytes) -> str:
 def _robots(results: Found) -> list[dict[str, Any]]:
     """The robots of the report, with the files their numbers stand in."""
     found = [("The robot of the planar model", results.context.robot, "robot.toml")]
-    if results.lines(RobotRow):
+    if any(row.twin for row in results.robot_rows()):
         found.append(("The robot in three dimensions", results.context.whole, "robot-3d.toml"))
     return [{"says": says, "name": robot.name, "file": file, "numbers": _numbers(robot)} for says, robot, file in found]
 

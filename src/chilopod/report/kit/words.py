@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+
+from chilopod.paper.table import listing as listing
 
 SPRING_UNIT = "N·mm/deg"
 
@@ -47,12 +49,6 @@ def typeset(text: str) -> str:
 
 def _power(digit: str, sign: str, power: str) -> str:
     return f"{digit}×10{(sign.strip('+') + power).translate(_SUPERSCRIPTS)}"
-
-
-def listing(items: Iterable[str]) -> str:
-    """Items joined by commas and a last "and"."""
-    names = list(items)
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 def spans(counts: Sequence[int]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Final
@@ -147,6 +148,15 @@ def _frames(shown: Scene, heading: str, size: tuple[int, int], speed: float) -> 
             yield stage.drawn(index)
 
 
+@dataclass(frozen=True)
+class _Captions:
+    """Titles and outcomes of all panels, and how wide the widest pair is in one line, pixels."""
+
+    titles: list[Text]
+    outcomes: list[Text]
+    longest: float
+
+
 class Stage:
     """The panels, and what moves in them drawn anew over what does not."""
 
@@ -233,38 +243,50 @@ class Stage:
             legend.remove()
         return float(legend.get_window_extent(self.canvas.get_renderer()).height)
 
+    def _captions(self) -> _Captions:
+        """Titles and outcomes, still to be placed."""
+        said = (self.shown.titles, map(says, self.shown.outcomes))
+        titles, outcomes = ([self._text(0.0, 0.0, each, weight="bold", va="top") for each in texts] for texts in said)
+        longest = max(self._extent(a) + self._extent(b) for a, b in zip(titles, outcomes, strict=True)) + self.font
+        return _Captions(titles, outcomes, longest)
+
+    def _tall(self, lines: int) -> float:
+        """Height of a caption."""
+        return (0.35 + 1.35 * lines) * self.font
+
+    def _place(self, captions: _Captions, index: int, at: tuple[float, float], across: float, lines: int) -> None:
+        """Put a caption over its panel: title and outcome in one line, or in two."""
+        x, y = at
+        outcome = (x + across, y) if lines == 1 else (x, y - 1.35 * self.font)
+        captions.outcomes[index].set_horizontalalignment("right" if lines == 1 else "left")
+        for text, place in ((captions.titles[index], at), (captions.outcomes[index], outcome)):
+            text.set_position((place[0] / self.size[0], place[1] / self.size[1]))
+            self._fit(text, across)
+
     def _panels(self, bottom: float, top: float) -> None:
         """Lay the panels out as large as they fit, with title and outcome in one line if there is room for both."""
         floor, width = self.shown.floor, self.size[0] - 2.0 * GAP
         count, aspect = len(self.shown.titles), (floor.y1 - floor.y0) / (floor.x1 - floor.x0)
-        titles = [self._text(0.0, 0.0, title, weight="bold", va="top") for title in self.shown.titles]
-        outcomes = [self._text(0.0, 0.0, says(outcome), weight="bold", va="top") for outcome in self.shown.outcomes]
-        longest = max(self._extent(a) + self._extent(b) for a, b in zip(titles, outcomes, strict=True)) + self.font
+        captions = self._captions()
         for lines in (1, 2):
-            caption = (0.35 + 1.35 * lines) * self.font
+            caption = self._tall(lines)
             sizes = []
             for columns in range(1, count + 1):
                 rows = math.ceil(count / columns)
                 wide = (width - APART * (columns - 1)) / columns
                 sizes.append((min(wide, ((top - bottom - GAP * (rows - 1)) / rows - caption) / aspect), columns))
             across, columns = max(sizes)
-            if longest <= across:
+            if captions.longest <= across:
                 break
         across = max(across, 40.0)
         left = GAP + 0.5 * (width - columns * across - (columns - 1) * APART)
         rows = math.ceil(count / columns)
         top -= max(0.0, 0.5 * (top - bottom + GAP - rows * (across * aspect + caption + GAP)))
         self.panels = []
-        for index, (title, outcome) in enumerate(zip(titles, outcomes, strict=True)):
+        for index, outcome in enumerate(captions.outcomes):
             x = left + (index % columns) * (across + APART)
             y = top - (index // columns) * (across * aspect + caption + GAP)
-            title.set_position((x / self.size[0], y / self.size[1]))
-            self._fit(title, across)
-            line = 0.0 if lines == 1 else 1.35 * self.font
-            where = x + across if lines == 1 else x
-            outcome.set_position((where / self.size[0], (y - line) / self.size[1]))
-            outcome.set_horizontalalignment("right" if lines == 1 else "left")
-            self._fit(outcome, across)
+            self._place(captions, index, (x, y), across, lines)
             box = (x, y - caption - across * aspect, across, across * aspect)
             axes = self.figure.add_axes(tuple(np.array(box) / np.tile(self.size, 2)))
             self.panels.append(FilmPanel(self.shown, index, axes, across / (floor.x1 - floor.x0), self.font, outcome))

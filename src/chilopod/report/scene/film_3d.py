@@ -30,7 +30,6 @@ from chilopod.report.scene.film import (
     Stage,
     encoded,
     frame_times,
-    says,
 )
 from chilopod.report.scene.frames import Scene, scene
 from chilopod.report.scene.stage_3d import TILE, Look, Studio, View, framing
@@ -63,19 +62,9 @@ def film_3d(
     Parameters
     ----------
     record
-        As described at the top of this module.
-    path
-        Of the file; its folder is created where there is none, and a file of that name is replaced as a whole.
-    titles
-        What to call each robot: by its label in the record, or in the order of the record.
-    heading
-        Stands above all panels.
-    fps
-        Frames per second of the film; it is no smoother than the record.
-    speed
-        Seconds of the walk per second of the film.
-    size
-        Width and height, pixels, both even.
+        As described at the top of this module; the film is no smoother.
+    path, titles, heading, fps, speed, size
+        As for :func:`chilopod.report.scene.film.movie`.
     follow
         Whether every panel follows its robot; otherwise all show the same piece of floor, with all of all walks.
 
@@ -117,16 +106,10 @@ def stills(
 
     Parameters
     ----------
-    record
-        As described at the top of this module.
+    record, path, titles, heading
+        As for :func:`film_3d`; by default without titles and heading.
     times
         Of the moments, s, shape (T,); the nearest samples are shown.
-    path
-        Of the file; its folder is created where there is none, and a file of that name is replaced as a whole.
-    titles
-        What to call each robot; by default nothing.
-    heading
-        Stands above all pictures; none by default.
     size
         Width and height of a picture, pixels.
 
@@ -240,30 +223,21 @@ class _Stage3D(Stage):
         columns = _columns(count)
         rows = math.ceil(count / columns)
         across = max(_NARROWEST, int((width - APART * (columns - 1)) / columns))
-        titles = [self._text(0.0, 0.0, title, weight="bold", va="top") for title in self.shown.titles]
-        outcomes = [self._text(0.0, 0.0, says(outcome), weight="bold", va="top") for outcome in self.shown.outcomes]
-        longest = max(self._extent(a) + self._extent(b) for a, b in zip(titles, outcomes, strict=True)) + self.font
-        lines = 1 if longest <= across else 2
-        caption = (0.35 + 1.35 * lines) * self.font
+        captions = self._captions()
+        lines = 1 if captions.longest <= across else 2
+        caption = self._tall(lines)
         tall = max(_LOWEST, int((top - bottom - GAP * (rows - 1)) / rows - caption))
         robot, panel = self.shown.frames.robot, (across, tall)
         self.studio = Studio(robot, panel, self.walks.view(panel, 0 if self.follow else None))
         self.panels = []
-        for index, (title, outcome) in enumerate(zip(titles, outcomes, strict=True)):
+        for index, outcome in enumerate(captions.outcomes):
             x = GAP + (index % columns) * (across + APART)
             y = top - (index // columns) * (tall + caption + GAP)
-            self._place(title, x, y, across)
-            where = (x + across, y) if lines == 1 else (x, y - 1.35 * self.font)
-            outcome.set_horizontalalignment("right" if lines == 1 else "left")
-            self._place(outcome, *where, across)
+            self._place(captions, index, (x, y), across, lines)
             corner = (round(x), round(self.size[1] - y + caption))
             self.panels.append(_Panel3D(self, index, panel, corner, outcome))
         note = self._text(self.size[0] - GAP, GAP, f"tiles of {TILE:g} m", ha="right", fontsize=0.85 * self.font)
         note.set_visible(self._room_beside_key(note))
-
-    def _place(self, text: Text, x: float, y: float, room: float) -> None:
-        text.set_position((x / self.size[0], y / self.size[1]))
-        self._fit(text, room)
 
     def _room_beside_key(self, note: Text) -> bool:
         renderer = self.canvas.get_renderer()

@@ -40,10 +40,8 @@ def replay_3d(record: xr.Dataset, *, titles: Mapping[Any, str] | Sequence[str], 
     ----------
     record
         From :func:`chilopod.twin.simulate.simulate` with ``poses=True``.
-    titles
-        What to call each robot: by its label in the record, or in the order of the record.
-    heading
-        Of the page.
+    titles, heading
+        As for :func:`chilopod.report.scene.replay.replay`.
 
     Returns
     -------

@@ -2,16 +2,56 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
+
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
 from chilopod.analysis.square_root import RESAMPLED, SquareRootFit, square_root_fit
 from chilopod.errors import AnalysisError
 from chilopod.paper.scatter import drawn_anew, mean_and_error
+from chilopod.robot import Robot
 from chilopod.tasks.radius_law import in_settled_curve, is_curved
+from chilopod.trials import Trial, run
 
 Array = NDArray[np.float64]
+
+_RATE = 50.0  # Hz
+
+
+def by_spring(walks: Sequence[xr.Dataset], springs: Sequence[float]) -> xr.Dataset:
+    """What walks come to, over spring (N*mm/deg) and repeat; of each spring as many, one after the other."""
+    repeats = len(walks) // len(springs)
+    rows = [xr.concat(walks[i : i + repeats], "repeat") for i in range(0, len(walks), repeats)]
+    each = ("spring", np.asarray(springs, dtype=np.float64), {"units": PAPER_UNIT})
+    return xr.concat(rows, "spring").assign_coords(spring=each, repeat=np.arange(repeats))
+
+
+def example_walks(
+    robot: Robot,
+    springs: Sequence[float],
+    duration: float,
+    seeds: Sequence[int],
+    engine: str = "planar",
+    folder: str | Path | None = None,
+) -> xr.Dataset:
+    """Joint angles over time of one walk at each of some springs.
+
+    Returns
+    -------
+    Dataset over (time, spring, joint): ``joint_angle`` (rad).
+    """
+    robots = [robot.with_value(K1, stiffness(spring)) for spring in springs]
+    pairs = zip(robots, seeds, strict=True)
+    records = run([Trial(each, duration, seed, rate=_RATE, engine=engine) for each, seed in pairs], folder)
+    angles = [record.joint_angle.isel(robot=0, drop=True) for record in records]
+    data = xr.concat(angles, dim="spring").transpose("time", "spring", "joint").to_dataset(name="joint_angle")
+    data = data.assign_coords(spring=("spring", np.asarray(springs, dtype=np.float64), {"units": PAPER_UNIT}))
+    data.attrs = {"robot": robot.name, "varied": K1, "about": "yaw joint angles over time"}
+    return data
 
 
 def shares(data: xr.Dataset) -> xr.Dataset:

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chilopod.paper.robot.equal_distance import change, law_ratio, radius_ratio
-from chilopod.paper.robot.walk_measures import onset, radius_at, shares
+from chilopod.paper.equal_distance import change, law_ratio, radius_ratio
 from chilopod.paper.robot.walks import SPRINGS, VARIANT_SPRINGS
+from chilopod.paper.walk_measures import onset, radius_at, shares
 
-MADE_UP = runpy.run_path(str(Path(__file__).with_name("made_up_robot.py")))
+MADE_UP = runpy.run_path(str(Path(__file__).parent / "robot" / "made_up_robot.py"))
 series, AMPLITUDE = MADE_UP["series"], MADE_UP["AMPLITUDE"]
 
 

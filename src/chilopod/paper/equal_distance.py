@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from chilopod.analysis.square_root import square_root_fit
 from chilopod.errors import AnalysisError
-from chilopod.paper.robot.walk_measures import counted
 from chilopod.paper.scatter import drawn_anew, mean_and_error
+from chilopod.paper.walk_measures import counted
 
 Array = NDArray[np.float64]
 
@@ -58,7 +58,7 @@ def radius_ratio(base: xr.Dataset, variant: xr.Dataset, drawn: int = DRAWN, seed
     base, variant
         Over spring and repeat: ``axis_radius``, ``direction`` and ``settled``, as
         :func:`chilopod.tasks.radius_law.end_of_walk` has them. What counts, see
-        :func:`chilopod.paper.robot.walk_measures.counted`.
+        :func:`chilopod.paper.walk_measures.counted`.
     drawn
         How many times trials are drawn anew at every spring for the standard errors, onsets fitted anew each time; 0
         for none.

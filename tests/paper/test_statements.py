@@ -1,0 +1,58 @@
+"""What is asked of numbers: a number just inside agrees, one just outside does not."""
+
+import pytest
+
+from chilopod.paper import printed, statements
+from chilopod.paper.printed import Band
+from chilopod.paper.table import Kind, OfPlanar, OfTwin, Statement, of_twin, robot_rows
+
+MEASURED = [each for each in statements.ORDER if isinstance(each.said, Band)]
+
+
+@pytest.mark.parametrize("statement", MEASURED, ids=lambda each: each.quantity)
+def test_every_measured_statement_on_both_sides(statement):
+    low, high = statement.said.low, statement.said.high
+    for value, verdict in ((low, "outside"), (high, "outside"), (0.5 * (low + high), "within")):
+        beyond = value + (1e-6 * (value - 0.5 * (low + high)))
+        (row,) = robot_rows([of_twin(statement, "", beyond, 0.0)], ())
+        assert row.verdict == verdict
+    for value in (low, high):
+        inside = value - 1e-6 * (value - 0.5 * (low + high))
+        assert [row.verdict for row in robot_rows([of_twin(statement, "", inside)], ())] == ["within"]
+        assert [row.verdict for row in robot_rows([of_twin(statement, "", inside, high - low)], ())] == ["undecided"]
+
+
+def test_tolerances_are_those_that_the_rows_name():
+    """What the table says is asked is what is asked."""
+    for each in MEASURED:
+        part, percent, _ = each.said.asked.partition(" %")
+        if percent and part.isdigit():
+            wanted = each.said.middle if not each.said.words.startswith(("almost", "no ")) else 1.0
+            assert each.said.high == pytest.approx(wanted * (1.0 + float(part) / 100.0)), each.quantity
+
+
+def test_statements_are_told_apart():
+    assert len({each.quantity for each in statements.ORDER}) == len(statements.ORDER)
+    assert len(set(statements.ORDER)) == len(statements.ORDER)
+
+
+def test_lines_stand_in_the_order_of_the_statements_whoever_found_them_first():
+    first, second = statements.ONSET, statements.UNIFORM
+    other = Statement("one of a new section", printed.Said("1", "2"), Kind.CHECKED)
+    found = [OfTwin(other, "3", True), OfPlanar(second, "6.58"), OfTwin(first, "33", True), OfPlanar(first, "12")]
+    rows = robot_rows(found, statements.ORDER)
+    assert [(row.quantity, row.twin, row.planar, row.verdict) for row in rows] == [
+        (first.quantity, "33", "12", "within"),
+        (second.quantity, "", "6.58", "not computed"),
+        ("one of a new section", "3", "", "within"),
+    ]
+
+
+def test_readings_of_a_statement_have_a_line_each():
+    said = statements.VARIANTS["stride 1.8 cm"].onset
+    found = [of_twin(said, "25", 25.0, reading="one"), of_twin(said, "40", 40.0, reading="other"), OfPlanar(said, "11")]
+    rows = robot_rows(found, statements.ORDER)
+    assert [(row.quantity, row.planar, row.verdict) for row in rows] == [
+        (f"{said.quantity} (one)", "11", "within"),
+        (f"{said.quantity} (other)", "11", "outside"),
+    ]
