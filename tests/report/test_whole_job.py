@@ -65,7 +65,7 @@ def test_every_section_is_computed_and_on_the_page(tiny):
 def test_nothing_of_the_page_is_missing_or_empty(tiny):
     html = (tiny.folder / "index.html").read_text(encoding="utf-8")
     page = PAGE(html)
-    for address in page.attributes("src") + page.attributes("href") + page.attributes("srcset"):
+    for address in (each for name in ("src", "href", "srcset", "poster") for each in page.attributes(name)):
         assert not re.match(r"(https?:)?//", address)
         if address.startswith("#"):
             assert address[1:] in page.attributes("id")
