@@ -1,7 +1,7 @@
 # Everything here needs only make and a Python from 3.11 to 3.13. Choose another with: make setup PYTHON=/path/to/python3
 # The environment lives in .venv and is reused until pyproject.toml or requirements.lock changes.
 .DEFAULT_GOAL := help
-.PHONY: help setup reproduce test lint types format bench lock clean
+.PHONY: help setup reproduce test lint types format docs bench lock clean
 .DELETE_ON_ERROR:
 
 VENV := .venv
@@ -73,6 +73,10 @@ types: $(DEV)  ## static types
 format: $(DEV)  ## rewrite files in the project's style
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+docs: $(RUNTIME)  ## run what README and docs show; rewrites its output, numbers and pictures
+	$(BIN)/python docs/renew.py
+	$(BIN)/python docs/moving_picture.py
 
 bench: $(BENCH)  ## benchmarks beside their peers; rewrites the tables in benchmarks/README.md
 	$(BIN)/python benchmarks/straight_walk.py

@@ -34,14 +34,14 @@ class PeerRobot:
     mass: float = 8.5
     stiffness: tuple[float, ...] = field(default=(41.0 * N_MM_PER_DEG,) * 5)
     damping: tuple[float, ...] = field(default=(0.0,) * 5)
-    forward_offset: float = 0.048
-    half_width: float = 0.0728
+    forward_offset: float = 0.0493
+    half_width: float = 0.0732
     stride: float = 0.03
     stance: float = 0.31
     swing: float = 0.29
     module_phase: float = 1.0 / 3.0  # of a period
     side_phase: float = 0.5
-    friction: float = 256.5
+    friction: float = 246.5
 
     @property
     def period(self) -> float:

@@ -45,6 +45,11 @@ def peer_of(robot):
     )
 
 
+def test_the_peers_robot_is_the_preset():
+    for name, value in vars(peer_of(PRESET)).items():
+        assert getattr(peer_model.PeerRobot(), name) == pytest.approx(value), name
+
+
 @settings(max_examples=40, deadline=None)
 @given(robots(st.integers(2, 8)), st.floats(0.0, 1.0), st.floats(0.05, 1.2))
 def test_it_is_the_derivative_of_the_nonlinear_flow(robot, start, duration):

@@ -1,4 +1,4 @@
-"""The preset against the numbers known of it, and located points of any robot against a finer computation."""
+"""The preset against the paper, former constants against other programs, points of any robot against a finer one."""
 
 import math
 
@@ -10,6 +10,7 @@ from planar_reference import EXTENDED, LD, PI, fine_flow
 from planar_strategies import robots
 
 from chilopod import Robot, load_robot
+from chilopod.paper.fit_data import critical_mode_data
 from chilopod.planar import PlanarModel
 from chilopod.stability import Criticality, Kind, exponents, locate, multipliers
 from chilopod.units import parse
@@ -32,49 +33,52 @@ def only(found):
 
 def test_the_paper_s_pitchfork():
     point = only(points(PRESET))
+    printed = critical_mode_data()
     assert point.kind is Kind.PITCHFORK
-    assert point.value / UNIT == pytest.approx(12.001, abs=0.002)
+    assert point.value / UNIT == pytest.approx(printed.k1, abs=printed.k1_tolerance)
     assert point.frequency == 0.0
     assert point.criticality is Criticality.SUPERCRITICAL
     assert point.multiplier == pytest.approx(-1.0, abs=1e-10)
     joints = point.mode[3:8].real
     np.testing.assert_allclose(np.abs(point.mode.imag), 0.0)
     joints = joints / np.linalg.norm(joints)
-    np.testing.assert_allclose(joints * np.sign(joints[0]), [0.635, 0.358, 0.476, 0.465, 0.163], rtol=0, atol=1e-3)
+    joints *= np.sign(joints[0])
+    np.testing.assert_allclose(joints, printed.components, rtol=0, atol=printed.component_tolerance)
 
 
-def with_modules(n):
-    return PRESET.override("body.modules", n).with_value("body.length", 0.225 * n).with_value("body.mass", 8.5 / 6 * n)
+def test_the_pitchfork_with_the_former_constants(former):
+    point = only(points(former, between=(11.0, 13.0)))
+    assert point.value / UNIT == pytest.approx(12.00114549050763, rel=1e-13)
+    joints = np.abs(point.mode[3:8]) / np.linalg.norm(point.mode[3:8])
+    np.testing.assert_allclose(joints, [0.635, 0.358, 0.476, 0.465, 0.163], rtol=0, atol=1e-3)
 
 
-def softer_rear():
-    robot = PRESET
-    for joint in range(1, 5):
-        robot = robot.with_value(f"springs.stiffness[{joint}]", 28 * UNIT)
-    return robot
+def with_modules(robot, n):
+    return robot.override("body.modules", n).with_value("body.length", 0.225 * n).with_value("body.mass", 8.5 / 6 * n)
 
 
 @pytest.mark.parametrize(
-    ("robot", "expected", "half_a_digit"),
+    ("setting", "expected", "half_a_digit"),
     [
-        (softer_rear(), 8.97, 0.005),
-        (PRESET.override("gait.stride", "1.8 cm"), 10.8, 0.05),
-        (PRESET.override("gait.module_phase", "180 deg"), 11.3, 0.05),
-        (PRESET.override("gait.module_phase", "-120 deg"), 11.79, 0.005),
-        (with_modules(7), 12.1, 0.05),
-        (with_modules(8), 12.0, 0.05),
-        (with_modules(9), 12.3, 0.05),
-        (with_modules(10), 12.5, 0.05),
+        ([f"springs.stiffness[{joint}]=28 N*mm/deg" for joint in range(1, 5)], 8.97, 0.005),
+        (["gait.stride=1.8 cm"], 10.8, 0.05),
+        (["gait.module_phase=180 deg"], 11.3, 0.05),
+        (["gait.module_phase=-120 deg"], 11.79, 0.005),
+        (7, 12.1, 0.05),
+        (8, 12.0, 0.05),
+        (9, 12.3, 0.05),
+        (10, 12.5, 0.05),
     ],
     ids=["k2-5 = 28", "stride 1.8 cm", "phase pi", "phase -120 deg", "N = 7", "N = 8", "N = 9", "N = 10"],
 )
-def test_variants_of_the_pitchfork(robot, expected, half_a_digit):
+def test_variants_of_the_pitchfork(former, setting, expected, half_a_digit):
+    robot = with_modules(former, setting) if isinstance(setting, int) else former.set_from_text(setting)
     found = [point for point in points(robot, normal_form=False) if point.kind is Kind.PITCHFORK]
     assert found[-1].value / UNIT == pytest.approx(expected, abs=half_a_digit)
 
 
-def test_uniform_springs_oscillate():
-    point = points(PRESET, "springs.stiffness")[-1]
+def test_uniform_springs_oscillate(former):
+    point = points(former, "springs.stiffness")[-1]
     assert point.kind is Kind.NEIMARK_SACKER
     assert point.value / UNIT == pytest.approx(6.5756, abs=5e-5)
     assert point.frequency == pytest.approx(0.5767, abs=5e-5)
@@ -92,8 +96,8 @@ def test_half_and_full_period_find_the_same_point():
     assert abs(half.value - full.value) <= half.error_bound + full.error_bound
 
 
-def test_all_thirteen_exponents_against_800_bits():
-    robot = PRESET.with_value("springs.stiffness", 41 * UNIT)
+def test_all_thirteen_exponents_against_800_bits(former):
+    robot = former.with_value("springs.stiffness", 41 * UNIT)
     values = exponents(PlanarModel(robot)).values
     known = [
         -0.229784358749284,
@@ -209,7 +213,7 @@ def test_located_points_lie_within_their_error_bound(robot):
     st.sampled_from([180.0, 180.0, 180.0, 150.0]),
 )
 def test_located_points_near_the_paper_s_robot_lie_within_their_error_bound(n, c, b, x0, phase, side):
-    robot = with_modules(n).with_value("ground.friction", 256.5 * c).with_value("legs.half_width", 0.0728 * b)
+    robot = with_modules(PRESET, n).with_value("ground.friction", 256.5 * c).with_value("legs.half_width", 0.0728 * b)
     robot = robot.with_value("legs.forward_offset", x0).with_value("gait.module_phase", math.radians(phase))
     robot = robot.with_value("gait.side_phase", math.radians(side))
     check(lambda k: PlanarModel(robot.with_value("springs.stiffness[0]", k)), (3.0 * UNIT, 40.0 * UNIT))

@@ -116,17 +116,19 @@ def test_a_browser_sees_replays_move(tiny, browser, name):
 
 
 def test_identification_finds_constants_it_was_not_started_from(tiny):
-    # Data made with other constants than the preset's: the fit has to find those back, wherever it starts.
-    data = critical_mode_data()
-    residuals = planar.residuals(tiny.found.context.robot, data)
-    assert np.abs(residuals).max() == pytest.approx(1.016, abs=0.01)
+    data, robot = critical_mode_data(), tiny.found.context.robot
+    residuals = planar.residuals(robot, data)
+    assert np.abs(residuals).max() == pytest.approx(0.702, abs=0.001)
     starts = tiny.found[IDENTIFICATION].starts
     assert len(starts) == 3
     for constants in starts:
-        off = planar.residuals(planar.with_constants(tiny.found.context.robot, constants), data)
+        off = planar.residuals(planar.with_constants(robot, constants), data)
         assert constants == pytest.approx(starts[0], rel=1e-4)
         assert np.abs(off).max() < 1.0
         assert (off**2).sum() < (residuals**2).sum()
+    # The preset has what is found, to tenths of N*s/m and of mm.
+    tenths = np.array([1.0, 1e3, 1e3])
+    assert (starts[0] * tenths).round(1) == pytest.approx(tenths * [robot.get(path) for path in planar.FREE])
 
 
 def test_the_profile_passes_through_the_best_fit_and_predicts(tiny):

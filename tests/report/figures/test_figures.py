@@ -6,8 +6,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
 from chilopod import load_robot
-from chilopod.paper.straight.sections import EXPONENTS, MODE
-from chilopod.report.figures import exponents, overview, schematic
+from chilopod.paper.straight.sections import EXPONENTS
+from chilopod.report.figures import exponents, schematic
 from chilopod.report.figures.drawings import DRAWINGS
 from chilopod.report.kit import style, words
 from chilopod.report.scene.outline import chain, turned_about_tail
@@ -108,11 +108,6 @@ def test_curves_meet_where_a_pair_becomes_real(results):
     np.testing.assert_allclose(real[:, 1] + 1j * imaginary[:, 1], -0.08 - exact, atol=1e-7)
     assert np.abs(ks - 13.0).min() < 1e-9
     assert set(np.round(k1, 9)) <= set(np.round(ks, 9))
-
-
-def test_overview_is_small(results, tmp_path):
-    path = overview.write_overview(results[MODE], results[EXPONENTS], tmp_path / "overview.png")
-    assert path.stat().st_size < 150_000
 
 
 def test_words():

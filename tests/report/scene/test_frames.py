@@ -32,7 +32,9 @@ def test_feet_follow_the_gait():
     frames = body_frames(record)
     robot, stride = frames.robot, frames.robot.gait.stride
     local = frames.feet[:, 0] - frames.centres[:, 0, :, None]
-    np.testing.assert_allclose(local[..., 1], np.broadcast_to([0.0728, -0.0728], local[..., 1].shape), atol=1e-12)
+    np.testing.assert_allclose(
+        local[..., 1], np.broadcast_to(robot.legs.half_width * np.array([1, -1]), local[..., 1].shape), atol=1e-12
+    )
     ahead = local[..., 0] - robot.legs.forward_offset
     assert frames.stands[0, 0, 0].tolist() == [True, True]  # phases 0 and 1/2, while a foot stands for 0.517
     np.testing.assert_allclose(ahead[0, 0], [0.5 * stride, stride * (0.5 - 0.3 / 0.31)], atol=1e-12)
@@ -73,7 +75,9 @@ def test_mirrored_record_gives_mirrored_feet():
 def test_leg_yaw_turns_the_stroke_of_module_1_about_its_middle():
     straight, yawed = body_frames(walk(0.0)), body_frames(walk(0.0, leg_yaw=0.3))
     np.testing.assert_array_equal(yawed.feet[:, :, 1:], straight.feet[:, :, 1:])
-    middle = straight.centres[:, :, 0, None] + np.array([[0.048, 0.0728], [0.048, -0.0728]])
+    legs = straight.robot.legs
+    feet = [[legs.forward_offset, side * legs.half_width] for side in (1, -1)]
+    middle = straight.centres[:, :, 0, None] + np.array(feet)
     ahead = (straight.feet[:, :, 0] - middle)[..., 0]
     expected = ahead[..., None] * [math.cos(0.3), math.sin(0.3)]  # ahead is to the left of before
     np.testing.assert_allclose(yawed.feet[:, :, 0] - middle, expected, atol=1e-12)

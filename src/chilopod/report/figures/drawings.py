@@ -27,7 +27,7 @@ from chilopod.report.figures import (
 from chilopod.report.kit.drawing import Drawing
 
 DRAWINGS: tuple[Drawing[Any], ...] = (
-    Drawing(MODE, lambda data, found: [mode.panel(data, found[IDENTIFICATION])], beside=(IDENTIFICATION,)),
+    Drawing(MODE, lambda data, found: [mode.panel(data)]),
     Drawing(EXPONENTS, lambda data, found: [exponents.panel(data, found[MODE])], beside=(MODE,)),
     Drawing(VARIANTS, lambda data, found: [critical.variants(data)]),
     Drawing(MODULES, lambda data, found: [critical.modules(data, found.context.robot)]),

@@ -13,7 +13,6 @@ from chilopod.report.kit import style
 from chilopod.report.kit.panel import Panel
 from chilopod.report.kit.words import listing, number, spring
 from chilopod.report.scene.outline import chain, draw_heading, draw_joints, draw_modules, turned_about_tail
-from chilopod.tasks.identify import Identification
 
 _WIDE = style.Layout("AC;BC", 5.2, heights=(1.5, 1.0), widths=(1.15, 1.0))
 _NARROW = style.Layout("A;B;C", 10.8, heights=(1.2, 0.9, 1.9))
@@ -21,8 +20,8 @@ _ROUNDING = MODE[0].tolerance
 _DRAWN_BEND = 75.0  # degrees from head to tail: the mode leaves the size free
 
 
-def panel(data: xr.Dataset, fit: Identification | None) -> Panel:
-    """The mode, with the best fit of the constants that are not printed where it is there."""
+def panel(data: xr.Dataset) -> Panel:
+    """The mode beside the paper's."""
     computed, printed = data.computed.values, data.printed.values
     known = ~np.isnan(printed)
     off = np.abs(computed - printed)[known]
@@ -36,15 +35,7 @@ def panel(data: xr.Dataset, fit: Identification | None) -> Panel:
         if beyond:
             worst = float(off.max() - _ROUNDING)
             compared += (
-                f"Joint {listing(str(joint) for joint in beyond)} of this robot lies outside, by {worst:.4f} at "
-                "most"
-                + (
-                    "; the paper does not print three constants of its model, and with the best fit of them (figure G) "
-                    f"every component is inside, the largest at {number(float(np.abs(fit.residuals[1:]).max()), 2)} of "
-                    "what rounding allows."
-                    if fit is not None and np.abs(fit.residuals[1:]).max() <= 1.0
-                    else "."
-                )
+                f"Joint {listing(str(joint) for joint in beyond)} of this robot lies outside, by {worst:.4f} at most."
             )
         else:
             compared += f"All {len(off)} are inside."
@@ -53,7 +44,7 @@ def panel(data: xr.Dataset, fit: Identification | None) -> Panel:
         name="mode",
         letter="E",
         title="The mode: how the body bends",
-        draw=lambda narrow: _draw(data, fit, narrow),
+        draw=lambda narrow: _draw(data, narrow),
         alt="Joint components of the critical mode: "
         + ", ".join(number(value, 4) for value in computed)
         + ("; the paper prints " + ", ".join(f"{value:.2f}" for value in printed) if known.any() else "")
@@ -76,11 +67,11 @@ def panel(data: xr.Dataset, fit: Identification | None) -> Panel:
     )
 
 
-def _draw(data: xr.Dataset, fit: Identification | None, narrow: bool) -> Figure:
+def _draw(data: xr.Dataset, narrow: bool) -> Figure:
     figure, axes = style.figure(_WIDE, _NARROW, narrow)
     computed, printed, joints = data.computed.values, data.printed.values, data.joint.values
     _components(axes["A"], joints, computed, printed)
-    _differences(axes["B"], data, fit)
+    _differences(axes["B"], data)
     bent_body(axes["C"], computed, _DRAWN_BEND)
     axes["C"].set_title("The body bent that way")
     return figure
@@ -100,7 +91,7 @@ def _components(axes: Axes, joints: np.ndarray, computed: np.ndarray, printed: n
     axes.legend(loc="upper right", ncols=2)
 
 
-def _differences(axes: Axes, data: xr.Dataset, fit: Identification | None) -> None:
+def _differences(axes: Axes, data: xr.Dataset) -> None:
     axes.set_title("Computed less printed")
     joints = data.joint.values
     difference = data.computed.values - data.printed.values
@@ -108,17 +99,6 @@ def _differences(axes: Axes, data: xr.Dataset, fit: Identification | None) -> No
     axes.axhline(0.0, color=style.BLACK, lw=0.8)
     if not np.isnan(difference).all():
         axes.plot(joints, 1e3 * difference, "o", color=style.BLUE, markersize=7, label="this robot")
-        if fit is not None:
-            axes.plot(
-                joints,
-                1e3 * _ROUNDING * fit.residuals[1:],
-                "D",
-                color=style.VERMILLION,
-                markerfacecolor="white",
-                markersize=6,
-                markeredgewidth=1.6,
-                label="best fit",
-            )
     reach = 1e3 * _ROUNDING * 1.4
     if not np.isnan(difference).all():
         reach = max(reach, 1.2e3 * np.nanmax(np.abs(difference)))
