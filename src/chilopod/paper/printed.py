@@ -195,6 +195,10 @@ UNIFORM = _onset(18.0)
 
 COMPARISON = "section Comparison with previous strategy"
 TURNING = "section Turning maneuverability"
+
+CRITERION_NAMES = {"distance": "ε1, distance", "angle": "ε2, angle", "effort": "ε3, leg yaw"}
+"""Of its criteria."""
+
 ARRIVAL = Number(23.0, "s", 0.15 * 23.0)
 """The robot's earliest, in task A."""
 

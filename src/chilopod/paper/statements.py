@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.paper import printed
 from chilopod.paper.fit_data import walking_speed
-from chilopod.paper.printed import Band, Number, Said
+from chilopod.paper.printed import CRITERION_NAMES, Band, Number, Said
 from chilopod.paper.scatter import SURE
 from chilopod.paper.table import Kind, Statement, listing
-from chilopod.paper.turning.minima import NAMES
 from chilopod.steering import Outcome
 
 _FITTED, _PREDICTED, _CHECKED = Kind
@@ -59,7 +58,10 @@ def _of_task(letter: str, task: printed.Task) -> TaskStatements:
     return TaskStatements(
         _number(f"{name}: k1 whose walk has the radius of the circle", k_hat, _PREDICTED),
         Statement(f"{name}: what becomes of it", became, _PREDICTED),
-        {key: Statement(f"{name}: smallest {title}", task.minima, _PREDICTED) for key, title in NAMES.items()},
+        {
+            key: Statement(f"{name}: smallest {title}", task.minima, _PREDICTED)
+            for key, title in CRITERION_NAMES.items()
+        },
     )
 
 

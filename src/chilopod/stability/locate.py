@@ -113,7 +113,8 @@ def locate(
         there. What comes on top has bounds of its own: the first orbit, where the motion is given time to settle, and
         every point that is found, 400 return maps and its normal form.
     seconds
-        Time after which the search ends with what it has, if that is before the budget is spent.
+        Time after which the search ends with what it has, from the first orbit on, if that is before the budget is
+        spent.
 
     Returns
     -------

@@ -69,7 +69,7 @@ class Samples:
         Orbits that may be computed until the upper end is reached, by twice as many return maps, and as many return
         maps once more for those in between.
     seconds
-        Time for all that.
+        Time for all that, once the first orbit is found.
 
     Attributes
     ----------
@@ -104,13 +104,14 @@ class Samples:
         self._bends: dict[float, float] = {}
         self._budget = budget
         self._allowed = _RETURNS * budget
-        self._returns = ReturnBudget(self._allowed, seconds)
         self._refused: dict[str, tuple[str, set[float]]] = {}
         self._dimension, self.timed = 0, True
         self.count = self._counted = 0
         with Asking("family", low):
             self.first = find_orbit(self.family(low), guess)
             self.size = sizes(self.family(low), self.first.state, self.first.period / self.first.image.returns)
+        # From here on: by now most of what is compiled when it is first called has been.
+        self._returns = ReturnBudget(self._allowed, seconds)
         if not (self.known and self.timed):
             self._keep(_sample(low, self.first))
         self.spent = False

@@ -22,10 +22,11 @@ from numpy.typing import NDArray
 from chilopod import twin
 from chilopod.paper import printed
 from chilopod.paper.fit_data import base_series_data
+from chilopod.paper.printed import CRITERION_NAMES
 from chilopod.paper.robot.spread import LOWER, predictions, printed_number
 from chilopod.paper.robot.turning import TASK_DURATION
 from chilopod.paper.size import Size
-from chilopod.paper.turning.minima import NAMES, minima
+from chilopod.paper.turning.minima import minima
 from chilopod.paper.turning.trials import turning_task
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
@@ -222,7 +223,7 @@ def structures(
             "constant": [each.path for each in FREE],
             "prediction": names,
             "strategy": list(_SPRINGS),
-            "criterion": list(NAMES),
+            "criterion": list(CRITERION_NAMES),
         },
         attrs={"robot": robot.name},
     ).pipe(_with_chi_squared)
@@ -245,7 +246,7 @@ def _strategies(robot: Robot, folder: str | Path | None, engine: str, size: Size
     for strategy, springs in _SPRINGS.items():
         task = turning_task(robot, target, springs, repeats, strategy, time=time, **kept)
         time = task.time
-        rows.append(minima(task.criteria)["mean"].sel(criterion=list(NAMES)).values)
+        rows.append(minima(task.criteria)["mean"].sel(criterion=list(CRITERION_NAMES)).values)
     return {"criteria": np.array(rows)}
 
 

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.analysis.parameters import PAPER_UNIT
+from chilopod.paper.printed import CRITERION_NAMES
 from chilopod.paper.scatter import Answer, Difference, difference, every
-from chilopod.paper.turning.minima import NAMES, SCALES, minima
+from chilopod.paper.turning.minima import SCALES, minima
 from chilopod.paper.turning.trials import TurningTask
 from chilopod.steering import LegYawController
 
@@ -17,7 +18,7 @@ def differences(pitchfork: TurningTask, hopf: TurningTask) -> dict[str, Differen
 
     Both have the seeds 0, 1, ...: with as many repeats they are compared seed by seed, else as independent trials.
     """
-    pairs = {name: (_smallest(pitchfork, name), _smallest(hopf, name)) for name in NAMES}
+    pairs = {name: (_smallest(pitchfork, name), _smallest(hopf, name)) for name in CRITERION_NAMES}
     return {name: difference(one, two, paired=one.size == two.size) for name, (one, two) in pairs.items()}
 
 
@@ -33,7 +34,7 @@ def words(pitchfork: TurningTask, hopf: TurningTask) -> str:
     for name, apart in differences(pitchfork, hopf).items():
         factor, unit = SCALES[name]
         one, two = (factor * float(each.sel(criterion=name)) for each in (ours, theirs))
-        parts.append(f"{NAMES[name]} {one:.3g} against {two:.3g} {unit}: {apart}")
+        parts.append(f"{CRITERION_NAMES[name]} {one:.3g} against {two:.3g} {unit}: {apart}")
     return "; ".join(parts)
 
 
@@ -48,7 +49,7 @@ def counted(pitchfork: TurningTask, hopf: TurningTask) -> str:
 def softest_minima(hopf: TurningTask, point: float) -> tuple[str, bool]:
     """Where the criteria are smallest with all springs alike, beside the point below which the body undulates, and
     whether all of them are below it, in the unstable region."""
-    at = minima(hopf.criteria).spring.sel(criterion=list(NAMES)).values
+    at = minima(hopf.criteria).spring.sel(criterion=list(CRITERION_NAMES)).values
     places = " and ".join(f"{spring:g}" for spring in np.unique(at))
     return f"{places} {PAPER_UNIT}, the body undulates below {point:.2f}", bool((at < point).all())
 

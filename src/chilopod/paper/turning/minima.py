@@ -15,9 +15,6 @@ from chilopod.paper.turning.trials import CRITERIA
 
 Array = NDArray[np.float64]
 
-NAMES = {"distance": "ε1, distance", "angle": "ε2, angle", "effort": "ε3, leg yaw"}
-"""The paper's criteria."""
-
 SCALES = {"distance": (1.0, "m"), "angle": (180.0 / math.pi, "deg"), "effort": (1.0, "rad²·s")}
 """What they are shown in: factor and unit."""
 

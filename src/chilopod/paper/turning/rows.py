@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.paper import printed, statements
+from chilopod.paper.printed import CRITERION_NAMES
 from chilopod.paper.table import AGREES, NOT_PRINTED, OfPlanar, Row
 from chilopod.paper.turning import hopf
-from chilopod.paper.turning.minima import NAMES, SCALES, minima
+from chilopod.paper.turning.minima import SCALES, minima
 from chilopod.paper.turning.study import ROUGH, Turning
 from chilopod.paper.turning.trials import by_leg_yaw, outcome_words, span
 
@@ -58,7 +59,7 @@ def _rough(found: Turning) -> Row:
     pairs = [
         f"{title.partition(',')[0]} {float(usual['at'].sel(criterion=name)):.1f} → "
         f"{float(rough['at'].sel(criterion=name)):.1f}"
-        for name, title in NAMES.items()
+        for name, title in CRITERION_NAMES.items()
     ]
     return Row(
         f"task A, disturbances {ROUGH:g} times as large: springs of the smallest criteria",

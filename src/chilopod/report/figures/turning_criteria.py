@@ -9,8 +9,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from chilopod.paper import printed
+from chilopod.paper.printed import CRITERION_NAMES
 from chilopod.paper.turning import hopf
-from chilopod.paper.turning.minima import NAMES, SCALES, minima
+from chilopod.paper.turning.minima import SCALES, minima
 from chilopod.paper.turning.study import Turning
 from chilopod.paper.turning.trials import TurningTask, outcome_words, span, springs_by_outcome
 from chilopod.report.kit import style
@@ -105,7 +106,7 @@ def _alt(found: Turning, letter: str) -> str:
     low = minima(found.tasks[letter].criteria)
     return (
         "Distance, angle and leg yaw over the compliance of the first spring, smallest at "
-        + listing(number(float(low["at"].sel(criterion=name)), 2) for name in NAMES)
+        + listing(number(float(low["at"].sel(criterion=name)), 2) for name in CRITERION_NAMES)
         + f" {SPRING_UNIT}."
     )
 
@@ -116,7 +117,7 @@ def _said(found: Turning, letter: str) -> str:
     arrived = springs_by_outcome(task.criteria)[Outcome.ARRIVED]
     if not arrived:
         return f"No robot arrives within {task.criteria.attrs['duration_s']:g}\u00a0s."
-    parts = [float(low["at"].sel(criterion=name)) / k_hat for name in NAMES]
+    parts = [float(low["at"].sel(criterion=name)) / k_hat for name in CRITERION_NAMES]
     return (
         f"Means and standard errors of {task.criteria.sizes['repeat']} walks, at {number(task.time)}\u00a0s. Robots "
         f"arrive with {min(arrived):g} to {max(arrived):g}\u00a0{SPRING_UNIT} (shaded); most have "
@@ -132,7 +133,8 @@ def places(task: TurningTask) -> str:
     """Where the criteria are smallest."""
     at = minima(task.criteria)["at"]
     return listing(
-        f"{title.partition(',')[0]} at {number(float(at.sel(criterion=name)), 3)}" for name, title in NAMES.items()
+        f"{title.partition(',')[0]} at {number(float(at.sel(criterion=name)), 3)}"
+        for name, title in CRITERION_NAMES.items()
     )
 
 
@@ -140,7 +142,7 @@ def draw_criteria(task: TurningTask, k_hat: float, narrow: bool, top: tuple[floa
     """The three criteria over 1/k1, with the spring of a radius law (N*mm/deg) and springs to mark on the top axis."""
     figure, axes = style.figure(*_LAYOUTS, narrow)
     arrived = springs_by_outcome(task.criteria)[Outcome.ARRIVED]
-    for place, name in zip("ABC", NAMES, strict=True):
+    for place, name in zip("ABC", CRITERION_NAMES, strict=True):
         if arrived:
             axes[place].axvspan(1.0 / max(arrived), 1.0 / min(arrived), color=style.PALE, zorder=0)
         _points(axes[place], task.criteria, name, style.BLUE, "o")
@@ -165,7 +167,7 @@ def draw_comparison(
 ) -> Figure:
     """The three criteria over 1/k of the two strategies."""
     figure, axes = style.figure(*_LAYOUTS, narrow)
-    for place, name in zip("ABC", NAMES, strict=True):
+    for place, name in zip("ABC", CRITERION_NAMES, strict=True):
         _points(axes[place], task.criteria, name, style.BLUE, "o")
         _points(axes[place], hopf.criteria, name, style.ORANGE, "s")
         low = minima(task.criteria)
