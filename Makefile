@@ -60,7 +60,7 @@ reproduce: $(RUNTIME)  ## compute the paper's results and write report/index.htm
 	$(BIN)/chilopod reproduce $(ARGS)
 
 test: lint types  ## all checks and all tests
-	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile --benchmark-disable $(ARGS)
+	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder --benchmark-disable $(ARGS)
 
 lint: $(DEV)  ## style and the contracts between layers
 	$(BIN)/ruff check .

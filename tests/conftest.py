@@ -1,6 +1,8 @@
 """Settings of all tests."""
 
 import os
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from hypothesis import settings
@@ -20,3 +22,34 @@ def former() -> Robot:
     return load_robot("aoi2022-planar").set_from_text(
         ["ground.friction=256.5 N*s/m", "legs.half_width=72.8 mm", "legs.forward_offset=48 mm"]
     )
+
+
+@pytest.fixture(scope="session")
+def kept(tmp_path_factory) -> Path:
+    """Where all tests, in whatever process, keep the trials of studies: each is walked once a session."""
+    root = tmp_path_factory.getbasetemp()
+    folder = (root.parent if os.environ.get("PYTEST_XDIST_WORKER") else root) / "trials"
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def tiny(kept, tmp_path_factory) -> SimpleNamespace:
+    """The main job with every section, as small as it gets: its folder, what was found, and what failed.
+
+    Tests of one file run in one process, so all that need it are in one.
+    """
+    from chilopod.paper.section import Context
+    from chilopod.paper.sections import SECTIONS, reproduce
+    from chilopod.paper.size import Size
+    from chilopod.report import Report
+
+    context, folder = Context(size=Size.TINY, folder=kept), tmp_path_factory.mktemp("tiny")
+    with Report(SECTIONS, context, folder) as report:
+        found = reproduce(SECTIONS, context, told=lambda found, section: report.add(found, [section]))
+    return SimpleNamespace(folder=folder, found=found, failures=report.failures)
+
+
+def pytest_collection_modifyitems(items) -> None:
+    """What takes longest is begun first, and beside what needs other compiled code."""
+    items.sort(key=lambda item: 0 if "tiny" in item.fixturenames else 1 if "truth" in item.path.parts else 2)

@@ -1,6 +1,7 @@
 """`chilopod branch` as a user meets it: saving, resuming, and what is refused."""
 
 import json
+import shutil
 
 import pytest
 import xarray as xr
@@ -17,10 +18,16 @@ def call(capsys, *arguments):
     return code, captured.out, captured.err
 
 
+@pytest.fixture(scope="module")
+def original(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("branch")
+    assert main([*ROBOT, *SHORT, "--out", str(folder)]) == 0
+    return folder
+
+
 @pytest.fixture
-def saved(capsys, tmp_path):
-    assert call(capsys, *ROBOT, *SHORT, "--out", tmp_path)[0] == 0
-    return tmp_path
+def saved(original, tmp_path):
+    return shutil.copytree(original, tmp_path, dirs_exist_ok=True)
 
 
 def test_text_shows_verdict_and_direction(capsys):

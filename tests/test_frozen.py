@@ -12,9 +12,10 @@ import pytest
 from chilopod import stability
 from chilopod.analysis import bifurcations, straight_walk
 from chilopod.frozen import ReadOnlyArrays, read_only
-from chilopod.planar import PlanarModel
+from chilopod.planar import PlanarModel, start
 from chilopod.planar.along import FollowedModel, walk_means
 from chilopod.planar.flow import advance
+from chilopod.planar.stretch import walk
 from chilopod.robot import load_robot
 from chilopod.stability.branches.fold import find_fold
 from chilopod.stability.floquet import spectrum
@@ -151,3 +152,12 @@ def test_read_only_arrays_compile_no_kernel_a_second_time():
     arrays = [each for signature in advance.signatures for each in signature if hasattr(each, "layout")]
     assert arrays
     assert all(each.mutable for each in arrays)
+
+
+def test_arrays_of_another_order_in_memory_compile_no_kernel_a_second_time():
+    FollowedModel(PRESET).flow(MODEL.orbit + 1e-3, 0.0, 0.1)
+    MODEL.flow_states(np.asfortranarray([MODEL.orbit, MODEL.orbit]), 0.0, 0.1)
+    start(PRESET, seeds=[3, 4]).advance(0.1)
+    for kernel in (advance, walk):
+        layouts = {each.layout for signature in kernel.signatures for each in signature if hasattr(each, "layout")}
+        assert layouts == {"C"}

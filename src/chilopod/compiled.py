@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import functools
 from pathlib import Path
+from typing import Any
 
 import numba
 
@@ -36,3 +37,13 @@ fused_njit = functools.partial(numba.njit, cache=True, fastmath={"contract"})
 parallel_njit = functools.partial(numba.njit, cache=True, parallel=True)
 """The same for loops over ``prange``: one robot an iteration, so the answer does not depend on the number of
 threads."""
+
+
+@njit(inline="always")
+def copy_into(target: Any, source: Any) -> None:
+    """Copy an array of one dimension, or the start of it, over another.
+
+    With ``target[:] = source`` numba compiles what would say that the sizes differ, formatted: seconds of it.
+    """
+    for i in range(target.size):
+        target[i] = source[i]

@@ -5,6 +5,7 @@ import pytest
 from chilopod.errors import ParameterError
 from chilopod.paper.section import Context, Found, Section
 from chilopod.paper.sections import SECTIONS, chosen, reproduce
+from chilopod.paper.size import Size
 from chilopod.paper.straight.sections import MODE, UNIFORM
 from chilopod.paper.table import Row
 from chilopod.report.figures.drawings import DRAWINGS
@@ -82,7 +83,7 @@ def test_one_that_fails_leaves_the_others_alone():
     broken = Section("broken", "chapter", "broken", fail)
     after = Section("after", "chapter", "after", lambda context, found, report: found[broken], needs=(broken,))
     told = []
-    found = reproduce([broken, ONE, after], Context(quick=True), told=lambda found, section: told.append(section))
+    found = reproduce([broken, ONE, after], Context(size=Size.QUICK), told=lambda found, section: told.append(section))
     assert told == [broken, ONE, after]
     assert [str(error) for error in found.failures.values()] == ["no luck"]
     assert found[ONE] == 1

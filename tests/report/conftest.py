@@ -11,6 +11,7 @@ from chilopod import load_robot
 from chilopod.paper.movies import Movie
 from chilopod.paper.section import Context, Found
 from chilopod.paper.sections import chosen, reproduce
+from chilopod.paper.size import Size
 from chilopod.paper.straight.sections import EXPONENTS, IDENTIFICATION, MODE, MODULES
 from chilopod.paper.table import Row
 from chilopod.paper.turning.sections import MOVIES
@@ -21,7 +22,7 @@ WALK = runpy.run_path(str(Path(__file__).with_name("walks.py")))["walk"]
 
 @pytest.fixture(scope="session")
 def results() -> Found:
-    found = reproduce(chosen(["mode", "variants", "uniform"]), Context(quick=True))
+    found = reproduce(chosen(["mode", "variants", "uniform"]), Context(size=Size.QUICK))
     assert not found.failures
     odd = Row("a <b> & c", "1 N*mm/deg", "-2e-10 N*mm/deg", "nowhere", "differs", "for <script>")
     found.rows[MODE] = [*found.rows[MODE], odd]

@@ -52,7 +52,8 @@ def drawing(section):
 
 @pytest.fixture
 def drawn(monkeypatch):
-    """Sets what is drawn."""
+    """Sets what is drawn; of the robot itself nothing much."""
+    monkeypatch.setattr("chilopod.report.filling.schematic.panel", lambda robot: panel("schematic"))
     return lambda *entries: monkeypatch.setattr(drawings, "DRAWINGS", entries)
 
 

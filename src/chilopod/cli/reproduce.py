@@ -60,6 +60,9 @@ def reproduce(
         Path, typer.Option("--out", metavar="FOLDER", help="Where the report goes; one that is there is gone on with.")
     ] = Path("report"),
     quick: Annotated[bool, typer.Option("--quick", help="Coarser sweeps, fewer trials.")] = False,
+    tiny: Annotated[
+        bool, typer.Option("--tiny", help="Hardly anything of every section: to see that all works, not what it finds.")
+    ] = False,
     paper: Annotated[
         bool, typer.Option("--paper", help="The paper's own experiments, not what goes beyond them.")
     ] = False,
@@ -82,14 +85,16 @@ def reproduce(
         )
     from chilopod.paper.sections import chosen
 
-    sections = chosen(only, quick, paper)  # refuses an unknown section
+    sections = chosen(only, quick or tiny, paper)  # refuses an unknown section
     from chilopod.errors import in_words
     from chilopod.output import prepare_folder
     from chilopod.paper import sections as computed
     from chilopod.paper.section import Context
+    from chilopod.paper.size import Size
     from chilopod.report import Report
 
-    context = Context(read_robot(PRESET, None), read_robot(WHOLE, None), quick, prepare_folder(out / "trials"))
+    size = Size.TINY if tiny else Size.QUICK if quick else Size.FULL
+    context = Context(read_robot(PRESET, None), read_robot(WHOLE, None), size, prepare_folder(out / "trials"))
     with walking_on(cluster), progress_bar() as show, Report(sections, context, out, show) as report:
         typer.echo(f"The page is {report.page.resolve()}", err=as_json)
         found = computed.reproduce(sections, context, show, lambda found, section: report.add(found, [section]))

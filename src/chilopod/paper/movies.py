@@ -59,6 +59,7 @@ def movies(
     best: float,
     folder: str | Path | None = None,
     progress: Progress = silent,
+    shorter: float = 1.0,
 ) -> list[Movie]:
     """Walk what is filmed.
 
@@ -76,13 +77,17 @@ def movies(
         Where records are kept.
     progress
         Called with the part done (0 to 1) and a few words.
+    shorter
+        Which part of them is walked.
     """
 
     joints = robot.body.modules - 1
     bend = (_BEND + (0.0,) * joints)[:joints]
-    walks = [Trial(robot.with_value(K1, value), _WALK, 0, bend, disturbance=NONE, rate=25.0) for value in springs]
+    walks = [
+        Trial(robot.with_value(K1, value), shorter * _WALK, 0, bend, disturbance=NONE, rate=25.0) for value in springs
+    ]
     tried = (4.0 * best, best, 0.7 * best)
-    records = run([*walks, *_tasks(robot, tried)], folder, progress)
+    records = run([*walks, *_tasks(robot, tried, shorter * _TASK)], folder, progress)
     return _movies("", (*springs, *tried), records)
 
 
@@ -92,6 +97,7 @@ def robot_movies(
     tried: tuple[float, float, float],
     folder: str | Path | None = None,
     progress: Progress = silent,
+    shorter: float = 1.0,
 ) -> list[Movie]:
     """The same of the whole robot: the walks of movie 1 start straight but for their disturbance, as the paper's do.
 
@@ -103,21 +109,26 @@ def robot_movies(
         As for :func:`movies`.
     tried
         First springs for task A, N*m/rad: too stiff, best, too soft.
-    folder, progress
+    folder, progress, shorter
         As for :func:`movies`.
     """
     walks = [
-        Trial(robot.with_value(K1, value), _ROBOT_WALK, 1, rate=25.0, engine="twin", poses=True) for value in springs
+        Trial(robot.with_value(K1, value), shorter * _ROBOT_WALK, 1, rate=25.0, engine="twin", poses=True)
+        for value in springs
     ]
-    tasks = [replace(each, duration=_ROBOT_TASK, engine="twin", poses=True) for each in _tasks(robot, tried)]
+    tasks = [replace(each, engine="twin", poses=True) for each in _tasks(robot, tried, shorter * _ROBOT_TASK)]
     records = run([*walks, *tasks], folder, progress)
     first, second = _movies("robot-", (*springs, *tried), records, speed=3.0)
-    return [replace(first, stills=_ROBOT_STILLS[0]), replace(second, stills=_ROBOT_STILLS[1])]
-
-
-def _tasks(robot: Robot, tried: tuple[float, float, float]) -> list[Trial]:
     return [
-        Trial(robot.with_value(K1, value), _TASK, 0, (), TASK_A, LegYawController(), NONE, rate=25.0) for value in tried
+        replace(movie, stills=tuple(shorter * moment for moment in stills))
+        for movie, stills in zip((first, second), _ROBOT_STILLS, strict=True)
+    ]
+
+
+def _tasks(robot: Robot, tried: tuple[float, float, float], duration: float) -> list[Trial]:
+    return [
+        Trial(robot.with_value(K1, value), duration, 0, (), TASK_A, LegYawController(), NONE, rate=25.0)
+        for value in tried
     ]
 
 

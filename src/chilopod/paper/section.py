@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+from chilopod.paper.size import Size
 from chilopod.paper.statements import ORDER
 from chilopod.paper.table import OfPlanar, OfTwin, RobotRow, Row, robot_rows
 from chilopod.progress import Progress
@@ -26,9 +27,8 @@ class Context:
         Of the planar model; the paper's numbers are those of ``aoi2022-planar``.
     whole
         Of the sections in three dimensions, with a twin.
-    quick
-        Coarser sweeps, fewer module counts, springs and repeats; what does not depend on chance is as exact as
-        otherwise.
+    size
+        How much of everything is computed.
     folder
         Where the records of trials are kept, so that what was stopped goes on where it was; without one nothing is
         kept.
@@ -36,7 +36,7 @@ class Context:
 
     robot: Robot = field(default_factory=lambda: load_robot("aoi2022-planar"))
     whole: Robot = field(default_factory=lambda: load_robot("aoi2022"))
-    quick: bool = False
+    size: Size = Size.FULL
     folder: Path | None = None
 
 

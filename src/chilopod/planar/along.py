@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import qr
 
-from chilopod.compiled import parallel_njit
+from chilopod.compiled import copy_into, parallel_njit
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.integrate import COMPLEX_STEP, integrator
@@ -58,7 +58,7 @@ class FollowedModel(PlanarModel):
         tolerance = _DERIVATIVE * self.tolerance
         state, left, right = x.astype(np.complex128), np.eye(self.dimension), np.eye(self.dimension)
         for start, end in zip(times, times[1:], strict=False):
-            batch = state + 1j * COMPLEX_STEP * left.T
+            batch = np.ascontiguousarray(state + 1j * COMPLEX_STEP * left.T)  # numba would compile all once more
             self._advance(batch, start, end, tolerance)
             state, left = batch[0].real.astype(np.complex128), batch.imag.T / COMPLEX_STEP
             basis, upper, order = qr(left, mode="economic", pivoting=True)
@@ -92,7 +92,7 @@ class FollowedModel(PlanarModel):
         AnalysisError
             If a motion diverges.
         """
-        batch = np.array(states, dtype=np.float64)
+        batch = np.array(states, dtype=np.float64, order="C")
         if len(batch) != len(models):
             raise ParameterError("must be one for each model", field="states", value=len(batch))
         if not _alike(models):
@@ -222,10 +222,10 @@ def _record(
                     break
                 t = end
                 if node < fractions.size:
-                    recorded[r, s, node] = x[: recorded.shape[3]]
+                    copy_into(recorded[r, s, node], x)
             if not ok[r]:
                 break
-        states[r] = x
+        copy_into(states[r], x)
 
 
 def _powers(models: Sequence[PlanarModel], x: Array, since: Array) -> tuple[Array, Array]:

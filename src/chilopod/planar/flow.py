@@ -12,7 +12,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from chilopod.compiled import parallel_njit
+from chilopod.compiled import copy_into, parallel_njit
 from chilopod.integrate import integrator
 from chilopod.planar.dynamics import SCRATCH, rhs
 
@@ -63,4 +63,4 @@ def advance(
             if not reached:
                 ok[r] = False
                 break
-        states[r] = x
+        copy_into(states[r], x)

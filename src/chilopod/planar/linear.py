@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lu_factor, lu_solve
 
-from chilopod.compiled import njit, parallel_njit
+from chilopod.compiled import copy_into, njit, parallel_njit
 from chilopod.planar.contact import C_PP
 from chilopod.planar.series import PANEL, ROWS, series_term
 
@@ -189,6 +189,12 @@ def steps(widths: Array, decay: Array, frequency: float) -> float:
     return float((widths * np.maximum(centred / _LONGEST, (centred - 0.5 * decay) / _CANCELLED)).sum())
 
 
+@njit(inline="always")
+def _copy_rows(source: Any, target: Any, at: int, count: int) -> None:
+    for i in range(count):
+        copy_into(target[at + i], source[i])
+
+
 @njit
 def _propagate(widths: Any, upper: Any, decay: Any, frequency: float, clock: float, state: Any) -> tuple[float, int]:
     """Carry one panel of columns through all intervals, in place; returns (error, orders).
@@ -245,13 +251,13 @@ def _propagate(widths: Any, upper: Any, decay: Any, frequency: float, clock: flo
                 bits = (bits * 1103515245 + 12345) & 0x7FFFFFFF
                 state[i, PANEL - 1] += _ROUND_OFF * (size if bits & 0x10000 else -size)
             at = (_KEPT - 3) * rows
-            terms[at : at + rows] = state
+            _copy_rows(state, terms, at, rows)
             terms[at + rows :] = 0.0
             peak = 0.0
             for k in range(1, _MOST_ORDERS + 1):
                 if at == 0:
                     at = (_KEPT - 3) * rows
-                    terms[at:] = terms[: 3 * rows]
+                    _copy_rows(terms, terms, at, 3 * rows)
                 series_term(block, terms, at, 1.0 / k, state)
                 at -= rows
                 orders += 1
@@ -285,11 +291,13 @@ def _propagate_all(
     for first in range(0, n, PANEL - 1):
         last = min(first + PANEL - 1, n)
         state[:] = 0.0
-        state[:n, : last - first] = matrix[:, first:last]
+        for i in range(n):
+            copy_into(state[i, : last - first], matrix[i, first:last])
         e, k = _propagate(widths, upper, decay, frequency, clock, state)
         error = max(error, e)
         orders += k
-        matrix[:, first:last] = state[:n, : last - first]
+        for i in range(n):
+            copy_into(matrix[i, first:last], state[i])
     return error, orders
 
 

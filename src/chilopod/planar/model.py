@@ -162,7 +162,7 @@ class PlanarModel(ReadOnlyArrays):
 
     def flow_states(self, states: ArrayLike, t0: float, t1: float) -> Array:
         """Carry many states, shape (states, 2N+1), on all cores, without derivatives."""
-        batch = np.array(states, dtype=np.float64)
+        batch = np.array(states, dtype=np.float64, order="C")
         if batch.ndim != 2 or batch.shape[1] != self.dimension:
             raise ParameterError(
                 "states have the wrong shape",

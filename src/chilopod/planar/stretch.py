@@ -7,7 +7,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from chilopod.compiled import njit, parallel_njit
+from chilopod.compiled import copy_into, njit, parallel_njit
 from chilopod.engine.actuators import FROM, GOAL, RAMPING, SETTLING, SINCE, UNTIL
 from chilopod.engine.actuators import SLOPE as RAMP
 from chilopod.integrate import integrator
@@ -109,8 +109,8 @@ def walk_alone(
         if status[r] != WALKING:
             break
         if sample[s] >= 0:
-            record[sample[s], r] = x
-    states[r] = x
+            copy_into(record[sample[s], r], x)
+    copy_into(states[r], x)
     step[r] = h
 
 
@@ -193,8 +193,8 @@ def drive_alone(
         if status[r] != WALKING:
             break
         if sample[s] >= 0:
-            record[sample[s], r] = x
-    states[r] = x
+            copy_into(record[sample[s], r], x)
+    copy_into(states[r], x)
     step[r] = h
 
 

@@ -118,7 +118,7 @@ def start(
     states = rows["initial"]
     return PlanarWalk(
         all_robots,
-        np.array(np.broadcast_to(initial_states(given[0]) if states is None else states, (count, 2 * n + 4))),
+        np.broadcast_to(initial_states(given[0]) if states is None else states, (count, 2 * n + 4)).copy(),
         np.ones((count, n, 2)) if rows["friction"] is None else rows["friction"],
         rows["target"],
         record,

@@ -12,6 +12,7 @@ from chilopod.paper.curved import rows as curved_rows
 from chilopod.paper.curved import study as curved_findings
 from chilopod.paper.curved.trials import curved_trials, off_branch, on_branch
 from chilopod.paper.printed import variant_robots
+from chilopod.paper.size import Size
 from chilopod.paper.table import OfPlanar, Row
 from chilopod.planar import PlanarModel
 from chilopod.robot import load_robot
@@ -135,11 +136,9 @@ def test_variants_are_the_papers():
     assert robots["stride 1.8 cm"].gait.stride == pytest.approx(0.018)
 
 
-def test_a_small_study_says_what_it_found(monkeypatch):
-    monkeypatch.setattr(curved_findings, "SPRINGS", (8.0, 9.0, 10.0, 41.0))
-    monkeypatch.setattr(curved_findings, "AGREEMENT_SPRINGS", (8.0,))
+def test_a_small_study_says_what_it_found(kept):
     seen = []
-    study = curved_findings.curved_study(ROBOT, 3, 2, progress=lambda done, words: seen.append(done))
+    study = curved_findings.curved_study(ROBOT, kept, Size.TINY, progress=lambda done, words: seen.append(done))
     assert seen == sorted(seen)
     assert seen[-1] == 1.0
     found = curved_rows.rows(study)

@@ -29,7 +29,7 @@ SOFT, SLOW, PHASE = "k2-5 = 28 N*mm/deg", "stride 1.8 cm", "module phase 180 deg
 @pytest.fixture(autouse=True)
 def few_drawn(monkeypatch):
     """Standard errors of ratios from fewer sets of trials than in the report, to be quick."""
-    monkeypatch.setattr(rows_of_walks, "radius_ratio", partial(rows_of_walks.radius_ratio, drawn=20))
+    monkeypatch.setattr(rows_of_walks, "radius_ratio", partial(rows_of_walks.radius_ratio, drawn=8))
 
 
 def walked(found):

@@ -5,6 +5,7 @@ from chilopod import load_robot
 from chilopod.analysis.straight_walk import pitchfork
 from chilopod.paper.robot import why as ablation
 from chilopod.paper.robot.why import FACTORS, FINER, limit_point, planar_limit, sign_change, with_factors, with_grip
+from chilopod.paper.size import Size
 from chilopod.twin import foot_creep
 
 ROBOT, PLANAR = load_robot("aoi2022"), load_robot("aoi2022-planar")
@@ -22,7 +23,9 @@ def test_the_two_engines_vouch_for_each_other():
     """The planar limit of the twin loses the straight walk where the planar model does, within 3 %."""
     limit = planar_limit(ROBOT, PLANAR, FINER)
     assert foot_creep(limit).across == pytest.approx(PLANAR.ground.friction, rel=1e-3)
-    assert limit_point(ROBOT, PLANAR) == pytest.approx(pitchfork(PLANAR, normal_form=False).value, rel=0.03)
+    assert limit_point(ROBOT, PLANAR, duration=12.0) == pytest.approx(
+        pitchfork(PLANAR, normal_form=False).value, rel=0.03
+    )
 
 
 def test_factors_take_every_constant_from_the_limit_to_the_twin():
@@ -48,11 +51,11 @@ def test_creep_is_in_proportion_to_the_impedance_ratio():
 
 def test_points_that_are_not_there_are_said_to_be(monkeypatch):
     def curving_below(spring):
-        return lambda robot, springs, folder: 0.3 * np.sqrt(np.maximum(spring / np.array(springs) - 1.0, 0.0))
+        return lambda robot, springs, duration, folder: 0.3 * np.sqrt(np.maximum(spring / np.array(springs) - 1.0, 0.0))
 
     monkeypatch.setattr(ablation, "_bends", curving_below(27.0))
     assert ablation.onset(ROBOT) == pytest.approx(27.0, rel=1e-3)
-    assert ablation.onset(ROBOT, quick=True) == pytest.approx(27.0, rel=1e-3)
+    assert ablation.onset(ROBOT, size=Size.QUICK) == pytest.approx(27.0, rel=1e-3)
     monkeypatch.setattr(ablation, "_bends", curving_below(500.0))
     assert ablation.onset(ROBOT) == np.inf
     monkeypatch.setattr(ablation, "_bends", curving_below(5.0))

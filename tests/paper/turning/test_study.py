@@ -13,6 +13,7 @@ import xarray as xr
 
 from chilopod.errors import ParameterError
 from chilopod.paper import statements
+from chilopod.paper.size import Size
 from chilopod.paper.table import NOT_PRINTED, OfPlanar, Row
 from chilopod.paper.turning.minima import minima
 from chilopod.paper.turning.rows import rows
@@ -27,8 +28,8 @@ TASK_A = Target.parse("45 deg, 1.3 m")
 
 
 @pytest.fixture(scope="module")
-def found():
-    return turning(ROBOT, quick=True)
+def found(kept):
+    return turning(ROBOT, kept, Size.TINY)
 
 
 def test_stiff_springs_bulge_outside_soft_ones_turn_inside_and_those_between_arrive(found):

@@ -7,8 +7,8 @@ from matplotlib.text import Text
 
 from chilopod import load_robot
 from chilopod.output import netcdf
-from chilopod.paper import printed
-from chilopod.paper.curved import study as curved_findings
+from chilopod.paper.curved.study import curved_study
+from chilopod.paper.size import Size
 from chilopod.report.figures import curved_trials, curved_variants
 from chilopod.report.kit import style
 from chilopod.report.kit.tables import csv
@@ -22,18 +22,8 @@ PANELS = {
 
 
 @pytest.fixture(scope="module")
-def study():
-    with pytest.MonkeyPatch.context() as patch:
-        # As wide a range as in earnest, or the axes would be others.
-        patch.setattr(curved_findings, "SPRINGS", (7.0, 8.5, 10.0, 41.0))
-        patch.setattr(curved_findings, "AGREEMENT_SPRINGS", (8.0,))
-        # Two variants are enough to draw.
-        robot = load_robot("aoi2022-planar")
-        two = {
-            name: each for name, each in printed.variant_robots(robot).items() if name in ("as built", "stride 1.8 cm")
-        }
-        patch.setattr(printed, "variant_robots", lambda robot: two)
-        return curved_findings.curved_study(robot, 3, 2)
+def study(kept):
+    return curved_study(load_robot("aoi2022-planar"), kept, Size.TINY)
 
 
 @pytest.mark.parametrize("narrow", [False, True])

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from chilopod import load_robot
+from chilopod.paper.size import Size
 from chilopod.paper.turning.study import turning
 from chilopod.report.figures.turning import panels
 from chilopod.report.kit import style, tables
@@ -15,8 +16,8 @@ CHECK = runpy.run_path(str(Path(__file__).parents[1] / "texts.py"))["check"]
 
 
 @pytest.fixture(scope="module")
-def drawn():
-    found = turning(load_robot("aoi2022-planar"), quick=True)
+def drawn(kept):
+    found = turning(load_robot("aoi2022-planar"), kept, Size.TINY)
     return list(panels(found))
 
 

@@ -6,7 +6,7 @@ import xarray as xr
 
 from chilopod.analysis.branch import curved_walks
 from chilopod.analysis.parameters import K1, stiffness
-from chilopod.analysis.undulation import undulating_walks
+from chilopod.analysis.undulation import DISTANCES, undulating_walks
 from chilopod.paper.curved.rows import rows
 from chilopod.paper.curved.study import CurvedStudy, curved_study
 from chilopod.paper.section import Section
@@ -25,14 +25,12 @@ CURVED: Section[CurvedStudy] = Section(
     "curved",
     CHAPTER,
     "walks from straight on, trial by trial",
-    lambda context, found, report: curved_study(
-        context.robot, 3 if context.quick else 10, 2 if context.quick else 5, context.folder, report
-    ),
+    lambda context, found, report: curved_study(context.robot, context.folder, context.size, report),
     lambda study, found: rows(study),
 )
 UNDULATION: Section[xr.Dataset] = Section(
     "undulation",
     CHAPTER,
     "undulating walks of uniform springs",
-    lambda context, found, report: undulating_walks(context.robot, progress=report),
+    lambda context, found, report: undulating_walks(context.robot, context.size.cut(DISTANCES, DISTANCES[-2:]), report),
 )

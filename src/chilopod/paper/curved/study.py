@@ -26,6 +26,7 @@ from chilopod.paper.curved.trials import (
     variant_trials,
 )
 from chilopod.paper.scatter import Difference, spread_difference
+from chilopod.paper.size import Size
 from chilopod.paper.walk_measures import example_walks
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
@@ -35,6 +36,9 @@ Array = NDArray[np.float64]
 
 AGREEMENT_SPRINGS = (8.0, 10.0, 11.0)
 """N*mm/deg, where trials without spread of friction are held against the branch."""
+
+TINY_SPRINGS = (7.0, 8.5, 10.0, 41.0)
+"""N*mm/deg: as wide a range as in earnest."""
 
 _NARROWEST, _WIDEST = 1e-4, 0.4  # of the critical spring, ranges that the law is fitted over along the branch
 
@@ -83,9 +87,8 @@ class CurvedStudy:
 
 def curved_study(
     robot: Robot,
-    repeats: int = 10,
-    variant_repeats: int = 5,
     folder: str | Path | None = None,
+    size: Size = Size.FULL,
     progress: Progress = silent,
 ) -> CurvedStudy:
     """Run the trials of the paper's curved walks and compare them with the exact branches.
@@ -94,21 +97,24 @@ def curved_study(
     ----------
     robot
         The paper's, as the springs of the trials are spread about its critical one.
-    repeats, variant_repeats
-        Trials at every spring, of the robot as built and of each variant; the paper has 10 and 5.
     folder
         Where trials are kept.
+    size
+        If not full, three trials at every spring and two of the variants, in place of the paper's 10 and 5; if tiny, at
+        fewer springs.
     progress
         Called as the work goes on.
     """
 
-    trials = curved_trials(robot, SPRINGS, repeats, folder=folder, progress=part(progress, 0.0, 0.3))
+    repeats, variant_repeats = (10, 5) if size is Size.FULL else (3, 2)
+    springs, agreement_springs = size.cut((SPRINGS, AGREEMENT_SPRINGS), (TINY_SPRINGS, AGREEMENT_SPRINGS[:1]))
+    trials = curved_trials(robot, springs, repeats, folder=folder, progress=part(progress, 0.0, 0.3))
     variants = variant_trials(robot, trials, variant_repeats, folder=folder, progress=part(progress, 0.3, 0.8))
     progress(0.8, "branches")
     branches = {name: _branch(variant, variants[name]) for name, variant in printed.variant_robots(robot).items()}
     progress(0.9, "trials beside the branch")
     even = Disturbance(friction=0.0)
-    settled = curved_trials(robot, AGREEMENT_SPRINGS, 3, disturbance=even, e_folds=25.0, folder=folder)
+    settled = curved_trials(robot, agreement_springs, 3, disturbance=even, e_folds=25.0, folder=folder)
     branch = branches[printed.AS_BUILT]
     study = CurvedStudy(
         trials=trials,

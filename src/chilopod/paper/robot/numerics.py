@@ -8,11 +8,12 @@ import xarray as xr
 from chilopod.analysis.square_root import square_root_fit
 from chilopod.errors import AnalysisError
 from chilopod.paper.fit_data import base_series_data
+from chilopod.paper.size import Size
 from chilopod.paper.statements import NUMERICS
 from chilopod.paper.table import OfTwin, of_twin
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
-from chilopod.tasks.identify.twin_series import base_series
+from chilopod.tasks.identify.twin_series import DURATION, base_series
 from chilopod.twin.walk import TOLERANCE
 
 SPRINGS = (15.0, 17.0, 21.0, 26.0, 28.0)
@@ -22,15 +23,15 @@ CASES = {"2 ms": (2e-3, TOLERANCE), "1 ms": (1e-3, TOLERANCE), "0.5 ms": (5e-4, 
 """Step (s) and tolerance of the contact solver, the first what all studies have."""
 
 
-def twin_numerics(robot: Robot, quick: bool = False, progress: Progress = silent) -> xr.Dataset:
+def twin_numerics(robot: Robot, size: Size = Size.FULL, progress: Progress = silent) -> xr.Dataset:
     """Onset, radii and speeds with finer steps and a tighter solver.
 
     Parameters
     ----------
     robot
         With a twin.
-    quick
-        The first two cases only.
+    size
+        If not full, the first two cases only.
     progress
         Called as the work goes on.
 
@@ -40,16 +41,17 @@ def twin_numerics(robot: Robot, quick: bool = False, progress: Progress = silent
     paper's method (N*mm/deg).
     """
     radii, speeds, onsets = [], [], []
-    cases = dict(list(CASES.items())[:2]) if quick else CASES
+    cases = CASES if size is Size.FULL else dict(list(CASES.items())[:2])
+    springs, duration = size.cut((SPRINGS, DURATION), (SPRINGS[::2], 18.0))
     for index, (name, (step, tolerance)) in enumerate(cases.items()):
         progress(index / len(cases), name)
         finer = robot.with_value("twin.timestep", step)
-        found = base_series(finer, base_series_data(), SPRINGS, tolerance=tolerance)
+        found = base_series(finer, base_series_data(), springs, tolerance=tolerance, duration=duration)
         angles = found.bends
         speeds.append(found.speeds)
         radii.append((robot.body.modules - 1) * robot.module_length / np.abs(angles).sum(axis=1))
         try:
-            onsets.append(square_root_fit(1.0 / np.array(SPRINGS), np.abs(angles[:, 0]), resampled=0).critical)
+            onsets.append(square_root_fit(1.0 / np.array(springs), np.abs(angles[:, 0]), resampled=0).critical)
         except AnalysisError:
             onsets.append(np.nan)
     return xr.Dataset(
@@ -58,7 +60,7 @@ def twin_numerics(robot: Robot, quick: bool = False, progress: Progress = silent
             "speed": (("case", "spring"), np.array(speeds), {"units": "m/s"}),
             "onset": ("case", np.array(onsets), {"units": "N*mm/deg"}),
         },
-        coords={"case": list(cases), "spring": ("spring", np.array(SPRINGS), {"units": "N*mm/deg"})},
+        coords={"case": list(cases), "spring": ("spring", np.array(springs), {"units": "N*mm/deg"})},
         attrs={"robot": robot.name},
     )
 

@@ -8,7 +8,7 @@ from chilopod.analysis.parameters import stiffness
 from chilopod.paper.movies import Movie, robot_movies
 from chilopod.paper.robot import numerics, why
 from chilopod.paper.robot.rows import walk_rows
-from chilopod.paper.robot.spread import COUNT, twin_spread
+from chilopod.paper.robot.spread import twin_spread
 from chilopod.paper.robot.structures import structures
 from chilopod.paper.robot.turning import RobotTurning, robot_turning
 from chilopod.paper.robot.turning_rows import turning_rows
@@ -25,14 +25,14 @@ WALKS: Section[RobotWalks] = Section(
     "robot-walks",
     CHAPTER,
     "the whole robot in 3-D: its walks",
-    lambda context, found, report: robot_walks(context.whole, context.folder, context.quick, report),
+    lambda context, found, report: robot_walks(context.whole, context.folder, context.size, report),
     lambda walks, found: walk_rows(walks),
 )
 TASKS: Section[RobotTurning] = Section(
     "robot-turning",
     CHAPTER,
     "the whole robot in 3-D: turning to targets",
-    lambda context, found, report: robot_turning(context.whole, context.folder, context.quick, report),
+    lambda context, found, report: robot_turning(context.whole, context.folder, context.size, report),
     lambda tasks, found: turning_rows(tasks, found[WALKS]),
     needs=(WALKS,),
 )
@@ -40,13 +40,15 @@ FILMS: Section[list[Movie]] = Section(
     "robot-movies",
     CHAPTER,
     "the paper's two movies in 3-D",
-    lambda context, found, report: robot_movies(context.whole, _FILMED, _TRIED, context.folder, report),
+    lambda context, found, report: robot_movies(
+        context.whole, _FILMED, _TRIED, context.folder, report, shorter=context.size.cut(1.0, 0.02)
+    ),
 )
 SPREAD: Section[xr.Dataset] = Section(
     "robot-spread",
     CHAPTER,
     "the whole robot in 3-D: other constants that fit as well",
-    lambda context, found, report: twin_spread(context.whole, context.folder, 2 if context.quick else COUNT, report),
+    lambda context, found, report: twin_spread(context.whole, context.folder, context.size, report),
     beyond=True,
     full=True,
 )
@@ -54,7 +56,7 @@ NUMERICS: Section[xr.Dataset] = Section(
     "robot-numerics",
     CHAPTER,
     "the whole robot in 3-D: finer steps",
-    lambda context, found, report: numerics.twin_numerics(context.whole, context.quick, report),
+    lambda context, found, report: numerics.twin_numerics(context.whole, context.size, report),
     lambda data, found: numerics.rows(data),
     beyond=True,
 )
@@ -62,7 +64,7 @@ STRUCTURES: Section[xr.Dataset] = Section(
     "robot-structures",
     CHAPTER,
     "the whole robot in 3-D: what else it could be made of",
-    lambda context, found, report: structures(context.whole, context.folder, progress=report),
+    lambda context, found, report: structures(context.whole, context.folder, context.size, report),
     beyond=True,
     on_request=True,
 )
@@ -70,7 +72,7 @@ WHY: Section[xr.Dataset] = Section(
     "robot-why",
     CHAPTER,
     "why the robot bends earlier than the planar model",
-    lambda context, found, report: why.ablation(context.whole, context.robot, context.folder, context.quick, report),
+    lambda context, found, report: why.ablation(context.whole, context.robot, context.folder, context.size, report),
     lambda data, found: why.rows(data),
     beyond=True,
 )

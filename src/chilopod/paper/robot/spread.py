@@ -19,7 +19,8 @@ from chilopod.paper import printed
 from chilopod.paper.equal_distance import radius_ratio
 from chilopod.paper.fit_data import base_series_data
 from chilopod.paper.robot.turning import TASK_DURATION
-from chilopod.paper.robot.walks import lower_steps, undulations, walk_ends
+from chilopod.paper.robot.walks import UNIFORM_DURATION, lower_steps, undulations, walk_ends
+from chilopod.paper.size import Size
 from chilopod.paper.walk_measures import onset_with_error
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
@@ -44,7 +45,7 @@ _BENT = 0.8  # rad in all, that walks begin with
 
 
 def twin_spread(
-    robot: Robot, folder: str | Path | None = None, count: int = COUNT, progress: Progress = silent
+    robot: Robot, folder: str | Path | None = None, size: Size = Size.FULL, progress: Progress = silent
 ) -> xr.Dataset:
     """Predictions by several sets of constants.
 
@@ -54,8 +55,8 @@ def twin_spread(
         For what is not fitted.
     folder
         Where trials are kept.
-    count
-        Of sets.
+    size
+        If not full, two sets, or one.
     progress
         Called as the work goes on.
 
@@ -66,12 +67,12 @@ def twin_spread(
     built, at an equal distance from each one's own onset), ``uniform`` (N*mm/deg), and over task ``best``, the spring
     that comes nearest to the target (N*mm/deg), and ``arrives``, whether that arrives.
     """
-    fits = unlike(known(), count)
+    fits = unlike(known(), size.of(COUNT, 2, 1))
     rows: list[dict[str, Any]] = []
     for index, fit in enumerate(fits):
         progress(index / len(fits), f"set {index + 1} of {len(fits)}")
         other = with_constants(robot, fit.constants)
-        rows.append({**predictions(other, folder), **nearest_springs(other, folder)})
+        rows.append({**predictions(other, folder, size=size), **nearest_springs(other, folder, size)})
     series = base_series_data()
     numbers, answers = len(series.radii) + len(series.speeds) + 1, len(series.curved) + len(series.straight)
     names = list(rows[0]["onset"])
@@ -97,7 +98,9 @@ def printed_number(reading: str) -> printed.Number:
     return printed.onset(reading.removesuffix(LOWER))
 
 
-def predictions(robot: Robot, folder: str | Path | None = None, engine: str = "twin") -> dict[str, Any]:
+def predictions(
+    robot: Robot, folder: str | Path | None = None, engine: str = "twin", size: Size = Size.FULL
+) -> dict[str, Any]:
     """Where curved and undulating walks set in other than in the base series, and how tight they are.
 
     Few and undisturbed walks, which begin bent, in place of the many from straight on that
@@ -114,35 +117,41 @@ def predictions(robot: Robot, folder: str | Path | None = None, engine: str = "t
     for name, variant in list(variants.items()):
         if variant.gait.stride != robot.gait.stride:
             variants[f"{name}{LOWER}"] = lower_steps(robot, variant)
+    springs, uniform_springs = size.cut((SPRINGS, UNIFORM_SPRINGS), (SPRINGS[1::4], UNIFORM_SPRINGS[::3]))
+    longest, swinging = size.cut((_DURATION, UNIFORM_DURATION), (16.0, 12.0))
     series = {}
     for name, variant in variants.items():
-        duration = _DURATION * robot.gait.stride / variant.gait.stride
+        duration = longest * robot.gait.stride / variant.gait.stride
         walks = [
             Trial(variant.with_value(K1, stiffness(k)), duration, 0, bend, disturbance=NONE, rate=10.0, engine=engine)
-            for k in SPRINGS
+            for k in springs
         ]
-        series[name] = walk_ends(trials.run(walks, folder), variant, SPRINGS)
+        series[name] = walk_ends(trials.run(walks, folder), variant, springs)
     base = next(iter(series.values()))
+    uniform = undulations(robot, uniform_springs, 1, duration=swinging, folder=folder, engine=engine)
     return {
         "onset": {name: onset_with_error(each)[0] for name, each in series.items()},
         "radius": {name: radius_ratio(base, each, drawn=0).distance for name, each in series.items()},
-        "uniform": undulations(robot, UNIFORM_SPRINGS, 1, folder=folder, engine=engine).attrs["critical_k"],
+        "uniform": uniform.attrs["critical_k"],
     }
 
 
-def nearest_springs(robot: Robot, folder: str | Path | None = None) -> dict[str, dict[str, Any]]:
+def nearest_springs(
+    robot: Robot, folder: str | Path | None = None, size: Size = Size.FULL
+) -> dict[str, dict[str, Any]]:
     """For each of the paper's tasks the spring that comes ``best``, nearest to the target (N*mm/deg), undisturbed, and
     whether it ``arrives``."""
     found: dict[str, dict[str, Any]] = {"best": {}, "arrives": {}}
+    springs, duration = size.cut((TASK_SPRINGS, TASK_DURATION), (TASK_SPRINGS[::3], 2.0))
     plan = strategy_named("pitchfork")
     for letter, task in printed.TASKS.items():
         walks = []
-        for k in TASK_SPRINGS:
+        for k in springs:
             walker, controller = steered(robot, plan, stiffness(k))
             walks.append(
-                Trial(walker, TASK_DURATION, 0, (), task.target, controller, disturbance=NONE, rate=20.0, engine="twin")
+                Trial(walker, duration, 0, (), task.target, controller, disturbance=NONE, rate=20.0, engine="twin")
             )
         nearest = [float(record.distance.min()) for record in trials.run(walks, folder)]
-        found["best"][letter] = TASK_SPRINGS[int(np.argmin(nearest))]
+        found["best"][letter] = springs[int(np.argmin(nearest))]
         found["arrives"][letter] = bool(min(nearest) < ARRIVAL_RADIUS)
     return found

@@ -9,7 +9,7 @@ what the paper prints. That says which structures the paper's numbers speak for 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ from chilopod.paper.fit_data import base_series_data
 from chilopod.paper.printed import CRITERION_NAMES
 from chilopod.paper.robot.spread import LOWER, predictions, printed_number
 from chilopod.paper.robot.turning import TASK_DURATION
+from chilopod.paper.size import Size
 from chilopod.paper.turning.minima import minima
 from chilopod.paper.turning.trials import turning_task
 from chilopod.progress import Progress, part, silent
@@ -32,7 +33,7 @@ from chilopod.robot import Robot
 from chilopod.tasks.identify.data import BaseSeries
 from chilopod.tasks.identify.twin import corrected, damped_step
 from chilopod.tasks.identify.twin_constants import FREE, constants_of, parts_of, values_at, with_constants
-from chilopod.tasks.identify.twin_series import base_series, residuals
+from chilopod.tasks.identify.twin_series import DURATION, base_series, residuals
 
 Array = NDArray[np.float64]
 
@@ -154,7 +155,7 @@ STRUCTURES = (
 def structures(
     robot: Robot,
     folder: str | Path | None = None,
-    tried: Sequence[Structure] = STRUCTURES,
+    size: Size = Size.FULL,
     progress: Progress = silent,
 ) -> xr.Dataset:
     """Predictions by other structures, with their constants fitted anew.
@@ -165,8 +166,8 @@ def structures(
         With constants that meet the base series.
     folder
         Where trials are kept.
-    tried
-        Structures.
+    size
+        If tiny, one structure, whose constants are not fitted.
     progress
         Called as the work goes on.
 
@@ -180,15 +181,16 @@ def structures(
     by the nearer of its two readings.
     """
     data = base_series_data()
-    law = _law(robot, data, part(progress, 0.0, 0.1))
+    tried, rounds, duration = size.cut((STRUCTURES, _ROUNDS, DURATION), (STRUCTURES[:1], 0, 18.0))
+    law = _law(robot, data, part(progress, 0.0, 0.1)) if rounds else np.empty(0)
     rows: list[Mapping[str, Any]] = []
     for index, each in enumerate(tried):
         progress(0.1 + 0.9 * index / len(tried), each.name)
         changed = robot.set_from_text(each.overrides)
-        given, fitted, anew = _fitted(changed, data, law, each.engine)
-        found = predictions(anew, folder, each.engine)
+        given, fitted, anew = _fitted(changed, data, law, each.engine, rounds, duration)
+        found = predictions(anew, folder, each.engine, size)
         rows.append(
-            {"given": given, "fitted": fitted, "robot": anew, **found, **_strategies(anew, folder, each.engine)}
+            {"given": given, "fitted": fitted, "robot": anew, **found, **_strategies(anew, folder, each.engine, size)}
         )
     variants = [name for name in rows[0]["onset"] if name != printed.AS_BUILT]
     names = [*variants, UNIFORM]
@@ -235,14 +237,14 @@ def _with_chi_squared(data: xr.Dataset) -> xr.Dataset:
     return data.assign(chi_squared=once + squared.sel(prediction=twice).min("prediction", skipna=False))
 
 
-def _strategies(robot: Robot, folder: str | Path | None, engine: str) -> dict[str, Array]:
+def _strategies(robot: Robot, folder: str | Path | None, engine: str, size: Size) -> dict[str, Array]:
     """The smallest criteria of task A, with one soft spring and with all springs alike."""
     target = printed.TASKS["A"].target
+    repeats, duration = size.cut((_REPEATS, TASK_DURATION), (2, 3.0))
+    kept: Any = {"duration": duration, "engine": engine, "folder": folder}
     time, rows = None, []
     for strategy, springs in _SPRINGS.items():
-        task = turning_task(
-            robot, target, springs, _REPEATS, strategy, time=time, duration=TASK_DURATION, engine=engine, folder=folder
-        )
+        task = turning_task(robot, target, springs, repeats, strategy, time=time, **kept)
         time = task.time
         rows.append(minima(task.criteria)["mean"].sel(criterion=list(CRITERION_NAMES)).values)
     return {"criteria": np.array(rows)}
@@ -263,23 +265,25 @@ def _law(robot: Robot, data: BaseSeries, progress: Progress) -> Array:
     return np.array(columns).T
 
 
-def _off(robot: Robot, data: BaseSeries, engine: str = "twin") -> Array:
-    return residuals(robot, base_series(robot, data, engine=engine), data)[: _smooth(data)]
+def _off(robot: Robot, data: BaseSeries, engine: str = "twin", duration: float = DURATION) -> Array:
+    return residuals(robot, base_series(robot, data, engine=engine, duration=duration), data)[: _smooth(data)]
 
 
-def _fitted(robot: Robot, data: BaseSeries, law: Array, engine: str) -> tuple[float, float, Robot]:
+def _fitted(
+    robot: Robot, data: BaseSeries, law: Array, engine: str, rounds: int, duration: float
+) -> tuple[float, float, Robot]:
     """Misfits before and after, and the robot with constants that meet the base series best."""
     place = parts_of(constants_of(robot))
-    best_robot, off = robot, _off(robot, data, engine)
+    best_robot, off = robot, _off(robot, data, engine, duration)
     given = best = float(np.sqrt(np.mean(off**2)))
     here = place
-    for _ in range(_ROUNDS):
+    for _ in range(rounds):
         if best <= _MET:
             break
         # Damped about the preset: no constant is moved far for little.
         step = np.clip(here + damped_step(law, off, here - place), 0.0, 1.0) - here
         moved = with_constants(robot, values_at(here + step))
-        found = _off(moved, data, engine)
+        found = _off(moved, data, engine, duration)
         law = corrected(law, step, found - off)
         here, off = here + step, found
         misfit = float(np.sqrt(np.mean(off**2)))

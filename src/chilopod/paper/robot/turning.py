@@ -9,6 +9,7 @@ from pathlib import Path
 import xarray as xr
 
 from chilopod.paper import printed
+from chilopod.paper.size import Size
 from chilopod.paper.turning.trials import DURATION, TurningTask, turning_task, without_leg_yaw
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
@@ -50,7 +51,7 @@ class RobotTurning:
 
 
 def robot_turning(
-    robot: Robot, folder: str | Path | None = None, quick: bool = False, progress: Progress = silent
+    robot: Robot, folder: str | Path | None = None, size: Size = Size.FULL, progress: Progress = silent
 ) -> RobotTurning:
     """All turning tasks of the paper.
 
@@ -60,13 +61,15 @@ def robot_turning(
         With a twin.
     folder
         Where trials are kept.
-    quick
-        Two repeats instead of five, and five springs instead of nine.
+    size
+        If not full, two repeats instead of five, and fewer springs.
     progress
         Called as the work goes on.
     """
 
-    repeats, springs = (2, SPRINGS[1::2]) if quick else (printed.REPEATS, SPRINGS)
+    repeats, springs, duration = size.of(
+        (printed.REPEATS, SPRINGS, TASK_DURATION), (2, SPRINGS[1::2], TASK_DURATION), (2, SHOWN, 6.0)
+    )
     springs = tuple(sorted({*springs, *SHOWN}))
     tasks = {}
     for index, (letter, task) in enumerate(printed.TASKS.items()):
@@ -75,7 +78,7 @@ def robot_turning(
             task.target,
             springs,
             repeats,
-            duration=TASK_DURATION,
+            duration=duration,
             shown=SHOWN,
             engine="twin",
             folder=folder,
@@ -88,7 +91,7 @@ def robot_turning(
         repeats,
         "hopf",
         time=tasks["A"].time,
-        duration=TASK_DURATION,
+        duration=duration,
         engine="twin",
         folder=folder,
         progress=part(progress, 0.7, 0.9, "uniform springs"),
@@ -97,7 +100,7 @@ def robot_turning(
         robot,
         tasks["A"].target,
         {"paper's spring": printed.TASKS["A"].k_hat.value},
-        duration=TASK_DURATION,
+        duration=duration,
         engine="twin",
         folder=folder,
         progress=part(progress, 0.9, 1.0, "without leg yaw"),

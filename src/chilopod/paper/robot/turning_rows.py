@@ -26,7 +26,8 @@ def turning_rows(found: RobotTurning, walks: RobotWalks | None) -> list[OfTwin]:
         said = statements.TASKS[letter]
         if walks is not None:
             own, error = spring_for(walks.base, task.target.radius)
-            rows.append(of_twin(said.k_hat, f"{with_error(own, error, 1)} {PAPER_UNIT}", own, error))
+            words = f"{with_error(own, error, 1)} {PAPER_UNIT}" if np.isfinite(own) else "none of the springs walked"
+            rows.append(of_twin(said.k_hat, words, own, error))
         words = outcome_words(task.criteria, lambda springs: ", ".join(f"{k:g}" for k in springs))
         rows.append(OfTwin(said.outcomes, words, _became(task.criteria, printed.TASKS[letter])))
         low = minima(task.criteria)
@@ -37,12 +38,13 @@ def turning_rows(found: RobotTurning, walks: RobotWalks | None) -> list[OfTwin]:
                 f"{float(at['at']):.3g} (no worse: {float(at.softest):g} to {float(at.stiffest):g})"
             )
             rows.append(OfTwin(statement, words, around(at, statement.said)))
-    task, time = found.tasks["A"], found.tasks["A"].time
+    task = found.tasks["A"]
+    time = task.time if (task.criteria.outcome == Outcome.ARRIVED.label).any() else np.nan
     own = walks.uniform.attrs["critical_k"] if walks else np.nan
     words, below = hopf.softest_minima(found.hopf, own if np.isfinite(own) else printed.UNIFORM.value)
     return [
         *rows,
-        of_twin(statements.ARRIVAL, f"{time:.1f} s", time),
+        of_twin(statements.ARRIVAL, f"{time:.1f} s" if np.isfinite(time) else "none arrives", time),
         *(OfTwin(statements.WITHOUT, str(each), _needs_leg_yaw(each)) for each in by_leg_yaw(found.without)),
         OfTwin(
             statements.HOPF,

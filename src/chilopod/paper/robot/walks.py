@@ -20,6 +20,7 @@ from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT, stiffness
 from chilopod.analysis.square_root import SquareRootFit, square_root_fit
 from chilopod.errors import AnalysisError
 from chilopod.paper import printed
+from chilopod.paper.size import Size
 from chilopod.paper.walk_measures import by_spring, example_walks, onset, onset_with_error, radius_at, shares
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
@@ -93,7 +94,7 @@ class RobotWalks:
 
 
 def robot_walks(
-    robot: Robot, folder: str | Path | None = None, quick: bool = False, progress: Progress = silent
+    robot: Robot, folder: str | Path | None = None, size: Size = Size.FULL, progress: Progress = silent
 ) -> RobotWalks:
     """All walks of the paper.
 
@@ -103,17 +104,18 @@ def robot_walks(
         With a twin.
     folder
         Where trials are kept.
-    quick
-        Two repeats of the base series, one of the variants and of uniform springs, with fewer springs.
+    size
+        If not full, two repeats of the base series, one of the variants and of uniform springs, with fewer springs.
     progress
         Called as the work goes on.
     """
 
-    repeats, fewer, fewest = (2, 1, 1) if quick else (REPEATS, VARIANT_REPEATS, UNIFORM_REPEATS)
-    springs, uniform_springs = (
-        (VARIANT_SPRINGS[1::2], UNIFORM_SPRINGS[:4]) if quick else (VARIANT_SPRINGS, UNIFORM_SPRINGS)
-    )
-    records = walk_records(robot, SPRINGS, repeats, folder=folder, progress=part(progress, 0.0, 0.31, "as built"))
+    repeats, fewer, fewest = size.of((REPEATS, VARIANT_REPEATS, UNIFORM_REPEATS), (2, 1, 1), (1, 1, 1))
+    springs = size.of(VARIANT_SPRINGS, VARIANT_SPRINGS[1::2], VARIANT_SPRINGS[1::4])
+    uniform_springs = size.of(UNIFORM_SPRINGS, UNIFORM_SPRINGS[:4], UNIFORM_SPRINGS[:4:2])
+    duration, swinging = size.cut((DURATION, UNIFORM_DURATION), (21.0, 12.0))
+    told = part(progress, 0.0, 0.31, "as built")
+    records = walk_records(robot, SPRINGS, repeats, duration=duration, folder=folder, progress=told)
     base, durations = walk_ends(records, robot, SPRINGS), by_duration(records, robot, SPRINGS)
     robots = {name: each for name, each in printed.variant_robots(robot).items() if name != printed.AS_BUILT}
     readings = {
@@ -124,15 +126,14 @@ def robot_walks(
     for index, (of, name) in enumerate(asked):
         shown = part(progress, 0.31 + 0.6 * index / len(asked), 0.31 + 0.6 * (index + 1) / len(asked), name)
         # Growing and settling go with the way: who makes shorter steps is given the time to walk as far.
-        longer = DURATION * robot.gait.stride / of[name].gait.stride
+        longer = duration * robot.gait.stride / of[name].gait.stride
         walked = walk_records(of[name], springs, fewer, duration=longer, folder=folder, progress=shown)
         found.append(walk_ends(walked, of[name], springs))
     variants, lower = dict(zip(robots, found, strict=False)), dict(zip(readings, found[len(robots) :], strict=True))
-    uniform = undulations(
-        robot, uniform_springs, fewest, folder=folder, progress=part(progress, 0.91, 1.0, "uniform springs")
-    )
+    told = part(progress, 0.91, 1.0, "uniform springs")
+    uniform = undulations(robot, uniform_springs, fewest, duration=swinging, folder=folder, progress=told)
     seeds = [int(_SEEDS * spring) for spring in _EXAMPLES]
-    examples = example_walks(robot, _EXAMPLES, DURATION, seeds, "twin", folder)
+    examples = example_walks(robot, _EXAMPLES, duration, seeds, "twin", folder)
     return RobotWalks(robot, base, durations, variants, lower, examples, uniform)
 
 
@@ -147,7 +148,7 @@ def walk_records(
     springs: Sequence[float] = SPRINGS,
     repeats: int = REPEATS,
     *,
-    duration: float | None = None,
+    duration: float = DURATION,
     disturbance: Disturbance | None = None,
     folder: str | Path | None = None,
     progress: Progress = silent,
@@ -163,7 +164,7 @@ def walk_records(
     repeats
         Trials at each of them, all with seeds of their own.
     duration
-        s; by default :data:`DURATION`.
+        s.
     disturbance
         By default that of all studies.
     folder
@@ -174,7 +175,7 @@ def walk_records(
     asked = [
         Trial(
             robot.with_value(K1, stiffness(spring)),
-            DURATION if duration is None else duration,
+            duration,
             int(_SEEDS * spring) + repeat,
             disturbance=disturbance or Disturbance(),
             rate=_RATE,
@@ -225,7 +226,8 @@ def by_duration(records: Sequence[xr.Dataset], robot: Robot, springs: Sequence[f
     bootstrap), N*mm/deg; over duration and spring: those of :func:`shares`, and ``axis_radius`` with
     ``axis_radius_error`` as of :func:`radius_at`, m.
     """
-    durations = [*(each for each in SHORTER if each < DURATION), DURATION]
+    last = float(records[0].time[-1])
+    durations = [*(each for each in SHORTER if each < last), last]
     series = [walk_ends(records, robot, springs, duration) for duration in durations]
     # Short walks have not settled: what they show is what one would take for the radius.
     onsets = np.array([onset_with_error(each, settled=False) for each in series])
@@ -249,6 +251,7 @@ def undulations(
     springs: Sequence[float] = UNIFORM_SPRINGS,
     repeats: int = UNIFORM_REPEATS,
     *,
+    duration: float = UNIFORM_DURATION,
     engine: str = "twin",
     folder: str | Path | None = None,
     progress: Progress = silent,
@@ -268,7 +271,7 @@ def undulations(
     asked = [
         Trial(
             robot.with_value(ALL, stiffness(spring)),
-            UNIFORM_DURATION,
+            duration,
             int(_SEEDS * spring) + repeat,
             wave,
             engine=engine,

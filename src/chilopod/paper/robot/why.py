@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -26,6 +27,7 @@ from chilopod.analysis.square_root import square_root_fit
 from chilopod.analysis.straight_walk import pitchfork
 from chilopod.errors import AnalysisError
 from chilopod.paper import printed
+from chilopod.paper.size import Size
 from chilopod.paper.statements import PLANAR_LIMIT
 from chilopod.paper.table import OfPlanar, OfTwin, of_twin
 from chilopod.progress import Progress, silent
@@ -201,34 +203,32 @@ def sign_change(springs: Array, growth: Array) -> float:
     return float("nan")
 
 
-def onset(robot: Robot, folder: str | Path | None = None, quick: bool = False) -> float:
+def onset(robot: Robot, folder: str | Path | None = None, size: Size = Size.FULL) -> float:
     """Where curved walks set in, N*mm/deg, by the paper's method: the square-root fit to the bend of joint 1 of walks
     that begin bent; over the three stiffest springs that curve, then over three beside the point that these give.
 
     Infinite if walks curve at the stiffest spring tried, NaN if at fewer than two, or if their bends point beyond it.
-    With ``quick`` without the second fit.
+    If not full, without the second fit.
     """
-    springs = SPRINGS[::2] if quick else SPRINGS
-    bends = _bends(robot, springs, folder)
+    springs = size.of(SPRINGS, SPRINGS[::2], SPRINGS[::3])
+    duration = size.cut(_WALK, 3.0)
+    bends = _bends(robot, springs, duration, folder)
     if bends[-1] > 0.0:
         return float("inf")
     point = _fitted(springs, bends)
-    if quick or np.isnan(point):
+    if size is not Size.FULL or np.isnan(point):
         return point
     finer = [round(point * part, 2) for part in _BESIDE]
-    refined = _fitted(finer, _bends(robot, finer, folder))
+    refined = _fitted(finer, _bends(robot, finer, duration, folder))
     return refined if refined <= max(springs) else point
 
 
-def _bends(robot: Robot, springs: Sequence[float], folder: str | Path | None) -> Array:
+def _bends(robot: Robot, springs: Sequence[float], duration: float, folder: str | Path | None) -> Array:
     """Mean angle of joint 1 at the end of walks, rad; 0 where the body is straight, or the walk failed."""
     bend = tuple(_BENT * _shape(robot))
-    asked = [
-        Trial(
-            robot.with_value(K1, stiffness(spring)), _WALK, 0, bend, disturbance=NONE, rate=_PER_SECOND, engine="twin"
-        )
-        for spring in springs
-    ]
+    robots = [robot.with_value(K1, stiffness(spring)) for spring in springs]
+    same: Any = {"disturbance": NONE, "rate": _PER_SECOND, "engine": "twin"}
+    asked = [Trial(each, duration, 0, bend, **same) for each in robots]
     found = []
     for record in trials.run(asked, folder):
         last = np.abs(record.joint_angle.isel(robot=0).values[-round(_AVERAGED * _PER_SECOND) :].mean(axis=0))
@@ -251,17 +251,21 @@ def _fitted(springs: Sequence[float], bends: Array) -> float:
 
 
 def limit_point(
-    robot: Robot, planar: Robot, constants: Mapping[str, float] = FINER, folder: str | Path | None = None
+    robot: Robot,
+    planar: Robot,
+    constants: Mapping[str, float] = FINER,
+    folder: str | Path | None = None,
+    duration: float = _DURATION,
 ) -> float:
     """Where a small bend neither grows nor dies out in the planar limit, N*mm/deg: what the planar model calls its
     pitchfork; NaN if nowhere near that."""
     springs = [round(part * pitchfork(planar, normal_form=False).value, 2) for part in (0.95, 1.05)]
-    found = growth(planar_limit(robot, planar, constants), springs, folder)
+    found = growth(planar_limit(robot, planar, constants), springs, folder, duration)
     return sign_change(found.spring.values, found.growth.values)
 
 
 def ablation(
-    robot: Robot, planar: Robot, folder: str | Path | None = None, quick: bool = False, progress: Progress = silent
+    robot: Robot, planar: Robot, folder: str | Path | None = None, size: Size = Size.FULL, progress: Progress = silent
 ) -> xr.Dataset:
     """The point with factors switched on and off.
 
@@ -273,8 +277,8 @@ def ablation(
         What the planar limit takes feet and friction from.
     folder
         Where trials are kept.
-    quick
-        Only the path from the planar limit to the twin, by fewer springs.
+    size
+        If not full, only the path from the planar limit to the twin, by fewer springs.
     progress
         Called as the work goes on.
 
@@ -288,7 +292,7 @@ def ablation(
     """
     names = [factor.name for factor in FACTORS]
     wanted: dict[str, list[list[str]]] = {"path": [names[: i + 1] for i in range(len(names))]}
-    if not quick:
+    if size is Size.FULL:
         wanted["alone"] = [[name] for name in names]
         wanted["without"] = [[other for other in names if other != name] for name in names]
     sets = [frozenset(), *(frozenset(on) for rows in wanted.values() for on in rows)]
@@ -296,7 +300,7 @@ def ablation(
     for on in sets:
         if on not in points:
             progress(len(points) / len(set(sets)), ", ".join(sorted(on)) or "planar limit")
-            points[on] = onset(with_factors(robot, planar, sorted(on)), folder, quick)
+            points[on] = onset(with_factors(robot, planar, sorted(on)), folder, size)
     data = xr.Dataset(coords={"factor": names})
     for name in ("alone", "without", "path"):
         values = [points[frozenset(on)] for on in wanted[name]] if name in wanted else [np.nan] * len(names)
@@ -305,7 +309,7 @@ def ablation(
     progress(1.0, "planar limit by growth")
     data.attrs = {
         "robot": robot.name,
-        "vouched": limit_point(robot, planar, PLANAR if quick else FINER, folder),
+        "vouched": limit_point(robot, planar, FINER if size is Size.FULL else PLANAR, folder, size.cut(_DURATION, 9.0)),
         "exact": pitchfork(planar, normal_form=False).value,
         "limit": points[frozenset()],
         "twin": points[frozenset(names)],

@@ -22,7 +22,7 @@ EXPONENTS: Section[xr.Dataset] = Section(
     "exponents",
     CHAPTER,
     "Floquet exponents as k1 falls",
-    lambda context, found, report: study.exponent_sweep(context.robot, 40 if context.quick else 160, report),
+    lambda context, found, report: study.exponent_sweep(context.robot, context.size.of(160, 40, 12), report),
 )
 VARIANTS: Section[xr.Dataset] = Section(
     "variants",
@@ -35,7 +35,7 @@ MODULES: Section[xr.Dataset] = Section(
     "modules",
     CHAPTER,
     "critical k1 over the number of modules",
-    lambda context, found, report: study.module_counts(context.robot, range(3, 11 if context.quick else 21), report),
+    lambda context, found, report: study.module_counts(context.robot, range(3, context.size.of(21, 11, 8)), report),
     lambda data, found: rows.module_rows(data),
 )
 UNIFORM: Section[xr.Dataset] = Section(
@@ -50,7 +50,7 @@ IDENTIFICATION: Section[Identification] = Section(
     CHAPTER,
     "the constants the paper does not print",
     lambda context, found, report: identify_planar(
-        context.robot, critical_mode_data(), 7 if context.quick else 25, variant_settings(), report
+        context.robot, critical_mode_data(), context.size.of(25, 7, 5), variant_settings(), report
     ),
     lambda fit, found: rows.identification_rows(fit),
     beyond=True,

@@ -19,14 +19,14 @@ _BEST = 9.8
 def _movies(context: Context, found: Found, report: Progress) -> list[Movie]:
     tasks = found[TURNING]
     best = _BEST if tasks is None else tasks.tasks["A"].best
-    return movies(context.robot, _FILMED, stiffness(best), context.folder, report)
+    return movies(context.robot, _FILMED, stiffness(best), context.folder, report, shorter=context.size.cut(1.0, 0.1))
 
 
 TURNING: Section[Turning] = Section(
     "turning",
     CHAPTER,
     "turning to targets",
-    lambda context, found, report: turning(context.robot, context.folder, context.quick, report),
+    lambda context, found, report: turning(context.robot, context.folder, context.size, report),
     lambda tasks, found: rows(tasks),
 )
 MOVIES: Section[list[Movie]] = Section("movies", CHAPTER, "the paper's two movies", _movies, needs=(TURNING,))

@@ -16,6 +16,7 @@ from chilopod.analysis.parameters import ALL, PAPER_UNIT, stiffness
 from chilopod.analysis.radius_law import RadiusLaws, radius_laws
 from chilopod.analysis.straight_walk import first_loss
 from chilopod.paper import printed
+from chilopod.paper.size import Size
 from chilopod.paper.turning.trials import (
     DURATION,
     RATE,
@@ -83,7 +84,7 @@ class Turning:
 
 
 def turning(
-    robot: Robot, folder: str | Path | None = None, quick: bool = False, progress: Progress = silent
+    robot: Robot, folder: str | Path | None = None, size: Size = Size.FULL, progress: Progress = silent
 ) -> Turning:
     """All turning studies of a robot.
 
@@ -93,11 +94,12 @@ def turning(
         The paper's numbers are those of ``aoi2022-planar``.
     folder
         Where trials are kept; without one nothing is kept.
-    quick
-        Fewer springs and fewer, nearer targets.
+    size
+        If not full, fewer springs and fewer, nearer targets.
     progress
         Called with the part done (0 to 1) and a few words.
     """
+    quick = size is not Size.FULL
     springs = QUICK_SPRINGS if quick else SPRINGS
     laws = radius_laws(robot)
     tasks: dict[str, TurningTask] = {}

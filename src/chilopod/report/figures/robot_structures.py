@@ -60,6 +60,8 @@ def panel(data: xr.Dataset) -> Panel:
 
 
 def _shown(value: float) -> str:
+    if np.isnan(value):
+        return "a prediction without a point"
     return f"{value:.0f}" if value >= 10.0 else f"{value:.1f}"
 
 
@@ -71,8 +73,7 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
     values = np.clip(np.nan_to_num(data.chi_squared.values, nan=0.0), 0.0, _MOST)
     axes["A"].barh(rows, values, 0.6, color=[style.BLUE if good else style.PALE for good in met])
     for row, value, end in zip(rows, data.chi_squared.values, values, strict=True):
-        text = "a prediction has no point" if np.isnan(value) else _shown(value)
-        style.note(axes["A"], text, (end, float(row)), (4, 0), va="center")
+        style.note(axes["A"], _shown(value), (end, float(row)), (4, 0), va="center")
     axes["A"].set_yticks(rows, names)
     axes["A"].set(xlim=(0.0, 1.2 * _MOST), xlabel="chi squared", title="A  From the paper's")
     off = 100.0 * (data.predicted / data.paper - 1.0)

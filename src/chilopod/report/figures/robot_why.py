@@ -118,12 +118,12 @@ def spread(data: xr.Dataset, robot: Robot) -> Panel:
         values, unit = data.constants.values[:, index], robot.unit_of(str(path))
         low, high = (units.format(float(each), unit, digits=2) for each in (values.min(), values.max()))
         ranges.append(f"{path} {low} to {high}".replace("*", "·"))
-    onsets = listing(
-        f"{name} {number(float(np.nanmin(data.onset.sel(variant=name))), 3)} to "
-        f"{number(float(np.nanmax(data.onset.sel(variant=name))), 3)}"
-        for name in data.variant.values
-        if np.isfinite(data.onset.sel(variant=name)).any()
-    )
+    points = {str(name): data.onset.sel(variant=name).values for name in data.variant.values}
+    predicted = [
+        f"{name} {number(float(np.nanmin(values)), 3)} to {number(float(np.nanmax(values)), 3)}"
+        for name, values in (points | {"all springs alike": data.uniform.values}).items()
+        if np.isfinite(values).any()
+    ]
     tasks = listing(
         f"task {task} with {listing(sorted({f'{float(each):g}' for each in data.best.sel(task=task)}))}"
         for task in data.task.values
@@ -138,9 +138,8 @@ def spread(data: xr.Dataset, robot: Robot) -> Panel:
             f"{data.sizes['constant']} constants. {data.attrs['known']} sets that the search found meet them within "
             "5 %; shown are the preset (filled) and "
             f"those that are most unlike it and each other. What the data leave open (A): {listing(ranges)}.",
-            f"What they predict (B), with few and undisturbed walks, in {SPRING_UNIT}: {onsets}; all springs alike "
-            f"{number(float(np.nanmin(data.uniform)), 3)} to {number(float(np.nanmax(data.uniform)), 3)}. They come "
-            f"nearest to the target in {tasks}\u00a0{SPRING_UNIT}.",
+            f"What they predict (B), with few and undisturbed walks, in {SPRING_UNIT}: "
+            f"{listing(predicted) or 'no point'}. They come nearest to the target in {tasks}\u00a0{SPRING_UNIT}.",
         ),
         data=data,
     )

@@ -58,8 +58,9 @@ def base_series(
     springs: Sequence[float] | None = None,
     tolerance: float = TOLERANCE,
     engine: str = "twin",
+    duration: float = DURATION,
 ) -> Series:
-    """Walk a series, for a minute from near the bends that its data ask for.
+    """Walk a series from near the bends that its data ask for.
 
     Walks of all springs of the data that are far off after 36 s are left there.
 
@@ -75,18 +76,20 @@ def base_series(
         Of the contact solver.
     engine
         The twin, or one that is edited, see :class:`chilopod.twin.Edited`.
+    duration
+        s.
     """
     walks: Any = engine_named(engine)  # with arguments that only the twin knows
     robots = [robot.with_value(K1, stiffness(spring)) for spring in springs or data.springs]
     initial = walks.initial_states(robot, data.start(springs or data.springs))
     record = Recording(rate=_PER_CYCLE / robot.gait.period)
-    walk: Walk = walks.start(robots, initial=initial, record=record, tolerance=tolerance, expected=DURATION)
+    walk: Walk = walks.start(robots, initial=initial, record=record, tolerance=tolerance, expected=duration)
     if springs is None:
-        walk.advance(_SOONER)
+        walk.advance(min(_SOONER, duration))
         early = _series(walk, robot)
         if np.sqrt(np.mean(residuals(robot, early, data) ** 2)) > _HOPELESS:
             return early
-    walk.advance(DURATION)
+    walk.advance(duration)
     return _series(walk, robot)
 
 

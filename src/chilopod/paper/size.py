@@ -1,0 +1,24 @@
+"""How much of everything a report computes."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import TypeVar
+
+T = TypeVar("T")
+
+
+class Size(Enum):
+    """Of a report."""
+
+    FULL = "as much as the paper"
+    QUICK = "coarser sweeps, fewer module counts, springs and repeats; what does not depend on chance is as exact"
+    TINY = "every section, but hardly anything of it: walks of the whole robot are cut before they have settled"
+
+    def of(self, full: T, quick: T, tiny: T) -> T:
+        """The one of three that is this size's."""
+        return {Size.FULL: full, Size.QUICK: quick, Size.TINY: tiny}[self]
+
+    def cut(self, usual: T, tiny: T) -> T:
+        """What only a tiny report has less of."""
+        return self.of(usual, usual, tiny)
