@@ -211,7 +211,10 @@ def estimated(
                 factor[k, m] = jacobian[k, m]
         for j in range(s):
             factor -= start[j] * (jacobians[j] @ columns[j * n : (j + 1) * n])
-        off[:, 1:] = (h * gamma) * (factor @ derivative)
+        entries = (h * gamma) * (factor @ derivative)
+        for k in range(n):
+            for m in range(n):
+                off[k, 1 + m] = entries[k, m]
     for m in range(n):
         terms[m, 0] = abs(x[m])
         for j in range(size):

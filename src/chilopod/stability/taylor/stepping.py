@@ -22,6 +22,7 @@ from chilopod.compiled import fused_njit
 from chilopod.stability.taylor import tape as ops
 from chilopod.stability.taylor.exits import first_exit
 from chilopod.stability.taylor.series import LANES, expand, load
+from chilopod.stability.taylor.step_length import agrees, step_size
 from chilopod.stability.taylor.switching import (
     BUDGET,
     CHATTERS,
@@ -38,63 +39,8 @@ from chilopod.stability.taylor.switching import (
 
 _ROUNDING = 2.0**-53
 _BLOCK = 64
-_UNDERFLOW = 1e-290
-"""Numbers below have no full precision: their round-off looks like a singularity."""
 _AT_ONCE = 1e-13
 """Of the time: an event so close to the border of an interval is on it."""
-_SAME = 3e-13
-"""Round-off in a pulse of a thousandth of the period; a narrower one costs a step at every point of the grid in it."""
-
-
-@fused_njit(error_model="numpy")
-def _allowed(coefficients: Any, order: int, h: float, epsilon: float) -> float:
-    """The largest step up to h at which the last two terms are below epsilon times the largest of the first half."""
-    for q in range(order, order - 2, -1):
-        last = abs(coefficients[q])
-        if last < _UNDERFLOW:
-            continue
-        first = 0
-        while first < 3 and coefficients[first] == 0.0:
-            first += 1
-        # What starts with a high power (the far end of a chain) is small within a step, and no matter of accuracy.
-        if first == 3:
-            continue
-        # Newton's method for the logarithms, which are convex: from below after one round, in a few rounds.
-        best = 0.0
-        while True:
-            z = best if best > 0.0 else h
-            power = z**first
-            biggest = 0.0
-            at = first
-            for k in range(first, q // 2 + 1):
-                size = abs(coefficients[k]) * power
-                if size > biggest:
-                    biggest = size
-                    at = k
-                power *= z
-            if best == 0.0 and last * z**q <= 2.0 * epsilon * biggest:
-                best = h
-                break
-            better = (epsilon * abs(coefficients[at]) / last) ** (1.0 / (q - at))
-            if better <= best:
-                break
-            best = better
-        h = min(h, best)
-    return h
-
-
-@fused_njit(error_model="numpy")
-def _step_size(
-    layout: Any, switches: Any, order: int, h: float, epsilon: float, values: Any, tangents: Any, columns: int
-) -> float:
-    for i in range(layout[0]):
-        h = _allowed(values[i], order, h, epsilon)
-    for s in range(switches.shape[1]):
-        h = _allowed(values[switches[1, s]], order, h, epsilon)
-    for i in range(layout[0]):
-        for j in range(columns):
-            h = _allowed(tangents[i, :, j], order, h, epsilon)
-    return h
 
 
 @fused_njit(error_model="numpy")
@@ -132,31 +78,11 @@ def _first_crossing(
 
 
 @fused_njit(error_model="numpy")
-def _agrees(clocks: Any, table: Any, period: float, t: float, h: float, unit: float, order: int, values: Any) -> float:
-    """A step within which the series of functions of time agree with their values on a grid over the period."""
-    if clocks.size == 0 or table.shape[1] < 2:
-        return h
-    spacing = period / (table.shape[1] - 1)
-    at = math.floor(t / spacing) + 1
-    while True:
-        u = at * spacing - t
-        if u >= h * unit * (1.0 - 1e-9):
-            return h
-        if u > 1e-9 * spacing:
-            z = u / unit
-            row = int(at % (table.shape[1] - 1))
-            for c in range(clocks.size):
-                s = 0.0
-                size = 0.0
-                for k in range(order, -1, -1):
-                    s = s * z + values[clocks[c], k]
-                    size = size * z + abs(values[clocks[c], k])
-                value = table[c, row]
-                # Nothing but this part of the largest value may be passed over.
-                if not abs(s - value) <= _SAME * abs(value) + 1e-15 * size + 1e-17 * table[c, table.shape[1] - 1]:
-                    before = (u - spacing) / unit
-                    return before if before > 0.1 * z else 0.5 * min(h, z)
-        at += 1
+def _assign(matrix: Any, values: Any) -> None:
+    """Write values into a matrix: ``matrix[:] = values`` takes seconds to compile."""
+    for i in range(matrix.shape[0]):
+        for j in range(matrix.shape[1]):
+            matrix[i, j] = values[i, j]
 
 
 @fused_njit(error_model="numpy")
@@ -167,16 +93,18 @@ def _absorb(factors: Any, errors: Any, count: int, total: Any, bound: Any) -> No
     """
     n = total.shape[0]
     before = np.empty((count + 1, n, n))
-    before[0] = np.eye(n)
+    for i in range(n):
+        for j in range(n):
+            before[0, i, j] = 1.0 if i == j else 0.0
     for s in range(count):
-        before[s + 1] = factors[s] @ before[s]
+        _assign(before[s + 1], factors[s] @ before[s])
     after = np.eye(n)
     fresh = np.zeros((n, n))
     for s in range(count - 1, -1, -1):
         fresh += np.abs(after) @ errors[s] @ np.abs(before[s])
         after = after @ factors[s]
-    bound[:] = np.abs(before[count]) @ bound + fresh @ np.abs(total)
-    total[:] = before[count] @ total
+    _assign(bound, np.abs(before[count]) @ bound + fresh @ np.abs(total))
+    _assign(total, before[count] @ total)
 
 
 @fused_njit(error_model="numpy", nogil=True)
@@ -294,7 +222,7 @@ def advance(
             status = NOT_FINITE
             break
         remaining = (t1 - t) / unit
-        h = _step_size(layout, switches, order, remaining, epsilon, values, tangents, columns)
+        h = step_size(layout, switches, order, remaining, epsilon, values, tangents, columns)
         if h < remaining and h > 0.5 * remaining:
             h = 0.5 * remaining
         crossing = -1
@@ -302,11 +230,11 @@ def advance(
         if count_switches > 0:
             late = remaining - at_once / unit
             h, crossing, direction = _first_crossing(program, switches, order, h, late, values, branches, work)
-        shorter = _agrees(clocks, table, period, t, h, unit, order, values)
+        shorter = agrees(clocks, table, period, t, h, unit, order, values)
         while shorter < h:
             h = shorter
             crossing = -1
-            shorter = _agrees(clocks, table, period, t, h, unit, order, values)
+            shorter = agrees(clocks, table, period, t, h, unit, order, values)
         ends = h >= remaining
         reached = t1 if ends else t + h * unit
         if reached > t1:
@@ -354,7 +282,7 @@ def advance(
                 _absorb(factors, errors, in_block, derivative, bound)
                 in_block = 0
         elif with_tangents:
-            derivative[:] = factor @ derivative if stepwise else factor
+            _assign(derivative, factor @ derivative if stepwise else factor)
         t = reached
         unit *= min(max(h, 1e-3), 1e3) if h > 0.0 else 1.0
         if crossing >= 0:
@@ -397,7 +325,7 @@ def advance(
                     _absorb(factors, errors, in_block, derivative, bound)
                     in_block = 0
             elif with_tangents:
-                derivative[:] = factor @ derivative if stepwise else factor
+                _assign(derivative, factor @ derivative if stepwise else factor)
     if with_bound and in_block > 0:
         _absorb(factors, errors, in_block, derivative, bound)
     report[0], report[1], report[2], report[3] = steps, crossings, passed, t

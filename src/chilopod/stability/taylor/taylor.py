@@ -203,7 +203,7 @@ class TaylorFlow(ReadOnlyArrays):
         """Carry many states, shape (states, n); ``params`` has shape (parameters,) or (states, parameters)."""
         states = np.array(states, dtype=np.float64, order="C")
         params = np.asarray(params, dtype=np.float64)
-        rows = np.array(np.broadcast_to(params, (states.shape[0], params.shape[-1])))
+        rows = np.array(np.broadcast_to(params, (states.shape[0], params.shape[-1])), order="C")
         none = np.empty((self.tape.dimension, 0))
 
         def carry(numbers: range) -> None:

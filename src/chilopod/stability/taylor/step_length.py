@@ -1,0 +1,93 @@
+"""How long a step of a Taylor series may be (:mod:`.stepping`)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from chilopod.compiled import fused_njit
+
+_UNDERFLOW = 1e-290
+"""Numbers below have no full precision: their round-off looks like a singularity."""
+_SAME = 3e-13
+"""Round-off in a pulse of a thousandth of the period; a narrower one costs a step at every point of the grid in it."""
+
+
+@fused_njit(error_model="numpy")
+def _allowed(coefficients: Any, order: int, h: float, epsilon: float) -> float:
+    """The largest step up to h at which the last two terms are below epsilon times the largest of the first half."""
+    for q in range(order, order - 2, -1):
+        last = abs(coefficients[q])
+        if last < _UNDERFLOW:
+            continue
+        first = 0
+        while first < 3 and coefficients[first] == 0.0:
+            first += 1
+        # What starts with a high power (the far end of a chain) is small within a step, and no matter of accuracy.
+        if first == 3:
+            continue
+        # Newton's method for the logarithms, which are convex: from below after one round, in a few rounds.
+        best = 0.0
+        while True:
+            z = best if best > 0.0 else h
+            power = z**first
+            biggest = 0.0
+            at = first
+            for k in range(first, q // 2 + 1):
+                size = abs(coefficients[k]) * power
+                if size > biggest:
+                    biggest = size
+                    at = k
+                power *= z
+            if best == 0.0 and last * z**q <= 2.0 * epsilon * biggest:
+                best = h
+                break
+            better = (epsilon * abs(coefficients[at]) / last) ** (1.0 / (q - at))
+            if better <= best:
+                break
+            best = better
+        h = min(h, best)
+    return h
+
+
+@fused_njit(error_model="numpy")
+def step_size(
+    layout: Any, switches: Any, order: int, h: float, epsilon: float, values: Any, tangents: Any, columns: int
+) -> float:
+    """The largest step up to h at which states, switching functions and tangents are exact to epsilon."""
+    for i in range(layout[0]):
+        h = _allowed(values[i], order, h, epsilon)
+    for s in range(switches.shape[1]):
+        h = _allowed(values[switches[1, s]], order, h, epsilon)
+    for i in range(layout[0]):
+        for j in range(columns):
+            h = _allowed(tangents[i, :, j], order, h, epsilon)
+    return h
+
+
+@fused_njit(error_model="numpy")
+def agrees(clocks: Any, table: Any, period: float, t: float, h: float, unit: float, order: int, values: Any) -> float:
+    """A step within which the series of functions of time agree with their values on a grid over the period."""
+    if clocks.size == 0 or table.shape[1] < 2:
+        return h
+    spacing = period / (table.shape[1] - 1)
+    at = math.floor(t / spacing) + 1
+    while True:
+        u = at * spacing - t
+        if u >= h * unit * (1.0 - 1e-9):
+            return h
+        if u > 1e-9 * spacing:
+            z = u / unit
+            row = int(at % (table.shape[1] - 1))
+            for c in range(clocks.size):
+                s = 0.0
+                size = 0.0
+                for k in range(order, -1, -1):
+                    s = s * z + values[clocks[c], k]
+                    size = size * z + abs(values[clocks[c], k])
+                value = table[c, row]
+                # Nothing but this part of the largest value may be passed over.
+                if not abs(s - value) <= _SAME * abs(value) + 1e-15 * size + 1e-17 * table[c, table.shape[1] - 1]:
+                    before = (u - spacing) / unit
+                    return before if before > 0.1 * z else 0.5 * min(h, z)
+        at += 1
