@@ -79,11 +79,11 @@ def branch(
     saved = None if resume is None else read_walks(resume / "branch.nc")
     folder = out or resume
     if folder:
-        from chilopod.report import files_of_branch
+        from chilopod.report import files_of
 
         # A branch that goes on where it is saved holds all it held before.
         grows = resume is not None and folder.resolve() == resume.resolve()
-        free(files_of_branch(folder), force or grows)
+        free(files_of("branch", folder), force or grows)
     with progress_bar() as show:
 
         def progress(done: float, words: str) -> None:

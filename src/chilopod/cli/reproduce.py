@@ -162,10 +162,10 @@ def planar(
 
     described = read_robot(robot, overrides)
     from chilopod.paper.fit_data import critical_mode_data, variant_settings
-    from chilopod.report import files_of_identification, write_identification
+    from chilopod.report import files_of, write_identification
     from chilopod.tasks.identify import identify_planar
 
-    free([*files_of_identification(out), out / "identification.json", out / "identified.toml"], force)
+    free([*files_of("identification", out), out / "identification.json", out / "identified.toml"], force)
     with progress_bar() as show:
         found = identify_planar(
             described,

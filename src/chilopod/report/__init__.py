@@ -2,8 +2,7 @@
 
 from chilopod.report.filling import Report, write_report
 from chilopod.report.write import (
-    files_of_branch,
-    files_of_identification,
+    files_of,
     write_branch,
     write_identification,
     write_undulation,
@@ -11,8 +10,7 @@ from chilopod.report.write import (
 
 __all__ = [
     "Report",
-    "files_of_branch",
-    "files_of_identification",
+    "files_of",
     "write_branch",
     "write_identification",
     "write_report",

@@ -13,14 +13,9 @@ from chilopod.report.kit.panel import Panel
 from chilopod.tasks.identify import Identification
 
 
-def files_of_branch(folder: str | Path) -> list[Path]:
-    """What :func:`write_branch` writes."""
-    return _files_of("branch", folder)
-
-
-def files_of_identification(folder: str | Path) -> list[Path]:
-    """What :func:`write_identification` writes."""
-    return _files_of("identification", folder)
+def files_of(name: str, folder: str | Path) -> list[Path]:
+    """What is written of the figure of that name alone."""
+    return [Path(folder) / f"{name}.{kind}" for kind in ("png", "svg", "csv", "nc")]
 
 
 def write_identification(found: Identification, folder: str | Path) -> list[Path]:
@@ -59,11 +54,7 @@ def write_undulation(data: xr.Dataset, folder: str | Path) -> list[Path]:
 
 def _write_alone(panel: Panel, folder: str | Path, table: xr.Dataset | None = None) -> list[Path]:
     write_panel(panel, Path(folder), Path(folder), table)
-    return _files_of(panel.name, folder)
-
-
-def _files_of(name: str, folder: str | Path) -> list[Path]:
-    return [Path(folder) / f"{name}.{kind}" for kind in ("png", "svg", "csv", "nc")]
+    return files_of(panel.name, folder)
 
 
 def write_panel(panel: Panel, figures: Path, data: Path, table: xr.Dataset | None = None) -> bytes:

@@ -8,7 +8,7 @@ from typing import Final
 from chilopod.paper import printed, statements
 from chilopod.paper.section import Found
 from chilopod.paper.straight.sections import MODE, UNIFORM
-from chilopod.paper.table import AGREES, NOT_COMPUTED, WITHIN, Kind, RobotRow
+from chilopod.paper.table import AGREES, NOT_COMPUTED, WITHIN, Kind
 from chilopod.paper.turning.sections import TURNING
 from chilopod.paper.turning.trials import outcome_words, span
 from chilopod.report.kit.words import SPRING_UNIT, listing, spring, typeset
@@ -47,23 +47,20 @@ def facts(found: Found) -> list[Fact]:
     if mode is not None:
         about = "front spring at which the straight walk gives way, in the planar model"
         told.append(Fact(spring(mode.attrs["value"], 5), about, typeset(str(printed.CRITICAL_K1))))
-    judged = _judged(found)
+    rows = {row.quantity: row for row in found.robot_rows() if row.verdict != NOT_COMPUTED}
     for statement, about in _TOLD.items():
-        told += [
-            Fact(typeset(row.twin), typeset(about), typeset(row.robot))
-            for row in judged
-            if row.quantity == statement.quantity
-        ]
-    predicted = [row for row in judged if row.kind == Kind.PREDICTED.value]
-    if predicted:
-        within = sum(row.verdict == WITHIN[True] for row in predicted)
+        if row := rows.get(statement.quantity):
+            told.append(Fact(typeset(row.twin), typeset(about), typeset(row.robot)))
+    if predicted := _predictions(found):
         about = "statements about the robot met by its twin that it was not fitted to"
-        told.append(Fact(f"{within} of {len(predicted)}", about))
+        told.append(Fact(f"{predicted.count(WITHIN[True])} of {len(predicted)}", about))
     return told
 
 
-def _judged(found: Found) -> list[RobotRow]:
-    return [row for row in found.robot_rows() if row.verdict != NOT_COMPUTED]
+def _predictions(found: Found) -> list[str]:
+    """The verdicts on what the twin was not fitted to."""
+    rows = [row for row in found.robot_rows() if row.verdict != NOT_COMPUTED]
+    return [row.verdict for row in rows if row.kind == Kind.PREDICTED.value]
 
 
 def summary(results: Found) -> str:
@@ -92,21 +89,17 @@ def summary(results: Found) -> str:
             f"Sent to a target at {task.target}, it comes nearest with a front spring of {spring(task.best, 3)}; most "
             f"walks have {outcome_words(task.criteria, span)}\u00a0{SPRING_UNIT}."
         )
-    judged = _judged(results)
-    if judged:
-        predicted = [row for row in judged if row.kind == Kind.PREDICTED.value]
-        counted = {word: sum(row.verdict == word for row in predicted) for word in WITHIN.values()}
-        open_ = counted["undecided"]
+    if predicted := _predictions(results):
+        open_ = predicted.count(WITHIN[None])
         left = f"; {open_} more {'is' if open_ == 1 else 'are'} left open by the scatter of its trials" if open_ else ""
         parts.append(
             "The same robot in three dimensions, its unknown constants fitted to the paper's base series of walks and "
-            f"their speed alone, meets {counted['within']} of {len(predicted)} further statements about the robot that "
-            f"it was not fitted to{left}."
+            f"their speed alone, meets {predicted.count(WITHIN[True])} of {len(predicted)} further statements about "
+            f"the robot that it was not fitted to{left}."
         )
     rows = [row for part in results.planar_rows().values() for row in part]
     counted = {word: sum(row.verdict == word for row in rows) for word in AGREES.values()}
-    compared = sum(counted.values())
-    if compared:
+    if compared := sum(counted.values()):
         differing = [typeset(row.quantity) for row in rows if row.verdict == AGREES[False]]
         said = [f"{counted['agrees']} agree"]
         if counted["undecided"]:
