@@ -7,7 +7,18 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 from scipy.special import jn_zeros, jv
 
-from chilopod.stability.unit_circle.zeros import find_zeros, signed_log
+from chilopod.stability.unit_circle.zeros import find_zeros
+
+
+def signed_log(function):
+    """As find_zeros wants a function: its signs and logarithms."""
+
+    def both(places):
+        values = function(places)
+        with np.errstate(divide="ignore"):
+            return np.sign(values), np.log(np.abs(values))
+
+    return both
 
 
 def zeros(function, low, high):

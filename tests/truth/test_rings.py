@@ -9,7 +9,7 @@ from scipy.linalg import expm
 
 from chilopod.stability.symmetry.equivariants import Critical, SymmetricKind, symmetric_crossing
 from chilopod.stability.symmetry.groups import commutes, finite_group
-from chilopod.stability.symmetry.isotypic import Type, isotypic, reduced_matrices
+from chilopod.stability.symmetry.isotypic import Type, isotypic
 
 
 def ring_group(cells, states, mirrored, scales):
@@ -89,7 +89,8 @@ def test_five_van_der_pol_cells():
     beside = np.array([[0.0, 0.0], [coupling, 0.0]])
     group = ring_group(5, 2, True, np.ones(10))
     blocks = isotypic(group)
-    reduced = reduced_matrices(blocks, expm(duration * ring_matrix(own, beside, beside, 5))[None])
+    matrix = expm(duration * ring_matrix(own, beside, beside, 5))
+    reduced = [block.reduced(matrix[None]) for block in blocks]
     assert [block.dimension for block in blocks] == [1, 2, 2]
     for block, (matrix,) in zip(blocks, reduced, strict=True):
         # The character of the shift is 2 cos(2 pi k / 5), that of the constant 1.

@@ -78,11 +78,6 @@ class Group(ReadOnlyArrays):
         """Number n of states."""
         return int(self.elements.shape[1])
 
-    @property
-    def invariant_metric(self) -> Array:
-        """Symmetric positive definite matrix G with P^T G P = G for every element, shape (n, n)."""
-        return np.asarray(self.to_orthogonal.T @ self.to_orthogonal)
-
     @cached_property
     def orthogonal(self) -> Array:
         """The elements as orthogonal matrices, in the coordinates y, shape (order, n, n)."""

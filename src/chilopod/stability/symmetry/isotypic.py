@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.errors import AnalysisError, ParameterError
+from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.symmetry.groups import Group
 
@@ -210,18 +210,6 @@ def isotypic(group: Group) -> tuple[Block, ...]:
         field="group",
         allowed="matrices exact to 1e-9 or better",
     )
-
-
-def reduced_matrices(blocks: Sequence[Block], matrices: ArrayLike) -> list[Array | ComplexArray]:
-    """What is left of k matrices M that commute with the group, shape (k, n, n), in each block: shape (k, m, m), or
-    (k, 2m, 2m) with the quaternionic type (see :meth:`Block.reduced`)."""
-    if not blocks:
-        raise ParameterError("must be one or more", field="blocks")
-    given = np.asarray(matrices, dtype=np.float64)
-    n = blocks[0].basis.shape[0]
-    if given.ndim != 3 or given.shape[1:] != (n, n):
-        raise ParameterError("has the wrong shape", field="matrices", value=given.shape, allowed=f"(k, {n}, {n})")
-    return [block.reduced(given) for block in blocks]
 
 
 def _mean(left: Array, matrix: Array, right: Array) -> Array:

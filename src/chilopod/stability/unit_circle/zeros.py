@@ -72,17 +72,6 @@ class Zeros:
     spent: bool
 
 
-def signed_log(function: Callable[[Array], Array]) -> SignedLog:
-    """A function of real values as signs and logarithms."""
-
-    def both(places: Array) -> tuple[Array, Array]:
-        values = function(places)
-        with np.errstate(divide="ignore"):
-            return np.sign(values), np.log(np.abs(values))
-
-    return both
-
-
 def first_places(low: float, high: float) -> Array:
     """Where a search begins: the values of the function it asks for first, whatever the function is."""
     return _places(low, high, _POINTS)
