@@ -1,6 +1,5 @@
 """Chromium without a window, driven by its DevTools protocol over a pipe."""
 
-import base64
 import fcntl
 import itertools
 import json
@@ -76,10 +75,6 @@ class Browser:
         done = self("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)
         assert "exceptionDetails" not in done, done
         return done["result"].get("value")
-
-    def picture(self) -> bytes:
-        """What is seen, as PNG."""
-        return base64.b64decode(self("Page.captureScreenshot")["data"])
 
     def named(self, name: str) -> list[dict]:
         """What was told of a kind of event since the page was opened."""

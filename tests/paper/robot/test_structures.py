@@ -31,18 +31,18 @@ def test_constants_are_moved_until_the_series_is_met_again(monkeypatch):
     law = rng.normal(0.0, 10.0, (4, len(FREE)))
     start = parts_of(constants_of(ROBOT))
 
-    def off(robot, data, engine="twin"):
+    def off(robot, data, engine="twin", duration=60.0):
         moved = parts_of(constants_of(robot)) - start
         return law @ moved + 2.0 * (law @ moved) ** 2 / 30.0 + (4.0 if engine == "another" else 0.0)
 
     monkeypatch.setattr(structures, "_off", off)
     measured = structures._law(ROBOT, None, lambda done, words: None)
     np.testing.assert_allclose(measured, law, rtol=1e-6)
-    given, fitted, robot = structures._fitted(ROBOT, None, measured, "another")
+    given, fitted, robot = structures._fitted(ROBOT, None, measured, "another", 5, 60.0)
     assert given == pytest.approx(4.0)
     assert fitted < 1.0
     assert np.abs(parts_of(constants_of(robot)) - start).max() < 0.4  # by the shortest way
-    assert structures._fitted(ROBOT, None, measured, "twin")[0] == 0.0
+    assert structures._fitted(ROBOT, None, measured, "twin", 5, 60.0)[0] == 0.0
 
 
 def made_up(predicted):

@@ -105,11 +105,10 @@ def test_walks_that_are_far_off_are_left_early(monkeypatch):
     ends = []
     whole = twin_series._series
     monkeypatch.setattr(twin_series, "_series", lambda walk, robot: (ends.append(walk.time), whole(walk, robot))[1])
-    monkeypatch.setattr(twin_series, "DURATION", 30.0)
     monkeypatch.setattr(twin_series, "_SOONER", 18.0)
-    base_series(ROBOT.with_value("twin.sliding_friction", 0.3), DATA)
+    base_series(ROBOT.with_value("twin.sliding_friction", 0.3), DATA, duration=30.0)
     assert ends == [18.0]
-    base_series(ROBOT.with_value("twin.sliding_friction", 0.3), DATA, springs=(15.0,))
+    base_series(ROBOT.with_value("twin.sliding_friction", 0.3), DATA, springs=(15.0,), duration=30.0)
     assert ends == [18.0, 30.0]
 
 
