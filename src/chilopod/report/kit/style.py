@@ -110,6 +110,7 @@ def png(drawn: Figure, dpi: float = 160) -> bytes:
 def _saved(drawn: Figure, kind: str, metadata: dict[str, None], dpi: float = 100) -> bytes:
     stream = io.BytesIO()
     drawn.savefig(stream, format=kind, metadata=metadata, dpi=dpi)
+    drawn.set_layout_engine("none")  # once laid out, it stays so: in the next format everything is in the same place
     return stream.getvalue()
 
 
