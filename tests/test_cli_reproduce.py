@@ -29,3 +29,14 @@ def test_the_json_names_the_robots(capsys, tmp_path):
     found = json.loads(capsys.readouterr().out)
     assert (found["robot"], found["whole_robot"]) == ("aoi2022-planar", "aoi2022")
     assert found["rows"]
+
+
+def test_a_page_that_is_no_report_is_not_replaced(capsys, tmp_path):
+    page = tmp_path / "index.html"
+    page.write_text("<title>mine</title>", encoding="utf-8")
+    asked = ["reproduce", "--tiny", "--only", "modules", "--out", str(tmp_path)]
+    assert main(asked) == 2
+    assert "index.html" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [page]
+    assert main([*asked, "--force"]) == 0
+    assert main(asked) == 0  # its own goes on

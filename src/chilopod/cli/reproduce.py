@@ -31,6 +31,9 @@ _SECTIONS = (
 )
 """For the help, which loads nothing heavy; a test holds them to what there is."""
 
+_MARK = ">chilopod reproduce<"
+"""What every page of a report says of itself."""
+
 if TYPE_CHECKING:
     from chilopod.paper.table import RobotRow, Row
 
@@ -67,6 +70,7 @@ def reproduce(
         bool, typer.Option("--paper", help="The paper's own experiments, not what goes beyond them.")
     ] = False,
     cluster: ClusterOption = None,
+    force: ForceOption = False,
     as_json: JsonOption = False,
     overrides: Annotated[list[str] | None, typer.Option("--set", hidden=True)] = None,
 ) -> None:
@@ -86,6 +90,9 @@ def reproduce(
     from chilopod.paper.sections import chosen
 
     sections = chosen(only, quick or tiny, paper)  # refuses an unknown section
+    index = out / "index.html"
+    if index.is_file() and _MARK not in index.read_text(encoding="utf-8", errors="replace"):
+        free([index], force)  # somebody else's page
     from chilopod.errors import in_words
     from chilopod.output import prepare_folder
     from chilopod.paper import sections as computed
