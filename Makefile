@@ -12,7 +12,7 @@ LOCK_BENCH := requirements-bench.lock
 RUNTIME := $(VENV)/.runtime-installed
 DEV := $(VENV)/.dev-installed
 BENCH := $(VENV)/.bench-installed
-# Test processes at once.
+# Test processes at once; each with one thread for linear algebra, as more would stand in each other's way.
 JOBS ?= 2
 
 # Makes .venv with the first suitable Python, unless a working one is there.
@@ -60,7 +60,7 @@ reproduce: $(RUNTIME)  ## compute the paper's results and write report/index.htm
 	$(BIN)/chilopod reproduce $(ARGS)
 
 test: lint types  ## all checks and all tests
-	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder --benchmark-disable $(ARGS)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder --benchmark-disable $(ARGS)
 
 lint: $(DEV)  ## style and the contracts between layers
 	$(BIN)/ruff check .
