@@ -20,12 +20,12 @@ from chilopod.cli.options import (
     SeedOption,
     SetOption,
     TrialsOption,
+    deliver,
     free,
     print_creep,
     print_json,
     read_robot,
     walking_on,
-    wrote,
 )
 from chilopod.cli.own import own_code, own_controller
 from chilopod.cli.progress import progress_bar
@@ -66,7 +66,8 @@ def walk(
     where the body bends to the right; the radius is that of the arc they make of the body, as in the paper.
     """
     from chilopod import units
-    from chilopod.output import netcdf, write_atomic
+    from chilopod.netcdf import netcdf
+    from chilopod.output import write_all
 
     described = read_robot(robot, overrides)
     seconds, angles = units.parse(duration, "s"), joint_angles(initial_joints)
@@ -89,11 +90,10 @@ def walk(
             folder=trials,
             progress=lambda part, words: show("walk", part, words),
         )
-    wrote(write_atomic(file, netcdf(done.record)) for file in files)
-    if as_json:
-        print_json(done.as_json())
-    else:
-        _print(done)
+    deliver(
+        lambda: write_all(((file, netcdf(done.record)) for file in files), replace=force),
+        lambda: print_json(done.as_json()) if as_json else _print(done),
+    )
 
 
 def _print(done: Walks) -> None:

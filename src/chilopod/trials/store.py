@@ -14,7 +14,7 @@ from pathlib import Path
 import xarray as xr
 
 from chilopod.errors import OutputError
-from chilopod.output import prepare_folder, sync_folder, write_atomic
+from chilopod.output import check_folder, sync_folder, write_atomic
 from chilopod.trials.netcdf3 import encode
 from chilopod.trials.trial import Trial
 
@@ -37,7 +37,7 @@ class Store:
     Parameters
     ----------
     folder
-        Made where there is none.
+        Made with the first record where there is none.
     tell
         Given a line about every file that is not what it should be; by default the logger of this module, which prints
         it on stderr if nobody has told it otherwise.
@@ -49,7 +49,7 @@ class Store:
     """
 
     def __init__(self, folder: str | Path, tell: Callable[[str], object] = _logger.warning) -> None:
-        self.folder = prepare_folder(folder)
+        self.folder = check_folder(folder)
         self._tell = tell
 
     def read(self, trial: Trial) -> xr.Dataset | None:
@@ -105,8 +105,7 @@ class Store:
         content = encode(record, {_CHECKSUM: _BLANK})
         at = content.index(_BEFORE) + len(_BEFORE)
         content[at : at + len(_BLANK)] = f"{zlib.crc32(content):08x}".encode()
-        # Whoever deletes the folder while trials walk loses what was in it, not the walks to come.
-        self.folder.mkdir(parents=True, exist_ok=True)
+        # Whoever deletes the folder while trials walk loses what was in it, not the walks to come: it is made again.
         write_atomic(self.folder / trial.file_name, content, durable=True)
 
     def sync(self) -> None:

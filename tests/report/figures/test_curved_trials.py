@@ -6,7 +6,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
 from chilopod import load_robot
-from chilopod.output import netcdf
+from chilopod.netcdf import netcdf
 from chilopod.paper.curved.study import curved_study
 from chilopod.paper.size import Size
 from chilopod.report.figures import curved_trials, curved_variants
