@@ -6,11 +6,12 @@ import os
 import shutil
 import stat
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
+from chilopod import memory
 from chilopod.errors import OutputError
 
 Content = str | bytes | bytearray | IO[bytes]
@@ -61,6 +62,30 @@ def check_folder(path: str | Path) -> Path:
     except (OSError, ValueError) as error:
         raise _refused(path, error) from None
     return path
+
+
+def check_room(path: Path, needed: float) -> None:
+    """Make sure, before any work is done for it, that there is room for a large file, or for more files in a folder.
+
+    Parameters
+    ----------
+    path
+        Of the file or the folder.
+    needed
+        Bytes, at least.
+
+    Raises
+    ------
+    OutputError
+        If there is not.
+    """
+    try:
+        free = float(shutil.disk_usage(_nearest(path)).free)
+    except (OSError, ValueError) as error:
+        raise _refused(path, error) from None
+    if needed > free:
+        problem = f"takes {memory.in_words(needed)} or more, and there is room for {memory.in_words(free)}"
+        raise OutputError(problem, source=str(path))
 
 
 def write_atomic(path: str | Path, content: Content, *, replace: bool = True, durable: bool = False) -> Path:
@@ -141,23 +166,36 @@ def write_all(files: Iterable[tuple[Path, Content]], *, replace: bool = True) ->
     raise OutputError(f"{failure.problem}; {where}", source=failure.source)
 
 
-def spool(path: Path) -> IO[bytes]:
-    """A file for a large result that is still being computed, on the disk where it will go: :func:`write_atomic` gives
-    it its name. It vanishes with this process.
+def spool(path: Path, size: int = 0) -> IO[bytes]:
+    """A file for a large result that is still being computed, which vanishes with this process unless
+    :func:`write_atomic` gives it a name.
+
+    Parameters
+    ----------
+    path
+        Where the result will go: the file is on the same disk, or where else :func:`write_all` would keep it.
+    size
+        Bytes that are set aside for it.
 
     Raises
     ------
     OutputError
-        If there can be none.
+        If there is no room for it.
     """
-    try:
-        folder = _nearest(path.parent)
-        if hasattr(os, "O_TMPFILE"):
-            with suppress(OSError):  # some file systems cannot
-                return os.fdopen(os.open(folder, os.O_TMPFILE | os.O_RDWR, 0o666), "w+b")
-        return tempfile.TemporaryFile(dir=folder)
-    except (OSError, ValueError) as error:
-        raise _refused(path, error) from None
+    failure: OutputError | None = None
+    for folder in _folders(path):
+        file = None
+        try:
+            file = _nameless(_nearest(Path(folder())))
+            if size and hasattr(os, "posix_fallocate"):
+                os.posix_fallocate(file.fileno(), 0, size)
+            return file
+        except (OSError, ValueError, RuntimeError) as error:
+            if file is not None:
+                file.close()
+            failure = failure or _refused(path, error)
+    assert failure is not None
+    raise failure
 
 
 def sync_folder(path: Path) -> None:
@@ -250,10 +288,22 @@ def _named(content: IO[bytes], path: Path) -> bool:
     return True
 
 
+def _folders(path: Path) -> tuple[Callable[[], Path | str], ...]:
+    """Where a result may go; asking may fail, with RuntimeError if nobody knows where home is."""
+    return path.parent.resolve, path.parent.parent.resolve, Path.cwd, Path.home, tempfile.gettempdir
+
+
+def _nameless(folder: Path) -> IO[bytes]:
+    if hasattr(os, "O_TMPFILE"):
+        with suppress(OSError):  # some file systems cannot
+            return os.fdopen(os.open(folder, os.O_TMPFILE | os.O_RDWR, 0o666), "w+b")
+    return tempfile.TemporaryFile(dir=folder)
+
+
 def _kept(path: Path, content: Content) -> list[Path]:
     """Where else a file could be written; nothing if nowhere."""
-    for folder in (path.parent.resolve, path.parent.parent.resolve, Path.cwd, Path.home, tempfile.gettempdir):
-        with suppress(OSError, RuntimeError):  # RuntimeError: nobody knows where home is
+    for folder in _folders(path):
+        with suppress(OSError, RuntimeError):
             return [write_atomic(_free(Path(folder()) / path.name), content, replace=False)]
     return []
 
@@ -267,7 +317,7 @@ def _free(path: Path) -> Path:
     return free
 
 
-def _refused(path: Path, error: OSError | ValueError) -> OutputError:
+def _refused(path: Path, error: Exception) -> OutputError:
     if isinstance(error, OutputError):
         return error
     reason = error.strerror if isinstance(error, OSError) else str(error)
