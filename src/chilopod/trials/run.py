@@ -16,7 +16,7 @@ from chilopod.trials.executors import Executor, current
 from chilopod.trials.store import Store
 from chilopod.trials.trial import Trial
 
-_COPIES = 2  # of records: each, and all together
+_COPIES = 2  # of a record: as the engine has it and as it is given; of many, each and all together
 
 
 def run(
@@ -51,9 +51,20 @@ def run(
     OutputError
         If the folder has no room for them.
     """
-    check_memory(_COPIES * sum(trial.least_bytes for trial in trials))
+    check_fits(trials)
     records = {trial.file_name: record for trial, record in run_each(trials, folder, progress, executor)}
     return [records[trial.file_name] for trial in trials]
+
+
+def check_fits(trials: Sequence[Trial]) -> None:
+    """Refuse trials whose records memory cannot hold all together.
+
+    Raises
+    ------
+    ParameterError
+        With what they would take.
+    """
+    check_memory(_COPIES * sum(trial.least_bytes for trial in trials))
 
 
 def run_each(
@@ -83,7 +94,7 @@ def run_each(
         check_room(store.folder, sum(trial.least_bytes for trial in missing))
     executor = current() if executor is None else executor
     share = executor.cut(batches(missing))
-    check_memory(max((sum(trial.least_bytes for trial in batch) for batch in share), default=0.0))
+    check_memory(_COPIES * max((sum(trial.least_bytes for trial in batch) for batch in share), default=0.0))
     done = len(asked) - len(missing)
     progress(done / max(len(asked), 1), f"{done} of {len(asked)} trials")
     for index, walked in executor.walk(share):
