@@ -7,7 +7,7 @@ import shutil
 import stat
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import IO
 
@@ -88,8 +88,10 @@ def check_room(path: Path, needed: float) -> None:
         raise OutputError(problem, source=str(path))
 
 
-def write_atomic(path: str | Path, content: Content, *, replace: bool = True, durable: bool = False) -> Path:
-    """Write a file so that it never exists half-written; its folder is made where there is none.
+def write_atomic(
+    path: str | Path, content: Content, *, replace: bool = True, durable: bool = False, folders: bool = True
+) -> Path:
+    """Write a file so that it never exists half-written.
 
     Parameters
     ----------
@@ -101,6 +103,8 @@ def write_atomic(path: str | Path, content: Content, *, replace: bool = True, du
         Whether a file that is already there may be replaced; what is no regular file never is.
     durable
         Whether it is to outlast a power failure; :func:`sync_folder` makes its name do so.
+    folders
+        Whether its folder is made where there is none.
 
     Returns
     -------
@@ -115,7 +119,7 @@ def write_atomic(path: str | Path, content: Content, *, replace: bool = True, du
     path = Path(path)
     try:
         _check_replaceable(path, replace)
-        with _folder(path.parent):
+        with _folder(path.parent) if folders else nullcontext():
             # In the same folder, because a rename is atomic only within one file system.
             temporary = path.parent / f".chilopod-{os.urandom(8).hex()}"
             try:
