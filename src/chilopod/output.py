@@ -18,7 +18,12 @@ _ASKING = threading.Lock()  # asking for the umask sets it for a moment, and thr
 
 
 def write_atomic(
-    path: str | Path, content: str | bytes | bytearray, *, replace: bool = True, durable: bool = False
+    path: str | Path,
+    content: str | bytes | bytearray,
+    *,
+    replace: bool = True,
+    durable: bool = False,
+    temporary: str = ".chilopod-",
 ) -> Path:
     """Write a file so that it never exists half-written.
 
@@ -32,6 +37,8 @@ def write_atomic(
         Whether a file that is already there may be replaced.
     durable
         Whether it is to outlast a power failure; :func:`sync_folder` makes its name do so.
+    temporary
+        How its name begins until it is whole; such a file stays where a process is killed.
 
     Returns
     -------
@@ -50,7 +57,7 @@ def write_atomic(
         if not replace and path.exists():
             raise _taken(path)
         # In the same folder, because a rename is atomic only within one file system.
-        handle, temporary = tempfile.mkstemp(prefix=".chilopod-", dir=path.parent)
+        handle, unfinished = tempfile.mkstemp(prefix=temporary, dir=path.parent)
         try:
             with os.fdopen(handle, "wb") as file:
                 file.write(content.encode() if isinstance(content, str) else content)
@@ -58,10 +65,10 @@ def write_atomic(
                     file.flush()
                     os.fsync(file.fileno())
             # mkstemp makes files private; what users write follows their umask.
-            os.chmod(temporary, 0o666 & ~_umask())
-            os.replace(temporary, path)
+            os.chmod(unfinished, 0o666 & ~_umask())
+            os.replace(unfinished, path)
         except BaseException:
-            Path(temporary).unlink(missing_ok=True)
+            Path(unfinished).unlink(missing_ok=True)
             raise
     except OutputError:
         raise

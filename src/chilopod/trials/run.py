@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,15 @@ import xarray as xr
 
 from chilopod.progress import Progress, silent
 from chilopod.trials.batch import batches
+from chilopod.trials.claims import Claims
 from chilopod.trials.executors import Executor, current
 from chilopod.trials.store import Store
 from chilopod.trials.trial import Trial
+
+_LOOK = 0.2  # s between two looks whether other processes are done
+_PATIENCE = 120.0  # s in which they have to be done with one trial; one that is stopped never is
+
+Walked = list[tuple[Trial, xr.Dataset]]
 
 
 def run(
@@ -28,7 +35,8 @@ def run(
     trials
         In any order; the same trial may occur twice.
     folder
-        Where records are kept, see :class:`chilopod.trials.Store`; without one nothing is kept.
+        Where records are kept, see :class:`chilopod.trials.Store`; without one nothing is kept. Several processes that
+        are given the same one share the work: each walks what no other has begun, and waits for the others' at the end.
     progress
         Called with the part done (0 to 1) and a few words.
     executor
@@ -40,26 +48,82 @@ def run(
     The record of every trial, see :func:`chilopod.planar.simulate` and :func:`chilopod.twin.simulate`, with one
     ``robot`` and the trial in the attributes.
     """
-    store = None if folder is None else Store(folder)
+    executor = current() if executor is None else executor
     asked = {trial.file_name: trial for trial in trials}
     records: dict[str, xr.Dataset] = {}
-    for name, trial in asked.items() if store else ():
-        found = store.read(trial) if store else None
-        if found is not None:
-            records[name] = found
-    executor = current() if executor is None else executor
-    share = executor.cut(batches([trial for name, trial in asked.items() if name not in records]))
-    progress(len(records) / max(len(asked), 1), f"{len(records)} of {len(asked)} trials")
-    for index, walked in executor.walk(share):
-        for trial, record in zip(share[index], walked, strict=True):
-            if store:
-                store.write(trial, record)
-            records[trial.file_name] = record
-        if store:
-            store.sync()
-        progress(len(records) / len(asked), f"{len(records)} of {len(asked)} trials{executor.words}")
+    ours = list(asked.values())
+    come = _shared(ours, Store(folder), executor) if folder else ((each, 0) for each in _walked(ours, executor))
+    for walked, elsewhere in come:
+        records.update((trial.file_name, record) for trial, record in walked)
+        words = f"{len(records)} of {len(asked)} trials{executor.words}"
+        told = f"{words}, {elsewhere} walked by another process" if elsewhere else words
+        progress(len(records) / max(len(asked), 1), told)
     progress(1.0, f"{len(records)} trials")
     return [records[trial.file_name] for trial in trials]
+
+
+def _walked(
+    trials: Sequence[Trial], executor: Executor, free: Callable[[list[Trial]], list[Trial]] = list
+) -> Iterator[Walked]:
+    """Trials with their records, batch by batch; ``free`` says which of a batch are to be walked when it is begun."""
+    begun: list[list[Trial]] = []
+
+    def taken() -> Iterator[list[Trial]]:
+        for batch in executor.cut(batches(trials)):
+            mine = free(batch)
+            if mine:
+                begun.append(mine)
+                yield mine
+
+    for index, records in executor.walk(taken()):
+        yield list(zip(begun[index], records, strict=True))
+
+
+def _shared(trials: Sequence[Trial], store: Store, executor: Executor) -> Iterator[tuple[Walked, int]]:
+    """Trials with their records, from the store or walked, and how many other processes walk that we wait for."""
+    with store.claims() as claims:
+        there = [(trial, record) for trial in trials if (record := store.read(trial)) is not None]
+        yield there, 0
+        names = {trial.file_name for trial, _ in there}
+        left = [trial for trial in trials if trial.file_name not in names]
+        moved, patient = time.monotonic(), True
+        while left:
+            share = _Share(store, claims, patient)
+            for walked in _walked(left, executor, share.free):
+                for trial, record in walked:
+                    store.write(trial, record)
+                store.sync()
+                for trial, _ in walked:
+                    claims.release(trial.file_name)
+                yield walked, 0
+            yield share.brought, len(share.elsewhere)
+            now = time.monotonic()
+            moved = now if len(share.elsewhere) < len(left) else moved
+            left, patient = share.elsewhere, now - moved < _PATIENCE
+            if left and patient:
+                time.sleep(_LOOK)
+
+
+class _Share:
+    """What of a study is to be walked here, what other processes walk, and what they have brought meanwhile."""
+
+    def __init__(self, store: Store, claims: Claims, patient: bool) -> None:
+        self._store, self._claims, self._patient = store, claims, patient
+        self.elsewhere: list[Trial] = []
+        self.brought: Walked = []
+
+    def free(self, batch: list[Trial]) -> list[Trial]:
+        """Those of a batch that are to be walked here; they are claimed."""
+        mine = []
+        for trial in batch:
+            if not self._claims.take(trial.file_name) and self._patient:
+                self.elsewhere.append(trial)
+            elif (record := self._store.read(trial)) is None:
+                mine.append(trial)
+            else:
+                self._claims.release(trial.file_name)
+                self.brought.append((trial, record))
+        return mine
 
 
 def together(records: Sequence[xr.Dataset]) -> xr.Dataset:

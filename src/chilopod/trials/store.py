@@ -2,37 +2,32 @@
 
 from __future__ import annotations
 
-import io
 import logging
 import os
-import stat
-import zlib
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from chilopod.errors import OutputError
 from chilopod.output import prepare_folder, sync_folder, write_atomic
-from chilopod.trials.netcdf3 import encode
+from chilopod.trials.claims import Claims
+from chilopod.trials.file import Unsound, content_of, read_whole, record_of
 from chilopod.trials.trial import Trial
 
-_logger = logging.getLogger(__name__)
+if TYPE_CHECKING:
+    import xarray as xr
 
-_CHECKSUM = "checksum"
-_BLANK = "0" * 8
-# The attribute as it stands in a file: length of its name, name, type, length of its text, and then the text.
-_BEFORE = b"\0\0\0\x08checksum\0\0\0\x02\0\0\0\x08"
-_FRONT = 65_536  # bytes: before all but dimensions
+_UNFINISHED = ".chilopod-trial-"
+_logger = logging.getLogger(__name__)
 
 
 class Store:
     """A folder that keeps the records of trials, each in a netCDF-3 file of its own.
 
     Every file is there whole or not at all, has a name derived from all that makes its trial, holds that as text, and a
-    checksum over all of its bytes. Many processes may use one folder at the same time: whoever walks the same trial
-    writes the same file.
+    checksum over all of its bytes. Many processes may use one folder at the same time: they share the work, see
+    :class:`chilopod.trials.claims.Claims`, and whoever walks the same trial writes the same file.
 
     Parameters
     ----------
@@ -63,27 +58,20 @@ class Store:
         ParameterError
             If the trial cannot be kept, see :meth:`chilopod.trials.Trial.check_findable`.
         OutputError
-            If such a file cannot be moved.
+            If such a file cannot be moved, or this process has no memory to read it.
         """
         trial.check_findable()
         path = self.folder / trial.file_name
         try:
-            content = _content(path)
+            content, header = read_whole(path)
+            if header.attributes.get("trial") != trial.text:
+                raise Unsound("holds another trial")
+            return record_of(content)
         except FileNotFoundError:
             return None
-        except (OSError, MemoryError) as error:
-            self._move_aside(path, f"cannot be read ({error})")
+        except Unsound as error:
+            self._move_aside(path, str(error))
             return None
-        if not _whole(content):
-            self._move_aside(path, "is damaged or was edited")
-            return None
-        # What was written here can be read again.
-        record = xr.load_dataset(io.BytesIO(content), engine="scipy")
-        if record.attrs.get("trial") != trial.text:
-            self._move_aside(path, "holds another trial")
-            return None
-        del record.attrs[_CHECKSUM]
-        return record
 
     def write(self, trial: Trial, record: xr.Dataset) -> None:
         """Keep a record, for good once :meth:`sync` has been called.
@@ -102,12 +90,14 @@ class Store:
                 field="record",
                 allowed=f"a record for {trial.file_name}",
             )
-        content = encode(record, {_CHECKSUM: _BLANK})
-        at = content.index(_BEFORE) + len(_BEFORE)
-        content[at : at + len(_BLANK)] = f"{zlib.crc32(content):08x}".encode()
+        content = content_of(record)
         # Whoever deletes the folder while trials walk loses what was in it, not the walks to come.
         self.folder.mkdir(parents=True, exist_ok=True)
-        write_atomic(self.folder / trial.file_name, content, durable=True)
+        write_atomic(self.folder / trial.file_name, content, durable=True, temporary=_UNFINISHED)
+
+    def claims(self) -> Claims:
+        """What this process walks here, so that others walk other trials; to be entered."""
+        return Claims(self.folder, self._sweep)
 
     def sync(self) -> None:
         """Make sure that what has been written is there even after a power failure."""
@@ -128,22 +118,7 @@ class Store:
             raise OutputError(f"{why}, and cannot be moved aside ({error.strerror})", source=str(path)) from None
         self._tell(f"{path} {why}: walked again, what was there is {aside.name}")
 
-
-def _content(path: Path) -> bytearray:
-    # A pipe of this name must not keep us waiting.
-    handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
-    with os.fdopen(handle, "rb") as file:
-        if not stat.S_ISREG(os.fstat(handle).st_mode):
-            raise OSError("no file")
-        return bytearray(file.read())
-
-
-def _whole(content: bytearray) -> bool:
-    """Whether nothing has changed since it was written; the content's checksum is blanked."""
-    at = content.find(_BEFORE, 0, _FRONT) + len(_BEFORE)
-    end = at + len(_BLANK)
-    if at < len(_BEFORE) or end > len(content):
-        return False
-    said = bytes(content[at:end])
-    content[at:end] = _BLANK.encode()
-    return said == f"{zlib.crc32(content):08x}".encode()
+    def _sweep(self) -> None:
+        """Remove what was not finished when somebody was killed."""
+        for path in self.folder.glob(f"{_UNFINISHED}*"):
+            path.unlink(missing_ok=True)
