@@ -52,7 +52,7 @@ def run(
     asked = {trial.file_name: trial for trial in trials}
     records: dict[str, xr.Dataset] = {}
     ours = list(asked.values())
-    come = _shared(ours, Store(folder), executor) if folder else ((each, 0) for each in _walked(ours, executor))
+    come = _shared(ours, Store(folder), executor) if folder is not None else _alone(ours, executor)
     for walked, elsewhere in come:
         records.update((trial.file_name, record) for trial, record in walked)
         words = f"{len(records)} of {len(asked)} trials{executor.words}"
@@ -77,6 +77,13 @@ def _walked(
 
     for index, records in executor.walk(taken()):
         yield list(zip(begun[index], records, strict=True))
+
+
+def _alone(trials: Sequence[Trial], executor: Executor) -> Iterator[tuple[Walked, int]]:
+    """What :func:`_shared` gives, where nothing is kept."""
+    yield [], 0
+    for walked in _walked(trials, executor):
+        yield walked, 0
 
 
 def _shared(trials: Sequence[Trial], store: Store, executor: Executor) -> Iterator[tuple[Walked, int]]:
