@@ -18,7 +18,7 @@ NAME = ".chilopod-claims"
 _NOT, _WITH_OTHERS, _ALONE = "F_UNLCK", "F_RDLCK", "F_WRLCK"  # how a byte is locked
 _PRESENT = 0  # the byte that all who are here have locked, with the others
 _DIGITS = 15  # of a trial's name: which byte is its own, of 2**63
-_TRIES, _PAUSE = 500, 2e-3  # s; whoever comes when the last one leaves tries again
+_TRIES, _PAUSE = 500, 2e-3  # s; whoever comes while the last one leaves tries again
 
 
 class Claims:
@@ -34,13 +34,13 @@ class Claims:
     ----------
     folder
         Of the trials.
-    swept
-        Called before anything else if somebody was killed here, and nobody else is here now: whatever is there that is
-        no whole file was left over by him.
+    sweep
+        Called at the end if nobody else is there: what is in the folder now and is no whole file was left over by
+        somebody who was killed.
     """
 
-    def __init__(self, folder: Path, swept: Callable[[], object]) -> None:
-        self._path, self._swept = folder / NAME, swept
+    def __init__(self, folder: Path, sweep: Callable[[], object]) -> None:
+        self._path, self._sweep = folder / NAME, sweep
         self._handle: int | None = None
 
     def __enter__(self) -> Self:
@@ -60,6 +60,7 @@ class Claims:
             with suppress(OSError):
                 _locked(handle, _NOT, _PRESENT)  # of two who leave at once one has it alone
                 if _locked(handle, _ALONE, _PRESENT) and _is(handle, self._path):
+                    self._sweep()
                     self._path.unlink()
             os.close(handle)
 
@@ -82,12 +83,10 @@ class Claims:
                 _locked(self._handle, _NOT, _byte_of(name))
 
     def _entered(self) -> bool:
-        """Whether we are in; False if somebody is just removing the file, or what was left over."""
+        """Whether we are in; False if somebody is just leaving and takes the file along."""
         was_there = self._path.exists()
         handle = _opened(self._path, os.O_CREAT)
         try:
-            if _locked(handle, _ALONE, _PRESENT) and was_there:
-                self._swept()
             if _locked(handle, _WITH_OTHERS, _PRESENT) and _is(handle, self._path):
                 self._handle = handle
         except OSError:  # no locks here

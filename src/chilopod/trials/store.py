@@ -44,7 +44,11 @@ class Store:
     """
 
     def __init__(self, folder: str | Path, tell: Callable[[str], object] = _logger.warning) -> None:
+        made = [each for each in (Path(folder), *Path(folder).parents) if not each.exists()]
         self.folder = prepare_folder(folder)
+        for each in made:
+            with suppress(OSError):  # not everybody may look into what is above
+                sync_folder(each.parent)
         self._tell = tell
 
     def read(self, trial: Trial) -> xr.Dataset | None:
@@ -119,6 +123,8 @@ class Store:
         self._tell(f"{path} {why}: walked again, what was there is {aside.name}")
 
     def _sweep(self) -> None:
-        """Remove what was not finished when somebody was killed."""
-        for path in self.folder.glob(f"{_UNFINISHED}*"):
-            path.unlink(missing_ok=True)
+        """Remove what somebody who was killed did not finish."""
+        with os.scandir(self.folder) as entries:
+            for entry in entries:
+                if entry.name.startswith(_UNFINISHED):
+                    os.unlink(entry)
