@@ -2,6 +2,7 @@
 
 import dataclasses
 import errno
+from contextlib import ExitStack
 from importlib import import_module
 
 import pytest
@@ -45,9 +46,8 @@ def test_who_has_a_claim_has_it_alone_and_the_last_one_leaves_nothing(tmp_path):
 
 @pytest.mark.parametrize("brought", [True, False])
 def test_what_another_walks_is_waited_for_at_the_end(tmp_path, walked_here, brought):
-    store, told = Store(tmp_path), []
-    other = store.claims().__enter__()
-    assert other.take(NAMES[1])
+    store, told, stack = Store(tmp_path), [], ExitStack()
+    assert stack.enter_context(store.claims()).take(NAMES[1])
 
     def progress(part, words):
         told.append(words)
@@ -55,7 +55,7 @@ def test_what_another_walks_is_waited_for_at_the_end(tmp_path, walked_here, brou
             if brought:
                 store.write(TRIALS[1], run([TRIALS[1]])[0])
                 walked_here.remove(1)
-            other.__exit__(None, None, None)
+            stack.close()
 
     records = run(TRIALS, tmp_path, progress)
     assert walked_here == ([0, 2, 3] if brought else [0, 2, 3, 1])

@@ -154,6 +154,7 @@ def test_nothing_that_was_aside_is_lost(store, record):
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes")
 def test_what_is_no_file_does_not_keep_anybody_waiting(store, record):
     path = store.folder / BASE.file_name
+    path.parent.mkdir()
     os.mkfifo(path)
     assert store.read(BASE) is None
     path.mkdir()
@@ -207,7 +208,7 @@ def test_what_a_record_is_made_of_belongs_to_its_version(record):
 def test_a_record_of_another_trial_is_not_written(store, record):
     with pytest.raises(OutputError, match="another trial"):
         store.write(dataclasses.replace(BASE, seed=4), record)
-    assert names(store) == []
+    assert not store.folder.exists()
 
 
 def test_by_default_one_line_goes_to_the_log(tmp_path, record, caplog):

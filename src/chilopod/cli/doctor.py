@@ -148,7 +148,7 @@ def _cache() -> list[Finding]:
         try:
             from chilopod.planar.linear import propagate_batch
 
-            folder = prepare_folder(propagate_batch.stats.cache_path)
+            folder = check_folder(propagate_batch.stats.cache_path)
         except RuntimeError as error:
             # Numba's answer where it finds no place to keep what it compiles.
             return Finding("compile cache", one_line(f"nowhere: {error}"), mend, essential=True)
@@ -157,7 +157,7 @@ def _cache() -> list[Finding]:
         return Finding("compile cache", str(folder))
 
     from chilopod.errors import OutputError, one_line
-    from chilopod.output import prepare_folder
+    from chilopod.output import check_folder
 
     return [_guarded("compile cache", cache)]
 
@@ -176,7 +176,7 @@ def _drawing() -> list[Finding]:
 
 def _encoder() -> list[Finding]:
     def encoder() -> Finding:
-        from chilopod.report.scene.film import has_encoder
+        from chilopod.report.scene.encoder import has_encoder
 
         if not has_encoder():
             return Finding("mp4 encoder", "PyAV has no H.264; all but mp4 films works", _again("av"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -147,7 +147,12 @@ def read_robot(robot: str, overrides: Sequence[str] | None) -> Robot:
 
 def print_json(result: dict[str, Any]) -> None:
     """Print a result as one JSON object; NaN and infinity have no place in JSON and are a fault here."""
-    typer.echo(json.dumps(result, indent=2, allow_nan=False))
+    typer.echo(json_text(result))
+
+
+def json_text(result: dict[str, Any]) -> str:
+    """A result as :func:`print_json` prints it."""
+    return json.dumps(result, indent=2, allow_nan=False)
 
 
 def print_creep(coefficient: float | None) -> None:
@@ -158,24 +163,34 @@ def print_creep(coefficient: float | None) -> None:
 
 def free(paths: Iterable[Path], force: bool) -> None:
     """Make sure, before any work is done for them, that files can be written and replace none without ``--force``."""
-    from chilopod.output import free_path
+    from chilopod.output import check_files
 
-    for path in paths:
-        free_path(path, force)
-
-
-def save_json(path: Path, result: dict[str, Any]) -> None:
-    """Write a result as a JSON file and say so on stderr."""
-    from chilopod.output import write_atomic
-
-    write_atomic(path, json.dumps(result, indent=2, allow_nan=False) + "\n")
-    wrote([path])
+    check_files(paths, replace=force)
 
 
-def wrote(paths: Iterable[Path]) -> None:
-    """Say on stderr what was written."""
-    for path in paths:
-        typer.echo(f"wrote {path}", err=True)
+def deliver(write: Callable[[], Iterable[Path]], show: Callable[[], None]) -> None:
+    """Write the files of a result, say so on stderr, and print the result, also where a file cannot be written.
+
+    Parameters
+    ----------
+    write
+        Gives what it wrote.
+    show
+        Prints.
+    """
+    from chilopod.errors import OutputError
+
+    failure = None
+    try:
+        for path in write():
+            typer.echo(f"wrote {path}", err=True)
+    except OutputError as error:
+        failure = error
+    try:
+        show()
+    finally:
+        if failure is not None:
+            raise failure
 
 
 def interval(robot: Robot, parameter: str, between: tuple[str, str]) -> tuple[float, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -21,12 +22,12 @@ from chilopod.cli.options import (
     SetOption,
     StrategyOption,
     TrialsOption,
+    deliver,
     free,
     print_creep,
     print_json,
     read_robot,
     walking_on,
-    wrote,
 )
 from chilopod.cli.own import own_code, own_controller
 from chilopod.cli.progress import progress_bar
@@ -108,14 +109,13 @@ def turn(
             folder=trials,
             progress=lambda part, words: show("turn", part, words),
         )
-    if out:
+
+    def write() -> list[Path]:
         from chilopod.report.figures.turn import write_turn
 
-        wrote(write_turn(done, out))
-    if as_json:
-        print_json(done.as_json())
-    else:
-        _print(done, seed)
+        return write_turn(done, out, replace=force) if out else []
+
+    deliver(write, lambda: print_json(done.as_json()) if as_json else _print(done, seed))
 
 
 def _print(done: Turn, seed: int | None) -> None:

@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from chilopod.output import check_room
 from chilopod.progress import Progress, silent
+from chilopod.record import check_memory
 from chilopod.trials.batch import batches
 from chilopod.trials.claims import Claims
 from chilopod.trials.executors import Executor, current
@@ -18,6 +20,7 @@ from chilopod.trials.trial import Trial
 
 _LOOK = 0.2  # s between two looks whether other processes are done
 _PATIENCE = 120.0  # s in which they have to be done with one trial; one that is stopped never is
+_COPIES = 2  # of a record: as the engine has it and as it is given; of many, each and all together
 
 Walked = list[tuple[Trial, xr.Dataset]]
 
@@ -33,7 +36,7 @@ def run(
     Parameters
     ----------
     trials
-        In any order; the same trial may occur twice.
+        In any order; the same trial may occur twice. All their records have to fit into memory, see :func:`run_each`.
     folder
         Where records are kept, see :class:`chilopod.trials.Store`; without one nothing is kept. Several processes that
         are given the same one share the work: each walks what no other has begun, and waits for the others' at the end.
@@ -47,29 +50,76 @@ def run(
     -------
     The record of every trial, see :func:`chilopod.planar.simulate` and :func:`chilopod.twin.simulate`, with one
     ``robot`` and the trial in the attributes.
+
+    Raises
+    ------
+    ParameterError
+        If memory cannot hold the records.
+    OutputError
+        If the folder has no room for them.
     """
-    executor = current() if executor is None else executor
-    asked = {trial.file_name: trial for trial in trials}
-    records: dict[str, xr.Dataset] = {}
-    ours = list(asked.values())
-    come = _shared(ours, Store(folder), executor) if folder is not None else _alone(ours, executor)
-    for walked, elsewhere in come:
-        records.update((trial.file_name, record) for trial, record in walked)
-        words = f"{len(records)} of {len(asked)} trials{executor.words}"
-        told = f"{words}, {elsewhere} walked by another process" if elsewhere else words
-        progress(len(records) / max(len(asked), 1), told)
-    progress(1.0, f"{len(records)} trials")
+    check_fits(trials)
+    records = {trial.file_name: record for trial, record in run_each(trials, folder, progress, executor)}
     return [records[trial.file_name] for trial in trials]
 
 
+def check_fits(trials: Sequence[Trial]) -> None:
+    """Refuse trials whose records memory cannot hold all together.
+
+    Raises
+    ------
+    ParameterError
+        With what they would take.
+    """
+    check_memory(_COPIES * sum(trial.least_bytes for trial in trials))
+
+
+def run_each(
+    trials: Sequence[Trial],
+    folder: str | Path | None = None,
+    progress: Progress = silent,
+    executor: Executor | None = None,
+) -> Iterator[tuple[Trial, xr.Dataset]]:
+    """Run trials, or read what has been run before, and give each different one and its record as soon as it is there,
+    in any order: memory holds a batch at a time.
+
+    Parameters
+    ----------
+    trials, folder, progress, executor
+        As for :func:`run`.
+    """
+    store = None if folder is None else Store(folder)
+    asked = {trial.file_name: trial for trial in trials}
+    missing = []
+    for trial in asked.values():
+        found = store.read(trial) if store else None
+        if found is None:
+            missing.append(trial)
+        else:
+            yield trial, found
+    if store:
+        check_room(store.folder, sum(trial.least_bytes for trial in missing))
+    executor = current() if executor is None else executor
+    share = executor.cut(batches(missing))
+    check_memory(_COPIES * max((sum(trial.least_bytes for trial in batch) for batch in share), default=0.0))
+    done = len(asked) - len(missing)
+    progress(done / max(len(asked), 1), f"{done} of {len(asked)} trials")
+    for walked, elsewhere in _shared(missing, store, executor) if store and missing else _alone(share, executor):
+        yield from walked
+        done += len(walked)
+        words = f"{done} of {len(asked)} trials{executor.words}"
+        progress(done / len(asked), f"{words}, {elsewhere} walked by another process" if elsewhere else words)
+    progress(1.0, f"{len(asked)} trials")
+
+
 def _walked(
-    trials: Sequence[Trial], executor: Executor, free: Callable[[list[Trial]], list[Trial]] = list
+    share: Sequence[list[Trial]], executor: Executor, free: Callable[[list[Trial]], list[Trial]] = list
 ) -> Iterator[Walked]:
-    """Trials with their records, batch by batch; ``free`` says which of a batch are to be walked when it is begun."""
+    """Batches of trials with their records; ``free`` says which of a batch are to be walked when it is begun."""
     begun: list[list[Trial]] = []
 
     def taken() -> Iterator[list[Trial]]:
-        for batch in executor.cut(batches(trials)):
+        for batch in share:
             mine = free(batch)
             if mine:
                 begun.append(mine)
@@ -79,39 +129,34 @@ def _walked(
         yield list(zip(begun[index], records, strict=True))
 
 
-def _alone(trials: Sequence[Trial], executor: Executor) -> Iterator[tuple[Walked, int]]:
+def _alone(share: Sequence[list[Trial]], executor: Executor) -> Iterator[tuple[Walked, int]]:
     """What :func:`_shared` gives, where nothing is kept."""
-    yield [], 0
-    for walked in _walked(trials, executor):
+    for walked in _walked(share, executor):
         yield walked, 0
 
 
 def _shared(trials: Sequence[Trial], store: Store, executor: Executor) -> Iterator[tuple[Walked, int]]:
-    """Trials with their records, from the store or walked, and how many other processes walk that we wait for."""
+    """Trials with their records, walked here or by others, and for how many of the others we wait."""
     with store.claims() as claims:
-        there = [(trial, record) for trial in trials if (record := store.read(trial)) is not None]
-        yield there, 0
-        names = {trial.file_name for trial, _ in there}
-        left = [trial for trial in trials if trial.file_name not in names]
-        moved, patient = time.monotonic(), True
+        left, moved, patient = list(trials), time.monotonic(), True
         while left:
-            share = _Share(store, claims, patient)
-            for walked in _walked(left, executor, share.free):
+            part = _Part(store, claims, patient)
+            for walked in _walked(executor.cut(batches(left)), executor, part.free):
                 for trial, record in walked:
                     store.write(trial, record)
                 store.sync()
                 for trial, _ in walked:
                     claims.release(trial.file_name)
                 yield walked, 0
-            yield share.brought, len(share.elsewhere)
+            yield part.brought, len(part.elsewhere)
             now = time.monotonic()
-            moved = now if len(share.elsewhere) < len(left) else moved
-            left, patient = share.elsewhere, now - moved < _PATIENCE
+            moved = now if len(part.elsewhere) < len(left) else moved
+            left, patient = part.elsewhere, now - moved < _PATIENCE
             if left and patient:
                 time.sleep(_LOOK)
 
 
-class _Share:
+class _Part:
     """What of a study is to be walked here, what other processes walk, and what they have brought meanwhile."""
 
     def __init__(self, store: Store, claims: Claims, patient: bool) -> None:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from chilopod.errors import OutputError
-from chilopod.output import prepare_folder, sync_folder, write_atomic
+from chilopod.output import check_folder, made_folder, sync_folder, write_atomic
 from chilopod.trials.claims import Claims
 from chilopod.trials.file import Unsound, content_of, read_whole, record_of
 from chilopod.trials.trial import Trial
@@ -32,7 +32,7 @@ class Store:
     Parameters
     ----------
     folder
-        Made where there is none.
+        Made with the first record where there is none.
     tell
         Given a line about every file that is not what it should be; by default the logger of this module, which prints
         it on stderr if nobody has told it otherwise.
@@ -44,11 +44,7 @@ class Store:
     """
 
     def __init__(self, folder: str | Path, tell: Callable[[str], object] = _logger.warning) -> None:
-        made = [each for each in (Path(folder), *Path(folder).parents) if not each.exists()]
-        self.folder = prepare_folder(folder)
-        for each in made:
-            with suppress(OSError):  # not everybody may look into what is above
-                sync_folder(each.parent)
+        self.folder = check_folder(folder)
         self._tell = tell
 
     def read(self, trial: Trial) -> xr.Dataset | None:
@@ -95,13 +91,14 @@ class Store:
                 allowed=f"a record for {trial.file_name}",
             )
         content = content_of(record)
-        # Whoever deletes the folder while trials walk loses what was in it, not the walks to come.
-        self.folder.mkdir(parents=True, exist_ok=True)
+        # Whoever deletes the folder while trials walk loses what was in it, not the walks to come: it is made again.
         write_atomic(self.folder / trial.file_name, content, durable=True, temporary=_UNFINISHED)
 
-    def claims(self) -> Claims:
-        """What this process walks here, so that others walk other trials; to be entered."""
-        return Claims(self.folder, self._sweep)
+    @contextmanager
+    def claims(self) -> Iterator[Claims]:
+        """For what this process walks and keeps here: others walk other trials. The folder is made."""
+        with made_folder(self.folder), Claims(self.folder, self._sweep) as claims:
+            yield claims
 
     def sync(self) -> None:
         """Make sure that what has been written is there even after a power failure."""

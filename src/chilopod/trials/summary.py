@@ -75,8 +75,9 @@ class WalkSummary:
 
 def mean_joint_angles(record: xr.Dataset, seconds: float = AVERAGED) -> xr.DataArray:
     """Joint angles averaged over the last ``seconds`` of a record (all of a shorter one), rad, over (robot, joint)."""
-    end = float(record.time[-1])
-    return record.joint_angle.where(record.time >= end - seconds * (1.0 + 1e-9), drop=True).mean("time", skipna=False)
+    times = record.time.values
+    first = int(np.searchsorted(times, times[-1] - seconds * (1.0 + 1e-9)))
+    return record.joint_angle.isel(time=slice(first, None)).mean("time", skipna=False)
 
 
 def straight(record: xr.Dataset) -> bool:

@@ -120,6 +120,11 @@ class Trial:
         """What is written down."""
         return Recording(self.rate, self.forces, self.poses)
 
+    @property
+    def least_bytes(self) -> float:
+        """What its record takes, at least."""
+        return self.recording.least_bytes(self.robot.body.modules, self.duration)
+
     @cached_property
     def steering(self) -> Any:
         """The controller as plain data, see :func:`chilopod.trials.description.plain`."""
