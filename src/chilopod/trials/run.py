@@ -148,7 +148,13 @@ def _shared(trials: Sequence[Trial], store: Store, executor: Executor) -> Iterat
                 for trial, _ in walked:
                     claims.release(trial.file_name)
                 yield walked, 0
-            yield part.brought, len(part.elsewhere)
+            for trial in part.brought:
+                found = store.read(trial)
+                if found is None:
+                    part.elsewhere.append(trial)
+                else:
+                    yield [(trial, found)], 0
+            yield [], len(part.elsewhere)
             now = time.monotonic()
             moved = now if len(part.elsewhere) < len(left) else moved
             left, patient = part.elsewhere, now - moved < _PATIENCE
@@ -162,7 +168,7 @@ class _Part:
     def __init__(self, store: Store, claims: Claims, patient: bool) -> None:
         self._store, self._claims, self._patient = store, claims, patient
         self.elsewhere: list[Trial] = []
-        self.brought: Walked = []
+        self.brought: list[Trial] = []
 
     def free(self, batch: list[Trial]) -> list[Trial]:
         """Those of a batch that are to be walked here; they are claimed."""
@@ -170,11 +176,11 @@ class _Part:
         for trial in batch:
             if not self._claims.take(trial.file_name) and self._patient:
                 self.elsewhere.append(trial)
-            elif (record := self._store.read(trial)) is None:
-                mine.append(trial)
-            else:
+            elif self._store.has(trial):
                 self._claims.release(trial.file_name)
-                self.brought.append((trial, record))
+                self.brought.append(trial)
+            else:
+                mine.append(trial)
         return mine
 
 

@@ -47,6 +47,10 @@ class Store:
         self.folder = check_folder(folder)
         self._tell = tell
 
+    def has(self, trial: Trial) -> bool:
+        """Whether there is something that has the name of a trial's record."""
+        return os.path.lexists(self.folder / trial.file_name)
+
     def read(self, trial: Trial) -> xr.Dataset | None:
         """The record of a trial; None if there is none.
 
