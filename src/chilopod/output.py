@@ -89,7 +89,13 @@ def check_room(path: Path, needed: float) -> None:
 
 
 def write_atomic(
-    path: str | Path, content: Content, *, replace: bool = True, durable: bool = False, folders: bool = True
+    path: str | Path,
+    content: Content,
+    *,
+    replace: bool = True,
+    durable: bool = False,
+    folders: bool = True,
+    temporary: str = ".chilopod-",
 ) -> Path:
     """Write a file so that it never exists half-written.
 
@@ -105,6 +111,8 @@ def write_atomic(
         Whether it is to outlast a power failure; :func:`sync_folder` makes its name do so.
     folders
         Whether its folder is made where there is none.
+    temporary
+        How its name begins until it is whole; such a file stays where a process is killed.
 
     Returns
     -------
@@ -119,14 +127,14 @@ def write_atomic(
     path = Path(path)
     try:
         _check_replaceable(path, replace)
-        with _folder(path.parent) if folders else nullcontext():
+        with made_folder(path.parent) if folders else nullcontext():
             # In the same folder, because a rename is atomic only within one file system.
-            temporary = path.parent / f".chilopod-{os.urandom(8).hex()}"
+            unfinished = path.parent / f"{temporary}{os.urandom(8).hex()}"
             try:
-                _fill(temporary, content, durable)
-                os.replace(temporary, path)
+                _fill(unfinished, content, durable)
+                os.replace(unfinished, path)
             except BaseException:
-                temporary.unlink(missing_ok=True)
+                unfinished.unlink(missing_ok=True)
                 raise
     except (OSError, ValueError) as error:
         raise _refused(path, error) from None
@@ -214,6 +222,24 @@ def sync_folder(path: Path) -> None:
         os.close(handle)
 
 
+@contextmanager
+def made_folder(path: Path) -> Iterator[None]:
+    """See to it that a folder is there, after a power failure too; what was made for it goes again if the block fails
+    and nothing is in it."""
+    made = [each for each in (path, *path.parents) if not _is_there(each)]
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        for each in made:
+            with suppress(OSError):  # not everybody may look into what is above
+                sync_folder(each.parent)
+        yield
+    except BaseException:
+        for each in made:
+            with suppress(OSError):
+                each.rmdir()
+        raise
+
+
 def _check_replaceable(path: Path, replace: bool) -> None:
     try:
         mode = os.lstat(path).st_mode
@@ -248,28 +274,13 @@ def _nearest(folder: Path) -> Path:
     return next((each for each in (folder, *folder.parents) if _is_there(each)), folder)
 
 
-@contextmanager
-def _folder(path: Path) -> Iterator[None]:
-    """See to it that a folder is there; what was made for it goes again if the block fails."""
-    made = [each for each in (path, *path.parents) if not _is_there(each)]
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        yield
-    except BaseException:
-        for each in made:
-            with suppress(OSError):
-                each.rmdir()
-        raise
-
-
 def _fill(path: Path, content: Content, durable: bool) -> None:
     """Make a new file of this content."""
-    if not isinstance(content, str | bytes | bytearray) and _named(content, path):
-        return
-    with open(path, "xb") as file:
+    named = not isinstance(content, str | bytes | bytearray) and _named(content, path)
+    with open(path, "r+b" if named else "xb") as file:
         if isinstance(content, str | bytes | bytearray):
             file.write(content.encode() if isinstance(content, str) else content)
-        else:
+        elif not named:
             content.seek(0)
             shutil.copyfileobj(content, file, _COPIED)
         if durable:

@@ -135,10 +135,8 @@ class Trial:
         """All of it as JSON; equal texts are equal trials."""
         return json.dumps(
             {
-                "version": RECORD_VERSION,
-                "chilopod": chilopod.__version__,
+                **versions_of(self.engine),
                 "engine": self.engine,
-                "engine_version": engine_named(self.engine).traits.version,
                 "robot": robot_text(self.robot),
                 "duration": self.duration,
                 "seed": self.seed,
@@ -158,7 +156,7 @@ class Trial:
         """Of its record."""
         engine = engine_named(self.engine).traits.name
         kind = "".join(each if each.isalnum() else "-" for each in engine)
-        return f"{kind}-{hashlib.sha256(self.text.encode()).hexdigest()[:20]}.nc"
+        return f"{kind}-{digest_of(self.text)}.nc"
 
     def check_findable(self) -> None:
         """Make sure that other processes, now or later, can find what walks and what steers: the folder of trials
@@ -181,3 +179,17 @@ class Trial:
                     value=path,
                     allowed="what stands at the top of a module that can be imported, or trials without a folder",
                 )
+
+
+def versions_of(engine: str) -> dict[str, Any]:
+    """Of what makes a record, as they stand in a trial's text."""
+    return {
+        "version": RECORD_VERSION,
+        "chilopod": chilopod.__version__,
+        "engine_version": engine_named(engine).traits.version,
+    }
+
+
+def digest_of(text: str) -> str:
+    """Of a trial's text: what its file is called by."""
+    return hashlib.sha256(text.encode()).hexdigest()[:20]
