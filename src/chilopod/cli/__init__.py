@@ -6,7 +6,6 @@ Results go to stdout, everything else to stderr. An error is one line on stderr 
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Sequence
 from typing import Annotated
@@ -16,10 +15,10 @@ import typer
 from chilopod.cli import branch, doctor, reproduce, robot, stability, turn, walk
 from chilopod.cli.options import new_app
 from chilopod.errors import ChilopodError, one_line
+from chilopod.process import INTERRUPTED
 
 USAGE_ERROR = 2
 INTERNAL_ERROR = 1
-INTERRUPTED = 130
 
 app = new_app("Many-legged robots that turn by bifurcation: simulate, analyse and steer them.", completion=True)
 app.command("reproduce", short_help="Repeat the paper, and write a report beside its numbers.")(reproduce.reproduce)
@@ -63,17 +62,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         something essential is missing, 130 when interrupted.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
-    # What a robot is called need not fit the terminal's encoding; better a question mark than a crash.
-    for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="backslashreplace")
     try:
         code = app(arguments, prog_name="chilopod", standalone_mode=False)
-        sys.stdout.flush()
-    except BrokenPipeError:
-        # Whoever read our output has seen enough. Python would complain once more when it flushes at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
     except (typer.Abort, KeyboardInterrupt):
         return _fail("interrupted", INTERRUPTED)
     except Exception as error:
