@@ -2,6 +2,7 @@
 
 import os
 import sys
+import warnings
 
 
 def main() -> int:
@@ -16,6 +17,8 @@ def main() -> int:
     stdout = process.hold_streams()
     # Figures go into files: which windows somebody prefers does not matter, nor whether there are such.
     os.environ["MPLBACKEND"] = "agg"
+    # Numba would go on without a variable that it cannot read, after many lines about it.
+    warnings.filterwarnings("error", "Environment variable 'NUMBA_", RuntimeWarning)
     from chilopod.cli import USAGE_ERROR
     from chilopod.cli import main as run
 

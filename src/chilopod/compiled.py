@@ -9,10 +9,16 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import os
 from pathlib import Path
 from typing import Any
 
 import numba
+
+from chilopod.errors import ParameterError
+
+# Somebody else's wish to debug: as plain Python, what is compiled here would take hours, and its overloads do not run.
+numba.config.DISABLE_JIT = False
 
 
 def _drop_stale() -> None:
@@ -26,7 +32,21 @@ def _drop_stale() -> None:
                 index.unlink()
 
 
+def _check_cache() -> None:
+    # Numba looks for a folder where a function is to be kept: beside its source, and in the user's own.
+    try:
+        numba.njit(cache=True)(_drop_stale)
+    except RuntimeError:
+        raise ParameterError(
+            "there is no folder in which compiled code can be kept",
+            field="NUMBA_CACHE_DIR",
+            value=os.environ.get("NUMBA_CACHE_DIR"),
+            allowed="one that can be written, in the environment",
+        ) from None
+
+
 _drop_stale()
+_check_cache()
 
 njit = functools.partial(numba.njit, cache=True)
 """``numba.njit`` with the compiled code kept on disk."""

@@ -7,6 +7,7 @@ Results go to stdout, everything else to stderr. An error is one line on stderr 
 from __future__ import annotations
 
 import sys
+import traceback
 from collections.abc import Sequence
 from typing import Annotated
 
@@ -14,7 +15,7 @@ import typer
 
 from chilopod.cli import branch, doctor, reproduce, robot, stability, turn, walk
 from chilopod.cli.options import new_app
-from chilopod.errors import ChilopodError, one_line
+from chilopod.errors import ChilopodError, briefly, one_line
 from chilopod.process import INTERRUPTED
 
 USAGE_ERROR = 2
@@ -75,6 +76,9 @@ def main(argv: Sequence[str] | None = None) -> int:
             return _fail(f"{error.format_message()} ({_help_of(error)})", USAGE_ERROR)
         if isinstance(error, ChilopodError | OSError):
             return _fail(str(error), USAGE_ERROR)
+        package = _not_imported(error)
+        if package:
+            return _fail(f"{package} cannot be imported: {briefly(error)} ({_mend(package)})", USAGE_ERROR)
         return _fail(
             f"this is a fault of chilopod, please report it: {type(error).__name__}: {error} (--debug shows more)",
             INTERNAL_ERROR,
@@ -87,6 +91,20 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _help_of(error: Exception) -> str:
     context = getattr(error, "ctx", None)
     return f"see {context.command_path if context else 'chilopod'} --help"
+
+
+def _not_imported(error: Exception) -> str | None:
+    """The package of somebody else's that could not be imported, if that is what went wrong."""
+    frames = (frame for frame, _ in traceback.walk_tb(error.__traceback__))
+    loading = (frame.f_globals.get("__name__", "") for frame in frames if frame.f_code.co_name == "<module>")
+    packages = (name.partition(".")[0] for name in loading)
+    missing = error.name if isinstance(error, ModuleNotFoundError) else None
+    return next((package for package in packages if package not in ("chilopod", "__main__")), missing)
+
+
+def _mend(package: str) -> str:
+    wishes = doctor.settings(package)
+    return f"without {', '.join(wishes)} in the environment it may" if wishes else "see chilopod doctor"
 
 
 def _fail(message: str, code: int) -> int:
