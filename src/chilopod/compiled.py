@@ -48,13 +48,14 @@ def _check_cache() -> None:
 _drop_stale()
 _check_cache()
 
-njit = functools.partial(numba.njit, cache=True)
-"""``numba.njit`` with the compiled code kept on disk."""
+njit = functools.partial(numba.njit, cache=True, nogil=True)
+"""``numba.njit`` with the compiled code kept on disk; other threads go on while it runs, to show that it does and to
+answer Ctrl-C."""
 
-fused_njit = functools.partial(numba.njit, cache=True, fastmath={"contract"})
+fused_njit = functools.partial(numba.njit, cache=True, nogil=True, fastmath={"contract"})
 """The same where a product and a sum may become one instruction with one rounding: not for exact error terms."""
 
-parallel_njit = functools.partial(numba.njit, cache=True, parallel=True)
+parallel_njit = functools.partial(numba.njit, cache=True, nogil=True, parallel=True)
 """The same for loops over ``prange``: one robot an iteration, so the answer does not depend on the number of
 threads."""
 

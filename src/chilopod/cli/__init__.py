@@ -74,8 +74,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         # Usage errors have no public base class that all supported versions of typer share, but they all do this.
         if hasattr(error, "format_message"):
             return _fail(f"{error.format_message()} ({_help_of(error)})", USAGE_ERROR)
-        if isinstance(error, ChilopodError | OSError):
+        if isinstance(error, ChilopodError):
             return _fail(str(error), USAGE_ERROR)
+        if isinstance(error, OSError):
+            named = ChilopodError(error.strerror or str(error), source=str(error.filename or ""))
+            return _fail(str(named), USAGE_ERROR)
         package = _not_imported(error)
         if package:
             return _fail(f"{package} cannot be imported: {briefly(error)} ({_mend(package)})", USAGE_ERROR)

@@ -84,7 +84,7 @@ def branch(
         # A branch that goes on where it is saved holds all it held before.
         grows = resume is not None and folder.resolve() == resume.resolve()
         free(files_of("branch", folder), force or grows)
-    with progress_bar() as show:
+    with progress_bar("branch") as show:
 
         def progress(done: float, words: str) -> None:
             show("branch", done, words)

@@ -12,6 +12,7 @@ from pathlib import Path
 import typer
 
 from chilopod.cli.options import JsonOption, print_json
+from chilopod.cli.progress import progress_bar
 
 _PACKAGES = {
     "numpy": "numpy",
@@ -64,7 +65,8 @@ def doctor(as_json: JsonOption = False) -> None:
     The exit code is 0, or 3 if something is missing that nothing works without. Without OpenGL or an encoder all but
     films and pictures in 3-D works.
     """
-    found = [finding for look in (_versions, _cores, _cache, _drawing, _encoder, _fonts) for finding in look()]
+    with progress_bar("doctor"):
+        found = [finding for look in (_versions, _cores, _cache, _drawing, _encoder, _fonts) for finding in look()]
     broken = any(each.mend and each.essential for each in found)
     if as_json:
         findings = [

@@ -102,7 +102,7 @@ def reproduce(
 
     size = Size.TINY if tiny else Size.QUICK if quick else Size.FULL
     context = Context(read_robot(PRESET, None), read_robot(WHOLE, None), size, prepare_folder(out / "trials"))
-    with walking_on(cluster), progress_bar() as show, Report(sections, context, out, show) as report:
+    with walking_on(cluster), progress_bar("reproduce") as show, Report(sections, context, out, show) as report:
         typer.echo(f"The page is {report.page.resolve()}", err=as_json)
         found = computed.reproduce(sections, context, show, lambda found, section: report.add(found, [section]))
     rows, robot_rows = [row for part in found.planar_rows().values() for row in part], found.robot_rows()
@@ -173,7 +173,7 @@ def planar(
     from chilopod.tasks.identify import identify_planar
 
     free([*files_of("identification", out), out / "identification.json", out / "identified.toml"], force)
-    with progress_bar() as show:
+    with progress_bar("identification") as show:
         found = identify_planar(
             described,
             critical_mode_data(),
@@ -222,7 +222,7 @@ def twin(
     from chilopod.paper.fit_data import base_series_data
     from chilopod.tasks.identify import identify_twin
 
-    with progress_bar() as show:
+    with progress_bar("identification") as show:
         found = identify_twin(
             described,
             base_series_data(),

@@ -22,6 +22,7 @@ from chilopod.cli.options import (
     read_robot,
     save_json,
 )
+from chilopod.cli.progress import progress_bar
 
 
 def stability(
@@ -42,7 +43,8 @@ def stability(
     free([file] if file else [], force)
     from chilopod.analysis import straight_walk
 
-    found = straight_walk(described)
+    with progress_bar("stability"):
+        found = straight_walk(described)
     result = found.as_json()
     if file:
         save_json(file, result)
@@ -81,13 +83,14 @@ def bifurcation(
     free([file] if file else [], force)
     from chilopod.analysis import bifurcations
 
-    points = bifurcations(
-        described,
-        parameter,
-        (low, high),
-        remark=lambda text: typer.echo(f"note: {text}", err=True),
-        seconds=seconds,
-    )
+    with progress_bar("bifurcation"):
+        points = bifurcations(
+            described,
+            parameter,
+            (low, high),
+            remark=lambda text: typer.echo(f"note: {text}", err=True),
+            seconds=seconds,
+        )
     result = {"robot": described.name, "points": [point.as_json() for point in points]}
     if file:
         save_json(file, result)

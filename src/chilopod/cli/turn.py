@@ -25,6 +25,7 @@ from chilopod.cli.options import (
     print_creep,
     print_json,
     read_robot,
+    reading,
     walking_on,
     wrote,
 )
@@ -86,15 +87,18 @@ def turn(
 
     described = read_robot(robot, overrides)
     goal, chosen = Target.parse(target), strategy_named(strategy)
-    spring = k1 if k1 in ("auto", "law") else units.parse(k1, "N*m/rad")
-    seconds = None if duration is None else units.parse(duration, "s")
+    with reading("k1"):
+        path = chosen.springs or "springs.stiffness"
+        spring = k1 if k1 in ("auto", "law") else described.override(path, k1).get(path)
+    with reading("duration"):
+        seconds = None if duration is None else units.parse(duration, "s")
     if out:
         from chilopod.report.figures.turn import files_of_turn
 
         free(files_of_turn(out), force)
     from chilopod.tasks import turn as walk_there
 
-    with own_code(), walking_on(cluster), progress_bar() as show:
+    with own_code(), walking_on(cluster), progress_bar("turn") as show:
         done = walk_there(
             described,
             goal,

@@ -24,6 +24,7 @@ from chilopod.cli.options import (
     print_creep,
     print_json,
     read_robot,
+    reading,
     walking_on,
     wrote,
 )
@@ -69,13 +70,16 @@ def walk(
     from chilopod.output import netcdf, write_atomic
 
     described = read_robot(robot, overrides)
-    seconds, angles = units.parse(duration, "s"), joint_angles(initial_joints)
+    with reading("duration"):
+        seconds = units.parse(duration, "s")
+    with reading("initial_joints"):
+        angles = joint_angles(initial_joints)
     files = [out] if out else []
     free(files, force)
     from chilopod.record import RATE
     from chilopod.tasks import walk as let_walk
 
-    with own_code(), walking_on(cluster), progress_bar() as show:
+    with own_code(), walking_on(cluster), progress_bar("walk") as show:
         done = let_walk(
             described,
             seconds,

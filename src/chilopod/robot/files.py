@@ -96,9 +96,9 @@ def to_toml(table: Mapping[str, Any]) -> str:
 
 def _not_found(robot: str | Path, names: list[str]) -> RobotFileError:
     source, path = str(robot), Path(robot)
-    if path.is_dir():
+    if source and path.is_dir():
         return RobotFileError("is a folder, not a robot file", source=source)
-    if path.exists():
+    if source and path.exists():
         return RobotFileError("is not a regular file", source=source)
     if isinstance(robot, Path) or len(path.parts) > 1 or path.suffix:
         return RobotFileError("no such file", source=source, nearest=nearest_name(source, names))
