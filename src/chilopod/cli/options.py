@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,6 +15,7 @@ from chilopod.errors import ChilopodError
 
 if TYPE_CHECKING:
     from chilopod.robot import Robot
+    from chilopod.tasks import Turn, Walks
 
 STAYS_STRAIGHT = "nothing disturbed it, so nothing bends it, even where the straight walk is unstable"
 
@@ -200,6 +201,12 @@ def read_robot(robot: str, overrides: Sequence[str] | None) -> Robot:
 def print_json(result: dict[str, Any]) -> None:
     """Print a result as one JSON object; NaN and infinity have no place in JSON and are a fault here."""
     typer.echo(json.dumps(result, indent=2, allow_nan=False))
+
+
+def creep(done: Turn | Walks, show: Callable[[str, float, str], None]) -> None:
+    """Measure how firmly the floor holds standing feet, which may take as long as the walk, while that is shown."""
+    show("creep of the feet", 0.0, "on its way")
+    _ = done.foot_creep
 
 
 def print_creep(coefficient: float | None) -> None:

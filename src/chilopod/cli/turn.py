@@ -21,6 +21,7 @@ from chilopod.cli.options import (
     SetOption,
     StrategyOption,
     TrialsOption,
+    creep,
     free,
     print_creep,
     print_json,
@@ -98,7 +99,7 @@ def turn(
         free(files_of_turn(out), force)
     from chilopod.tasks import turn as walk_there
 
-    with own_code(), walking_on(cluster), progress_bar("turn") as show:
+    with progress_bar("turn") as show, own_code(show), walking_on(cluster):
         done = walk_there(
             described,
             goal,
@@ -112,6 +113,7 @@ def turn(
             folder=trials,
             progress=lambda part, words: show("turn", part, words),
         )
+        creep(done, show)
     if out:
         from chilopod.report.figures.turn import write_turn
 

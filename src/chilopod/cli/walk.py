@@ -20,6 +20,7 @@ from chilopod.cli.options import (
     SeedOption,
     SetOption,
     TrialsOption,
+    creep,
     free,
     print_creep,
     print_json,
@@ -79,7 +80,7 @@ def walk(
     from chilopod.record import RATE
     from chilopod.tasks import walk as let_walk
 
-    with own_code(), walking_on(cluster), progress_bar("walk") as show:
+    with progress_bar("walk") as show, own_code(show), walking_on(cluster):
         done = let_walk(
             described,
             seconds,
@@ -93,6 +94,7 @@ def walk(
             folder=trials,
             progress=lambda part, words: show("walk", part, words),
         )
+        creep(done, show)
     wrote(write_atomic(file, netcdf(done.record)) for file in files)
     if as_json:
         print_json(done.as_json())
