@@ -244,7 +244,7 @@ def interval(robot: Robot, parameter: str, between: tuple[str, str]) -> tuple[fl
 
     with reading("parameter"):
         unit = robot.si_unit_of(parameter)
-    with reading("between"):
+    with reading(f"between {parameter}"):
         low, high = (units.parse(text, unit) for text in between)
         for text in between:
             robot.override(parameter, text)

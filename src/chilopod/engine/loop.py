@@ -24,7 +24,7 @@ _T = TypeVar("_T")
 _MOMENT = 0.3
 """s, for which a walk goes on without a word, about: that long Ctrl-C may have to wait too."""
 
-_FIRST, _SHORTEST = 1.0, 1e-3
+_FIRST, _SHORTEST = 0.3, 1e-3
 """s of the walk, at first and at least, that it goes on for at a time."""
 
 
@@ -168,7 +168,7 @@ def steer(
 def _advance(walk: Walk, until: float, tell: Callable[[], None]) -> None:
     """Walk on in stretches that take a moment each; the walk is the same to the bit however it is cut."""
     stretch, there = _FIRST, walk.time + _FIRST
-    while there < until:
+    while there + 0.5 * stretch < until:
         begun = clock.perf_counter()
         walk.advance(there)
         tell()
