@@ -24,7 +24,7 @@ _T = TypeVar("_T")
 _MOMENT = 0.3
 """s, for which a walk goes on without a word, about: that long Ctrl-C may have to wait too."""
 
-_FIRST, _SHORTEST = 0.3, 1e-3
+_FIRST, _SHORTEST = 0.02, 1e-3
 """s of the walk, at first and at least, that it goes on for at a time."""
 
 
@@ -138,11 +138,12 @@ def steer(
         for each in (progress, *(spent.progress for spent in _watching)):
             each(done, words)
 
+    pace = _Pace()
     since, thought = clock.perf_counter(), 0.0
     for index, (time, event) in enumerate(event_times(controller, gait, until) if controller else ()):
         if time < begun:
             continue
-        _advance(walk, time, tell)
+        pace.advance(walk, time, tell)
         seen = walk.observe()
         if bearing_noise is not None:
             if index >= bearing_noise.shape[1]:
@@ -158,24 +159,36 @@ def steer(
             error.field = _of(controller, error.field or "command")
             raise
         tell()
-    _advance(walk, until, tell)
+    pace.advance(walk, until, tell)
     tell()
     for spent in _watching:
         spent.controller += thought
         spent.total += clock.perf_counter() - since
 
 
-def _advance(walk: Walk, until: float, tell: Callable[[], None]) -> None:
-    """Walk on in stretches that take a moment each; the walk is the same to the bit however it is cut."""
-    stretch, there = _FIRST, walk.time + _FIRST
-    while there + 0.5 * stretch < until:
-        begun = clock.perf_counter()
-        walk.advance(there)
-        tell()
-        took = clock.perf_counter() - begun
-        stretch = max(_SHORTEST, stretch * min(2.0, _MOMENT / max(took, 1e-9)))
-        there += stretch
-    walk.advance(until)
+@dataclass
+class _Pace:
+    """Walks on in stretches that take a moment each; a walk is the same to the bit however it is cut.
+
+    Attributes
+    ----------
+    stretch
+        s of the walk, the next one.
+    """
+
+    stretch: float = _FIRST
+
+    def advance(self, walk: Walk, until: float, tell: Callable[[], None]) -> None:
+        there = walk.time + self.stretch
+        # What is left shall not be a stretch of nearly nothing.
+        while there + 0.5 * self.stretch < until:
+            begun = clock.perf_counter()
+            walk.advance(there)
+            tell()
+            took = clock.perf_counter() - begun
+            self.stretch = max(_SHORTEST, self.stretch * min(2.0, _MOMENT / max(took, 1e-9)))
+            there += self.stretch
+        walk.advance(until)
 
 
 def _answer(controller: Controller, event: Event, seen: Observation) -> Command:

@@ -28,21 +28,20 @@ def check_steps(robot: Robot, seconds: float) -> None:
         Naming what makes it move so fast.
     """
     rates = {**_rates(robot), "gait.stance, gait.swing": _switches(robot)}
-    field, rate = max(rates.items(), key=lambda item: item[1])
-    steps = robot.body.modules * seconds * rate / _REACH
+    steps = robot.body.modules * seconds * sum(rates.values()) / _REACH
     if steps > MOST_STEPS:
         raise ParameterError(
             f"the motion is too fast to follow for {seconds:g} s: about {steps:.0e} steps of modules",
-            field=field,
+            field=max(rates, key=rates.__getitem__),
             allowed=f"what takes at most {MOST_STEPS:.0e}",
         )
 
 
 def _rates(robot: Robot) -> dict[str, float]:
-    """By what sets it: no slower than the fastest motion, 1/s.
+    """What each property adds to a bound on the fastest motion, 1/s.
 
-    They are those of modules that nothing joins. Joints only take freedom away, and by Rayleigh's principle no motion
-    that is left is faster than the fastest of all.
+    The bounds are those of modules that nothing joins. Joints only take freedom away, and by Rayleigh's principle what
+    is left is damped and sprung no more strongly.
     """
     mass, inertia = robot.module_mass, robot.module_yaw_inertia
     legs, springs, friction = robot.legs, robot.springs, robot.ground.friction
