@@ -91,7 +91,7 @@ def test_without_something_essential(capsys, monkeypatch, wish):
 
 def test_what_cannot_be_looked_at_is_said(capsys, monkeypatch):
     def broken():
-        raise ImportError("no\nthreads")
+        raise ImportError("no threads\nat all")
 
     monkeypatch.setattr("numba.get_num_threads", broken)
     found = findings(capsys)
@@ -100,3 +100,4 @@ def test_what_cannot_be_looked_at_is_said(capsys, monkeypatch):
     assert code == 0
     assert "? numba threads" in out
     assert "no threads" in out
+    assert "at all" not in out

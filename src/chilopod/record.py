@@ -48,7 +48,7 @@ class Recording:
     def __post_init__(self) -> None:
         if not isinstance(self.rate, int | float):
             raise ParameterError("is no number", field="rate", value=self.rate, allowed="samples per second")
-        in_range("rate", self.rate, 1e6)
+        in_range("rate", self.rate, 1e6, "Hz")
 
     def samples(self, until: float) -> Array:
         """Times of all samples up to a time, s."""
@@ -61,8 +61,8 @@ class Recording:
         return 8.0 * numbers * (until * self.rate + 1.0)
 
 
-def in_range(name: str, value: float, most: float) -> None:
-    """Refuse what is not positive or beyond all reason.
+def in_range(name: str, value: float, most: float, unit: str = "") -> None:
+    """Refuse what is not positive or beyond all reason, both in this unit.
 
     Raises
     ------
@@ -70,7 +70,13 @@ def in_range(name: str, value: float, most: float) -> None:
         Naming the field.
     """
     if not 0.0 < value <= most:
-        raise ParameterError("is out of range", field=name, value=value, allowed=f"more than 0, at most {most:g}")
+        high = f"{most:g} {unit}".strip()
+        raise ParameterError(
+            "is out of range",
+            field=name,
+            value=f"{value:g} {unit}" if unit else value,
+            allowed=f"more than 0, at most {high}",
+        )
 
 
 def check_size(record: Recording | None, until: float, numbers: int) -> None:

@@ -61,6 +61,11 @@ def test_feet_of_the_twin_creep():
     assert foot_creep(load_robot("aoi2022"), "twin") > 1000.0
 
 
+def test_a_twin_that_cannot_stand_has_no_creep():
+    limp = load_robot("aoi2022").set_from_text(["twin.servo_stiffness=1e-12 N*m/rad"])
+    assert foot_creep(limp, "twin") is None
+
+
 @pytest.mark.parametrize(
     ("more", "match"),
     [

@@ -102,7 +102,10 @@ def curved_walks(
     make = _followed(robot, parameter)
     # The positive side of the mode is that of positive joint angles.
     angles = fork.point.mode.real[3 : robot.body.modules + 2]
-    along, against = switch(make, fork.point)
+    starts = switch(make, fork.point)
+    if len(starts) != 2:
+        raise AnalysisError(f"{len(starts)} branches leave the straight walk there, not two", field=parameter)
+    along, against = starts
     start = along if (side > 0) is bool(angles.sum() >= 0) else against
     branch = follow(
         make, start, between, points=points, longest=longest, closely=False,

@@ -84,7 +84,7 @@ def branch(
         from chilopod.report import files_of
 
         free(files_of("branch", folder), replace)
-    with progress_bar() as show:
+    with progress_bar("branch") as show:
 
         def progress(done: float, words: str) -> None:
             show("branch", done, words)

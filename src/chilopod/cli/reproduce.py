@@ -106,7 +106,11 @@ def reproduce(
         report.add(now, [section])
 
     try:
-        with walking_on(cluster), progress_bar() as progress, Report(sections, context, out, progress) as report:
+        with (
+            walking_on(cluster),
+            progress_bar("reproduce") as progress,
+            Report(sections, context, out, progress) as report,
+        ):
             typer.echo(f"The page is {report.page.resolve()}", err=as_json)
             computed.reproduce(sections, context, progress, add)
     except OutputError as error:
@@ -183,7 +187,7 @@ def planar(
     from chilopod.tasks.identify import identify_planar
 
     free([*files_of("identification", out), *_identified(out)], force)
-    with progress_bar() as progress:
+    with progress_bar("identification") as progress:
         found = identify_planar(
             described,
             critical_mode_data(),
@@ -247,7 +251,7 @@ def twin(
     from chilopod.paper.fit_data import base_series_data
     from chilopod.tasks.identify import identify_twin
 
-    with progress_bar() as progress:
+    with progress_bar("identification") as progress:
         found = identify_twin(
             described,
             base_series_data(),

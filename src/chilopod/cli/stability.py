@@ -24,6 +24,7 @@ from chilopod.cli.options import (
     print_json,
     read_robot,
 )
+from chilopod.cli.progress import progress_bar
 
 if TYPE_CHECKING:
     from chilopod.analysis import StraightWalk, WalkBifurcation
@@ -48,7 +49,8 @@ def stability(
     free(files, force)
     from chilopod.analysis import straight_walk
 
-    found = straight_walk(described)
+    with progress_bar("stability"):
+        found = straight_walk(described)
     result = found.as_json()
     deliver(
         lambda: _write(files, result, force),
@@ -95,13 +97,14 @@ def bifurcation(
     free(files, force)
     from chilopod.analysis import bifurcations
 
-    points = bifurcations(
-        described,
-        parameter,
-        (low, high),
-        remark=lambda text: typer.echo(f"note: {text}", err=True),
-        seconds=seconds,
-    )
+    with progress_bar("bifurcation"):
+        points = bifurcations(
+            described,
+            parameter,
+            (low, high),
+            remark=lambda text: typer.echo(f"note: {text}", err=True),
+            seconds=seconds,
+        )
     result = {"robot": described.name, "points": [point.as_json() for point in points]}
     deliver(
         lambda: _write(files, result, force),

@@ -45,7 +45,7 @@ def listed(folder: FolderArg, as_json: JsonOption = False) -> None:
     from chilopod.trials.folder import contents, groups, kept
 
     there = contents(folder)
-    with progress_bar() as show:
+    with progress_bar("trials") as show:
         trials, wrong = kept(there.trials, lambda part, words: show("list", part, words))
     rows, size = groups(trials), sum(each.size for each in trials)
     others = sum(not each.found for each in trials)
@@ -124,7 +124,7 @@ def check(folder: FolderArg, as_json: JsonOption = False) -> None:
     """
     from chilopod.trials.folder import checked, contents
 
-    with progress_bar() as show:
+    with progress_bar("trials") as show:
         whole, wrong = checked(contents(folder).trials, lambda part, words: show("check", part, words))
     others = sum(not each.found for each in whole)
     if as_json:

@@ -22,11 +22,13 @@ from chilopod.cli.options import (
     SetOption,
     StrategyOption,
     TrialsOption,
+    creep,
     deliver,
     free,
     print_creep,
     print_json,
     read_robot,
+    reading,
     walking_on,
 )
 from chilopod.cli.own import own_code, own_controller
@@ -87,15 +89,18 @@ def turn(
 
     described = read_robot(robot, overrides)
     goal, chosen = Target.parse(target), strategy_named(strategy)
-    spring = k1 if k1 in ("auto", "law") else units.parse(k1, "N*m/rad")
-    seconds = None if duration is None else units.parse(duration, "s")
+    with reading("k1"):
+        path = chosen.springs or "springs.stiffness"
+        spring = k1 if k1 in ("auto", "law") else described.override(path, k1).get(path)
+    with reading("duration"):
+        seconds = None if duration is None else units.parse(duration, "s")
     if out:
         from chilopod.report.figures.turn import files_of_turn
 
         free(files_of_turn(out), force)
     from chilopod.tasks import turn as walk_there
 
-    with own_code(), walking_on(cluster), progress_bar() as show:
+    with progress_bar("turn") as show, own_code(show), walking_on(cluster):
         done = walk_there(
             described,
             goal,
@@ -115,7 +120,14 @@ def turn(
 
         return write_turn(done, out, replace=force) if out else []
 
-    deliver(write, lambda: print_json(done.as_json()) if as_json else _print(done, seed))
+    def printed() -> None:
+        creep(done)
+        if as_json:
+            print_json(done.as_json())
+        else:
+            _print(done, seed)
+
+    deliver(write, printed)
 
 
 def _print(done: Turn, seed: int | None) -> None:

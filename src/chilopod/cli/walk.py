@@ -22,11 +22,13 @@ from chilopod.cli.options import (
     SeedOption,
     SetOption,
     TrialsOption,
+    creep,
     deliver,
     free,
     print_creep,
     print_json,
     read_robot,
+    reading,
     walking_on,
 )
 from chilopod.cli.own import own_code, own_controller
@@ -74,35 +76,35 @@ def walk(
     from chilopod import units
 
     described = read_robot(robot, overrides)
-    seconds, angles = units.parse(duration, "s"), joint_angles(initial_joints)
+    with reading("duration"):
+        seconds = units.parse(duration, "s")
+    with reading("initial_joints"):
+        angles = joint_angles(initial_joints)
     free([out] if out else [], force)
     from chilopod.record import RATE
     from chilopod.tasks import ends, planned
 
-    with own_code(), ExitStack() as stack:
-        walks = planned(
-            described,
-            seconds,
-            seed=seed,
-            repeats=repeats,
-            joint_angles=angles,
-            rate=RATE if rate is None else rate,
-            forces=forces,
-            engine=engine,
-            controller=own_controller(controller),
-        )
-        file = stack.enter_context(_record_file(out, walks)) if out else None
-        with walking_on(cluster), progress_bar() as show:
+    with ExitStack() as stack:
+        with progress_bar("walk") as show, own_code(show), walking_on(cluster):
+            walks = planned(
+                described,
+                seconds,
+                seed=seed,
+                repeats=repeats,
+                joint_angles=angles,
+                rate=RATE if rate is None else rate,
+                forces=forces,
+                engine=engine,
+                controller=own_controller(controller),
+            )
+            file = stack.enter_context(_record_file(out, walks)) if out else None
             done = ends(
                 walks,
                 trials,
                 lambda part, words: show("walk", part, words),
                 file.add if file else lambda index, record: None,
             )
-        deliver(
-            lambda: file.write(replace=force) if file else [],
-            lambda: print_json(done.as_json()) if as_json else _print(done),
-        )
+        deliver(lambda: file.write(replace=force) if file else [], lambda: _show(done, as_json))
 
 
 def _record_file(path: Path, walks: Sequence[Trial]) -> RecordFile:
@@ -115,6 +117,14 @@ def _record_file(path: Path, walks: Sequence[Trial]) -> RecordFile:
     if size > _MUCH:
         typer.echo(f"{path} will have {in_words(size)} or more", err=True)
     return file
+
+
+def _show(done: Ends, as_json: bool) -> None:
+    creep(done)
+    if as_json:
+        print_json(done.as_json())
+    else:
+        _print(done)
 
 
 def _print(done: Ends) -> None:

@@ -16,6 +16,7 @@ from chilopod.engine import Controller, engine_named
 from chilopod.engine.named import check_controller, path_of
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.progress import Progress, silent
+from chilopod.record import LONGEST, in_range
 from chilopod.robot import Robot
 from chilopod.steering import Criteria, Strategy, Target, earliest_arrival, evaluate, steered
 from chilopod.tasks.radius_law import radius_law
@@ -163,6 +164,7 @@ def turn(
     if controller is not None:
         check_controller(controller)
     time = duration if duration is not None else _time_for(robot, target, traits.haste)
+    in_range("duration", time, LONGEST, "s")
     check_fits(repeated(Trial(robot, time, target=target, engine=engine), seed, repeats))
     law = None
     if isinstance(spring, str) and strategy.springs == K1:

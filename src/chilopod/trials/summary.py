@@ -89,7 +89,7 @@ def straight(record: xr.Dataset) -> bool:
 def axis_radius(robot: Robot, angles: Array) -> Array:
     """The paper's (N-1) L / sum |theta|, m, of joint angles over the last axis; infinite where all are zero."""
     bent = np.abs(angles).sum(-1)
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):  # what hardly bends at all is straight
         return np.asarray((robot.body.modules - 1) * robot.module_length / bent)
 
 

@@ -102,7 +102,7 @@ class Trial:
         }
         for name, value in told.items():
             object.__setattr__(self, name, value)
-        in_range("duration", self.duration, LONGEST)
+        in_range("duration", self.duration, LONGEST, "s")
         engine = engine_named(self.engine)
         engine.common(self.robot)
         if self.recording.poses and not engine.traits.poses:
