@@ -9,6 +9,11 @@ from pathlib import Path
 
 _UNITS = ("bytes", "kB", "MB", "GB", "TB", "PB")
 _CGROUPS = Path("/sys/fs/cgroup")
+_CONTAINER = (
+    ("memory.max", "memory.current", "memory.stat"),
+    ("memory/memory.limit_in_bytes", "memory/memory.usage_in_bytes", "memory/memory.stat"),
+)
+"""What a container may have, has, and what that is: of the second version of control groups and of the first."""
 
 
 def available() -> float:
@@ -29,12 +34,12 @@ def _limits() -> Iterator[float]:
     with suppress(OSError, TypeError):
         found = re.search(r"MemAvailable: *([0-9]+) kB", Path("/proc/meminfo").read_text())
         yield 1024.0 * int(found[1])  # type: ignore[index]
-    for most, used in (
-        ("memory.max", "memory.current"),
-        ("memory/memory.limit_in_bytes", "memory/memory.usage_in_bytes"),
-    ):
+    for most, used, details in _CONTAINER:
         with suppress(OSError, ValueError):  # there is none, or it is "max"
-            yield float(int((_CGROUPS / most).read_text()) - int((_CGROUPS / used).read_text()))
+            # What is cached of files is given up for us.
+            cached = re.search(r"^(?:total_)?inactive_file ([0-9]+)$", (_CGROUPS / details).read_text(), re.MULTILINE)
+            taken = int((_CGROUPS / used).read_text()) - int(cached[1] if cached else 0)
+            yield float(int((_CGROUPS / most).read_text()) - taken)
     with suppress(ImportError, OSError, ValueError):
         import resource
 
