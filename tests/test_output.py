@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from chilopod.errors import OutputError
-from chilopod.output import check_files, check_folder, spool, write_all, write_atomic
+from chilopod.output import check_files, check_folder, check_room, spool, write_all, write_atomic
 
 
 @pytest.fixture
@@ -115,3 +115,10 @@ def test_what_cannot_be_written_where_it_should_go_is_kept_elsewhere(tmp_path, m
     with pytest.raises(OutputError, match=r"a\.nc: cannot be written \(No space.*no other place could be written$"):
         write_all([(there / "a.nc", "1")])
     assert sorted(os.listdir(there)) == ["a.nc", "b-2.nc", "b.nc"]
+
+
+def test_what_does_not_fit_is_said_before_it_is_computed(tmp_path):
+    check_room(tmp_path / "new" / "a.nc", 1e3)
+    with pytest.raises(OutputError, match=r"a\.nc: takes 1e\+03 PB or more, and there is room for .* [kMGT]B$"):
+        check_room(tmp_path / "new" / "a.nc", 1e18)
+    assert not (tmp_path / "new").exists()

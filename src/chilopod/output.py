@@ -7,7 +7,7 @@ import shutil
 import stat
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import IO
 
@@ -94,9 +94,10 @@ def write_atomic(
     *,
     replace: bool = True,
     durable: bool = False,
+    folders: bool = True,
     temporary: str = ".chilopod-",
 ) -> Path:
-    """Write a file so that it never exists half-written; its folder is made where there is none.
+    """Write a file so that it never exists half-written.
 
     Parameters
     ----------
@@ -108,6 +109,8 @@ def write_atomic(
         Whether a file that is already there may be replaced; what is no regular file never is.
     durable
         Whether it is to outlast a power failure; :func:`sync_folder` makes its name do so.
+    folders
+        Whether its folder is made where there is none.
     temporary
         How its name begins until it is whole; such a file stays where a process is killed.
 
@@ -124,7 +127,7 @@ def write_atomic(
     path = Path(path)
     try:
         _check_replaceable(path, replace)
-        with made_folder(path.parent):
+        with made_folder(path.parent) if folders else nullcontext():
             # In the same folder, because a rename is atomic only within one file system.
             unfinished = path.parent / f"{temporary}{os.urandom(8).hex()}"
             try:

@@ -117,6 +117,9 @@ class RecordFile:
                 sizes = tuple(longest.get(str(dim), size) for dim, size in variable.sizes.items())
                 variable.encoding = {"chunksizes": sizes}
         dump(shaped, self._medium, unlimited=["robot"])
+        self._failure = self._medium.failure(self._path)
+        if self._failure is not None:
+            return
         self._file = h5py.File(self._medium, "r+")
         for name, variable in record.variables.items():
             if "robot" in variable.dims:
@@ -131,6 +134,7 @@ class RecordFile:
             self._file = None
         if self._medium is not None and self._failure is None:
             self._failure = self._medium.failure(self._path)
+            self._medium.trim()
 
 
 class _Medium:
@@ -143,12 +147,15 @@ class _Medium:
         self._error: OSError | None = None
 
     def failure(self, path: Path) -> OutputError | None:
-        """What failed, if anything; cuts off room that was not needed."""
-        with suppress(OSError):
-            os.ftruncate(self._handle, self._size)
+        """What failed, if anything."""
         if self._error is None:
             return None
         return OutputError(f"cannot be written ({self._error.strerror})", source=str(path))
+
+    def trim(self) -> None:
+        """Cut off room that was not needed."""
+        with suppress(OSError):
+            os.ftruncate(self._handle, self._size)
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
         self._at = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: self._size}[whence]

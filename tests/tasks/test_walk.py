@@ -5,7 +5,7 @@ import pytest
 
 from chilopod import load_robot
 from chilopod.errors import ParameterError
-from chilopod.tasks import foot_creep, walk
+from chilopod.tasks import ends, foot_creep, planned, walk
 from chilopod.tasks.walk import repeated
 from chilopod.trials import NONE, Disturbance, Trial, run
 
@@ -23,6 +23,25 @@ def test_seeds_count_up_and_walk_as_trials_do():
     told = done.as_json()
     assert (told["robot"], told["engine"], told["duration_s"], told["seeded"]) == (ROBOT.name, "planar", 3.0, True)
     assert [each["seed"] for each in told["walks"]] == [4, 5]
+
+
+def test_what_walks_came_to_needs_no_record(monkeypatch):
+    trials = planned(ROBOT, 2.0, seed=4, repeats=3)
+    came = []
+    found = ends(trials, told=lambda index, record: came.append((index, record.attrs["trial"])))
+    assert sorted(came) == [(index, trial.text) for index, trial in enumerate(trials)]
+    whole = walk(ROBOT, 2.0, seed=4, repeats=3)
+    assert found.as_json() == whole.as_json()
+    assert not found.straight
+    # Where memory holds a walk, but not all of them.
+    monkeypatch.setattr("chilopod.memory.available", lambda: 5.0 * trials[0].least_bytes)
+    with pytest.raises(ParameterError, match=r"record: would take 174 kB of memory, and 145 kB are free"):
+        walk(ROBOT, 2.0, seed=4, repeats=3)
+    monkeypatch.setattr("chilopod.trials.batch._MOST_BYTES", 1.0)
+    assert ends(trials).as_json() == whole.as_json()
+    monkeypatch.setattr("chilopod.memory.available", lambda: 1e4)
+    with pytest.raises(ParameterError, match="record: would take"):
+        ends(trials)
 
 
 def test_without_a_seed_it_stays_straight():

@@ -56,7 +56,7 @@ def new(
         robot = robot.with_twin_of(read_robot(_WHOLE, None))
     robot = robot.set_from_text([f"body.modules={modules}"] if modules is not None else [])
     robot = robot.set_from_text(overrides or []).with_(name=file.stem)
-    write_atomic(file, robot.to_toml(), replace=force)
+    write_atomic(file, robot.to_toml(), replace=force, folders=False)
     if as_json:
         print_json({"robot": robot.name, "file": str(file)})
     else:
@@ -142,7 +142,7 @@ def export(
 
     name, write = format_of(out.suffix)
     described = read_robot(robot, overrides)
-    write_atomic(out, write(described), replace=force)
+    write_atomic(out, write(described), replace=force, folders=False)
     if as_json:
         print_json({"robot": described.name, "file": str(out), "format": name})
     else:

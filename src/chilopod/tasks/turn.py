@@ -20,7 +20,7 @@ from chilopod.robot import Robot
 from chilopod.steering import Criteria, Strategy, Target, earliest_arrival, evaluate, steered
 from chilopod.tasks.radius_law import radius_law
 from chilopod.tasks.walk import check_repeats, foot_creep, repeated
-from chilopod.trials import NONE, Trial, run, straight, together
+from chilopod.trials import NONE, Trial, check_fits, run, straight, together
 
 Array = NDArray[np.float64]
 
@@ -163,6 +163,7 @@ def turn(
     if controller is not None:
         check_controller(controller)
     time = duration if duration is not None else _time_for(robot, target, traits.haste)
+    check_fits(repeated(Trial(robot, time, target=target, engine=engine), seed, repeats))
     law = None
     if isinstance(spring, str) and strategy.springs == K1:
 
