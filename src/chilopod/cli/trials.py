@@ -42,6 +42,7 @@ def listed(folder: FolderArg, as_json: JsonOption = False) -> None:
     Only the front of every file is read, ten thousand in some seconds; `chilopod trials check` reads all of it. Robots
     of one name that differ in their numbers are counted.
     """
+    from chilopod.memory import in_words
     from chilopod.trials.folder import contents, groups, kept
 
     there = contents(folder)
@@ -79,7 +80,7 @@ def listed(folder: FolderArg, as_json: JsonOption = False) -> None:
         )
         return
     _print_table(rows)
-    typer.echo(f"{_trials(len(trials))}, {_size(size)}")
+    typer.echo(f"{_trials(len(trials))}, {in_words(size)}")
     if others:
         typer.echo(f"{_trials(others)} of another version: this one does not find them (clean --old removes them)")
     for paths, words in (
@@ -93,6 +94,8 @@ def listed(folder: FolderArg, as_json: JsonOption = False) -> None:
 
 
 def _print_table(rows: Sequence[Group]) -> None:
+    from chilopod.memory import in_words
+
     table = [("robot", "engine", "walk", "target", "controller", "robots", "seeds", "trials", "size")]
     for row in rows:
         bearing, distance = row.target or (0.0, 0.0)
@@ -106,7 +109,7 @@ def _print_table(rows: Sequence[Group]) -> None:
                 str(row.robots),
                 _ranges(row.seeds) or "-",
                 str(row.count),
-                f"{_size(row.size)}{'' if row.found else ', another version'}",
+                f"{in_words(row.size)}{'' if row.found else ', another version'}",
             )
         )
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
@@ -180,10 +183,6 @@ def _ranges(numbers: Sequence[int]) -> str:
     """Numbers in order as ``1-4, 7``."""
     runs = [[each for _, each in run] for _, run in groupby(enumerate(numbers), lambda pair: pair[1] - pair[0])]
     return ", ".join(f"{run[0]}-{run[-1]}" if len(run) > 1 else str(run[0]) for run in runs)
-
-
-def _size(count: int) -> str:
-    return f"{count / 1e6:.1f} MB" if count < 1e9 else f"{count / 1e9:.2f} GB"
 
 
 def _trials(count: int) -> str:
