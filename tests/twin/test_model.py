@@ -243,5 +243,5 @@ def test_a_robot_without_a_twin_cannot_be_built():
 
 
 def test_a_robot_of_which_mujoco_warns_is_refused():
-    with pytest.raises(ParameterError, match="MuJoCo cannot build this robot .*singular"):
+    with pytest.raises(ParameterError, match=r"MuJoCo cannot build this robot .*singular"):
         TwinModel(PRESET.set_from_text(["body.length=1e9 m"]))
