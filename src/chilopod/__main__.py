@@ -8,12 +8,16 @@ import warnings
 def main() -> int:
     """Run the command line on the arguments of this process; its exit code is that of :func:`chilopod.cli.main`."""
     try:
-        from chilopod import process
-
-        process.answer_interrupts()
-    except KeyboardInterrupt:
+        return _run()
+    except KeyboardInterrupt:  # before the command line has begun
         print("error: interrupted", file=sys.stderr)
         return 130
+
+
+def _run() -> int:
+    from chilopod import process
+
+    process.answer_interrupts()
     stdout = process.hold_streams()
     # Figures go into files: which windows somebody prefers does not matter, nor whether there are such.
     os.environ["MPLBACKEND"] = "agg"
