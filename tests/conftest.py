@@ -1,6 +1,7 @@
 """Settings of all tests."""
 
 import os
+import runpy
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -9,10 +10,10 @@ from hypothesis import settings
 
 from chilopod.robot import Robot, load_robot
 
-# In CI the same examples every time, so that a submission is judged by its own changes; at a desk new ones each run.
-# No deadlines: how long an example takes is the machine's affair.
-settings.register_profile("desk", deadline=None)
-settings.register_profile("ci", derandomize=True, deadline=None)
+# In CI the same examples every time, so that a submission is judged by its own changes, and few, as more would be found
+# once; at a desk new ones each run. No deadlines: how long an example takes is the machine's affair.
+settings.register_profile("desk", max_examples=40, deadline=None)
+settings.register_profile("ci", max_examples=15, derandomize=True, deadline=None)
 settings.load_profile("ci" if os.environ.get("CI") else "desk")
 
 
@@ -35,7 +36,7 @@ def kept(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="session")
 def tiny(kept, tmp_path_factory) -> SimpleNamespace:
-    """The main job with every section, as small as it gets: its folder, what was found, and what failed.
+    """The main job with every section, as small as it gets: its folder, what was found, what failed, all text painted.
 
     Tests of one file run in one process, so all that need it are in one.
     """
@@ -45,9 +46,10 @@ def tiny(kept, tmp_path_factory) -> SimpleNamespace:
     from chilopod.report import Report
 
     context, folder = Context(size=Size.TINY, folder=kept), tmp_path_factory.mktemp("tiny")
-    with Report(SECTIONS, context, folder) as report:
+    watched = runpy.run_path(str(Path(__file__).parent / "report" / "texts.py"))["watched"]
+    with watched() as painted, Report(SECTIONS, context, folder) as report:
         found = reproduce(SECTIONS, context, told=lambda found, section: report.add(found, [section]))
-    return SimpleNamespace(folder=folder, found=found, failures=report.failures)
+    return SimpleNamespace(folder=folder, found=found, failures=report.failures, painted=painted)
 
 
 def pytest_collection_modifyitems(items) -> None:

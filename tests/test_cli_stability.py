@@ -167,7 +167,7 @@ _PATHS = st.one_of(
 )
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(parameter=_PATHS, low=_QUANTITIES, high=_QUANTITIES)
 @example(parameter="body.length", low="1e9 m", high="1e10 m")
 @example(parameter=K1, low="1e-12", high="1e9")

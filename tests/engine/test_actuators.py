@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
 
@@ -25,7 +25,6 @@ def told(actuators, time, first, within=0.0):
     actuators.command(time, Command(stiffness=stiffness, within=within), WALKING)
 
 
-@settings(max_examples=60, deadline=None)
 @given(
     st.lists(st.tuples(st.floats(0.01, 1.0), st.floats(0.2, 5.0), st.floats(0.0, 1.0)), min_size=1, max_size=4),
     st.floats(0.01, 0.5) | st.just(0.0),

@@ -51,7 +51,7 @@ def test_the_standard_error_is_that_of_repeated_series():
         factor = 1.0 + 0.05 * rng.standard_normal(data.bend.shape)
         return data.assign(bend=data.bend * factor, axis_radius=data.axis_radius / factor)
 
-    found = [radius_ratio(noisy(SPRINGS, 34.0), noisy(VARIANT_SPRINGS, 25.0), drawn=60) for _ in range(60)]
+    found = [radius_ratio(noisy(SPRINGS, 34.0), noisy(VARIANT_SPRINGS, 25.0), drawn=40) for _ in range(30)]
     for name in ("distance", "springs"):
         values = np.array([getattr(each, name) for each in found])
         errors = np.array([getattr(each, f"{name}_error") for each in found])

@@ -50,7 +50,6 @@ def test_the_peers_robot_is_the_preset():
         assert getattr(peer_model.PeerRobot(), name) == pytest.approx(value), name
 
 
-@settings(max_examples=40, deadline=None)
 @given(robots(st.integers(2, 8)), st.floats(0.0, 1.0), st.floats(0.05, 1.2))
 def test_it_is_the_derivative_of_the_nonlinear_flow(robot, start, duration):
     model = PlanarModel(robot)
@@ -85,7 +84,6 @@ def check_bound(robot, t0, t1):
 
 
 @finer
-@settings(max_examples=60, deadline=None)
 @given(robots(), st.floats(0.0, 1.0), st.one_of(st.floats(0.05, 1.5), st.just(1.0), log_floats(1e-15, 0.05)))
 @example(PRESET, 0.0, 0.5)
 @example(PRESET, 0.0, 1.0)
@@ -138,7 +136,6 @@ def test_the_reference_is_finer_than_what_it_judges():
     assert np.abs(coarse - fine).max() < 1e-4 * model.flow_with_error(model.orbit, 0.1, 0.7)[2]
 
 
-@settings(max_examples=40, deadline=None)
 @given(robots(), st.floats(-2.0, 2.0), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
 def test_flows_compose(robot, t0, first, second):
     model = PlanarModel(robot)

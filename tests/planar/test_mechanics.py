@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from planar_strategies import energy_rate, mid_interval, robots, state_of
 from scipy.integrate import solve_ivp
@@ -20,7 +20,6 @@ fractions = st.floats(0.0, 0.999)
 insides = st.floats(0.1, 0.9)
 
 
-@settings(max_examples=100, deadline=None)
 @given(robots(), st.integers(0, 1000), fractions, insides)
 def test_power_balances_and_friction_only_takes(robot, seed, fraction, inside):
     model = PlanarModel(robot)
@@ -59,7 +58,6 @@ def test_energy_is_that_of_moving_rods_and_bent_springs():
     assert (still.legs, still.floor, still.dampers) == pytest.approx((0.0, 0.0, 0.0), abs=1e-15)
 
 
-@settings(max_examples=100, deadline=None)
 @given(robots(), st.integers(0, 1000), fractions, insides)
 def test_seen_in_a_mirror_left_and_right_change_places(robot, seed, fraction, inside):
     # In the mirror the right legs lead by minus the side phase, and the left ones are a side phase late.
@@ -72,7 +70,6 @@ def test_seen_in_a_mirror_left_and_right_change_places(robot, seed, fraction, in
     np.testing.assert_allclose(there, here, rtol=0, atol=1e-10 * np.abs(here).max())
 
 
-@settings(max_examples=60, deadline=None)
 @given(robots(side_phase=st.just(math.pi)), st.integers(0, 1000), fractions, insides)
 def test_half_a_period_later_the_sides_have_changed_places(robot, seed, fraction, inside):
     model = PlanarModel(robot)
@@ -88,7 +85,6 @@ def test_half_a_period_later_the_sides_have_changed_places(robot, seed, fraction
     )
 
 
-@settings(max_examples=60, deadline=None)
 @given(robots(side_phase=st.just(0.0)), st.integers(0, 1000), fractions, insides)
 def test_legs_that_move_together_make_every_motion_a_mirror_image_of_another(robot, seed, fraction, inside):
     model = PlanarModel(robot)
@@ -108,7 +104,6 @@ def test_other_side_phases_have_no_symmetry_to_offer():
     assert model.spatial_symmetry is None
 
 
-@settings(max_examples=30, deadline=None)
 @given(robots(st.integers(2, 6)), st.integers(-4, 4), st.integers(-4, 4), st.integers(-4, 4))
 def test_other_units_of_length_mass_and_time_change_nothing_else(robot, a, b, c):
     length, mass, time = 2.0 ** (a / 2), 2.0 ** (b / 2), 2.0 ** (c / 2)

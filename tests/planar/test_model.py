@@ -4,7 +4,7 @@ import time
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from planar_strategies import robots, state_of
 
@@ -117,7 +117,6 @@ def test_the_model_is_a_periodic_system():
 # -- many robots at once
 
 
-@settings(max_examples=30, deadline=None)
 @given(robots(), st.lists(st.integers(-3, 3), min_size=1, max_size=5), st.floats(0.0, 1.0), st.floats(0.0, 1.2))
 def test_many_robots_at_once_are_each_alone(robot, powers, start, duration):
     # Alike in gait and size alone: springs, dampers, feet, length and mass differ by orders of magnitude.

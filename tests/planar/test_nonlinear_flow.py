@@ -6,7 +6,7 @@ import numba
 import numpy as np
 import pytest
 from free_bodies import FreeBodies
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from planar_strategies import mid_interval, nonlinear_flow, robots, state_of
 
@@ -66,7 +66,6 @@ def test_drift_is_that_of_the_free_bodies_wherever_they_start_and_composes(name)
     np.testing.assert_allclose(reduced, x, rtol=0, atol=1e-9)
 
 
-@settings(max_examples=30, deadline=None)
 @given(robots(st.integers(2, 8)), st.integers(0, 1000), st.floats(0.0, 1.0), st.floats(0.1, 1.2))
 def test_the_error_of_its_derivative_is_within_the_claimed_bound(robot, seed, start, duration):
     model = PlanarModel(robot)
@@ -88,7 +87,6 @@ def test_the_claimed_bound_follows_the_tolerance(tolerance):
     assert 0.0 < error <= bound < 1e4 * tolerance
 
 
-@settings(max_examples=25, deadline=None)
 @given(robots(st.integers(2, 8)), st.integers(0, 1000), st.floats(-1.0, 1.0), st.floats(0.0, 0.8), st.floats(0.0, 0.8))
 def test_flows_compose(robot, seed, start, first, second):
     model = PlanarModel(robot)
@@ -103,7 +101,6 @@ def test_flows_compose(robot, seed, start, first, second):
     assert np.abs(two @ one - whole).max() <= allowed * max(1.0, np.abs(two).max() * np.abs(one).max())
 
 
-@settings(max_examples=25, deadline=None)
 @given(robots(st.integers(2, 8)), st.integers(0, 1000), st.floats(0.0, 0.999), st.floats(0.3, 0.7))
 def test_its_slope_is_the_right_hand_side(robot, seed, fraction, inside):
     model = PlanarModel(robot)
@@ -121,7 +118,6 @@ def test_its_slope_is_the_right_hand_side(robot, seed, fraction, inside):
     np.testing.assert_allclose(extrapolated, slope, rtol=0, atol=1e-5 * np.abs(slope).max())
 
 
-@settings(max_examples=30, deadline=None)
 @given(robots())
 def test_the_straight_walk_stays_straight_for_every_gait(robot):
     model = PlanarModel(robot)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from free_bodies import FreeBodies
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from planar_strategies import energy_rate, mid_interval, robots, state_of
 
@@ -19,7 +19,6 @@ PRESET = load_robot("aoi2022-planar").override("springs.adjustable", True)
 BENT = np.array([0.3, 0.1, -0.2, 0.15, -0.05])
 
 
-@settings(max_examples=60, deadline=None)
 @given(robots(), st.integers(0, 1000), st.floats(0.0, 0.999), st.floats(0.1, 0.9))
 def test_power_balances_while_springs_change_and_joints_are_driven(robot, seed, fraction, inside):
     """To round-off, at one moment: what legs, floor, dampers, spring actuators and drives do is what energy gains."""

@@ -63,6 +63,13 @@ def test_every_section_is_computed_and_on_the_page(tiny):
     }
 
 
+def test_no_text_of_a_figure_is_cut_or_tiny(tiny):
+    """In both layouts of each, as a page shows them."""
+    assert tiny.painted.count > 2000
+    assert tiny.painted.cut == []
+    assert tiny.painted.tiny == []
+
+
 def test_nothing_of_the_page_is_missing_or_empty(tiny):
     html = (tiny.folder / "index.html").read_text(encoding="utf-8")
     page = PAGE(html)

@@ -1,27 +1,46 @@
-"""Whether all text of a figure is shown, and none is tiny."""
+"""Whether all text of figures is shown, and none is tiny: looked at while they are painted."""
 
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import pytest
 from matplotlib.text import Text
 
 from chilopod.report.kit import style
 
 
-def painted(figure, monkeypatch) -> list[Text]:
-    """The texts that are really painted: not those of hidden axes or of ticks outside the limits."""
-    found = []
-    draw = Text.draw
-    with monkeypatch.context() as patch:
-        patch.setattr(Text, "draw", lambda self, renderer: (found.append(self), draw(self, renderer)))
-        FigureCanvasAgg(figure).draw()
-    return [text for text in found if text.get_visible() and text.get_text().strip()]
+@dataclass
+class Painted:
+    """How many texts were painted, and those that are cut or tiny.
+
+    Texts of hidden axes and of ticks outside the limits are not painted.
+    """
+
+    count: int = 0
+    cut: list[str] = field(default_factory=list)
+    tiny: list[str] = field(default_factory=list)
+
+    def look_at(self, text: Text) -> None:
+        if not (text.get_visible() and text.get_text().strip()):
+            return
+        self.count += 1
+        box, extent = text.figure.bbox, text.get_window_extent()
+        if extent.x0 < -1 or extent.y0 < -1 or extent.x1 > box.x1 + 1 or extent.y1 > box.y1 + 1:
+            self.cut.append(text.get_text())
+        if text.get_fontsize() < style.SMALL:
+            self.tiny.append(text.get_text())
 
 
-def check(panel, narrow, monkeypatch) -> None:
-    """Draw a panel and look at its texts."""
-    with style.house_style():
-        figure = panel.draw(narrow)
-        for text in painted(figure, monkeypatch):
-            box, extent = figure.bbox, text.get_window_extent()
-            assert extent.x0 > -1 and extent.y0 > -1, (panel.name, text.get_text())  # noqa: PT018
-            assert extent.x1 < box.x1 + 1 and extent.y1 < box.y1 + 1, (panel.name, text.get_text())  # noqa: PT018
-            assert text.get_fontsize() >= style.SMALL, (panel.name, text.get_text())
+@contextmanager
+def watched() -> Iterator[Painted]:
+    """What is painted within it, in whatever thread."""
+    painted, draw = Painted(), Text.draw
+
+    def drawn(text: Text, renderer: object) -> None:
+        draw(text, renderer)
+        painted.look_at(text)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Text, "draw", drawn)
+        yield painted

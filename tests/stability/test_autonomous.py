@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from chilopod.errors import AnalysisError, ParameterError
@@ -56,7 +56,6 @@ def known(mu, leak, spin):
     return period, np.exp(-np.sort([2.0 * mu, leak]) * period)
 
 
-@settings(max_examples=40, deadline=None)
 @given(
     st.floats(0.2, 2.0),
     st.floats(-3.0, 3.0),

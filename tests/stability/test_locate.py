@@ -4,7 +4,7 @@ from math import pi
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
@@ -90,7 +90,6 @@ def test_a_crossing_at_a_point_of_the_first_grid(where):
     st.sampled_from([-30.0, -3.0, 3.0, 30.0]),
     st.floats(-3.0, -0.2),
 )
-@settings(max_examples=60, deadline=None)
 def test_none_missed(places, scale, other):
     roots = [0.031 * place for place in places]
     assert_found(locate(diagonal(with_roots(*roots, scale=scale), lambda mu: other), (0.0, 1.0)), roots)

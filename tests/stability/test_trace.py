@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numba
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from chilopod.stability.taylor.evaluation import evaluate, evaluate_jacobian
@@ -207,7 +207,6 @@ def test_objects_that_may_change_are_read_anew():
     assert values == [-2.0, -6.0]
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.data())
 def test_random_expressions(data):
     """Expression trees over two states, time and a parameter."""

@@ -4,7 +4,7 @@ from math import pi
 
 import numba
 import numpy as np
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
@@ -58,7 +58,6 @@ def rotating(draw):
 
 
 @given(rotating())
-@settings(max_examples=60, deadline=None)
 def test_constant_coefficients_seen_from_a_turning_frame(case):
     matrix, turns, exact = case
     n = len(matrix)
@@ -83,7 +82,6 @@ def test_constant_coefficients_seen_from_a_turning_frame(case):
 @example(  # the step control is deceived near a quarter of the period, at every tolerance alike
     [(-0.60546875, 0.0), (-0.60546875, 0.0), (-0.36926642652344077, -0.931640625)], 1, 4.91796875
 )
-@settings(max_examples=25, deadline=None)
 def test_commuting_coefficients(pairs, seed, period):
     """x' = V diag(c_i + d_i cos(2 pi t / T)) V^-1 x: the cosine leaves no trace in the multipliers."""
     mean, swing = np.array(pairs).T
@@ -104,7 +102,6 @@ def test_commuting_coefficients(pairs, seed, period):
 
 
 @given(rotating())
-@settings(max_examples=20, deadline=None)
 def test_exponents_of_a_turning_frame(case):
     matrix, turns, exact = case
     n = len(matrix)

@@ -1,17 +1,20 @@
-"""Figures show all of their text, in both layouts, for robots of many kinds."""
+"""Figures show all of their text, for robots of many kinds."""
+
+import runpy
+from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.text import Text
+from matplotlib.figure import Figure
 
 from chilopod import load_robot
 from chilopod.paper.straight.sections import EXPONENTS
 from chilopod.report.figures import exponents, schematic
-from chilopod.report.figures.drawings import DRAWINGS
 from chilopod.report.kit import style, words
 from chilopod.report.scene.outline import chain, turned_about_tail
 
+WATCHED = runpy.run_path(str(Path(__file__).parents[1] / "texts.py"))["watched"]
 PRESET = load_robot("aoi2022-planar")
 ROBOTS = {
     "preset": PRESET,
@@ -24,45 +27,22 @@ ROBOTS = {
 }
 
 
-def drawn_texts(drawn, monkeypatch) -> list[Text]:
-    """The texts that are really painted: not those of hidden axes or of ticks outside the limits."""
-    found = []
-    draw = Text.draw
-    with monkeypatch.context() as patch:
-        patch.setattr(Text, "draw", lambda self, renderer: (found.append(self), draw(self, renderer)))
-        FigureCanvasAgg(drawn).draw()
-    return [text for text in found if text.get_visible() and text.get_text().strip()]
-
-
-def clipped(drawn, monkeypatch) -> list[str]:
-    found = []
-    for text in drawn_texts(drawn, monkeypatch):
-        box, extent = drawn.bbox, text.get_window_extent()
-        if extent.x0 < -1 or extent.y0 < -1 or extent.x1 > box.x1 + 1 or extent.y1 > box.y1 + 1:
-            found.append(text.get_text())
-    return found
-
-
-def too_small(drawn, monkeypatch) -> list[str]:
-    return [text.get_text() for text in drawn_texts(drawn, monkeypatch) if text.get_fontsize() < style.SMALL]
-
-
-@pytest.mark.parametrize("narrow", [False, True])
-def test_no_text_is_cut_or_tiny(full, narrow, monkeypatch):
-    drawn = [each for each in DRAWINGS if each.section in full.values]
-    for panel in (panel for each in drawn for panel in each.panels(full[each.section], full)):
-        with style.house_style():
-            drawn = panel.draw(narrow)
-            assert clipped(drawn, monkeypatch) == [], panel.name
-            assert too_small(drawn, monkeypatch) == [], panel.name
-
-
-@pytest.mark.parametrize("narrow", [False, True])
 @pytest.mark.parametrize("kind", ROBOTS)
-def test_schematic_of_any_robot(kind, narrow, monkeypatch):
-    with style.house_style():
-        drawn = schematic.panel(ROBOTS[kind]).draw(narrow)
-        assert clipped(drawn, monkeypatch) == []
+def test_schematic_of_any_robot(kind):
+    """In the narrow layout, which has the least room; reports show whether text of the other is cut."""
+    with style.house_style(), WATCHED() as painted:
+        FigureCanvasAgg(schematic.panel(ROBOTS[kind]).draw(True)).draw()
+    assert painted.count > 10
+    assert painted.cut == []
+
+
+def test_text_that_is_cut_or_tiny_is_noticed():
+    drawn = Figure(figsize=(1, 1))
+    for text, x, size in (("all there", 0.1, 9.0), ("sticks out", 0.9, 10.0), ("tiny", 0.1, 8.0), (" ", 2.0, 1.0)):
+        drawn.text(x, 0.5, text, fontsize=size)
+    with WATCHED() as painted:
+        FigureCanvasAgg(drawn).draw()
+    assert (painted.count, painted.cut, painted.tiny) == (3, ["sticks out"], ["tiny"])
 
 
 def test_style_leaves_no_trace():

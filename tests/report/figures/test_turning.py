@@ -1,7 +1,4 @@
-"""Figures of the turning tasks: all text is shown, in both layouts, and what they say is what was found."""
-
-import runpy
-from pathlib import Path
+"""Figures of the turning tasks: what they say is what was found."""
 
 import numpy as np
 import pytest
@@ -12,19 +9,11 @@ from chilopod.paper.turning.study import turning
 from chilopod.report.figures.turning import panels
 from chilopod.report.kit import style, tables
 
-CHECK = runpy.run_path(str(Path(__file__).parents[1] / "texts.py"))["check"]
-
 
 @pytest.fixture(scope="module")
 def drawn(kept):
     found = turning(load_robot("aoi2022-planar"), kept, Size.TINY)
     return list(panels(found))
-
-
-@pytest.mark.parametrize("narrow", [False, True])
-def test_no_text_is_cut_or_tiny(drawn, narrow, monkeypatch):
-    for panel in drawn:
-        CHECK(panel, narrow, monkeypatch)
 
 
 def test_paths_are_drawn_with_equal_scales(drawn):

@@ -73,7 +73,7 @@ def _beside_robot(study: CurvedStudy) -> list[OfPlanar]:
         OfPlanar(statements.FLUCTUATION, f"{wider} at {softest:g} than at {stiffest:g} N*mm/deg"),
     ]
     for spring, statement in statements.RADII.items():
-        radius = axis_radius(study.branch, spring / printed.ONSET.value * exact)
+        radius = float(axis_radius(study.branch, spring / printed.ONSET.value * exact))
         words.append(OfPlanar(statement, f"{radius:.2f} m at the same share of its point"))
     return words
 

@@ -172,7 +172,7 @@ def onset_fits(trials: xr.Dataset, branch: xr.Dataset) -> xr.Dataset:
         part = curved.isel(spring=curved.spring.values >= low)
         here = bent(part)
         springs = np.broadcast_to(part.spring.values[:, None], here.shape)[here]
-        exact = [float(on_branch(branch, "mean_angle", float(spring))[0]) for spring in springs]
+        exact = on_branch(branch, "mean_angle", springs)[:, 0]
         found = fitted(part)
         without = square_root_fit(1.0 / springs, exact, resampled=0).critical
         rows.append((found.critical, found.error, found.bootstrap_error, without, found.trials))
@@ -202,7 +202,7 @@ def law_along_branch(branch: xr.Dataset, count: int = 25) -> xr.Dataset:
     found = []
     for low in softest:
         inverse = np.linspace(1.0 / exact, 1.0 / low, 21)[1:]
-        angles = [float(on_branch(branch, "mean_angle", float(1.0 / value))[0]) for value in inverse]
+        angles = on_branch(branch, "mean_angle", 1.0 / inverse)[:, 0]
         found.append((square_root_fit(inverse, angles, resampled=0).critical, angles[-1]))
     critical, angle = np.array(found).T
     return xr.Dataset(
@@ -264,12 +264,13 @@ def compared(variants: Mapping[str, xr.Dataset], branches: Mapping[str, xr.Datas
     )
 
 
-def axis_radius(branch: xr.Dataset, spring: float) -> float:
-    """The paper's radius (N-1) L / sum |theta| of the exact walk at a spring (N*mm/deg), m."""
+def axis_radius(branch: xr.Dataset, spring: float | Array) -> Array:
+    """The paper's radius (N-1) L / sum |theta| of the exact walk at a spring, or many (N*mm/deg), m."""
     # Along a branch only the bend changes, so that any of its points gives (N-1) L.
     length = float(branch.axis_radius[-1]) * float(np.abs(branch.mean_angle[-1]).sum())
-    total = float(np.abs(on_branch(branch, "mean_angle", spring)).sum())
-    return length / total if total > 0.0 else float("inf")
+    with np.errstate(divide="ignore"):
+        radius: Array = length / np.abs(on_branch(branch, "mean_angle", spring)).sum(axis=-1)
+    return radius
 
 
 def _branch(robot: Robot, trials: xr.Dataset) -> xr.Dataset:

@@ -156,8 +156,8 @@ def off_branch(robot: Robot, trials: xr.Dataset, branch: xr.Dataset) -> xr.DataA
     )
 
 
-def on_branch(branch: xr.Dataset, name: str, spring: float) -> Array:
-    """A quantity of the branch at a spring (N*mm/deg) between its points, beyond the stiffest of them.
+def on_branch(branch: xr.Dataset, name: str, spring: float | Array) -> Array:
+    """A quantity of the branch at a spring, or many (N*mm/deg), between its points, beyond the stiffest of them.
 
     That is the pitchfork, or the fold at which a subcritical branch turns back; either way angles change with the root
     of the distance from it, and from there on the walks are stable until something else happens.
@@ -165,7 +165,9 @@ def on_branch(branch: xr.Dataset, name: str, spring: float) -> Array:
     beyond = branch.isel(point=slice(int(branch.parameter.values.argmax()), None))
     stiffest = float(beyond.parameter.values[0])
     distance = np.sqrt(stiffest - beyond.parameter.values)
-    values: Array = PchipInterpolator(distance, beyond[name].values)(np.sqrt(max(stiffest - spring, 0.0)))
+    values: Array = PchipInterpolator(distance, beyond[name].values)(
+        np.sqrt(np.maximum(stiffest - np.asarray(spring), 0.0))
+    )
     return values
 
 

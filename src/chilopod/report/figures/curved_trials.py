@@ -37,7 +37,7 @@ def walks(study: CurvedStudy) -> Panel:
     if here.any():
         wider, softest, stiffest = fluctuation(trials)
     tighter = [
-        number(radius.value / axis_radius(study.branch, exact * at / printed.ONSET.value), 2)
+        number(radius.value / float(axis_radius(study.branch, exact * at / printed.ONSET.value)), 2)
         for at, radius in printed.RADII.items()
     ]
     return Panel(
@@ -128,7 +128,7 @@ def _along(study: CurvedStudy, softest: float) -> tuple[Array, Array]:
     """1/k1 and mean angles (deg) of the exact walks, denser towards the point, shape (points,) and (points, joint)."""
     inverse = 1.0 / study.trials.attrs["critical_k1"]
     grid = inverse + (1.0 / softest - inverse) * np.linspace(0.0, 1.0, 120) ** 3
-    return grid, np.rad2deg([on_branch(study.branch, "mean_angle", float(1.0 / value)) for value in grid])
+    return grid, np.rad2deg(on_branch(study.branch, "mean_angle", 1.0 / grid))
 
 
 def _draw_walks(study: CurvedStudy, narrow: bool) -> Figure:
@@ -152,7 +152,7 @@ def _draw_walks(study: CurvedStudy, narrow: bool) -> Figure:
     radius, error = means(trials.axis_radius.values, here)
     axes["D"].plot(
         exact * grid[1:],
-        [axis_radius(study.branch, float(1.0 / value)) for value in grid[1:]],
+        axis_radius(study.branch, 1.0 / grid[1:]),
         color=style.BLUE,
         label="model, exact",
     )

@@ -71,7 +71,7 @@ def _draw(study: CurvedStudy, narrow: bool) -> Figure:
         springs, radius, error = exact * data.ratio.values[here], radius[here], error[here]
         stiffest = float(branch.parameter.max())
         line = springs.min() + (stiffest - springs.min()) * (1.0 - np.linspace(1.0, 0.0, 80) ** 3)
-        exact_radius = [axis_radius(branch, float(value)) for value in line]
+        exact_radius = axis_radius(branch, line)
         for letter, scale in (("A", 1.0), ("B", exact)):
             axes[letter].plot(scale / line, exact_radius, color=color, lw=1.2)
             errorbars(axes[letter], scale / springs, radius, error, color, marker, typeset(str(name)))

@@ -108,9 +108,14 @@ def png(drawn: Figure, dpi: float = 160) -> bytes:
 
 
 def _saved(drawn: Figure, kind: str, metadata: dict[str, None], dpi: float = 100) -> bytes:
+    engine = drawn.get_layout_engine()
+    if engine is not None:
+        # Once laid out, it stays so: everything is in the same place in every format, and matplotlib draws once what it
+        # would else draw twice.
+        engine.execute(drawn)
+        drawn.set_layout_engine(None)
     stream = io.BytesIO()
     drawn.savefig(stream, format=kind, metadata=metadata, dpi=dpi)
-    drawn.set_layout_engine("none")  # once laid out, it stays so: in the next format everything is in the same place
     return stream.getvalue()
 
 
