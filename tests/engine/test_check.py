@@ -24,9 +24,8 @@ def docs():
     return names
 
 
-@pytest.mark.parametrize("seed", [0, 1])
-def test_the_planar_model_keeps_every_promise(seed):
-    assert len(check_engine(planar, ROBOT, seed)) == 12
+def test_the_planar_model_keeps_every_promise():
+    assert len(check_engine(planar, ROBOT, seed=1)) == 12
 
 
 @pytest.mark.parametrize("changes", [["body.modules=3"], ["gait.side_phase=0 deg"], ["springs.damping=0.05"]])
@@ -34,9 +33,9 @@ def test_the_planar_model_keeps_them_with_other_robots(changes):
     check_engine(planar, ROBOT.set_from_text(changes))
 
 
-@pytest.mark.parametrize("changes", [[], ["twin.control_interval=4 ms", "springs.stiffness[0]=10 N*mm/deg"]])
-def test_the_twin_keeps_every_promise(changes):
-    assert len(check_engine(twin, load_robot("aoi2022").set_from_text(changes))) == 12
+def test_the_twin_keeps_every_promise():
+    robot = load_robot("aoi2022").set_from_text(["twin.control_interval=4 ms", "springs.stiffness[0]=10 N*mm/deg"])
+    assert len(check_engine(twin, robot)) == 12
 
 
 def test_the_engine_in_the_docs_keeps_every_promise(docs):

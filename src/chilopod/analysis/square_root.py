@@ -132,6 +132,8 @@ def _lost(basis: Array, angles: Array) -> Array:
 
 def _bootstrap(x: Array, y: Array, grid: Array, basis: Array, resampled: int, seed: int) -> float:
     """Standard error of kc when trials are drawn anew at every spring."""
+    if resampled < 2:
+        return float("nan")
     rng = np.random.default_rng(seed)
     drawn = np.repeat(y[:, None], resampled, axis=1)
     repeated = False
@@ -143,7 +145,7 @@ def _bootstrap(x: Array, y: Array, grid: Array, basis: Array, resampled: int, se
             wider = np.sqrt(here.size / (here.size - 1.0))
             spread = wider * (y[here] - y[here].mean())
             drawn[here] = y[here].mean() + rng.choice(spread, size=(here.size, resampled))
-    if not repeated or resampled < 2:
+    if not repeated:
         return float("nan")
     lost = _lost(basis, drawn)
     best = np.clip(lost.argmin(axis=0), 1, len(grid) - 2)

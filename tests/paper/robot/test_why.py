@@ -23,7 +23,7 @@ def test_the_two_engines_vouch_for_each_other():
     """The planar limit of the twin loses the straight walk where the planar model does, within 3 %."""
     limit = planar_limit(ROBOT, PLANAR, FINER)
     assert foot_creep(limit).across == pytest.approx(PLANAR.ground.friction, rel=1e-3)
-    assert limit_point(ROBOT, PLANAR, duration=12.0) == pytest.approx(
+    assert limit_point(ROBOT, PLANAR, ablation.PLANAR, duration=12.0) == pytest.approx(
         pitchfork(PLANAR, normal_form=False).value, rel=0.03
     )
 
