@@ -341,7 +341,8 @@ def refused(capsys, *arguments):
     begin = time.monotonic()
     assert main(["walk", "aoi2022-planar", "--cluster", *arguments]) == 2
     assert time.monotonic() - begin < 15.0
-    (line,) = capsys.readouterr().err.splitlines()
+    *waiting, line = capsys.readouterr().err.splitlines()
+    assert all(each.startswith("walk: ") for each in waiting)  # for an answer
     return line
 
 
