@@ -50,7 +50,7 @@ def test_prints_a_line_each(capsys, monkeypatch):
 
 def test_without_opengl_and_encoder(capsys, monkeypatch):
     monkeypatch.setattr(gl, "find", lambda: gl.Found(None, missing="no OpenGL works", mend="plug one in"))
-    monkeypatch.setattr("chilopod.report.scene.film._ENCODER", "no-such-encoder")
+    monkeypatch.setattr("chilopod.report.scene.encoder.ENCODER", "no-such-encoder")
     found = findings(capsys)
     assert found["OpenGL"]["mend"] == "plug one in"
     assert "all but films and stills in 3-D works" in found["OpenGL"]["found"]
@@ -70,7 +70,7 @@ def test_without_font_and_cache(capsys, monkeypatch):
         raise OutputError("cannot be written", source="there")
 
     monkeypatch.setattr(matplotlib.font_manager, "findfont", missing)
-    monkeypatch.setattr("chilopod.output.prepare_folder", refused)
+    monkeypatch.setattr("chilopod.output.check_folder", refused)
     found = findings(capsys)
     assert "no DejaVu Sans" in found["fonts"]["found"]
     assert "there: cannot be written" in found["compile cache"]["found"]
@@ -91,7 +91,7 @@ def test_without_something_essential(capsys, monkeypatch, wish):
 
 def test_what_cannot_be_looked_at_is_said(capsys, monkeypatch):
     def broken():
-        raise ImportError("no\nthreads")
+        raise ImportError("no threads\nat all")
 
     monkeypatch.setattr("numba.get_num_threads", broken)
     found = findings(capsys)
@@ -100,3 +100,4 @@ def test_what_cannot_be_looked_at_is_said(capsys, monkeypatch):
     assert code == 0
     assert "? numba threads" in out
     assert "no threads" in out
+    assert "at all" not in out

@@ -1,6 +1,8 @@
-"""Results of one's own are never lost: `--out` replaces nothing without `--force`; and every JSON names its robot."""
+"""Results are never lost, one's own by `--out` without `--force` neither; and every JSON names its robot."""
 
+import errno
 import json
+import os
 
 import pytest
 
@@ -36,3 +38,56 @@ def test_what_is_forced_is_replaced_and_the_json_names_the_robot(capsys, tmp_pat
     assert main([*COMMANDS[name], "--out", str(tmp_path), "--force", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["robot"] == ROBOT
     assert (tmp_path / name).read_text(encoding="utf-8") != "old"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["walk", ROBOT, "--engine", "bogus", "--out", "a/b/c.nc", "--trials", "t"],
+        ["walk", ROBOT, "--rate", "0", "--out", "a/c.nc", "--trials", "t/u"],
+        ["walk", ROBOT, "--seed", "1", "--repeats", "1000", "--duration", "1e5 s", "--rate", "1e6", "--out", "a/c.nc"],
+        ["walk", ROBOT, "--out", "/dev/null", "--force", "--trials", "t"],
+        ["branch", ROBOT, "--resume", "nosuch", "--out", "new"],
+        ["branch", ROBOT, "--parameter", "nosuch", "--out", "new"],
+        ["turn", ROBOT, "--target", "45 deg, 1.3 m", "--k1", "0 N*mm/deg", "--out", "a/b", "--trials", "t"],
+        ["bifurcation", ROBOT, "--parameter", "nosuch", "--between", "1", "2", "--out", "a"],
+        ["stability", "nosuch", "--out", "a"],
+        ["identify", "twin", ROBOT, "--out", "a"],
+        ["reproduce", "--only", "nosuch", "--out", "a"],
+        ["robot", "new", "a/b.toml", "--modules", "0"],
+        ["robot", "export", ROBOT, "--out", "a/b.xml"],
+    ],
+)
+def test_what_is_refused_leaves_nothing(capsys, tmp_path, monkeypatch, arguments):
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("error: ")) == ("", 1)
+    assert err.splitlines()[-1].startswith("error: ")
+    assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["walk", ROBOT, "--duration", "1 s", "--out", "there/walks.nc"],
+        ["stability", ROBOT, "--out", "there"],
+    ],
+)
+def test_what_cannot_be_written_is_printed_all_the_same(capsys, tmp_path, monkeypatch, arguments):
+    real = os.replace
+
+    def full(source, target):
+        if ".chilopod-" in str(source):
+            raise OSError(errno.ENOSPC, "No space left on device")
+        real(source, target)  # of compiled code
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(os, "replace", full)
+    assert main([*arguments, "--json"]) == 2
+    out, err = capsys.readouterr()
+    assert json.loads(out)["robot"] == ROBOT
+    last = err.splitlines()[-1]
+    assert last.startswith("error: there/")
+    assert last.endswith("cannot be written (No space left on device); and no other place could be written")
+    assert os.listdir(tmp_path) == []

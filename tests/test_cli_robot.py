@@ -223,6 +223,17 @@ def test_faults_of_our_own_show_no_traceback_unless_asked(monkeypatch):
         run("--debug", "robot", "show", PRESET)
 
 
+def test_a_package_that_cannot_be_imported_is_named_with_what_the_environment_tells_it(monkeypatch, tmp_path):
+    (tmp_path / "broken_package.py").write_text("raise ValueError('no\\nmore of it')")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("BROKEN_PACKAGE_THREADS", "0")
+    monkeypatch.setattr("chilopod.robot.Robot.set_from_text", lambda *told: __import__("broken_package"))
+    code, out, err = run("robot", "show", PRESET)
+    assert (code, out) == (2, "")
+    assert err.startswith("error: broken_package cannot be imported: ValueError: no (without BROKEN_PACKAGE_THREADS")
+    assert err.count("\n") == 1
+
+
 def python(*arguments: str, **keywords) -> subprocess.CompletedProcess:
     return subprocess.run([sys.executable, *arguments], capture_output=True, timeout=60, check=False, **keywords)
 

@@ -102,6 +102,36 @@ def test_walk_refuses(capsys, arguments, words):
     assert all(word in message for word in words), message
 
 
+@pytest.mark.parametrize(
+    ("arguments", "start"),
+    [
+        (["walk", ROBOT, "--duration", "abc"], "--duration = 'abc': "),
+        (
+            ["walk", ROBOT, "--duration", "1e6 s"],
+            "--duration = '1e6 s': is out of range; allowed: more than 0, at most",
+        ),
+        (["walk", ROBOT, "--initial-joints", "2 kg"], "--initial-joints = '2 kg': "),
+        (["walk", ROBOT, "--initial-joints", "120 deg"], "--initial-joints = '120 deg': are bent too far"),
+        (["walk", ROBOT, "--set", "1"], "--set = '1': is not an override"),
+        (
+            ["walk", ROBOT, "--set", "springs.stiffness[ 0]=1"],
+            "springs.stiffness[ 0]: names no parameter; did you mean ",
+        ),
+        (["turn", ROBOT, "--target", "170 deg, 1 m"], "--target bearing = '170 deg': "),
+        (["turn", ROBOT, "--target", "0 deg, 1 m", "--k1", "-3"], "--k1 = '-3': must be positive"),
+        (["turn", ROBOT, "--target", "0 deg, 1 m", "--duration", "1e6 s"], "--duration = '1e6 s': is out of range"),
+        (["branch", ROBOT, "--between", "1 kg", "2 kg"], "--between springs.stiffness[0] = '1 kg': is a mass"),
+        (["branch", ROBOT, "--parameter", "k1"], "--parameter = 'k1': names no parameter"),
+        (["robot", "new", "x.toml", "--modules", "1"], "--modules = '1': "),
+        (["robot", "export", "aoi2022", "--out", "x.pdf"], "--out = 'x.pdf': "),
+        (["identify", "twin", ROBOT], "twin: this robot has none"),
+    ],
+)
+def test_options_are_named_as_they_are_typed(capsys, monkeypatch, tmp_path, arguments, start):
+    monkeypatch.chdir(tmp_path)
+    assert refused(capsys, *arguments).startswith(f"error: {start}")
+
+
 def test_turn_finds_a_spring_that_arrives(capsys, tmp_path):
     folder = tmp_path / "there"
     found = printed(capsys, "turn", ROBOT, "--target", "45 deg, 1.3 m", "--json", "--out", str(folder))

@@ -1,20 +1,47 @@
-"""Results are written whole or not at all."""
+"""Results are written whole or not at all, replace only what they may, and are never lost."""
 
+import errno
 import os
+import socket
+from pathlib import Path
 
 import pytest
 
 from chilopod.errors import OutputError
-from chilopod.output import prepare_folder, write_atomic
+from chilopod.output import check_files, check_folder, check_room, spool, write_all, write_atomic
 
 
-def test_writes_text_and_bytes(tmp_path):
+@pytest.fixture
+def full_disk(monkeypatch):
+    """Let nothing be written any more but in one folder."""
+
+    def fill(spared):
+        real = os.replace
+
+        def replace(source, target):
+            if Path(target).parent != spared:
+                raise OSError(errno.ENOSPC, "No space left on device")
+            real(source, target)
+
+        monkeypatch.setattr(os, "replace", replace)
+
+    return fill
+
+
+def test_writes_text_bytes_and_open_files(tmp_path):
     assert write_atomic(tmp_path / "a", "µ").read_text(encoding="utf-8") == "µ"
     assert write_atomic(tmp_path / "a", b"\xff").read_bytes() == b"\xff"
-    assert os.listdir(tmp_path) == ["a"]
+    with spool(tmp_path / "new" / "b") as file, open(tmp_path / "a", "rb") as other:
+        assert os.listdir(tmp_path) == ["a"]
+        file.write(b"spooled")
+        file.flush()
+        assert write_atomic(tmp_path / "new" / "b", file).read_bytes() == b"spooled"
+        assert write_atomic(tmp_path / "new" / "c", other).read_bytes() == b"\xff"
     plain = tmp_path / "plain"
     plain.touch()
-    assert (tmp_path / "a").stat().st_mode == plain.stat().st_mode
+    modes = {path.stat().st_mode for path in (plain, *(tmp_path / each for each in ("a", "new/b", "new/c")))}
+    assert len(modes) == 1
+    assert sorted(os.listdir(tmp_path / "new")) == ["b", "c"]
 
 
 def test_keeps_what_may_not_be_replaced(tmp_path):
@@ -24,25 +51,74 @@ def test_keeps_what_may_not_be_replaced(tmp_path):
     assert (tmp_path / "a").read_text() == "old"
 
 
+def test_only_regular_files_are_replaced(tmp_path):
+    (tmp_path / "a").write_text("old")
+    (tmp_path / "link").symlink_to("a")
+    (tmp_path / "dangling").symlink_to("nowhere")
+    os.mkfifo(tmp_path / "pipe")
+    os.mkdir(tmp_path / "folder")
+    listening = socket.socket(socket.AF_UNIX)
+    listening.bind(str(tmp_path / "socket"))
+    others = [tmp_path / each for each in ("link", "dangling", "pipe", "folder", "socket")]
+    for path in [*others, "/dev/null", "/dev/stdout"]:
+        before = os.lstat(path)
+        for write in (lambda path: write_atomic(path, "new"), lambda path: check_files([path], replace=True)):
+            with pytest.raises(OutputError, match=r"is no regular file|is a link|is a folder"):
+                write(path)
+        assert os.lstat(path).st_ino == before.st_ino
+    listening.close()
+    assert (tmp_path / "a").read_text() == "old"
+
+
 def test_leaves_nothing_behind_when_it_fails(tmp_path):
     write_atomic(tmp_path / "a", "old")
-    with pytest.raises(OutputError, match="surrogates"):
-        write_atomic(tmp_path / "a", "\ud800")
+    for path in (tmp_path / "a", tmp_path / "new" / "folder" / "a"):
+        with pytest.raises(OutputError, match="surrogates"):
+            write_atomic(path, "\ud800")
     assert os.listdir(tmp_path) == ["a"]
     assert (tmp_path / "a").read_text() == "old"
 
 
 def test_names_what_cannot_be_written(tmp_path):
     (tmp_path / "file").touch()
-    for path in (tmp_path, tmp_path / "no" / "file", tmp_path / "file" / "x", tmp_path / "a\0b"):
-        with pytest.raises(OutputError, match=str(tmp_path)):
-            write_atomic(path, "x")
+    for path in (tmp_path, tmp_path / "file" / "x", tmp_path / "a\0b", tmp_path / "new" / ("x" * 300)):
+        for write in (lambda path: write_atomic(path, "x"), lambda path: check_files([path])):
+            with pytest.raises(OutputError, match=str(tmp_path)):
+                write(path)
+    assert os.listdir(tmp_path) == ["file"]
 
 
-def test_prepares_folders(tmp_path):
-    assert prepare_folder(tmp_path / "a" / "b").is_dir()
-    assert os.listdir(tmp_path / "a" / "b") == []
+def test_folders_are_looked_at_and_not_made(tmp_path):
+    assert check_folder(tmp_path / "a" / "b") == tmp_path / "a" / "b"
     (tmp_path / "file").touch()
-    for path in (tmp_path / "file", tmp_path / "file" / "x", "/proc/nowhere"):
+    for path in (tmp_path / "file", tmp_path / "file" / "x", "/proc/nowhere", tmp_path / "new" / ("x" * 300) / "y"):
         with pytest.raises(OutputError, match="cannot be written"):
-            prepare_folder(path)
+            check_folder(path)
+    assert os.listdir(tmp_path) == ["file"]
+
+
+def test_what_cannot_be_written_where_it_should_go_is_kept_elsewhere(tmp_path, monkeypatch, full_disk):
+    there, here = tmp_path / "there", tmp_path / "here"
+    here.mkdir()
+    (here / "a.nc").write_text("mine")
+    monkeypatch.chdir(here)
+    write_atomic(there / "b.nc", "old")
+    # Somebody else's file appeared meanwhile.
+    with pytest.raises(OutputError, match=r"b\.nc: exists.*kept instead: .*there/b-2\.nc$"):
+        write_all([(there / "a.nc", "first"), (there / "b.nc", "new")], replace=False)
+    assert [(there / name).read_text() for name in ("a.nc", "b.nc", "b-2.nc")] == ["first", "old", "new"]
+    full_disk(here)
+    with pytest.raises(OutputError, match=r"a\.nc: cannot be written \(No space.*instead: .*/here/a-2\.nc, .*/b\.nc$"):
+        write_all([(there / "a.nc", "1"), (there / "b.nc", "2")])
+    assert [(here / name).read_text() for name in ("a.nc", "a-2.nc", "b.nc")] == ["mine", "1", "2"]
+    full_disk(None)
+    with pytest.raises(OutputError, match=r"a\.nc: cannot be written \(No space.*no other place could be written$"):
+        write_all([(there / "a.nc", "1")])
+    assert sorted(os.listdir(there)) == ["a.nc", "b-2.nc", "b.nc"]
+
+
+def test_what_does_not_fit_is_said_before_it_is_computed(tmp_path):
+    check_room(tmp_path / "new" / "a.nc", 1e3)
+    with pytest.raises(OutputError, match=r"a\.nc: takes 1e\+03 PB or more, and there is room for .* [kMGT]B$"):
+        check_room(tmp_path / "new" / "a.nc", 1e18)
+    assert not (tmp_path / "new").exists()

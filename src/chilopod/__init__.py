@@ -6,10 +6,10 @@
 """
 
 from importlib import import_module
-from typing import TYPE_CHECKING
 
 from chilopod.lazy import exports
 
+TYPE_CHECKING = False  # that of typing, which takes longer to load than all this
 if TYPE_CHECKING:
     from chilopod.errors import AnalysisError, ChilopodError, OutputError, ParameterError, RobotFileError, UnitError
     from chilopod.gait import Gait

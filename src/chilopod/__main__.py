@@ -1,8 +1,40 @@
-"""``python -m chilopod`` is the command ``chilopod``."""
+"""``chilopod`` and ``python -m chilopod``: the command line as a process of its own."""
 
+import os
 import sys
+import warnings
 
-from chilopod.cli import main
+
+def main() -> int:
+    """Run the command line on the arguments of this process; its exit code is that of :func:`chilopod.cli.main`."""
+    try:
+        return _run()
+    except KeyboardInterrupt:  # before the command line has begun
+        print("error: interrupted", file=sys.stderr)
+        return 130
+
+
+def _run() -> int:
+    from chilopod import process
+
+    process.answer_interrupts()
+    stdout = process.hold_streams()
+    # Figures go into files: which windows somebody prefers does not matter, nor whether there are such.
+    os.environ["MPLBACKEND"] = "agg"
+    # Numba would go on without a variable that it cannot read, after many lines about it.
+    warnings.filterwarnings("error", "Environment variable 'NUMBA_", RuntimeWarning)
+    from chilopod.cli import USAGE_ERROR
+    from chilopod.cli import main as run
+
+    code = run()
+    lost = process.unwritten(stdout)
+    if code != process.INTERRUPTED:
+        process.ignore_interrupts()
+    if code == 0 and lost:
+        print(f"error: stdout cannot be written ({lost})", file=sys.stderr)
+        return USAGE_ERROR
+    return code
+
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -9,10 +9,16 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import os
 from pathlib import Path
 from typing import Any
 
 import numba
+
+from chilopod.errors import ParameterError
+
+# Somebody else's wish to debug: as plain Python, what is compiled here would take hours, and its overloads do not run.
+numba.config.DISABLE_JIT = False
 
 
 def _drop_stale() -> None:
@@ -26,15 +32,30 @@ def _drop_stale() -> None:
                 index.unlink()
 
 
+def _check_cache() -> None:
+    # Numba looks for a folder where a function is to be kept: beside its source, and in the user's own.
+    try:
+        numba.njit(cache=True)(_drop_stale)
+    except RuntimeError:
+        raise ParameterError(
+            "there is no folder in which compiled code can be kept",
+            field="NUMBA_CACHE_DIR",
+            value=os.environ.get("NUMBA_CACHE_DIR"),
+            allowed="one that can be written, in the environment",
+        ) from None
+
+
 _drop_stale()
+_check_cache()
 
-njit = functools.partial(numba.njit, cache=True)
-"""``numba.njit`` with the compiled code kept on disk."""
+njit = functools.partial(numba.njit, cache=True, nogil=True)
+"""``numba.njit`` with the compiled code kept on disk; other threads go on while it runs, to show that it does and to
+answer Ctrl-C."""
 
-fused_njit = functools.partial(numba.njit, cache=True, fastmath={"contract"})
+fused_njit = functools.partial(numba.njit, cache=True, nogil=True, fastmath={"contract"})
 """The same where a product and a sum may become one instruction with one rounding: not for exact error terms."""
 
-parallel_njit = functools.partial(numba.njit, cache=True, parallel=True)
+parallel_njit = functools.partial(numba.njit, cache=True, nogil=True, parallel=True)
 """The same for loops over ``prange``: one robot an iteration, so the answer does not depend on the number of
 threads."""
 

@@ -116,6 +116,12 @@ def in_words(error: BaseException) -> str:
     return one_line(f"{type(error).__name__}: {said}" if said else type(error).__name__)
 
 
+def briefly(error: BaseException) -> str:
+    """As :func:`in_words`, but of what it says the first line only: others explain at length."""
+    words = str(error).strip().partition("\n")[0]
+    return one_line(f"{type(error).__name__}: {words}" if words else type(error).__name__)
+
+
 def _brief(value: object) -> str:
     try:
         text = repr(value)

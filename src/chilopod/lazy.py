@@ -9,7 +9,10 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from types import ModuleType
-from typing import Any
+
+TYPE_CHECKING = False  # that of typing, which takes longer to load than all this
+if TYPE_CHECKING:
+    from typing import Any
 
 
 class _Package(ModuleType):

@@ -1,37 +1,118 @@
-"""Writing results: a file is there whole or not at all, and a folder is known to be writable before work starts."""
+"""Writing results: a file is there whole or not at all, replaces nothing it should not, and no result is lost."""
 
 from __future__ import annotations
 
 import os
+import shutil
+import stat
 import tempfile
-import threading
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import IO
 
+from chilopod import memory
 from chilopod.errors import OutputError
 
-if TYPE_CHECKING:
-    import xarray as xr
+Content = str | bytes | bytearray | IO[bytes]
+"""Of a file: text, to be written as UTF-8, bytes, or what another open file holds, such as one of :func:`spool`."""
 
-_ASKING = threading.Lock()  # asking for the umask sets it for a moment, and threads write beside each other
+_COPIED = 2**24  # bytes at a time
+
+
+def check_files(paths: Iterable[Path], *, replace: bool = False) -> None:
+    """Make sure, before any work is done for them, that files can be written; nothing is made or changed.
+
+    Parameters
+    ----------
+    paths
+        The files.
+    replace
+        Whether those that are there already may be replaced.
+
+    Raises
+    ------
+    OutputError
+        If one of them is there and may not be replaced, is no regular file, or its folder cannot be written.
+    """
+    files = [Path(path) for path in paths]
+    for path in files:
+        try:
+            _check_names(path)
+            _check_replaceable(path, replace)
+        except (OSError, ValueError) as error:
+            raise _refused(path, error) from None
+    for folder in dict.fromkeys(path.parent for path in files):
+        check_folder(folder)
+
+
+def check_folder(path: str | Path) -> Path:
+    """Make sure that files can be written into a folder, or that it can be made; nothing is made.
+
+    Raises
+    ------
+    OutputError
+        If that is not so.
+    """
+    path = Path(path)
+    try:
+        _check_names(path)
+        with tempfile.TemporaryFile(dir=_nearest(path)):
+            pass
+    except (OSError, ValueError) as error:
+        raise _refused(path, error) from None
+    return path
+
+
+def check_room(path: Path, needed: float) -> None:
+    """Make sure, before any work is done for it, that there is room for a large file, or for more files in a folder.
+
+    Parameters
+    ----------
+    path
+        Of the file or the folder.
+    needed
+        Bytes, at least.
+
+    Raises
+    ------
+    OutputError
+        If there is not.
+    """
+    try:
+        free = float(shutil.disk_usage(_nearest(path)).free)
+    except (OSError, ValueError) as error:
+        raise _refused(path, error) from None
+    if needed > free:
+        problem = f"takes {memory.in_words(needed)} or more, and there is room for {memory.in_words(free)}"
+        raise OutputError(problem, source=str(path))
 
 
 def write_atomic(
-    path: str | Path, content: str | bytes | bytearray, *, replace: bool = True, durable: bool = False
+    path: str | Path,
+    content: Content,
+    *,
+    replace: bool = True,
+    durable: bool = False,
+    folders: bool = True,
+    temporary: str = ".chilopod-",
 ) -> Path:
     """Write a file so that it never exists half-written.
 
     Parameters
     ----------
     path
-        Where to; its folder must exist.
+        Where to.
     content
-        Text is written as UTF-8.
+        Of the file.
     replace
-        Whether a file that is already there may be replaced.
+        Whether a file that is already there may be replaced; what is no regular file never is.
     durable
         Whether it is to outlast a power failure; :func:`sync_folder` makes its name do so.
+    folders
+        Whether its folder is made where there is none.
+    temporary
+        How its name begins until it is whole; such a file stays where a process is killed.
 
     Returns
     -------
@@ -45,29 +126,88 @@ def write_atomic(
     """
     path = Path(path)
     try:
-        if path.is_dir():
-            raise OutputError("is a folder, not a file", source=str(path))
-        if not replace and path.exists():
-            raise _taken(path)
-        # In the same folder, because a rename is atomic only within one file system.
-        handle, temporary = tempfile.mkstemp(prefix=".chilopod-", dir=path.parent)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(content.encode() if isinstance(content, str) else content)
-                if durable:
-                    file.flush()
-                    os.fsync(file.fileno())
-            # mkstemp makes files private; what users write follows their umask.
-            os.chmod(temporary, 0o666 & ~_umask())
-            os.replace(temporary, path)
-        except BaseException:
-            Path(temporary).unlink(missing_ok=True)
-            raise
-    except OutputError:
-        raise
+        _check_replaceable(path, replace)
+        with made_folder(path.parent) if folders else nullcontext():
+            # In the same folder, because a rename is atomic only within one file system.
+            unfinished = path.parent / f"{temporary}{os.urandom(8).hex()}"
+            try:
+                _fill(unfinished, content, durable)
+                os.replace(unfinished, path)
+            except BaseException:
+                unfinished.unlink(missing_ok=True)
+                raise
     except (OSError, ValueError) as error:
         raise _refused(path, error) from None
     return path
+
+
+def write_all(files: Iterable[tuple[Path, Content]], *, replace: bool = True) -> list[Path]:
+    """Write the files of a result; what cannot be written where it should go is kept elsewhere.
+
+    Elsewhere is the first place that takes it: the same folder under another name, the one above, the current folder,
+    the home folder, the folder for temporary files.
+
+    Parameters
+    ----------
+    files
+        Where to, and what. They are written one after the other, as the iterable gives them.
+    replace
+        Whether files that are already there may be replaced.
+
+    Returns
+    -------
+    The files.
+
+    Raises
+    ------
+    OutputError
+        If a file could not be written where it should go; it says where it is kept.
+    """
+    written: list[Path] = []
+    kept: list[Path] = []
+    failure: OutputError | None = None
+    for path, content in files:
+        try:
+            written.append(write_atomic(path, content, replace=replace))
+        except OutputError as error:
+            failure = failure or error
+            kept += _kept(path, content)
+    if failure is None:
+        return written
+    where = f"kept instead: {', '.join(map(str, kept))}" if kept else "and no other place could be written"
+    raise OutputError(f"{failure.problem}; {where}", source=failure.source)
+
+
+def spool(path: Path, size: int = 0) -> IO[bytes]:
+    """A file for a large result that is still being computed, which vanishes with this process unless
+    :func:`write_atomic` gives it a name.
+
+    Parameters
+    ----------
+    path
+        Where the result will go: the file is on the same disk, or where else :func:`write_all` would keep it.
+    size
+        Bytes that are set aside for it.
+
+    Raises
+    ------
+    OutputError
+        If there is no room for it.
+    """
+    failure: OutputError | None = None
+    for folder in _folders(path):
+        file = None
+        try:
+            file = _nameless(_nearest(Path(folder())))
+            if size and hasattr(os, "posix_fallocate"):
+                os.posix_fallocate(file.fileno(), 0, size)
+            return file
+        except (OSError, ValueError, RuntimeError) as error:
+            if file is not None:
+                file.close()
+            failure = failure or _refused(path, error)
+    assert failure is not None
+    raise failure
 
 
 def sync_folder(path: Path) -> None:
@@ -82,72 +222,118 @@ def sync_folder(path: Path) -> None:
         os.close(handle)
 
 
-def free_path(path: str | Path, force: bool = False) -> Path:
-    """Make sure, before any work is done for it, that a file can be written; its folder is created.
-
-    Raises
-    ------
-    OutputError
-        If the file exists and ``force`` is not given, or the folder cannot be written.
-    """
-    path = Path(path)
-    if path.is_dir():
-        raise OutputError("is a folder, not a file", source=str(path))
-    if path.exists() and not force:
-        raise _taken(path)
-    prepare_folder(path.parent)
-    return path
-
-
-def prepare_folder(path: str | Path) -> Path:
-    """Create a folder for results where there is none and make sure files can be written into it.
-
-    Raises
-    ------
-    OutputError
-        If that is not so.
-    """
-    path = Path(path)
+@contextmanager
+def made_folder(path: Path) -> Iterator[None]:
+    """See to it that a folder is there, after a power failure too; what was made for it goes again if the block fails
+    and nothing is in it."""
+    made = [each for each in (path, *path.parents) if not _is_there(each)]
     try:
         path.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=path):
-            pass
-    except (OSError, ValueError) as error:
-        raise _refused(path, error) from None
-    return path
+        for each in made:
+            with suppress(OSError):  # not everybody may look into what is above
+                sync_folder(each.parent)
+        yield
+    except BaseException:
+        for each in made:
+            with suppress(OSError):
+                each.rmdir()
+        raise
 
 
-def storable(data: xr.Dataset) -> xr.Dataset:
-    """The dataset with names that files can hold.
-
-    A slash separates groups in netCDF; it becomes " per " and the name as it was stays as ``long_name``.
-    """
-    names = {str(name): str(name).replace("/", " per ") for name in data.variables if "/" in str(name)}
-    renamed = data.rename(names)
-    for name, new in names.items():
-        renamed[new].attrs["long_name"] = name
-    return renamed
-
-
-def netcdf(data: xr.Dataset) -> bytes:
-    """The bytes of a netCDF-4 file."""
-    with tempfile.TemporaryDirectory(prefix="chilopod-") as folder:
-        path = Path(folder) / "data.nc"
-        storable(data).to_netcdf(path, engine="h5netcdf")
-        return path.read_bytes()
+def _check_replaceable(path: Path, replace: bool) -> None:
+    try:
+        mode = os.lstat(path).st_mode
+    except FileNotFoundError:
+        return
+    if stat.S_ISDIR(mode):
+        raise OutputError("is a folder, not a file", source=str(path))
+    if not stat.S_ISREG(mode):
+        what = "a link, no regular file," if stat.S_ISLNK(mode) else "no regular file"
+        raise OutputError(f"is {what} and is not replaced, even with --force", source=str(path))
+    if not replace:
+        raise OutputError("exists and is only replaced with --force", source=str(path))
 
 
-def _taken(path: Path) -> OutputError:
-    return OutputError("exists and is only replaced with --force", source=str(path))
+def _check_names(path: Path) -> None:
+    """Refuse names that are too long, which is found only where their folder is there."""
+    here = _nearest(path)
+    for part in path.parts[len(here.parts) :]:
+        _is_there(here / part)
 
 
-def _refused(path: Path, error: OSError | ValueError) -> OutputError:
+def _is_there(path: Path) -> bool:
+    try:
+        os.lstat(path)
+    except FileNotFoundError:
+        return False
+    return True
+
+
+def _nearest(folder: Path) -> Path:
+    """The folder, or the nearest above it that is there."""
+    return next((each for each in (folder, *folder.parents) if _is_there(each)), folder)
+
+
+def _fill(path: Path, content: Content, durable: bool) -> None:
+    """Make a new file of this content."""
+    named = not isinstance(content, str | bytes | bytearray) and _named(content, path)
+    with open(path, "r+b" if named else "xb") as file:
+        if isinstance(content, str | bytes | bytearray):
+            file.write(content.encode() if isinstance(content, str) else content)
+        elif not named:
+            content.seek(0)
+            shutil.copyfileobj(content, file, _COPIED)
+        if durable:
+            file.flush()
+            os.fsync(file.fileno())
+
+
+def _named(content: IO[bytes], path: Path) -> bool:
+    """Give an open file without a name one, where the system can do that."""
+    if not hasattr(os, "O_TMPFILE"):
+        return False
+    handle = os.open(path.parent, os.O_RDONLY)
+    try:
+        # With a folder that it does not need, the link is that to which the source points.
+        os.link(f"/proc/self/fd/{content.fileno()}", path, src_dir_fd=handle)
+    except OSError:
+        return False
+    finally:
+        os.close(handle)
+    return True
+
+
+def _folders(path: Path) -> tuple[Callable[[], Path | str], ...]:
+    """Where a result may go; asking may fail, with RuntimeError if nobody knows where home is."""
+    return path.parent.resolve, path.parent.parent.resolve, Path.cwd, Path.home, tempfile.gettempdir
+
+
+def _nameless(folder: Path) -> IO[bytes]:
+    if hasattr(os, "O_TMPFILE"):
+        with suppress(OSError):  # some file systems cannot
+            return os.fdopen(os.open(folder, os.O_TMPFILE | os.O_RDWR, 0o666), "w+b")
+    return tempfile.TemporaryFile(dir=folder)
+
+
+def _kept(path: Path, content: Content) -> list[Path]:
+    """Where else a file could be written; nothing if nowhere."""
+    for folder in _folders(path):
+        with suppress(OSError, RuntimeError):
+            return [write_atomic(_free(Path(folder()) / path.name), content, replace=False)]
+    return []
+
+
+def _free(path: Path) -> Path:
+    """The path, or one like it with a number, at which there is nothing."""
+    free, number = path, 1
+    while _is_there(free):
+        number += 1
+        free = path.with_stem(f"{path.stem}-{number}")
+    return free
+
+
+def _refused(path: Path, error: Exception) -> OutputError:
+    if isinstance(error, OutputError):
+        return error
     reason = error.strerror if isinstance(error, OSError) else str(error)
     return OutputError(f"cannot be written ({reason or error})", source=str(path))
-
-
-def _umask() -> int:
-    with _ASKING:
-        mask = os.umask(0)
-        os.umask(mask)
-    return mask

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from chilopod import memory
 from chilopod.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -47,15 +48,21 @@ class Recording:
     def __post_init__(self) -> None:
         if not isinstance(self.rate, int | float):
             raise ParameterError("is no number", field="rate", value=self.rate, allowed="samples per second")
-        in_range("rate", self.rate, 1e6)
+        in_range("rate", self.rate, 1e6, "Hz")
 
     def samples(self, until: float) -> Array:
         """Times of all samples up to a time, s."""
         return np.arange(int(np.floor(until * self.rate * (1.0 + 1e-12))) + 1) / self.rate
 
+    def least_bytes(self, modules: int, until: float) -> float:
+        """What a robot's record up to a time, s, takes in every engine, at least."""
+        # Place, heading and their rates; joints and theirs; leg yaw; forces along the floor.
+        numbers = 6 + 2 * (modules - 1) + 2 + (4 * modules if self.forces else 0)
+        return 8.0 * numbers * (until * self.rate + 1.0)
 
-def in_range(name: str, value: float, most: float) -> None:
-    """Refuse what is not positive or beyond all reason.
+
+def in_range(name: str, value: float, most: float, unit: str = "") -> None:
+    """Refuse what is not positive or beyond all reason, both in this unit.
 
     Raises
     ------
@@ -63,7 +70,13 @@ def in_range(name: str, value: float, most: float) -> None:
         Naming the field.
     """
     if not 0.0 < value <= most:
-        raise ParameterError("is out of range", field=name, value=value, allowed=f"more than 0, at most {most:g}")
+        high = f"{most:g} {unit}".strip()
+        raise ParameterError(
+            "is out of range",
+            field=name,
+            value=f"{value:g} {unit}" if unit else value,
+            allowed=f"more than 0, at most {high}",
+        )
 
 
 def check_size(record: Recording | None, until: float, numbers: int) -> None:
@@ -77,6 +90,27 @@ def check_size(record: Recording | None, until: float, numbers: int) -> None:
     if record is not None and (until * record.rate + 1.0) * numbers > MOST_NUMBERS:
         raise ParameterError(
             "the record would be too large", field="rate", value=record.rate, allowed="fewer robots, samples or seconds"
+        )
+
+
+def check_memory(needed: float) -> None:
+    """Refuse records that memory cannot hold.
+
+    Parameters
+    ----------
+    needed
+        Bytes.
+
+    Raises
+    ------
+    ParameterError
+        If there is not so much.
+    """
+    if needed > memory.available():
+        raise ParameterError(
+            f"would take {memory.in_words(needed)} of memory, and {memory.in_words(memory.available())} are free",
+            field="record",
+            allowed="fewer walks, samples or seconds",
         )
 
 

@@ -1,5 +1,7 @@
 """Curved walks of the preset: the branch beyond the pitchfork, against long simulations and known symmetries."""
 
+import os
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -8,6 +10,7 @@ from chilopod import stability
 from chilopod.analysis.branch import as_json, curved_walks, read_walks, resumed
 from chilopod.analysis.parameters import K1, stiffness
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.netcdf import netcdf, sealed
 from chilopod.planar import PlanarModel
 from chilopod.planar.along import walk_means
 from chilopod.report import write_branch
@@ -137,11 +140,30 @@ def test_only_its_own_branch_is_resumed(tmp_path):
     ):
         with pytest.raises(ParameterError, match=match):
             resumed(data, robot, parameter, side=side)
-    (tmp_path / "text.nc").write_text("no netCDF")
-    xr.Dataset({"a": 1}).to_netcdf(tmp_path / "other.nc", engine="h5netcdf")
-    for name, match in (("text.nc", "can be read"), ("none.nc", "can be read"), ("other.nc", "lacks parameter_si")):
-        with pytest.raises(ParameterError, match=match):
-            read_walks(tmp_path / name)
+
+
+def test_a_damaged_or_edited_file_is_refused(tmp_path):
+    data = curved_walks(ROBOT, K1, (stiffness(7.8), stiffness(20.0)), points=2)
+    write_branch(data, tmp_path)
+    path = tmp_path / "branch.nc"
+    whole = path.read_bytes()
+    rng = np.random.default_rng(1)
+    damaged = [whole[:length] for length in (0, 10, 4096, len(whole) - 1)]
+    for place, flip in zip(rng.integers(len(whole), size=100), rng.integers(1, 256, size=100), strict=True):
+        damaged.append(whole[:place] + bytes([whole[place] ^ flip]) + whole[place + 1 :])
+    data.to_netcdf(tmp_path / "edited.nc", engine="h5netcdf")
+    for content in [*damaged, (tmp_path / "edited.nc").read_bytes()]:
+        path.write_bytes(content)
+        with pytest.raises(ParameterError, match="is damaged or was edited"):
+            read_walks(path)
+    path.write_bytes(sealed(netcdf(data.assign_attrs(version=0))))
+    with pytest.raises(ParameterError, match="another version"):
+        read_walks(path)
+    path.unlink()
+    for make in (lambda path: None, os.mkfifo):
+        make(path)
+        with pytest.raises(ParameterError, match="cannot be read"):
+            read_walks(path)
 
 
 def test_no_pitchfork_is_said():

@@ -5,7 +5,7 @@ import pytest
 
 from chilopod import load_robot
 from chilopod.errors import ParameterError
-from chilopod.tasks import foot_creep, walk
+from chilopod.tasks import ends, foot_creep, planned, walk
 from chilopod.tasks.walk import repeated
 from chilopod.trials import NONE, Disturbance, Trial, run
 
@@ -25,6 +25,25 @@ def test_seeds_count_up_and_walk_as_trials_do():
     assert [each["seed"] for each in told["walks"]] == [4, 5]
 
 
+def test_what_walks_came_to_needs_no_record(monkeypatch):
+    trials = planned(ROBOT, 2.0, seed=4, repeats=3)
+    came = []
+    found = ends(trials, told=lambda index, record: came.append((index, record.attrs["trial"])))
+    assert sorted(came) == [(index, trial.text) for index, trial in enumerate(trials)]
+    whole = walk(ROBOT, 2.0, seed=4, repeats=3)
+    assert found.as_json() == whole.as_json()
+    assert not found.straight
+    # Where memory holds a walk, but not all of them.
+    monkeypatch.setattr("chilopod.memory.available", lambda: 5.0 * trials[0].least_bytes)
+    with pytest.raises(ParameterError, match=r"record: would take 174 kB of memory, and 145 kB are free"):
+        walk(ROBOT, 2.0, seed=4, repeats=3)
+    monkeypatch.setattr("chilopod.trials.batch._MOST_BYTES", 1.0)
+    assert ends(trials).as_json() == whole.as_json()
+    monkeypatch.setattr("chilopod.memory.available", lambda: 1e4)
+    with pytest.raises(ParameterError, match="record: would take"):
+        ends(trials)
+
+
 def test_without_a_seed_it_stays_straight():
     done = walk(ROBOT, 3.0)
     assert done.straight
@@ -40,6 +59,11 @@ def test_disturbances_only_with_a_seed():
 
 def test_feet_of_the_twin_creep():
     assert foot_creep(load_robot("aoi2022"), "twin") > 1000.0
+
+
+def test_a_twin_that_cannot_stand_has_no_creep():
+    limp = load_robot("aoi2022").set_from_text(["twin.servo_stiffness=1e-12 N*m/rad"])
+    assert foot_creep(limp, "twin") is None
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,8 @@
 """A folder of trials: what is read back is what was asked, whatever has happened to the files."""
 
 import dataclasses
+import errno
+import hashlib
 import os
 import shutil
 
@@ -12,6 +14,7 @@ from chilopod import load_robot
 from chilopod.errors import OutputError
 from chilopod.steering import LegYawController, Target
 from chilopod.trials import Store, Trial, run
+from chilopod.trials.trial import RECORD_VERSION
 
 ROBOT, WHOLE = load_robot("aoi2022-planar"), load_robot("aoi2022")
 BASE = Trial(ROBOT, 1.0, 3, target=Target(0.7, 1.3), controller=LegYawController(), rate=20.0, forces=True)
@@ -151,6 +154,7 @@ def test_nothing_that_was_aside_is_lost(store, record):
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes")
 def test_what_is_no_file_does_not_keep_anybody_waiting(store, record):
     path = store.folder / BASE.file_name
+    path.parent.mkdir()
     os.mkfifo(path)
     assert store.read(BASE) is None
     path.mkdir()
@@ -160,10 +164,51 @@ def test_what_is_no_file_does_not_keep_anybody_waiting(store, record):
     assert all("cannot be read" in line for line in store.told)
 
 
+def test_a_link_is_followed_and_itself_moved_aside(store, record, tmp_path):
+    path = kept(store, record)
+    elsewhere = path.rename(tmp_path / "elsewhere.nc")
+    path.symlink_to(elsewhere)
+    assert same(store.read(BASE), record)
+    elsewhere.write_bytes(b"mine")
+    assert store.read(BASE) is None
+    assert elsewhere.read_bytes() == b"mine"
+    path.symlink_to(tmp_path / "nowhere")
+    assert store.read(BASE) is None
+    assert "leads nowhere" in store.told[-1]
+    assert names(store) == [f"{path.name}.aside", f"{path.name}.aside2"]
+
+
+def test_of_a_huge_file_only_the_front_is_read(store, record):
+    path = kept(store, record)
+    for _ in range(2):  # first one that begins as it should, then one of nothing
+        os.truncate(path, 2**40)
+        assert store.read(BASE) is None
+        path.touch()
+    assert all("damaged" in line for line in store.told)
+    assert len(store.told) == 2
+
+
+def test_what_this_process_cannot_read_for_a_moment_stays(store, record, monkeypatch):
+    path = kept(store, record)
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "open", lambda *_: (_ for _ in ()).throw(OSError(errno.EMFILE, "too many open files")))
+        with pytest.raises(OutputError, match="too many open files"):
+            store.read(BASE)
+    assert names(store) == [path.name]
+    assert same(store.read(BASE), record)
+
+
+def test_what_a_record_is_made_of_belongs_to_its_version(record):
+    """Change this together with RECORD_VERSION: files of the same version are taken for what would be walked now."""
+    variables = sorted((name, each.dims, str(each.dtype), each.attrs) for name, each in record.variables.items())
+    digest = hashlib.sha256(repr((variables, sorted(record.attrs))).encode()).hexdigest()[:12]
+    assert (RECORD_VERSION, digest) == (5, "6145ef3ab304")
+
+
 def test_a_record_of_another_trial_is_not_written(store, record):
     with pytest.raises(OutputError, match="another trial"):
         store.write(dataclasses.replace(BASE, seed=4), record)
-    assert names(store) == []
+    assert not store.folder.exists()
 
 
 def test_by_default_one_line_goes_to_the_log(tmp_path, record, caplog):

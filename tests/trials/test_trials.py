@@ -82,7 +82,7 @@ def test_an_engine_that_is_not_there_or_does_not_know_the_robot_is_refused():
         Trial(ROBOT, 1.0, engine="twin")
     with pytest.raises(ParameterError, match="poses"):
         Trial(ROBOT, 1.0, poses=True)
-    with pytest.raises(ParameterError, match="duration = 1000000000"):
+    with pytest.raises(ParameterError, match=r"duration = .1e\+09 s"):
         Trial(ROBOT, 1e9)
 
 

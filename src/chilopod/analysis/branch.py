@@ -5,6 +5,7 @@ The paper's linear analysis ends at the pitchfork; this follows the nonlinear mo
 
 from __future__ import annotations
 
+import io
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from chilopod import stability, units
 from chilopod.analysis.straight_walk import WalkBifurcation, bifurcations, family
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.netcdf import unsealed
 from chilopod.planar.along import FollowedModel, walk_means
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
@@ -27,6 +29,9 @@ Array = NDArray[np.float64]
 
 TOLERANCE = 1e-10
 """Of the nonlinear flow along a branch; orbits are then good to about 1e-10 (the tests hold 1e-9 against 1e-14)."""
+
+VERSION = 1
+"""Of what a branch is kept as: goes up whenever its data mean something else, or would go on in another way."""
 
 GRAVITY = 9.80665
 """m/s^2, standard."""
@@ -97,7 +102,10 @@ def curved_walks(
     make = _followed(robot, parameter)
     # The positive side of the mode is that of positive joint angles.
     angles = fork.point.mode.real[3 : robot.body.modules + 2]
-    along, against = switch(make, fork.point)
+    starts = switch(make, fork.point)
+    if len(starts) != 2:
+        raise AnalysisError(f"{len(starts)} branches leave the straight walk there, not two", field=parameter)
+    along, against = starts
     start = along if (side > 0) is bool(angles.sum() >= 0) else against
     branch = follow(
         make, start, between, points=points, longest=longest, closely=False,
@@ -191,17 +199,12 @@ def read_walks(path: str | Path) -> xr.Dataset:
     Raises
     ------
     ParameterError
-        If there is no such file, or it holds no branch that can be followed on.
+        If there is no such file, it is not as it was written, or another version wrote it.
     """
     path = Path(path)
-    try:
-        with xr.open_dataset(path, engine="h5netcdf") as stored:
-            data = stored.load()
-    except (OSError, ValueError):
-        raise ParameterError("is no netCDF file that can be read", source=str(path)) from None
-    missing = [name for name in _STORED if name not in data.variables and name not in data.attrs]
-    if missing:
-        raise ParameterError(f"holds no branch of curved walks: it lacks {missing[0]}", source=str(path))
+    data = xr.load_dataset(io.BytesIO(unsealed(path)), engine="h5netcdf")
+    if data.attrs.get("version") != VERSION:
+        raise ParameterError("holds no branch of curved walks, or that of another version", source=str(path))
     return data
 
 
@@ -236,10 +239,6 @@ def as_json(data: xr.Dataset) -> dict[str, Any]:
 
 
 _VERDICT = ("criticality", "coefficient", "direction", "direction_confirms")
-_STORED = (
-    *("parameter_si", "orbit", "tangent", "multiplier_real", "multiplier_imag", "special"),
-    *("robot_toml", "varied", "ending", "scale", "step", "side", "lowest_si", "highest_si", *_VERDICT),
-)
 
 
 def _followed(robot: Robot, parameter: str) -> Callable[[float], FollowedModel]:
@@ -337,6 +336,7 @@ def _walked(
         },
         coords={"joint": np.arange(1, robot.body.modules)},
         attrs={
+            "version": VERSION,
             "robot": robot.name,
             "varied": parameter,
             "ending": branch.ending.label,

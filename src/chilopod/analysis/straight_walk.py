@@ -20,6 +20,10 @@ from chilopod.stability import Kind
 
 ComplexArray = NDArray[np.complex128]
 
+_FEWEST_PARTS = 8
+_A_PART = 5e-6  # s, of one state
+_LONGEST = 60.0  # s
+
 
 @dataclass(frozen=True)
 class StraightWalk(ReadOnlyArrays):
@@ -119,8 +123,27 @@ class WalkBifurcation(ReadOnlyArrays):
 
 
 def straight_walk(robot: Robot) -> StraightWalk:
-    """Floquet analysis of the straight walk in the planar model."""
-    found = stability.exponents(PlanarModel(robot))
+    """Floquet analysis of the straight walk in the planar model.
+
+    Raises
+    ------
+    AnalysisError
+        If it would take far more than a minute, as of a hundred modules or of very light ones.
+    """
+    model = PlanarModel(robot)
+    # The period is cut into parts that contract by a factor of 1e6 at most, and matrices of this size are split along
+    # them: an estimate of the time that this takes, good to a factor of two on a desk of today.
+    parts = max(_FEWEST_PARTS, 0.5 * model.contraction / math.log(1e6))
+    seconds = _A_PART * parts * model.dimension**2.5
+    if seconds > _LONGEST:
+        raise AnalysisError(
+            f"the exponents would take about {seconds / 60.0:.3g} minutes: {model.dimension} states, the fastest of "
+            f"which dies out {model.contraction:.3g} e-folds a period",
+            field="body.modules",
+            value=robot.body.modules,
+            allowed=f"what takes about {_LONGEST / 60.0:.0f} minute: fewer modules, or longer and heavier ones",
+        )
+    found = stability.exponents(model)
     components = np.array([joint_components(mode, robot.body.modules) for mode in found.modes.T])
     return StraightWalk(robot, found, components)
 

@@ -6,20 +6,20 @@ Results go to stdout, everything else to stderr. An error is one line on stderr 
 
 from __future__ import annotations
 
-import os
 import sys
+import traceback
 from collections.abc import Sequence
 from typing import Annotated
 
 import typer
 
-from chilopod.cli import branch, doctor, reproduce, robot, stability, turn, walk
+from chilopod.cli import branch, doctor, reproduce, robot, stability, trials, turn, walk
 from chilopod.cli.options import new_app
-from chilopod.errors import ChilopodError, one_line
+from chilopod.errors import ChilopodError, briefly, one_line
+from chilopod.process import INTERRUPTED
 
 USAGE_ERROR = 2
 INTERNAL_ERROR = 1
-INTERRUPTED = 130
 
 app = new_app("Many-legged robots that turn by bifurcation: simulate, analyse and steer them.", completion=True)
 app.command("reproduce", short_help="Repeat the paper, and write a report beside its numbers.")(reproduce.reproduce)
@@ -30,6 +30,7 @@ app.command("branch", short_help="Follow the curved walks beyond: how tightly th
 app.command("walk", short_help="Let a robot walk, and say where it gets to.")(walk.walk)
 app.command("turn", short_help="Pick the spring that leads to a target, and walk there.")(turn.turn)
 app.add_typer(reproduce.identify_app, name="identify")
+app.add_typer(trials.app, name="trials")
 app.command("doctor", short_help="Is all here that chilopod needs, and what mends it?")(doctor.doctor)
 
 
@@ -63,17 +64,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         something essential is missing, 130 when interrupted.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
-    # What a robot is called need not fit the terminal's encoding; better a question mark than a crash.
-    for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors="backslashreplace")
     try:
         code = app(arguments, prog_name="chilopod", standalone_mode=False)
-        sys.stdout.flush()
-    except BrokenPipeError:
-        # Whoever read our output has seen enough. Python would complain once more when it flushes at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
     except (typer.Abort, KeyboardInterrupt):
         return _fail("interrupted", INTERRUPTED)
     except Exception as error:
@@ -83,8 +75,18 @@ def main(argv: Sequence[str] | None = None) -> int:
         # Usage errors have no public base class that all supported versions of typer share, but they all do this.
         if hasattr(error, "format_message"):
             return _fail(f"{error.format_message()} ({_help_of(error)})", USAGE_ERROR)
-        if isinstance(error, ChilopodError | OSError):
+        if isinstance(error, ChilopodError):
             return _fail(str(error), USAGE_ERROR)
+        if isinstance(error, OSError):
+            named = ChilopodError(error.strerror or str(error), source=str(error.filename or ""))
+            return _fail(str(named), USAGE_ERROR)
+        if isinstance(error, MemoryError):
+            return _fail(
+                f"there is too little memory ({str(error) or 'how much more it takes is not known'})", USAGE_ERROR
+            )
+        package = _not_imported(error)
+        if package:
+            return _fail(f"{package} cannot be imported: {briefly(error)} ({_mend(package)})", USAGE_ERROR)
         return _fail(
             f"this is a fault of chilopod, please report it: {type(error).__name__}: {error} (--debug shows more)",
             INTERNAL_ERROR,
@@ -97,6 +99,20 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _help_of(error: Exception) -> str:
     context = getattr(error, "ctx", None)
     return f"see {context.command_path if context else 'chilopod'} --help"
+
+
+def _not_imported(error: Exception) -> str | None:
+    """The package of somebody else's that could not be imported, if that is what went wrong."""
+    frames = (frame for frame, _ in traceback.walk_tb(error.__traceback__))
+    loading = (frame.f_globals.get("__name__", "") for frame in frames if frame.f_code.co_name == "<module>")
+    packages = (name.partition(".")[0] for name in loading)
+    missing = error.name if isinstance(error, ModuleNotFoundError) else None
+    return next((package for package in packages if package not in ("chilopod", "__main__")), missing)
+
+
+def _mend(package: str) -> str:
+    wishes = doctor.settings(package)
+    return f"without {', '.join(wishes)} in the environment it may" if wishes else "see chilopod doctor"
 
 
 def _fail(message: str, code: int) -> int:

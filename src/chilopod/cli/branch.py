@@ -14,11 +14,11 @@ from chilopod.cli.options import (
     ParameterOption,
     RobotArg,
     SetOption,
+    deliver,
     free,
     interval,
     print_json,
     read_robot,
-    wrote,
 )
 from chilopod.cli.progress import progress_bar
 
@@ -78,13 +78,13 @@ def branch(
 
     saved = None if resume is None else read_walks(resume / "branch.nc")
     folder = out or resume
+    # A branch that goes on where it is saved holds all it held before.
+    replace = force or (folder is not None and resume is not None and folder.resolve() == resume.resolve())
     if folder:
         from chilopod.report import files_of
 
-        # A branch that goes on where it is saved holds all it held before.
-        grows = resume is not None and folder.resolve() == resume.resolve()
-        free(files_of("branch", folder), force or grows)
-    with progress_bar() as show:
+        free(files_of("branch", folder), replace)
+    with progress_bar("branch") as show:
 
         def progress(done: float, words: str) -> None:
             show("branch", done, words)
@@ -111,14 +111,13 @@ def branch(
                 side=-1 if left else None,
                 progress=progress,
             )
-    if folder:
+
+    def write() -> list[Path]:
         from chilopod.report import write_branch
 
-        wrote(write_branch(data, folder))
-    if as_json:
-        print_json(plain(data))
-        return
-    _print(data)
+        return write_branch(data, folder, replace=replace) if folder else []
+
+    deliver(write, lambda: print_json(plain(data)) if as_json else _print(data))
 
 
 def _print(data: xr.Dataset) -> None:

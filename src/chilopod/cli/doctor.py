@@ -12,6 +12,7 @@ from pathlib import Path
 import typer
 
 from chilopod.cli.options import JsonOption, print_json
+from chilopod.cli.progress import progress_bar
 
 _PACKAGES = {
     "numpy": "numpy",
@@ -64,7 +65,8 @@ def doctor(as_json: JsonOption = False) -> None:
     The exit code is 0, or 3 if something is missing that nothing works without. Without OpenGL or an encoder all but
     films and pictures in 3-D works.
     """
-    found = [finding for look in (_versions, _cores, _cache, _drawing, _encoder, _fonts) for finding in look()]
+    with progress_bar("doctor"):
+        found = [finding for look in (_versions, _cores, _cache, _drawing, _encoder, _fonts) for finding in look()]
     broken = any(each.mend and each.essential for each in found)
     if as_json:
         findings = [
@@ -98,13 +100,17 @@ def _versions() -> list[Finding]:
         # What uses MuJoCo here may be able to import it where it cannot be imported alone.
         fault = _fault("chilopod.twin" if module == "mujoco" else module)
         if fault:
-            # With a backend that is not there, MuJoCo cannot be imported.
-            wish = module == "mujoco" and "MUJOCO_GL" in os.environ and "No module" not in fault
-            mend = "unset MUJOCO_GL" if wish else _again(package)
+            wishes = [] if "No module" in fault else settings(module)
+            mend = f"unset {' '.join(wishes)}" if wishes else _again(package)
             found.append(Finding(module, f"cannot be imported: {fault}", mend, essential=True))
         else:
             found.append(Finding(module, _version(package)))
     return found
+
+
+def settings(module: str) -> list[str]:
+    """Variables of the environment by which a package is told something, such as a backend that it may not have."""
+    return sorted(name for name in os.environ if name.startswith(f"{module.upper()}_"))
 
 
 def _version(package: str) -> str:
@@ -120,12 +126,12 @@ def _fault(module: str) -> str:
     """Why a package cannot be imported; empty if it can."""
     from importlib import import_module
 
-    from chilopod.errors import one_line
+    from chilopod.errors import briefly
 
     try:
         import_module(module)
     except Exception as error:  # packages with compiled parts fail in many ways
-        return one_line(f"{type(error).__name__}: {error}")
+        return briefly(error)
     return ""
 
 
@@ -148,16 +154,15 @@ def _cache() -> list[Finding]:
         try:
             from chilopod.planar.linear import propagate_batch
 
-            folder = prepare_folder(propagate_batch.stats.cache_path)
-        except RuntimeError as error:
-            # Numba's answer where it finds no place to keep what it compiles.
-            return Finding("compile cache", one_line(f"nowhere: {error}"), mend, essential=True)
+            folder = check_folder(propagate_batch.stats.cache_path)
+        except ParameterError as error:
+            return Finding("compile cache", error.problem, mend, essential=True)
         except OutputError as error:
             return Finding("compile cache", f"{error}, so every start compiles anew", mend)
         return Finding("compile cache", str(folder))
 
-    from chilopod.errors import OutputError, one_line
-    from chilopod.output import prepare_folder
+    from chilopod.errors import OutputError, ParameterError
+    from chilopod.output import check_folder
 
     return [_guarded("compile cache", cache)]
 
@@ -176,7 +181,7 @@ def _drawing() -> list[Finding]:
 
 def _encoder() -> list[Finding]:
     def encoder() -> Finding:
-        from chilopod.report.scene.film import has_encoder
+        from chilopod.report.scene.encoder import has_encoder
 
         if not has_encoder():
             return Finding("mp4 encoder", "PyAV has no H.264; all but mp4 films works", _again("av"))
@@ -213,9 +218,9 @@ def _again(package: str) -> str:
 
 def _guarded(name: str, look: Callable[[], Finding]) -> Finding:
     """What was found, even where a package that it takes is not there."""
-    from chilopod.errors import one_line
+    from chilopod.errors import briefly
 
     try:
         return look()
     except Exception as error:  # said once more, among the versions, with what mends it
-        return Finding(name, one_line(f"cannot be looked at: {type(error).__name__}: {error}"), looked=False)
+        return Finding(name, f"cannot be looked at: {briefly(error)}", looked=False)

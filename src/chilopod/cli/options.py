@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperCommand
+
+from chilopod.cli.progress import progress_bar
+from chilopod.errors import ChilopodError
 
 if TYPE_CHECKING:
     from chilopod.robot import Robot
+    from chilopod.tasks import Ends, Turn
 
 STAYS_STRAIGHT = "nothing disturbed it, so nothing bends it, even where the straight walk is unstable"
+
+
+_TYPED_AS = {"joint_angles": "initial_joints", "spring": "k1"}
+"""Options that are called otherwise than the argument of the function that they are for."""
 
 
 def _engines() -> list[str]:
@@ -105,6 +114,46 @@ ClusterOption = Annotated[
 ]
 
 
+class _Command(TyperCommand):
+    """A command whose mistakes are named as they were typed: ``--duration``, and the text behind it."""
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except ChilopodError as error:
+            _as_typed(error, ctx)
+            raise
+
+
+def _as_typed(error: ChilopodError, ctx: Any) -> None:
+    field, _, part = (error.field or "").partition(" ")
+    name = _TYPED_AS.get(field, field)
+    for option in ctx.command.params:
+        if option.name != name or option.param_type_name != "option" or option.is_flag:
+            continue
+        error.field = f"{max(option.opts, key=len)} {part}".strip()
+        typed = ctx.params[name]
+        if not part and ctx.get_parameter_source(name).name == "COMMANDLINE":
+            error.value = " ".join(typed) if isinstance(typed, tuple | list) else typed
+        if isinstance(error.value, Path):
+            error.value = str(error.value)
+
+
+@contextmanager
+def reading(option: str) -> Iterator[None]:
+    """What is wrong in this block is wrong with what was typed for an option (its name in Python)."""
+    try:
+        yield
+    except ChilopodError as error:
+        error.field = option
+        raise
+
+
+class _App(typer.Typer):
+    def command(self, name: str | None = None, **told: Any) -> Any:
+        return super().command(name, cls=_Command, **told)
+
+
 def new_app(help_text: str, *, completion: bool = False) -> typer.Typer:
     """Return an empty group of commands with the settings all groups share.
 
@@ -116,7 +165,7 @@ def new_app(help_text: str, *, completion: bool = False) -> typer.Typer:
         Whether it has the options that make a shell complete its commands; only the outermost can.
     """
     # Help without rich: importing it costs a third of what --help may take. Tracebacks are the business of `main`.
-    return typer.Typer(
+    return _App(
         help=help_text,
         rich_markup_mode=None,
         pretty_exceptions_enable=False,
@@ -142,12 +191,28 @@ def read_robot(robot: str, overrides: Sequence[str] | None) -> Robot:
     """Load a robot and apply what ``--set`` asked for."""
     from chilopod.robot import load_robot
 
-    return load_robot(robot).set_from_text(overrides or ())
+    described = load_robot(robot)
+    try:
+        return described.set_from_text(overrides or ())
+    except ChilopodError as error:
+        error.field = error.field or "--set"
+        raise
 
 
 def print_json(result: dict[str, Any]) -> None:
     """Print a result as one JSON object; NaN and infinity have no place in JSON and are a fault here."""
-    typer.echo(json.dumps(result, indent=2, allow_nan=False))
+    typer.echo(json_text(result))
+
+
+def json_text(result: dict[str, Any]) -> str:
+    """A result as :func:`print_json` prints it."""
+    return json.dumps(result, indent=2, allow_nan=False)
+
+
+def creep(done: Turn | Ends) -> None:
+    """Measure how firmly the floor holds standing feet, which may take as long as the walk, while that is shown."""
+    with progress_bar("creep of the feet"):
+        _ = done.foot_creep
 
 
 def print_creep(coefficient: float | None) -> None:
@@ -158,24 +223,34 @@ def print_creep(coefficient: float | None) -> None:
 
 def free(paths: Iterable[Path], force: bool) -> None:
     """Make sure, before any work is done for them, that files can be written and replace none without ``--force``."""
-    from chilopod.output import free_path
+    from chilopod.output import check_files
 
-    for path in paths:
-        free_path(path, force)
-
-
-def save_json(path: Path, result: dict[str, Any]) -> None:
-    """Write a result as a JSON file and say so on stderr."""
-    from chilopod.output import write_atomic
-
-    write_atomic(path, json.dumps(result, indent=2, allow_nan=False) + "\n")
-    wrote([path])
+    check_files(paths, replace=force)
 
 
-def wrote(paths: Iterable[Path]) -> None:
-    """Say on stderr what was written."""
-    for path in paths:
-        typer.echo(f"wrote {path}", err=True)
+def deliver(write: Callable[[], Iterable[Path]], show: Callable[[], None]) -> None:
+    """Write the files of a result, say so on stderr, and print the result, also where a file cannot be written.
+
+    Parameters
+    ----------
+    write
+        Gives what it wrote.
+    show
+        Prints.
+    """
+    from chilopod.errors import OutputError
+
+    failure = None
+    try:
+        for path in write():
+            typer.echo(f"wrote {path}", err=True)
+    except OutputError as error:
+        failure = error
+    try:
+        show()
+    finally:
+        if failure is not None:
+            raise failure
 
 
 def interval(robot: Robot, parameter: str, between: tuple[str, str]) -> tuple[float, float]:
@@ -183,9 +258,12 @@ def interval(robot: Robot, parameter: str, between: tuple[str, str]) -> tuple[fl
     from chilopod import units
     from chilopod.errors import ParameterError
 
-    low, high = (units.parse(text, robot.si_unit_of(parameter)) for text in between)
+    with reading("parameter"):
+        unit = robot.si_unit_of(parameter)
+    with reading(f"between {parameter}"):
+        low, high = (units.parse(text, unit) for text in between)
+        for text in between:
+            robot.override(parameter, text)
     if not low < high:
         raise ParameterError("must rise from a lower to a higher value", field="between", value=" ".join(between))
-    for value in (low, high):
-        robot.with_value(parameter, value)
     return low, high

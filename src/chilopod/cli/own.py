@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -27,9 +27,9 @@ def own_controller(path: str | None) -> Controller | None:
 
 
 @contextmanager
-def own_code() -> Iterator[None]:
-    """Find modules in the current folder too, after all others; and say at the end if controllers took most of the
-    time."""
+def own_code(show: Callable[[str, float, str], None]) -> Iterator[None]:
+    """Find modules in the current folder too, after all others; show how far walks are that are under way; and say at
+    the end if controllers took most of the time."""
     from chilopod.engine import watched
 
     here = os.getcwd()
@@ -37,7 +37,7 @@ def own_code() -> Iterator[None]:
     if added:
         sys.path.append(here)
     try:
-        with watched() as spent:
+        with watched(lambda done, words: show("under way", done, words)) as spent:
             yield
     finally:
         if added:

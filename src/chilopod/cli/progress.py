@@ -3,48 +3,85 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-_SECONDS_BETWEEN_LINES = 5.0
+_UNTIL_BAR = 0.5  # s
+_BETWEEN_LOOKS = 0.1  # s
+_UNTIL_LINE = 2.0  # s: most commands have ended by then
+_BETWEEN_LINES = 5.0  # s
+
+_Told = dict[str, tuple[float, str]]
+"""By title: the part done, and words."""
 
 
 @contextmanager
-def progress_bar() -> Iterator[Callable[[str, float, str], None]]:
-    """Show progress on stderr while the block runs.
+def progress_bar(doing: str) -> Iterator[Callable[[str, float, str], None]]:
+    """Show progress on stderr while the block runs, if that takes a moment.
+
+    Parameters
+    ----------
+    doing
+        What it does, to be shown as long as it says nothing itself.
 
     Yields
     ------
-    A function of a title, the part done (0 to 1), and a few words about the current step.
+    A function of a title, the part done (0 to 1), and a few words about the current step. Between two of its calls it
+    is shown that the work goes on.
     """
-    if sys.stderr.isatty():
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+    told: _Told = {}
+    over = threading.Event()
 
-        columns = (
-            TextColumn("{task.description:<44}"),
-            BarColumn(bar_width=24),
-            TimeElapsedColumn(),
-            TextColumn("{task.fields[words]}", style="dim"),
-        )
-        tasks: dict[str, TaskID] = {}
-        with Progress(*columns, console=Console(stderr=True)) as bar:
+    def tell(title: str, done: float, words: str) -> None:
+        told[title] = done, words
 
-            def draw(title: str, done: float, words: str) -> None:
+    show = _bars if sys.stderr.isatty() else _lines
+    showing = threading.Thread(target=show, args=(doing, told, over), name="progress", daemon=True)
+    showing.start()
+    try:
+        yield tell
+    finally:
+        over.set()
+        showing.join()
+
+
+def _lines(doing: str, told: _Told, over: threading.Event) -> None:
+    begun, shown = time.monotonic(), _Told()
+    wait = _UNTIL_LINE
+    while not over.wait(wait):
+        wait, seconds = _BETWEEN_LINES, f"{time.monotonic() - begun:.0f} s"
+        now = dict(told)
+        news = [title for title, state in now.items() if shown.get(title) != state] or list(now)[-1:]
+        for title in news:
+            done, words = now[title]
+            print(f"{title}: {100 * done:3.0f} %  {words}, {seconds}", file=sys.stderr, flush=True)
+        if not news:
+            print(f"{doing}: {seconds}", file=sys.stderr, flush=True)
+        shown = now
+
+
+def _bars(doing: str, told: _Told, over: threading.Event) -> None:
+    if over.wait(_UNTIL_BAR):
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+
+    columns = (
+        TextColumn("{task.description:<44}"),
+        BarColumn(bar_width=24),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[words]}", style="dim"),
+    )
+    tasks: dict[str, TaskID] = {}
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        alone = bar.add_task(doing, total=None, words="")
+        last = False
+        while not last:
+            last = over.wait(_BETWEEN_LOOKS)
+            for title, (done, words) in dict(told).items():
                 if title not in tasks:
                     tasks[title] = bar.add_task(title, total=1.0, words="")
                 bar.update(tasks[title], completed=done, words=words)
-
-            yield draw
-        return
-
-    last: dict[str, float] = {}
-
-    def line(title: str, done: float, words: str) -> None:
-        now = time.monotonic()
-        if title not in last or done >= 1.0 or now - last[title] > _SECONDS_BETWEEN_LINES:
-            last[title] = now
-            print(f"{title}: {100 * done:3.0f} %  {words}", file=sys.stderr, flush=True)
-
-    yield line
+            bar.update(alone, visible=not tasks)

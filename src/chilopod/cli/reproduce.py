@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import traceback
 from dataclasses import asdict
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,13 +15,13 @@ from chilopod.cli.options import (
     ForceOption,
     JsonOption,
     SetOption,
+    deliver,
     free,
+    json_text,
     new_app,
     print_json,
     read_robot,
-    save_json,
     walking_on,
-    wrote,
 )
 from chilopod.cli.progress import progress_bar
 
@@ -31,11 +32,9 @@ _SECTIONS = (
 )
 """For the help, which loads nothing heavy; a test holds them to what there is."""
 
-_MARK = ">chilopod reproduce<"
-"""What every page of a report says of itself."""
-
 if TYPE_CHECKING:
     from chilopod.paper.table import RobotRow, Row
+    from chilopod.robot import Robot
 
 PRESET, WHOLE = "aoi2022-planar", "aoi2022"
 
@@ -90,21 +89,34 @@ def reproduce(
     from chilopod.paper.sections import chosen
 
     sections = chosen(only, quick or tiny, paper)  # refuses an unknown section
-    index = out / "index.html"
-    if index.is_file() and _MARK not in index.read_text(encoding="utf-8", errors="replace"):
-        free([index], force)  # somebody else's page
-    from chilopod.errors import in_words
-    from chilopod.output import prepare_folder
+    from chilopod.errors import OutputError, in_words
     from chilopod.paper import sections as computed
-    from chilopod.paper.section import Context
+    from chilopod.paper.section import Context, Found, Section
     from chilopod.paper.size import Size
-    from chilopod.report import Report
+    from chilopod.report import Report, check_report
 
     size = Size.TINY if tiny else Size.QUICK if quick else Size.FULL
-    context = Context(read_robot(PRESET, None), read_robot(WHOLE, None), size, prepare_folder(out / "trials"))
-    with walking_on(cluster), progress_bar() as show, Report(sections, context, out, show) as report:
-        typer.echo(f"The page is {report.page.resolve()}", err=as_json)
-        found = computed.reproduce(sections, context, show, lambda found, section: report.add(found, [section]))
+    check_report(out, sections, size, replace=force)
+    context = Context(read_robot(PRESET, None), read_robot(WHOLE, None), size, out / "trials")
+    found, stopped = Found(context), None
+
+    def add(now: Found, section: Section[Any]) -> None:
+        nonlocal found
+        found = now
+        report.add(now, [section])
+
+    try:
+        with (
+            walking_on(cluster),
+            progress_bar("reproduce") as progress,
+            Report(sections, context, out, progress) as report,
+        ):
+            typer.echo(f"The page is {report.page.resolve()}", err=as_json)
+            computed.reproduce(sections, context, progress, add)
+    except OutputError as error:
+        if not found.values:
+            raise
+        stopped = error  # what was found is printed all the same
     rows, robot_rows = [row for part in found.planar_rows().values() for row in part], found.robot_rows()
     if as_json:
         print_json(
@@ -115,15 +127,17 @@ def reproduce(
                 "rows": [asdict(row) for row in rows],
                 "robot_rows": [asdict(row) for row in robot_rows],
                 "seconds": {section.name: value for section, value in found.seconds.items()},
-                "failures": {section.name: in_words(error) for section, error in report.failures.items()},
+                "failures": {section.name: in_words(failure) for section, failure in report.failures.items()},
             }
         )
     else:
         _print(rows, robot_rows, report.page)
-    for section, error in report.failures.items():
-        typer.echo(f"failed: {section.sentence}: {in_words(error)}", err=True)
+    for section, failure in report.failures.items():
+        typer.echo(f"failed: {section.sentence}: {in_words(failure)}", err=True)
         if ctx.find_root().params.get("debug"):
-            traceback.print_exception(error)
+            traceback.print_exception(failure)
+    if stopped is not None:
+        raise stopped
     if report.failures:
         raise typer.Exit(1)
 
@@ -165,33 +179,48 @@ def planar(
 
     Writes the profile over the forward offset as a figure and as data, and the robot with the best constants.
     """
-    from chilopod.output import write_atomic
+    from chilopod.output import write_all
 
     described = read_robot(robot, overrides)
     from chilopod.paper.fit_data import critical_mode_data, variant_settings
-    from chilopod.report import files_of, write_identification
+    from chilopod.report import files_of, identification_files
     from chilopod.tasks.identify import identify_planar
 
-    free([*files_of("identification", out), out / "identification.json", out / "identified.toml"], force)
-    with progress_bar() as show:
+    free([*files_of("identification", out), *_identified(out)], force)
+    with progress_bar("identification") as progress:
         found = identify_planar(
             described,
             critical_mode_data(),
             points,
             variant_settings(),
-            lambda done, words: show("identification", done, words),
+            lambda done, words: progress("identification", done, words),
         )
-    best = found.best.with_(name="identified")
-    wrote([*write_identification(found, out), write_atomic(out / "identified.toml", best.to_toml())])
     result = {"robot": described.name, **found.as_json()}
-    save_json(out / "identification.json", result)
-    if as_json:
-        print_json(result)
-        return
-    for name, value in result["constants"].items():
-        typer.echo(f"{name} = {value['text']}  (rounding of the printed numbers allows {value['allowed_text']})")
-    typer.echo(f"largest residual {result['largest_residual']:.2f}: 1 is what rounding of the printed numbers allows")
-    typer.echo(f"profile, figure and robot file are in {out}")
+
+    def write() -> list[Path]:
+        texts = zip(_identified(out), _texts(result, found.best), strict=True)
+        return write_all(chain(texts, identification_files(found, out)), replace=force)
+
+    def show() -> None:
+        if as_json:
+            print_json(result)
+            return
+        for name, value in result["constants"].items():
+            typer.echo(f"{name} = {value['text']}  (rounding of the printed numbers allows {value['allowed_text']})")
+        residual = result["largest_residual"]
+        typer.echo(f"largest residual {residual:.2f}: 1 is what rounding of the printed numbers allows")
+        typer.echo(f"profile, figure and robot file are in {out}")
+
+    deliver(write, show)
+
+
+def _identified(folder: Path) -> tuple[Path, Path]:
+    return folder / "identification.json", folder / "identified.toml"
+
+
+def _texts(result: dict[str, Any], best: Robot) -> tuple[str, str]:
+    """Of the files of :func:`_identified`."""
+    return json_text(result) + "\n", best.with_(name="identified").to_toml()
 
 
 @identify_app.command(short_help="Constants of the 3-D robot from the paper's walks.")
@@ -215,34 +244,39 @@ def twin(
     Half an hour on two cores; evaluations are kept in the folder, so a search that was stopped goes on where it
     was, and with --force one that has ended goes on with more. The preset aoi2022 is what this finds by default.
     """
-    from chilopod.output import prepare_folder, write_atomic
+    from chilopod.output import check_folder, write_all
 
     described = read_robot(robot, overrides)
-    free([out / "identification.json", out / "identified.toml"], force)
+    free(_identified(out), force)
     from chilopod.paper.fit_data import base_series_data
     from chilopod.tasks.identify import identify_twin
 
-    with progress_bar() as show:
+    with progress_bar("identification") as progress:
         found = identify_twin(
             described,
             base_series_data(),
             starts,
             generations,
             seed,
-            prepare_folder(out / "evaluations"),
+            check_folder(out / "evaluations"),
             fresh,
-            lambda done, words: show("identification", done, words),
+            lambda done, words: progress("identification", done, words),
         )
-    wrote([write_atomic(out / "identified.toml", found.best.with_(name="identified").to_toml())])
     result = {"robot": described.name, **found.as_json()}
-    save_json(out / "identification.json", result)
-    if as_json:
-        print_json(result)
-        return
-    for name, value in result["constants"].items():
-        typer.echo(f"{name} = {value['text']}  (fits as good: {value['good_fits_text']})")
-    typer.echo(
-        f"misfit {result['misfit']:.2f} (1: every datum within 5 %), {result['good']} of {result['evaluations']} "
-        "evaluations are below 1"
+
+    def show() -> None:
+        if as_json:
+            print_json(result)
+            return
+        for name, value in result["constants"].items():
+            typer.echo(f"{name} = {value['text']}  (fits as good: {value['good_fits_text']})")
+        typer.echo(
+            f"misfit {result['misfit']:.2f} (1: every datum within 5 %), {result['good']} of {result['evaluations']} "
+            "evaluations are below 1"
+        )
+        typer.echo(f"fits and robot file are in {out}")
+
+    deliver(
+        lambda: write_all(zip(_identified(out), _texts(result, found.best), strict=True), replace=force),
+        show,
     )
-    typer.echo(f"fits and robot file are in {out}")

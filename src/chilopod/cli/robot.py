@@ -7,7 +7,16 @@ from typing import Annotated
 
 import typer
 
-from chilopod.cli.options import ForceOption, JsonOption, RobotArg, SetOption, new_app, print_json, read_robot
+from chilopod.cli.options import (
+    ForceOption,
+    JsonOption,
+    RobotArg,
+    SetOption,
+    new_app,
+    print_json,
+    read_robot,
+    reading,
+)
 
 _PLANAR, _WHOLE = "aoi2022-planar", "aoi2022"
 
@@ -51,12 +60,13 @@ def new(
     """Write a new robot file, named after the file, to edit by hand."""
     from chilopod.output import write_atomic
 
-    robot = read_robot(preset or (_WHOLE if twin else _PLANAR), None)
+    robot = read_robot((_WHOLE if twin else _PLANAR) if preset is None else preset, None)
     if twin and robot.twin is None:
         robot = robot.with_twin_of(read_robot(_WHOLE, None))
-    robot = robot.set_from_text([f"body.modules={modules}"] if modules is not None else [])
+    with reading("modules"):
+        robot = robot.set_from_text([f"body.modules={modules}"] if modules is not None else [])
     robot = robot.set_from_text(overrides or []).with_(name=file.stem)
-    write_atomic(file, robot.to_toml(), replace=force)
+    write_atomic(file, robot.to_toml(), replace=force, folders=False)
     if as_json:
         print_json({"robot": robot.name, "file": str(file)})
     else:
@@ -142,7 +152,7 @@ def export(
 
     name, write = format_of(out.suffix)
     described = read_robot(robot, overrides)
-    write_atomic(out, write(described), replace=force)
+    write_atomic(out, write(described), replace=force, folders=False)
     if as_json:
         print_json({"robot": described.name, "file": str(out), "format": name})
     else:

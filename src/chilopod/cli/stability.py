@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from typing import Annotated
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,12 +17,18 @@ from chilopod.cli.options import (
     ParameterOption,
     RobotArg,
     SetOption,
+    deliver,
     free,
     interval,
+    json_text,
     print_json,
     read_robot,
-    save_json,
 )
+from chilopod.cli.progress import progress_bar
+
+if TYPE_CHECKING:
+    from chilopod.analysis import StraightWalk, WalkBifurcation
+    from chilopod.robot import Robot
 
 
 def stability(
@@ -38,17 +45,26 @@ def stability(
     Exponents are the principal logarithms of the multipliers over T: their imaginary parts lie in (-pi/T, pi/T].
     """
     described = read_robot(robot, overrides)
-    file = out / "stability.json" if out else None
-    free([file] if file else [], force)
+    files = [out / "stability.json"] if out else []
+    free(files, force)
     from chilopod.analysis import straight_walk
 
-    found = straight_walk(described)
+    with progress_bar("stability"):
+        found = straight_walk(described)
     result = found.as_json()
-    if file:
-        save_json(file, result)
-    if as_json:
-        print_json(result)
-        return
+    deliver(
+        lambda: _write(files, result, force),
+        lambda: print_json(result) if as_json else _print_stability(described, found),
+    )
+
+
+def _write(files: list[Path], result: dict[str, Any], force: bool) -> list[Path]:
+    from chilopod.output import write_all
+
+    return write_all(((file, json_text(result) + "\n") for file in files), replace=force)
+
+
+def _print_stability(described: Robot, found: StraightWalk) -> None:
     verdict = "stable" if found.stable else "unstable"
     typer.echo(f"{described.name}: the straight walk is {verdict} (period {described.gait.period:g} s)")
     typer.echo("  exponent (1/s)              |multiplier|   joint angles of the mode, front to rear")
@@ -77,23 +93,28 @@ def bifurcation(
     """
     described = read_robot(robot, overrides)
     low, high = interval(described, parameter, between)
-    file = out / "bifurcation.json" if out else None
-    free([file] if file else [], force)
+    files = [out / "bifurcation.json"] if out else []
+    free(files, force)
     from chilopod.analysis import bifurcations
 
-    points = bifurcations(
-        described,
-        parameter,
-        (low, high),
-        remark=lambda text: typer.echo(f"note: {text}", err=True),
-        seconds=seconds,
-    )
+    with progress_bar("bifurcation"):
+        points = bifurcations(
+            described,
+            parameter,
+            (low, high),
+            remark=lambda text: typer.echo(f"note: {text}", err=True),
+            seconds=seconds,
+        )
     result = {"robot": described.name, "points": [point.as_json() for point in points]}
-    if file:
-        save_json(file, result)
-    if as_json:
-        print_json(result)
-        return
+    deliver(
+        lambda: _write(files, result, force),
+        lambda: print_json(result) if as_json else _print_bifurcations(described, parameter, between, points),
+    )
+
+
+def _print_bifurcations(
+    described: Robot, parameter: str, between: tuple[str, str], points: Sequence[WalkBifurcation]
+) -> None:
     if not points:
         typer.echo(
             f"{described.name}: no bifurcation of the straight walk for {parameter} between {' and '.join(between)}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -21,12 +22,14 @@ from chilopod.cli.options import (
     SetOption,
     StrategyOption,
     TrialsOption,
+    creep,
+    deliver,
     free,
     print_creep,
     print_json,
     read_robot,
+    reading,
     walking_on,
-    wrote,
 )
 from chilopod.cli.own import own_code, own_controller
 from chilopod.cli.progress import progress_bar
@@ -86,15 +89,18 @@ def turn(
 
     described = read_robot(robot, overrides)
     goal, chosen = Target.parse(target), strategy_named(strategy)
-    spring = k1 if k1 in ("auto", "law") else units.parse(k1, "N*m/rad")
-    seconds = None if duration is None else units.parse(duration, "s")
+    with reading("k1"):
+        path = chosen.springs or "springs.stiffness"
+        spring = k1 if k1 in ("auto", "law") else described.override(path, k1).get(path)
+    with reading("duration"):
+        seconds = None if duration is None else units.parse(duration, "s")
     if out:
         from chilopod.report.figures.turn import files_of_turn
 
         free(files_of_turn(out), force)
     from chilopod.tasks import turn as walk_there
 
-    with own_code(), walking_on(cluster), progress_bar() as show:
+    with progress_bar("turn") as show, own_code(show), walking_on(cluster):
         done = walk_there(
             described,
             goal,
@@ -108,14 +114,20 @@ def turn(
             folder=trials,
             progress=lambda part, words: show("turn", part, words),
         )
-    if out:
+
+    def write() -> list[Path]:
         from chilopod.report.figures.turn import write_turn
 
-        wrote(write_turn(done, out))
-    if as_json:
-        print_json(done.as_json())
-    else:
-        _print(done, seed)
+        return write_turn(done, out, replace=force) if out else []
+
+    def printed() -> None:
+        creep(done)
+        if as_json:
+            print_json(done.as_json())
+        else:
+            _print(done, seed)
+
+    deliver(write, printed)
 
 
 def _print(done: Turn, seed: int | None) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,18 +22,24 @@ from chilopod.cli.options import (
     SeedOption,
     SetOption,
     TrialsOption,
+    creep,
+    deliver,
     free,
     print_creep,
     print_json,
     read_robot,
+    reading,
     walking_on,
-    wrote,
 )
 from chilopod.cli.own import own_code, own_controller
 from chilopod.cli.progress import progress_bar
 
 if TYPE_CHECKING:
-    from chilopod.tasks import Walks
+    from chilopod.record_file import RecordFile
+    from chilopod.tasks import Ends
+    from chilopod.trials import Trial
+
+_MUCH = 1e9  # bytes
 
 
 def walk(
@@ -66,37 +74,60 @@ def walk(
     where the body bends to the right; the radius is that of the arc they make of the body, as in the paper.
     """
     from chilopod import units
-    from chilopod.output import netcdf, write_atomic
 
     described = read_robot(robot, overrides)
-    seconds, angles = units.parse(duration, "s"), joint_angles(initial_joints)
-    files = [out] if out else []
-    free(files, force)
+    with reading("duration"):
+        seconds = units.parse(duration, "s")
+    with reading("initial_joints"):
+        angles = joint_angles(initial_joints)
+    free([out] if out else [], force)
     from chilopod.record import RATE
-    from chilopod.tasks import walk as let_walk
+    from chilopod.tasks import ends, planned
 
-    with own_code(), walking_on(cluster), progress_bar() as show:
-        done = let_walk(
-            described,
-            seconds,
-            seed=seed,
-            repeats=repeats,
-            joint_angles=angles,
-            rate=RATE if rate is None else rate,
-            forces=forces,
-            engine=engine,
-            controller=own_controller(controller),
-            folder=trials,
-            progress=lambda part, words: show("walk", part, words),
-        )
-    wrote(write_atomic(file, netcdf(done.record)) for file in files)
+    with ExitStack() as stack:
+        with progress_bar("walk") as show, own_code(show), walking_on(cluster):
+            walks = planned(
+                described,
+                seconds,
+                seed=seed,
+                repeats=repeats,
+                joint_angles=angles,
+                rate=RATE if rate is None else rate,
+                forces=forces,
+                engine=engine,
+                controller=own_controller(controller),
+            )
+            file = stack.enter_context(_record_file(out, walks)) if out else None
+            done = ends(
+                walks,
+                trials,
+                lambda part, words: show("walk", part, words),
+                file.add if file else lambda index, record: None,
+            )
+        deliver(lambda: file.write(replace=force) if file else [], lambda: _show(done, as_json))
+
+
+def _record_file(path: Path, walks: Sequence[Trial]) -> RecordFile:
+    """For the record of all walks; says what it takes if that is much."""
+    from chilopod.memory import in_words
+    from chilopod.record_file import RecordFile
+
+    size = sum(walk.least_bytes for walk in walks)
+    file = RecordFile(path, len(walks), size)
+    if size > _MUCH:
+        typer.echo(f"{path} will have {in_words(size)} or more", err=True)
+    return file
+
+
+def _show(done: Ends, as_json: bool) -> None:
+    creep(done)
     if as_json:
         print_json(done.as_json())
     else:
         _print(done)
 
 
-def _print(done: Walks) -> None:
+def _print(done: Ends) -> None:
     first, count = done.first, len(done.trials)
     typer.echo(f"{first.robot.name}, {first.engine}: {count} walk{'s' if count > 1 else ''} of {first.duration:g} s")
     typer.echo("  seed    x (m)     y (m)     radius (m)  joint angles, mean of the last 5 s (deg)")

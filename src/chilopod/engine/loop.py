@@ -16,12 +16,16 @@ from chilopod.engine.arguments import as_number, check_time
 from chilopod.engine.contract import Command, Controller, Event, Observation, Walk
 from chilopod.errors import AnalysisError, ParameterError, in_words
 from chilopod.gait import Gait
+from chilopod.progress import Progress, silent
 
 Array = NDArray[np.float64]
 _T = TypeVar("_T")
 
-_LOOKS = 10
-"""Times that the progress of a walk without a controller is told."""
+_MOMENT = 0.3
+"""s, for which a walk goes on without a word, about: that long Ctrl-C may have to wait too."""
+
+_FIRST, _SHORTEST = 0.02, 1e-3
+"""s of the walk, at first and at least, that it goes on for at a time."""
 
 
 @dataclass
@@ -34,10 +38,13 @@ class Spent:
         In controllers, s.
     total
         s.
+    progress
+        Told how far the walks are that are under way.
     """
 
     controller: float = 0.0
     total: float = 0.0
+    progress: Progress = silent
 
     @property
     def share(self) -> float:
@@ -49,9 +56,10 @@ _watching: list[Spent] = []
 
 
 @contextmanager
-def watched() -> Iterator[Spent]:
-    """Sum up where the time of all walks goes that :func:`steer` steers in this process meanwhile."""
-    spent = Spent()
+def watched(progress: Progress = silent) -> Iterator[Spent]:
+    """Sum up where the time of all walks goes that :func:`steer` steers in this process meanwhile, and tell how far
+    they are."""
+    spent = Spent(progress=progress)
     _watching.append(spent)
     try:
         yield spent
@@ -90,7 +98,7 @@ def steer(
     controller: Controller | None = None,
     *,
     bearing_noise: Array | None = None,
-    progress: Callable[[float, str], None] = lambda done, words: None,
+    progress: Progress = silent,
 ) -> None:
     """Walk on to a time, commanded by a controller at its events.
 
@@ -124,11 +132,18 @@ def steer(
             value=bearing_noise.shape,
             allowed=f"({len(walk.robots)}, as many as events)",
         )
+
+    def tell() -> None:
+        done, words = walk.time / until, f"{walk.time:.1f} of {until:g} s"
+        for each in (progress, *(spent.progress for spent in _watching)):
+            each(done, words)
+
+    pace = _Pace()
     since, thought = clock.perf_counter(), 0.0
     for index, (time, event) in enumerate(event_times(controller, gait, until) if controller else ()):
         if time < begun:
             continue
-        walk.advance(time)
+        pace.advance(walk, time, tell)
         seen = walk.observe()
         if bearing_noise is not None:
             if index >= bearing_noise.shape[1]:
@@ -143,13 +158,37 @@ def steer(
         except ParameterError as error:
             error.field = _of(controller, error.field or "command")
             raise
-        progress(time / until, f"{time:.1f} s")
-    for time in np.linspace(walk.time, until, _LOOKS + 1)[1:]:
-        walk.advance(float(time))
-        progress(time / until, f"{time:.1f} s")
+        tell()
+    pace.advance(walk, until, tell)
+    tell()
     for spent in _watching:
         spent.controller += thought
         spent.total += clock.perf_counter() - since
+
+
+@dataclass
+class _Pace:
+    """Walks on in stretches that take a moment each; a walk is the same to the bit however it is cut.
+
+    Attributes
+    ----------
+    stretch
+        s of the walk, the next one.
+    """
+
+    stretch: float = _FIRST
+
+    def advance(self, walk: Walk, until: float, tell: Callable[[], None]) -> None:
+        there = walk.time + self.stretch
+        # What is left shall not be a stretch of nearly nothing.
+        while there + 0.5 * self.stretch < until:
+            begun = clock.perf_counter()
+            walk.advance(there)
+            tell()
+            took = clock.perf_counter() - begun
+            self.stretch = max(_SHORTEST, self.stretch * min(2.0, _MOMENT / max(took, 1e-9)))
+            there += self.stretch
+        walk.advance(until)
 
 
 def _answer(controller: Controller, event: Event, seen: Observation) -> Command:

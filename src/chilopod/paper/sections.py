@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-from chilopod.errors import ParameterError, nearest_name
+from chilopod.errors import OutputError, ParameterError, nearest_name
 from chilopod.paper.curved.sections import BRANCH, CURVED, UNDULATION
 from chilopod.paper.robot.sections import FILMS, NUMERICS, SPREAD, STRUCTURES, TASKS, WALKS, WHY
 from chilopod.paper.section import Context, Found, Section
@@ -95,6 +95,11 @@ def reproduce(
         Called as the work goes on.
     told
         Called after every section with all that is found by then, and the section.
+
+    Raises
+    ------
+    OutputError
+        If trials cannot be kept.
     """
     found = Found(context or Context())
     for section in sections:
@@ -106,6 +111,8 @@ def reproduce(
 
         try:
             found.add(section, section.compute(found.context, found.seen_by(section.needs), report))
+        except OutputError:  # where nothing can be written any more, no other section fares better
+            raise
         except Exception as error:
             found.failures[section] = error
         found.seconds[section] = time.perf_counter() - started

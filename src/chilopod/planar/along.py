@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 NODES = 16
 """Gauss-Legendre nodes in every interval between two switches: after each one, motion settles within milliseconds."""
 
+_AT_ONCE = 500  # walks of which the motion is held in memory
 _DERIVATIVE = 100.0  # tolerance of the derivative over that of the state
 _CUTS = (1 / 6, 1 / 3, 1 / 2)  # of the interval, where tangents that have died out are dropped
 _DEAD = 1e-12  # size of a tangent that no longer matters, relative to the largest
@@ -152,8 +153,10 @@ def walk_means(models: Sequence[PlanarModel], orbits: ArrayLike) -> WalkMeans:
         If a motion diverges.
     """
     orbits = np.asarray(orbits, dtype=np.float64)
-    if not _alike(models):
-        parts = [walk_means([model], orbit[None]) for model, orbit in zip(models, orbits, strict=True)]
+    at_once = _AT_ONCE if _alike(models) else 1
+    if len(orbits) > at_once:
+        starts = range(0, len(orbits), at_once)
+        parts = [walk_means(models[i : i + at_once], orbits[i : i + at_once]) for i in starts]
         return WalkMeans(
             np.concatenate([part.mean_angle for part in parts]),
             np.concatenate([part.leg_power for part in parts]),

@@ -33,6 +33,8 @@ TOLERANCE = 1e-13
 _SAME_INSTANT = 1e-12  # in periods
 _ROWS_DIFFER = 2.0  # joint rates are differences of two rows
 _MOST_STEPS = 2e5  # of the linear flow: ten seconds or so
+_MOST_WORK = 2e9  # steps times the cube of the states: likewise of many modules
+_MOST_NUMBERS = 1e8  # of the matrices of a period
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -207,6 +209,11 @@ class PlanarModel(ReadOnlyArrays):
         moments = contact_moments(legs.forward_offset, legs.half_width, self.robot.ground.friction, self.schedule)
         return moments[interval]
 
+    @property
+    def contraction(self) -> float:
+        """How many times the fastest motion about the straight walk dies out by a factor of e in a period, at most."""
+        return float(self._linearised[3] @ np.diff(self.schedule.times))
+
     @staticmethod
     def flow_many(models: Sequence[PlanarModel], t0: float, t1: float) -> tuple[Array, Array]:
         """Derivative of the flow on the straight walks of many robots with one gait and size, on all cores.
@@ -286,6 +293,14 @@ class PlanarModel(ReadOnlyArrays):
         """Of one period: the passive matrices, what springs and dampers take from A0, the fastest decay in every
         interval, and the frequency of the springs."""
         robot = self.robot
+        n, intervals = self.modules, len(self.schedule.times) - 1
+        if 3 * intervals * (n + 2) * (2 * n + 1) > _MOST_NUMBERS:
+            raise AnalysisError(
+                f"its equations are too many: {intervals} intervals between touch-downs and lift-offs in a period",
+                field="body.modules",
+                value=n,
+                allowed="fewer modules, or phases with which many legs touch down at once",
+            )
         passive, joint, rates, decay = _passive_matrices(
             robot.gait,
             self.modules,
@@ -319,11 +334,12 @@ class PlanarModel(ReadOnlyArrays):
             upper[:, :, 0, : n + 2] -= dampers
         decay = decay[interval]
         steps = linear.steps(widths, decay, frequency)
-        if not steps < _MOST_STEPS:
+        if not steps < _MOST_STEPS or not steps * self.dimension**3 < _MOST_WORK:
             raise AnalysisError(
-                f"motion is too fast to follow from {t0:g} s to {t1:g} s: about {steps:.0e} steps",
+                f"motion is too fast to follow from {t0:g} s to {t1:g} s: about {steps:.0e} steps of {self.dimension} "
+                "states",
                 field="springs, ground",
-                allowed="less stiffness, damping or friction, or more mass",
+                allowed="less stiffness, damping or friction, or more mass, or fewer modules",
             )
         return widths, upper, decay, frequency
 

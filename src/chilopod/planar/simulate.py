@@ -74,7 +74,7 @@ def simulate(
     ParameterError
         If an argument has the wrong shape or is out of range, or the robots do not go together.
     """
-    in_range("duration", duration, LONGEST)
+    in_range("duration", duration, LONGEST, "s")
     record = Recording(rate, forces)
     walk = start(
         robots,

@@ -14,6 +14,7 @@ from chilopod.engine.arguments import as_array, as_number, as_robots, as_seeds, 
 from chilopod.engine.saved import pack, read_back, unpack
 from chilopod.errors import ParameterError
 from chilopod.planar import stretch
+from chilopod.planar.foreseen import check_steps
 from chilopod.planar.model import PlanarModel
 from chilopod.planar.record import foot_forces, planar_record
 from chilopod.planar.timeline import Timeline
@@ -180,6 +181,8 @@ class PlanarWalk:
         self._states, self._step = states, np.zeros(len(robots))
         self._status = np.full(len(robots), stretch.WALKING)
         self._here: tuple[Array, Array, NDArray[np.intp]] | None = None
+        for robot in {id(robot): robot for robot in robots}.values():
+            check_steps(robot, expected)
         check_size(record, expected, states.size)
         rows = int(expected * record.rate) + 2 if record else 0
         self._samples = Samples(states.shape, rows)

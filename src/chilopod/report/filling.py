@@ -13,7 +13,7 @@ from types import TracebackType
 from typing import Any, TypeVar
 
 from chilopod.errors import OutputError
-from chilopod.output import prepare_folder, write_atomic
+from chilopod.output import check_folder, write_atomic
 from chilopod.paper.movies import Movie
 from chilopod.paper.section import Context, Found, Section
 from chilopod.paper.sections import Progress
@@ -23,7 +23,7 @@ from chilopod.report.kit.drawing import Drawing
 from chilopod.report.kit.page import Drawn, Shown, State, page
 from chilopod.report.kit.panel import Panel
 from chilopod.report.scene.movie import write_movie
-from chilopod.report.write import write_panel
+from chilopod.report.write import panel_files
 from chilopod.robot import Robot, load_robot, presets
 
 T = TypeVar("T")
@@ -63,7 +63,7 @@ class Report:
         folder: str | Path,
         progress: Progress = lambda what, done, words: None,
     ) -> None:
-        self.page = prepare_folder(folder) / "index.html"
+        self.page = check_folder(folder) / "index.html"
         self.failures: dict[Section[Any], Exception] = {}
         """Why sections could not be computed or drawn."""
         self._sections, self._progress = sections, progress
@@ -143,10 +143,12 @@ class Report:
 
     def _draw_panel(self, panel: Panel) -> Drawn:
         folder = self.page.parent
-        wide = write_panel(panel, folder / "figures", folder / "data")
+        files = dict(panel_files(panel, folder / "figures", folder / "data"))
+        for path, content in files.items():
+            write_atomic(path, content)
         with style.house_style():
             narrow = style.svg(panel.draw(True), panel.name)
-        return Drawn(panel, wide, narrow)
+        return Drawn(panel, files[folder / "figures" / f"{panel.name}.svg"], narrow)
 
     def _write_if_possible(self) -> None:
         # Whoever deletes files while it runs does not stop it; whether the page can be written counts at the end.
@@ -154,15 +156,16 @@ class Report:
             self._write(State.RUNNING)
 
     def _write(self, state: State) -> None:
-        context, data = self._found.context, prepare_folder(self.page.parent / "data")
-        robot_file = write_atomic(data / "robot.toml", context.robot.to_toml())
-        write_atomic(data / "robot-3d.toml", context.whole.to_toml())
+        context, data = self._found.context, self.page.parent / "data"
+        robot_file = data / "robot.toml"
         name = context.robot.name if _is_preset(context.robot) else str(robot_file)
         shown = [self._shown[each] for each in drawings.DRAWINGS if each in self._shown]
         waiting = [section for section in self._sections if section not in self._found]
         waiting += [drawing.section for drawing, _ in self._films]
         html = page(self._found, self._sections, self._opening, shown, self.failures, waiting, name, state)
-        write_atomic(self.page, html)
+        write_atomic(self.page, html)  # first: what is beside it is known by it to be ours
+        write_atomic(robot_file, context.robot.to_toml())
+        write_atomic(data / "robot-3d.toml", context.whole.to_toml())
 
 
 def write_report(found: Found, folder: str | Path) -> Path:

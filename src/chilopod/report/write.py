@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import xarray as xr
 
-from chilopod.output import netcdf, prepare_folder, write_atomic
+from chilopod.netcdf import netcdf, sealed
+from chilopod.output import write_all
 from chilopod.report.figures import branch, identification, undulation
 from chilopod.report.kit import style, tables
 from chilopod.report.kit.panel import Panel
@@ -18,12 +20,18 @@ def files_of(name: str, folder: str | Path) -> list[Path]:
     return [Path(folder) / f"{name}.{kind}" for kind in ("png", "svg", "csv", "nc")]
 
 
-def write_identification(found: Identification, folder: str | Path) -> list[Path]:
+def write_identification(found: Identification, folder: str | Path, *, replace: bool = True) -> list[Path]:
     """Write the profile of an identification as ``identification``, with the same endings as :func:`write_branch`."""
-    return _write_alone(identification.panel(found), folder)
+    write_all(identification_files(found, folder), replace=replace)
+    return files_of("identification", folder)
 
 
-def write_branch(data: xr.Dataset, folder: str | Path) -> list[Path]:
+def identification_files(found: Identification, folder: str | Path) -> Iterator[tuple[Path, bytes]]:
+    """The files of :func:`write_identification`, see :func:`panel_files`."""
+    return panel_files(identification.panel(found), Path(folder), Path(folder))
+
+
+def write_branch(data: xr.Dataset, folder: str | Path, *, replace: bool = True) -> list[Path]:
     """Write a branch of curved walks as ``branch`` with ``.png``, ``.svg``, ``.csv`` and ``.nc``.
 
     The netCDF file holds all that the branch goes on from, the table what a reader wants.
@@ -34,6 +42,8 @@ def write_branch(data: xr.Dataset, folder: str | Path) -> list[Path]:
         From :mod:`chilopod.analysis.branch`.
     folder
         Created where there is none.
+    replace
+        Whether files that are already there may be replaced.
 
     Returns
     -------
@@ -42,50 +52,44 @@ def write_branch(data: xr.Dataset, folder: str | Path) -> list[Path]:
     Raises
     ------
     OutputError
-        If the folder cannot be written.
+        If a file cannot be written; it says where it is kept instead.
     """
-    return _write_alone(branch.panel(data), folder, branch.table(data))
+    return _write_alone(branch.panel(data), folder, replace, branch.table(data), sealed(netcdf(data)))
 
 
-def write_undulation(data: xr.Dataset, folder: str | Path) -> list[Path]:
+def write_undulation(data: xr.Dataset, folder: str | Path, *, replace: bool = True) -> list[Path]:
     """Write undulating walks as ``undulation``, with the same endings as :func:`write_branch`."""
-    return _write_alone(undulation.panel(data), folder)
+    return _write_alone(undulation.panel(data), folder, replace)
 
 
-def _write_alone(panel: Panel, folder: str | Path, table: xr.Dataset | None = None) -> list[Path]:
-    write_panel(panel, Path(folder), Path(folder), table)
-    return files_of(panel.name, folder)
-
-
-def write_panel(panel: Panel, figures: Path, data: Path, table: xr.Dataset | None = None) -> bytes:
-    """Write a figure as ``.png`` and ``.svg``, and the data behind it as ``.nc`` and ``.csv``.
+def panel_files(
+    panel: Panel, figures: Path, data: Path, table: xr.Dataset | None = None, stored: bytes | None = None
+) -> Iterator[tuple[Path, bytes]]:
+    """The files of a figure: the data behind it as ``.nc`` and ``.csv``, then, as ``.svg`` and ``.png``, what is drawn
+    when these are asked for.
 
     Parameters
     ----------
     panel
         The figure.
     figures, data
-        Folders, created where there are none.
+        Folders.
     table
         For the ``.csv``, in place of the data.
-
-    Returns
-    -------
-    bytes
-        The SVG.
-
-    Raises
-    ------
-    OutputError
-        If a folder cannot be written.
+    stored
+        For the ``.nc``, in place of the data.
     """
+    yield data / f"{panel.name}.nc", netcdf(panel.data) if stored is None else stored
+    yield data / f"{panel.name}.csv", tables.csv(panel.data if table is None else table).encode()
     with style.house_style():
         drawn = panel.draw(False)
         vector, pixels = style.svg(drawn, panel.name), style.png(drawn)
-    for folder in (figures, data):
-        prepare_folder(folder)
-    write_atomic(data / f"{panel.name}.nc", netcdf(panel.data))
-    write_atomic(data / f"{panel.name}.csv", tables.csv(panel.data if table is None else table))
-    write_atomic(figures / f"{panel.name}.svg", vector)
-    write_atomic(figures / f"{panel.name}.png", pixels)
-    return vector
+    yield figures / f"{panel.name}.svg", vector
+    yield figures / f"{panel.name}.png", pixels
+
+
+def _write_alone(
+    panel: Panel, folder: str | Path, replace: bool, table: xr.Dataset | None = None, stored: bytes | None = None
+) -> list[Path]:
+    write_all(panel_files(panel, Path(folder), Path(folder), table, stored), replace=replace)
+    return files_of(panel.name, folder)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import json
+import os
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -14,6 +15,8 @@ from chilopod.errors import RobotFileError, nearest_name
 
 _PRESETS: Final = Path(__file__).parent.parent / "robots"
 _LARGEST_FILE: Final = 1_000_000
+_MOST_DOTS: Final = 200
+_BETWEEN_KEYS: Final = re.compile(r"[\n=,\[\]{}]")
 _BARE_KEY: Final = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -69,8 +72,9 @@ def read_table(robot: str | Path) -> tuple[dict[str, Any], str]:
     try:
         if not path.is_file():
             raise _not_found(robot, names)
-        with path.open("rb") as file:
-            content = file.read(_LARGEST_FILE + 1)
+        # Some files that the system makes up call themselves regular, and keep waiting for news.
+        with open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as file:
+            content = file.read(_LARGEST_FILE + 1) or b""
     except (OSError, ValueError) as error:
         if isinstance(error, RobotFileError):
             raise
@@ -80,13 +84,33 @@ def read_table(robot: str | Path) -> tuple[dict[str, Any], str]:
     if not content.strip():
         raise RobotFileError("the file is empty", source=source)
     try:
-        return tomllib.loads(content.decode()), source
+        return parsed(content.decode()), source
     except UnicodeDecodeError:
         raise RobotFileError("is not a text file (UTF-8)", source=source) from None
+    except RobotFileError as error:
+        error.source = source
+        raise
+
+
+def parsed(text: str) -> dict[str, Any]:
+    """Read TOML text, whoever wrote it.
+
+    Raises
+    ------
+    RobotFileError
+        If it is none, or would take very long to read.
+    """
+    # What takes Python's reader time that grows with the square of their number: the parts of one key. Between two of
+    # these characters there is a key at most, or part of a text; and no text of a robot is that long.
+    dots = max(between.count(".") for between in _BETWEEN_KEYS.split(text))
+    if dots > _MOST_DOTS:
+        raise RobotFileError(f"has {dots} dots in a key or a text", allowed=f"up to {_MOST_DOTS}")
+    try:
+        return tomllib.loads(text)
     except RecursionError:
-        raise RobotFileError("is nested too deeply", source=source) from None
+        raise RobotFileError("is nested too deeply") from None
     except ValueError as error:  # TOMLDecodeError, and integers of more digits than Python converts
-        raise RobotFileError(f"is not valid TOML: {error}", source=source) from None
+        raise RobotFileError(f"is not valid TOML: {error}") from None
 
 
 def to_toml(table: Mapping[str, Any]) -> str:
@@ -96,9 +120,9 @@ def to_toml(table: Mapping[str, Any]) -> str:
 
 def _not_found(robot: str | Path, names: list[str]) -> RobotFileError:
     source, path = str(robot), Path(robot)
-    if path.is_dir():
+    if source and path.is_dir():
         return RobotFileError("is a folder, not a robot file", source=source)
-    if path.exists():
+    if source and path.exists():
         return RobotFileError("is not a regular file", source=source)
     if isinstance(robot, Path) or len(path.parts) > 1 or path.suffix:
         return RobotFileError("no such file", source=source, nearest=nearest_name(source, names))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import tomllib
+from collections import deque
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final, Self
@@ -12,7 +12,7 @@ from pydantic import PlainValidator, model_validator
 from chilopod.errors import ChilopodError, ParameterError, RobotFileError
 from chilopod.gait import Gait
 from chilopod.ground import Ground
-from chilopod.robot.files import Table, read_table, to_toml
+from chilopod.robot.files import Table, parsed, read_table, to_toml
 from chilopod.robot.inertia import module_yaw_inertia
 from chilopod.robot.parameters import QUANTITIES, Place, place_of, spring_index
 from chilopod.robot.parts import MODULES, Body, Legs, Springs, Twin, spread
@@ -42,11 +42,11 @@ def _table(table: object) -> Table:
 def _provenance(table: object) -> Table:
     """Read [provenance], where a key is a dotted path, quoted or not (TOML makes tables of the latter)."""
     flat: dict[str, str] = {}
-    pending = list(_table(table).items())
+    pending = deque(_table(table).items())
     while pending:
-        path, text = pending.pop(0)
+        path, text = pending.popleft()
         if isinstance(text, Mapping):
-            pending[:0] = [(f"{path}.{key}", item) for key, item in text.items()]
+            pending.extendleft((f"{path}.{key}", item) for key, item in reversed([*text.items()]))
             continue
         try:
             flat[path] = _printable(text, longest=1000)
@@ -112,7 +112,7 @@ class Robot(Description):
     @classmethod
     def from_toml(cls, text: str) -> Self:
         """The robot that :meth:`to_toml` wrote."""
-        return cls(**tomllib.loads(text))
+        return cls(**parsed(text))
 
     @model_validator(mode="before")
     @classmethod

@@ -14,6 +14,7 @@ from chilopod.robot.parts import Body, Legs, Springs, Twin
 from chilopod.units import Description, Quantity, quantities
 
 _PATH: Final = re.compile(r"([a-z_]+\.[a-z_]+)(?:\[([0-9]{1,6})\])?")
+_INDEX: Final = re.compile(r"\s*([0-9]{1,6})\s*\]?\s*")  # as one may have meant it
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,13 +56,14 @@ def place_of(path: str) -> Place:
     if stem not in known:
         if stem.partition(".")[0] in ("name", "provenance"):
             raise ParameterError("is text, not a parameter", field=path, allowed=", ".join(known))
-        bare, bracket, rest = path.partition("[")
+        bare, _, rest = path.partition("[")
         # "stiffness" alone, or under a wrong section, is nearer to what was meant than spelling can tell.
         same_key = (name for name in known if name.partition(".")[2] == bare.rpartition(".")[2])
         nearest = next(same_key, None) or nearest_name(bare, known)
-        if nearest and known[nearest].each:
-            nearest += bracket + rest
-        raise ParameterError("names no parameter", field=path, allowed=", ".join(known), nearest=nearest)
+        if nearest is None:
+            raise ParameterError("names no parameter", field=path, allowed=", ".join(known))
+        meant = _INDEX.fullmatch(rest) if known[nearest].each else None
+        raise ParameterError("names no parameter", field=path, nearest=f"{nearest}[{meant[1]}]" if meant else nearest)
     quantity = known[stem]
     if index is not None and not quantity.each:
         raise ParameterError("has no index", field=path, allowed=stem)

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from chilopod.tasks.identify import identify_planar, identify_twin
     from chilopod.tasks.radius_law import radius_law
     from chilopod.tasks.turn import Turn, best_spring, turn
-    from chilopod.tasks.walk import Walks, foot_creep, walk
+    from chilopod.tasks.walk import Ends, Walks, ends, foot_creep, planned, walk
 else:
     __getattr__, __dir__ = exports(
         __name__,
@@ -16,17 +16,20 @@ else:
             "identify": ("identify_planar", "identify_twin"),
             "radius_law": ("radius_law",),
             "turn": ("Turn", "best_spring", "turn"),
-            "walk": ("Walks", "foot_creep", "walk"),
+            "walk": ("Ends", "Walks", "ends", "foot_creep", "planned", "walk"),
         },
     )
 
 __all__ = [
+    "Ends",
     "Turn",
     "Walks",
     "best_spring",
+    "ends",
     "foot_creep",
     "identify_planar",
     "identify_twin",
+    "planned",
     "radius_law",
     "turn",
     "walk",

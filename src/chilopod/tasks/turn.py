@@ -16,11 +16,12 @@ from chilopod.engine import Controller, engine_named
 from chilopod.engine.named import check_controller, path_of
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.progress import Progress, silent
+from chilopod.record import LONGEST, in_range
 from chilopod.robot import Robot
 from chilopod.steering import Criteria, Strategy, Target, earliest_arrival, evaluate, steered
 from chilopod.tasks.radius_law import radius_law
 from chilopod.tasks.walk import check_repeats, foot_creep, repeated
-from chilopod.trials import NONE, Trial, run, straight, together
+from chilopod.trials import NONE, Trial, check_fits, run, straight, together
 
 Array = NDArray[np.float64]
 
@@ -163,6 +164,8 @@ def turn(
     if controller is not None:
         check_controller(controller)
     time = duration if duration is not None else _time_for(robot, target, traits.haste)
+    in_range("duration", time, LONGEST, "s")
+    check_fits(repeated(Trial(robot, time, target=target, engine=engine), seed, repeats))
     law = None
     if isinstance(spring, str) and strategy.springs == K1:
 

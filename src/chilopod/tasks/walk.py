@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -17,25 +17,28 @@ from chilopod.errors import ParameterError
 from chilopod.progress import Progress, silent
 from chilopod.record import RATE
 from chilopod.robot import Robot
-from chilopod.trials import NONE, Disturbance, Trial, WalkSummary, run, straight, summaries, together
+from chilopod.trials import NONE, Disturbance, Trial, WalkSummary, run, run_each, straight, summaries, together
 
 _MOST_BENT = 1.5  # rad; at a right angle modules run into each other
 
 
 @dataclass(frozen=True)
-class Walks:
-    """Walks that differ in nothing but their seed.
+class Ends:
+    """What walks came to that differ in nothing but their seed.
 
     Attributes
     ----------
     trials
         With all that makes each of them.
-    record
-        Of all walks.
+    summaries
+        The end of every walk.
+    straight
+        Whether none of them ever bent, see :func:`chilopod.trials.straight`.
     """
 
     trials: tuple[Trial, ...]
-    record: xr.Dataset
+    summaries: Sequence[WalkSummary]
+    straight: bool
 
     @property
     def first(self) -> Trial:
@@ -46,16 +49,6 @@ class Walks:
     def seeded(self) -> bool:
         """Whether the walks are disturbed."""
         return self.first.disturbance != NONE
-
-    @property
-    def straight(self) -> bool:
-        """See :func:`chilopod.trials.straight`."""
-        return straight(self.record)
-
-    @cached_property
-    def summaries(self) -> Sequence[WalkSummary]:
-        """The end of every walk."""
-        return summaries(self.first.robot, self.record)
 
     @cached_property
     def foot_creep(self) -> float | None:
@@ -76,6 +69,21 @@ class Walks:
             ],
             "foot_creep_N_s_m": self.foot_creep,
         }
+
+
+@dataclass(frozen=True)
+class Walks(Ends):
+    """Walks that differ in nothing but their seed, and what they came to.
+
+    Attributes
+    ----------
+    trials, summaries, straight
+        As for :class:`Ends`.
+    record
+        Of all walks.
+    """
+
+    record: xr.Dataset
 
 
 def walk(
@@ -122,6 +130,40 @@ def walk(
     Raises
     ------
     ParameterError
+        If something is out of range, or memory cannot hold the record: :func:`ends` needs none.
+    """
+    trials = planned(
+        robot,
+        duration,
+        seed=seed,
+        repeats=repeats,
+        joint_angles=joint_angles,
+        rate=rate,
+        forces=forces,
+        engine=engine,
+        controller=controller,
+    )
+    record = together(run(trials, folder, progress))
+    return Walks(trials, summaries(robot, record), straight(record), record)
+
+
+def planned(
+    robot: Robot,
+    duration: float,
+    *,
+    seed: int | None = None,
+    repeats: int = 1,
+    joint_angles: Sequence[float] = (),
+    rate: float = RATE,
+    forces: bool = False,
+    engine: str = "planar",
+    controller: Controller | None = None,
+) -> tuple[Trial, ...]:
+    """The trials of :func:`walk`, whose arguments these are.
+
+    Raises
+    ------
+    ParameterError
         If something is out of range.
     """
     angles, joints = tuple(joint_angles), robot.body.modules - 1
@@ -137,8 +179,35 @@ def walk(
         )
     check_repeats(seed, repeats)
     one = Trial(robot, duration, joint_angles=angles, controller=controller, rate=rate, forces=forces, engine=engine)
-    trials = repeated(one, seed, repeats)
-    return Walks(trials, together(run(trials, folder, progress)))
+    return repeated(one, seed, repeats)
+
+
+def ends(
+    trials: tuple[Trial, ...],
+    folder: str | Path | None = None,
+    progress: Progress = silent,
+    told: Callable[[int, xr.Dataset], None] = lambda index, record: None,
+) -> Ends:
+    """Let robots walk and keep only what they came to: memory holds a batch of records, however many walks there are.
+
+    Parameters
+    ----------
+    trials
+        From :func:`planned`.
+    folder, progress
+        As for :func:`walk`.
+    told
+        Called with the number of a walk and its record as soon as that is there.
+    """
+    number = {trial.file_name: index for index, trial in enumerate(trials)}
+    found: dict[int, WalkSummary] = {}
+    unbent = True
+    for trial, record in run_each(trials, folder, progress):
+        index = number[trial.file_name]
+        (found[index],) = summaries(trial.robot, record)
+        unbent = unbent and straight(record)
+        told(index, record)
+    return Ends(trials, [found[index] for index in range(len(trials))], unbent)
 
 
 def check_repeats(seed: int | None, repeats: int) -> None:

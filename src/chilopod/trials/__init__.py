@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from chilopod.trials.cluster import Cluster
     from chilopod.trials.disturbance import NONE, Disturbance
     from chilopod.trials.executors import Executor, Here, using
-    from chilopod.trials.run import run, together
+    from chilopod.trials.run import check_fits, run, run_each, together
     from chilopod.trials.store import Store
     from chilopod.trials.summary import AVERAGED, WalkSummary, axis_radius, mean_joint_angles, straight, summaries
     from chilopod.trials.trial import Trial
@@ -26,7 +26,7 @@ else:
             "cluster": ("Cluster",),
             "disturbance": ("NONE", "Disturbance"),
             "executors": ("Executor", "Here", "using"),
-            "run": ("run", "together"),
+            "run": ("check_fits", "run", "run_each", "together"),
             "store": ("Store",),
             "summary": ("AVERAGED", "WalkSummary", "axis_radius", "mean_joint_angles", "straight", "summaries"),
             "trial": ("Trial",),
@@ -45,8 +45,10 @@ __all__ = [
     "WalkSummary",
     "axis_radius",
     "batches",
+    "check_fits",
     "mean_joint_angles",
     "run",
+    "run_each",
     "straight",
     "summaries",
     "together",

@@ -9,9 +9,9 @@ from __future__ import annotations
 import asyncio
 import queue
 import time
-from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, suppress
+from itertools import islice
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
@@ -101,8 +101,8 @@ class Cluster:
             pieces += [batch[i : i + size] for i in range(0, len(batch), size)]
         return pieces
 
-    def walk(self, batches: Sequence[Sequence[Trial]]) -> Iterator[tuple[int, list[xr.Dataset]]]:
-        """The number of a batch and its records, as they come.
+    def walk(self, batches: Iterable[Sequence[Trial]]) -> Iterator[tuple[int, list[xr.Dataset]]]:
+        """The number of a batch and its records, as they come; a batch is taken when it is sent.
 
         Raises
         ------
@@ -112,33 +112,35 @@ class Cluster:
         ParameterError
             If a controller's class cannot be imported on a worker.
         """
-        suspects: list[int] = []
-        yield from self._walk(batches, range(len(batches)), suspects)
+        suspects: list[tuple[int, Sequence[Trial]]] = []
+        yield from self._walk(enumerate(batches), suspects)
         # Dask blames all that a killed worker was given. What is killed alone, too, kills.
-        guilty: list[int] = []
+        guilty: list[tuple[int, Sequence[Trial]]] = []
         for suspect in suspects:
-            yield from self._walk(batches, [suspect], guilty)
+            yield from self._walk([suspect], guilty)
         if guilty:
-            which = "; ".join(_named(batches[each]) for each in guilty)
+            which = "; ".join(_named(batch) for _, batch in guilty)
             raise self._error(f"these kill their worker again and again, all others are done: {which}")
 
     def _walk(
-        self, batches: Sequence[Sequence[Trial]], which: Sequence[int], killed: list[int]
+        self, batches: Iterable[tuple[int, Sequence[Trial]]], killed: list[tuple[int, Sequence[Trial]]]
     ) -> Iterator[tuple[int, list[xr.Dataset]]]:
-        """Some of the batches; the numbers of those that were given up go into ``killed``."""
+        """Batches with their numbers; those that were given up go into ``killed``."""
         from distributed import KilledWorker
 
         arrived: queue.SimpleQueue[tuple[int, bytes | BaseException]] = queue.SimpleQueue()
-        waiting, under_way = deque(which), dict[int, Any]()
+        under_way: dict[int, tuple[Sequence[Trial], Any]] = {}
+        waiting = iter(batches)
         try:
-            while waiting or under_way:
-                while waiting and len(under_way) < _AHEAD * max(self.workers, 1):
-                    index = waiting.popleft()
-                    under_way[index] = self._sent(index, batches[index], arrived)
+            while True:
+                for index, batch in islice(waiting, max(_AHEAD * max(self.workers, 1) - len(under_way), 0)):
+                    under_way[index] = batch, self._sent(index, batch, arrived)
+                if not under_way:
+                    return
                 index, answer = self._next(arrived)
-                del under_way[index]
+                batch, _ = under_way.pop(index)
                 if isinstance(answer, KilledWorker):
-                    killed.append(index)
+                    killed.append((index, batch))
                 elif isinstance(answer, BaseException):
                     raise self._in_words(answer)
                 else:
@@ -146,7 +148,7 @@ class Cluster:
         finally:
             # What nobody waits for any more does not walk. (Cancelling what fetches it would leave tasks of dask's
             # alone with their exceptions, of which asyncio complains.)
-            for future in under_way.values():
+            for _, future in under_way.values():
                 future.release()
 
     def _sent(

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import multiprocessing
 import os
 import signal
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from multiprocessing import resource_tracker
+from multiprocessing.process import BaseProcess
 from typing import Any
 
 from chilopod.errors import ClusterError, ParameterError, one_line
@@ -118,6 +120,7 @@ def _own(workers: int, threads: int, distributed: Any, stack: ExitStack) -> Any:
     # here, that it is not for them. (Whoever starts Python's resource tracker is told to listen again.)
     if sys.platform != "win32":
         resource_tracker.ensure_running()
+    others = multiprocessing.active_children()
     with _without_interrupts():
         cluster = distributed.LocalCluster(
             n_workers=0,
@@ -131,7 +134,7 @@ def _own(workers: int, threads: int, distributed: Any, stack: ExitStack) -> Any:
             env=dict.fromkeys(("NUMBA_NUM_THREADS", *_BLAS), str(threads)),
             preload=["chilopod.trials.on_worker"],
         )
-    stack.callback(_stopped, cluster)
+    stack.callback(_stopped, cluster, others)
     client = distributed.Client(cluster, timeout=_START, set_as_default=False, direct_to_workers=True)
     stack.callback(_closed, client)
     cluster.scale(workers)
@@ -151,8 +154,9 @@ def _closed(client: Any) -> None:
         client.close(timeout=_STOP)
 
 
-def _stopped(cluster: Any) -> None:
-    """Stop workers, those too that walk; left to itself dask waits for them."""
+def _stopped(cluster: Any, others: Sequence[BaseProcess]) -> None:
+    """Stop workers, those too that walk or have just been started; left to itself dask waits for them. What ``others``
+    started goes on."""
 
     async def stop() -> None:
         nannies = list(cluster.workers.values())
@@ -160,8 +164,11 @@ def _stopped(cluster: Any) -> None:
 
     with suppress(Exception):
         cluster.sync(stop)
+    for child in set(multiprocessing.active_children()) - set(others):
+        child.kill()
     with suppress(Exception):
         cluster.close(timeout=_STOP)
+    cluster.shutdown_on_close = False  # it would try again for ten seconds when Python ends
 
 
 @contextmanager

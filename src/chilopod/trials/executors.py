@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Protocol, TypeVar
@@ -30,10 +30,11 @@ class Executor(Protocol):
         """The same batches, those that are too large to be shared out evenly in pieces."""
         ...
 
-    def walk(self, batches: Sequence[Sequence[Trial]]) -> Iterator[tuple[int, list[xr.Dataset]]]:
+    def walk(self, batches: Iterable[Sequence[Trial]]) -> Iterator[tuple[int, list[xr.Dataset]]]:
         """The number of a batch and its records, of every batch as soon as it is done, in any order.
 
-        Whoever takes them writes them; one who stops taking them stops the walks.
+        A batch is taken when its walk begins, not before: what nobody has begun, another process may. Whoever takes
+        records writes them; one who stops taking them stops the walks.
         """
         ...
 
@@ -47,7 +48,7 @@ class Here:
         """The same batches."""
         return batches
 
-    def walk(self, batches: Sequence[Sequence[Trial]]) -> Iterator[tuple[int, list[xr.Dataset]]]:
+    def walk(self, batches: Iterable[Sequence[Trial]]) -> Iterator[tuple[int, list[xr.Dataset]]]:
         """One after the other."""
         from chilopod.trials.batch import walked
 

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
+from chilopod.output import check_room
 from chilopod.progress import Progress, silent
+from chilopod.record import check_memory
 from chilopod.trials.batch import batches
 from chilopod.trials.executors import Executor, current
+from chilopod.trials.sharing import alone, shared
 from chilopod.trials.store import Store
 from chilopod.trials.trial import Trial
+
+_COPIES = 2  # of a record: as the engine has it and as it is given; of many, each and all together
 
 
 def run(
@@ -26,9 +31,10 @@ def run(
     Parameters
     ----------
     trials
-        In any order; the same trial may occur twice.
+        In any order; the same trial may occur twice. All their records have to fit into memory, see :func:`run_each`.
     folder
-        Where records are kept, see :class:`chilopod.trials.Store`; without one nothing is kept.
+        Where records are kept, see :class:`chilopod.trials.Store`; without one nothing is kept. Several processes that
+        are given the same one share the work: each walks what no other has begun, and waits for the others' at the end.
     progress
         Called with the part done (0 to 1) and a few words.
     executor
@@ -39,27 +45,66 @@ def run(
     -------
     The record of every trial, see :func:`chilopod.planar.simulate` and :func:`chilopod.twin.simulate`, with one
     ``robot`` and the trial in the attributes.
+
+    Raises
+    ------
+    ParameterError
+        If memory cannot hold the records.
+    OutputError
+        If the folder has no room for them.
+    """
+    check_fits(trials)
+    records = {trial.file_name: record for trial, record in run_each(trials, folder, progress, executor)}
+    return [records[trial.file_name] for trial in trials]
+
+
+def check_fits(trials: Sequence[Trial]) -> None:
+    """Refuse trials whose records memory cannot hold all together.
+
+    Raises
+    ------
+    ParameterError
+        With what they would take.
+    """
+    check_memory(_COPIES * sum(trial.least_bytes for trial in trials))
+
+
+def run_each(
+    trials: Sequence[Trial],
+    folder: str | Path | None = None,
+    progress: Progress = silent,
+    executor: Executor | None = None,
+) -> Iterator[tuple[Trial, xr.Dataset]]:
+    """Run trials, or read what has been run before, and give each different one and its record as soon as it is there,
+    in any order: memory holds a batch at a time.
+
+    Parameters
+    ----------
+    trials, folder, progress, executor
+        As for :func:`run`.
     """
     store = None if folder is None else Store(folder)
     asked = {trial.file_name: trial for trial in trials}
-    records: dict[str, xr.Dataset] = {}
-    for name, trial in asked.items() if store else ():
+    missing = []
+    for trial in asked.values():
         found = store.read(trial) if store else None
-        if found is not None:
-            records[name] = found
+        if found is None:
+            missing.append(trial)
+        else:
+            yield trial, found
+    if store:
+        check_room(store.folder, sum(trial.least_bytes for trial in missing))
     executor = current() if executor is None else executor
-    share = executor.cut(batches([trial for name, trial in asked.items() if name not in records]))
-    progress(len(records) / max(len(asked), 1), f"{len(records)} of {len(asked)} trials")
-    for index, walked in executor.walk(share):
-        for trial, record in zip(share[index], walked, strict=True):
-            if store:
-                store.write(trial, record)
-            records[trial.file_name] = record
-        if store:
-            store.sync()
-        progress(len(records) / len(asked), f"{len(records)} of {len(asked)} trials{executor.words}")
-    progress(1.0, f"{len(records)} trials")
-    return [records[trial.file_name] for trial in trials]
+    share = executor.cut(batches(missing))
+    check_memory(_COPIES * max((sum(trial.least_bytes for trial in batch) for batch in share), default=0.0))
+    done = len(asked) - len(missing)
+    progress(done / max(len(asked), 1), f"{done} of {len(asked)} trials")
+    for walked, elsewhere in shared(missing, store, executor) if store and missing else alone(share, executor):
+        yield from walked
+        done += len(walked)
+        words = f"{done} of {len(asked)} trials{executor.words}"
+        progress(done / len(asked), f"{words}, {elsewhere} walked by another process" if elsewhere else words)
+    progress(1.0, f"{len(asked)} trials")
 
 
 def together(records: Sequence[xr.Dataset]) -> xr.Dataset:

@@ -2,42 +2,37 @@
 
 from __future__ import annotations
 
-import io
 import logging
 import os
-import stat
-import zlib
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
-
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from chilopod.errors import OutputError
-from chilopod.output import prepare_folder, sync_folder, write_atomic
-from chilopod.trials.netcdf3 import encode
+from chilopod.output import check_folder, made_folder, sync_folder, write_atomic
+from chilopod.trials.claims import Claims
+from chilopod.trials.file import Unsound, content_of, read_whole, record_of
 from chilopod.trials.trial import Trial
 
-_logger = logging.getLogger(__name__)
+if TYPE_CHECKING:
+    import xarray as xr
 
-_CHECKSUM = "checksum"
-_BLANK = "0" * 8
-# The attribute as it stands in a file: length of its name, name, type, length of its text, and then the text.
-_BEFORE = b"\0\0\0\x08checksum\0\0\0\x02\0\0\0\x08"
-_FRONT = 65_536  # bytes: before all but dimensions
+_UNFINISHED = ".chilopod-trial-"
+_logger = logging.getLogger(__name__)
 
 
 class Store:
     """A folder that keeps the records of trials, each in a netCDF-3 file of its own.
 
     Every file is there whole or not at all, has a name derived from all that makes its trial, holds that as text, and a
-    checksum over all of its bytes. Many processes may use one folder at the same time: whoever walks the same trial
-    writes the same file.
+    checksum over all of its bytes. Many processes may use one folder at the same time: they share the work, see
+    :class:`chilopod.trials.claims.Claims`, and whoever walks the same trial writes the same file.
 
     Parameters
     ----------
     folder
-        Made where there is none.
+        Made with the first record where there is none.
     tell
         Given a line about every file that is not what it should be; by default the logger of this module, which prints
         it on stderr if nobody has told it otherwise.
@@ -49,8 +44,12 @@ class Store:
     """
 
     def __init__(self, folder: str | Path, tell: Callable[[str], object] = _logger.warning) -> None:
-        self.folder = prepare_folder(folder)
+        self.folder = check_folder(folder)
         self._tell = tell
+
+    def has(self, trial: Trial) -> bool:
+        """Whether there is something that has the name of a trial's record."""
+        return os.path.lexists(self.folder / trial.file_name)
 
     def read(self, trial: Trial) -> xr.Dataset | None:
         """The record of a trial; None if there is none.
@@ -63,27 +62,20 @@ class Store:
         ParameterError
             If the trial cannot be kept, see :meth:`chilopod.trials.Trial.check_findable`.
         OutputError
-            If such a file cannot be moved.
+            If such a file cannot be moved, or this process has no memory to read it.
         """
         trial.check_findable()
         path = self.folder / trial.file_name
         try:
-            content = _content(path)
+            content, header = read_whole(path)
+            if header.attributes.get("trial") != trial.text:
+                raise Unsound("holds another trial")
+            return record_of(content)
         except FileNotFoundError:
             return None
-        except (OSError, MemoryError) as error:
-            self._move_aside(path, f"cannot be read ({error})")
+        except Unsound as error:
+            self._move_aside(path, str(error))
             return None
-        if not _whole(content):
-            self._move_aside(path, "is damaged or was edited")
-            return None
-        # What was written here can be read again.
-        record = xr.load_dataset(io.BytesIO(content), engine="scipy")
-        if record.attrs.get("trial") != trial.text:
-            self._move_aside(path, "holds another trial")
-            return None
-        del record.attrs[_CHECKSUM]
-        return record
 
     def write(self, trial: Trial, record: xr.Dataset) -> None:
         """Keep a record, for good once :meth:`sync` has been called.
@@ -102,12 +94,15 @@ class Store:
                 field="record",
                 allowed=f"a record for {trial.file_name}",
             )
-        content = encode(record, {_CHECKSUM: _BLANK})
-        at = content.index(_BEFORE) + len(_BEFORE)
-        content[at : at + len(_BLANK)] = f"{zlib.crc32(content):08x}".encode()
-        # Whoever deletes the folder while trials walk loses what was in it, not the walks to come.
-        self.folder.mkdir(parents=True, exist_ok=True)
-        write_atomic(self.folder / trial.file_name, content, durable=True)
+        content = content_of(record)
+        # Whoever deletes the folder while trials walk loses what was in it, not the walks to come: it is made again.
+        write_atomic(self.folder / trial.file_name, content, durable=True, temporary=_UNFINISHED)
+
+    @contextmanager
+    def claims(self) -> Iterator[Claims]:
+        """For what this process walks and keeps here: others walk other trials. The folder is made."""
+        with made_folder(self.folder), Claims(self.folder, self._sweep) as claims:
+            yield claims
 
     def sync(self) -> None:
         """Make sure that what has been written is there even after a power failure."""
@@ -128,22 +123,9 @@ class Store:
             raise OutputError(f"{why}, and cannot be moved aside ({error.strerror})", source=str(path)) from None
         self._tell(f"{path} {why}: walked again, what was there is {aside.name}")
 
-
-def _content(path: Path) -> bytearray:
-    # A pipe of this name must not keep us waiting.
-    handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
-    with os.fdopen(handle, "rb") as file:
-        if not stat.S_ISREG(os.fstat(handle).st_mode):
-            raise OSError("no file")
-        return bytearray(file.read())
-
-
-def _whole(content: bytearray) -> bool:
-    """Whether nothing has changed since it was written; the content's checksum is blanked."""
-    at = content.find(_BEFORE, 0, _FRONT) + len(_BEFORE)
-    end = at + len(_BLANK)
-    if at < len(_BEFORE) or end > len(content):
-        return False
-    said = bytes(content[at:end])
-    content[at:end] = _BLANK.encode()
-    return said == f"{zlib.crc32(content):08x}".encode()
+    def _sweep(self) -> None:
+        """Remove what somebody who was killed did not finish."""
+        with os.scandir(self.folder) as entries:
+            for entry in entries:
+                if entry.name.startswith(_UNFINISHED):
+                    os.unlink(entry)

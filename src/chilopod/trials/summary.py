@@ -75,8 +75,9 @@ class WalkSummary:
 
 def mean_joint_angles(record: xr.Dataset, seconds: float = AVERAGED) -> xr.DataArray:
     """Joint angles averaged over the last ``seconds`` of a record (all of a shorter one), rad, over (robot, joint)."""
-    end = float(record.time[-1])
-    return record.joint_angle.where(record.time >= end - seconds * (1.0 + 1e-9), drop=True).mean("time", skipna=False)
+    times = record.time.values
+    first = int(np.searchsorted(times, times[-1] - seconds * (1.0 + 1e-9)))
+    return record.joint_angle.isel(time=slice(first, None)).mean("time", skipna=False)
 
 
 def straight(record: xr.Dataset) -> bool:
@@ -88,7 +89,7 @@ def straight(record: xr.Dataset) -> bool:
 def axis_radius(robot: Robot, angles: Array) -> Array:
     """The paper's (N-1) L / sum |theta|, m, of joint angles over the last axis; infinite where all are zero."""
     bent = np.abs(angles).sum(-1)
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):  # what hardly bends at all is straight
         return np.asarray((robot.body.modules - 1) * robot.module_length / bent)
 
 

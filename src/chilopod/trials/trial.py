@@ -102,7 +102,7 @@ class Trial:
         }
         for name, value in told.items():
             object.__setattr__(self, name, value)
-        in_range("duration", self.duration, LONGEST)
+        in_range("duration", self.duration, LONGEST, "s")
         engine = engine_named(self.engine)
         engine.common(self.robot)
         if self.recording.poses and not engine.traits.poses:
@@ -120,6 +120,11 @@ class Trial:
         """What is written down."""
         return Recording(self.rate, self.forces, self.poses)
 
+    @property
+    def least_bytes(self) -> float:
+        """What its record takes, at least."""
+        return self.recording.least_bytes(self.robot.body.modules, self.duration)
+
     @cached_property
     def steering(self) -> Any:
         """The controller as plain data, see :func:`chilopod.trials.description.plain`."""
@@ -130,10 +135,8 @@ class Trial:
         """All of it as JSON; equal texts are equal trials."""
         return json.dumps(
             {
-                "version": RECORD_VERSION,
-                "chilopod": chilopod.__version__,
+                **versions_of(self.engine),
                 "engine": self.engine,
-                "engine_version": engine_named(self.engine).traits.version,
                 "robot": robot_text(self.robot),
                 "duration": self.duration,
                 "seed": self.seed,
@@ -153,7 +156,7 @@ class Trial:
         """Of its record."""
         engine = engine_named(self.engine).traits.name
         kind = "".join(each if each.isalnum() else "-" for each in engine)
-        return f"{kind}-{hashlib.sha256(self.text.encode()).hexdigest()[:20]}.nc"
+        return f"{kind}-{digest_of(self.text)}.nc"
 
     def check_findable(self) -> None:
         """Make sure that other processes, now or later, can find what walks and what steers: the folder of trials
@@ -176,3 +179,17 @@ class Trial:
                     value=path,
                     allowed="what stands at the top of a module that can be imported, or trials without a folder",
                 )
+
+
+def versions_of(engine: str) -> dict[str, Any]:
+    """Of what makes a record, as they stand in a trial's text."""
+    return {
+        "version": RECORD_VERSION,
+        "chilopod": chilopod.__version__,
+        "engine_version": engine_named(engine).traits.version,
+    }
+
+
+def digest_of(text: str) -> str:
+    """Of a trial's text: what its file is called by."""
+    return hashlib.sha256(text.encode()).hexdigest()[:20]

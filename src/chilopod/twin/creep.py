@@ -21,6 +21,7 @@ _PUSH = 0.05  # of the weight
 _SETTLING, _MEASURED = 1.5, 0.5  # s
 _LOOKS = 50  # at whether it still stands, while it settles
 _FASTEST = 100.0  # m/s and rad/s
+_SUNK = 0.5  # of its height: a robot that is lower does not stand on its feet
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,10 @@ def _coefficient(robot: Robot, axis: int) -> float:
             mujoco.mj_step(model, data, round(_SETTLING / _LOOKS / model.opt.timestep))
             if not np.abs(data.qvel).max() < _FASTEST:
                 return float("nan")
+        if data.qpos[2] < _SUNK * start[2]:
+            return float("nan")
         before = data.geom_xpos[plan.feet][..., axis].mean()
         mujoco.mj_step(model, data, round(_MEASURED / model.opt.timestep))
         speeds.append(sign * (data.geom_xpos[plan.feet][..., axis].mean() - before) / _MEASURED)
-    return float(0.5 * push / np.mean(speeds))
+    speed = float(np.mean(speeds))
+    return 0.5 * push / speed if speed > 0.0 else float("nan")

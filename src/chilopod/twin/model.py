@@ -11,6 +11,7 @@ the options.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
@@ -84,7 +85,9 @@ class TwinModel:
 
     def __init__(self, robot: Robot, forces: bool = False, edit: Edit | None = None) -> None:
         self.robot, self.twin = robot, twin_of(robot)
-        self.model = build(robot, forces, edit).compile()
+        spec = build(robot, forces, edit)
+        with _in_our_words():
+            self.model = spec.compile()
         count = robot.body.modules
 
         def joint(name: str) -> int:
@@ -173,10 +176,8 @@ def build(robot: Robot, forces: bool = False, edit: Edit | None = None) -> mujoc
         parent = body
     if edit is not None:
         edit(spec, robot)
-    try:
+    with _in_our_words():
         with_step(spec, twin)
-    except ValueError as error:  # in MuJoCo's words; ours have no better ones
-        raise ParameterError(f"MuJoCo cannot build this robot ({error})", field="twin") from None
     if forces:
         for i in range(robot.body.modules):
             for leg in _legs(i):
@@ -213,6 +214,17 @@ def silence() -> Iterator[None]:
         yield
     finally:
         before.set()
+
+
+@contextmanager
+def _in_our_words() -> Iterator[None]:
+    """What MuJoCo finds wrong with a robot is an error of one line, also where it would only warn of it."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            yield
+    except (ValueError, UserWarning) as error:  # ours has no better words
+        raise ParameterError(f"MuJoCo cannot build this robot ({error})", field="twin") from None
 
 
 def _legs(module: int) -> list[str]:

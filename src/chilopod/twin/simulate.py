@@ -73,7 +73,7 @@ def simulate(
     ParameterError
         If an argument has the wrong shape or is out of range, or the robots do not go together.
     """
-    in_range("duration", duration, LONGEST)
+    in_range("duration", duration, LONGEST, "s")
     walk = start(
         robots,
         initial=initial,

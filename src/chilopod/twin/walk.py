@@ -15,6 +15,7 @@ from chilopod.cores import cores
 from chilopod.engine import Actuators, Command, Observation, Ramps, Status, Traits
 from chilopod.engine.arguments import as_number, check_time
 from chilopod.engine.saved import pack
+from chilopod.errors import ParameterError
 from chilopod.record import Recording, Samples, add_outcome, check_size, walk_record
 from chilopod.robot import Robot
 from chilopod.twin.failures import failures
@@ -28,6 +29,7 @@ TOLERANCE = 1e-8
 """Default of the contact solver, MuJoCo's own."""
 
 _LONGEST_STRETCH = 0.6  # s that are stepped without a look, and kept step by step meanwhile
+_MOST_KEPT = 5e7  # numbers, of these steps
 _TARGETS_AHEAD = 2048  # ticks for which servo targets are computed at a time
 _SAME_INSTANT = 1e-9  # ticks
 _STATE = ("time", "qpos", "qvel", "qacc_warmstart", "qfrc_applied")
@@ -90,6 +92,21 @@ class TwinWalk:
             self._rates.grown(sample + 1)[sample] = 0.0
 
     @property
+    def _longest_stretch(self) -> int:
+        """Ticks that are stepped at a time: at least one, and no more than there is memory for."""
+        model, twin = self._plan.model, self._plan.twin
+        numbers = model.nq + model.nv + model.nu + model.nsensordata
+        most = _MOST_KEPT / (len(self._robots) * self._plan.steps_per_control * numbers)
+        if most < 1.0:
+            raise ParameterError(
+                f"is {self._plan.steps_per_control:g} steps, more than can be kept of {len(self._robots)} robots",
+                field="twin.control_interval",
+                value=f"{twin.control_interval:g} s",
+                allowed=f"{most * twin.control_interval:.2g} s or less with this timestep",
+            )
+        return max(1, int(min(_LONGEST_STRETCH / twin.control_interval, most)))
+
+    @property
     def robots(self) -> tuple[Robot, ...]:
         """One a walk."""
         return self._robots
@@ -127,7 +144,7 @@ class TwinWalk:
         until = check_time(until, self._time)
         check_size(self._record, until, len(self._robots) * (self._plan.model.nq + self._plan.model.nv))
         interval = self._plan.twin.control_interval
-        last, longest = int(np.ceil(until / interval - _SAME_INSTANT)), max(1, int(_LONGEST_STRETCH / interval))
+        last, longest = int(np.ceil(until / interval - _SAME_INSTANT)), self._longest_stretch
         with silence():
             while self._tick < last:
                 tick = min(last, self._tick + longest)

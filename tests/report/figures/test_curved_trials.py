@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chilopod import load_robot
-from chilopod.output import netcdf
+from chilopod.netcdf import netcdf
 from chilopod.paper.curved.study import curved_study
 from chilopod.paper.size import Size
 from chilopod.report.figures import curved_trials, curved_variants

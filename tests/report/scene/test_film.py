@@ -81,7 +81,7 @@ def test_what_cannot_be_filmed(tmp_path, monkeypatch):
     (tmp_path / "file").touch()
     with pytest.raises(OutputError, match="file"):
         movie(record, tmp_path / "file" / "a.mp4", titles=["a"], heading="h")
-    monkeypatch.setattr("chilopod.report.scene.film._ENCODER", "no-such-encoder")
+    monkeypatch.setattr("chilopod.report.scene.encoder.ENCODER", "no-such-encoder")
     with pytest.raises(OutputError, match="PyAV was built without the encoder"):
         movie(record, tmp_path / "a.mp4", titles=["a"], heading="h")
     assert [each.name for each in tmp_path.iterdir()] == ["file"]

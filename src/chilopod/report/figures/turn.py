@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from chilopod import units
-from chilopod.output import netcdf, prepare_folder, write_atomic
+from chilopod.netcdf import netcdf
+from chilopod.output import Content, write_all
 from chilopod.report.kit import style
 from chilopod.report.scene.frames import body_frames
 from chilopod.report.scene.replay import replay
@@ -29,8 +31,17 @@ def files_of_turn(folder: str | Path) -> list[Path]:
     return [Path(folder) / f"turn.{kind}" for kind in ("png", "svg", "nc", "html")]
 
 
-def write_turn(done: Turn, folder: str | Path) -> list[Path]:
+def write_turn(done: Turn, folder: str | Path, *, replace: bool = True) -> list[Path]:
     """Write a turn as a picture (``.png``, ``.svg``), its record (``.nc``) and a replay (``.html``).
+
+    Parameters
+    ----------
+    done
+        The turn.
+    folder
+        Created where there is none.
+    replace
+        Whether files that are already there may be replaced.
 
     Returns
     -------
@@ -39,22 +50,26 @@ def write_turn(done: Turn, folder: str | Path) -> list[Path]:
     Raises
     ------
     OutputError
-        If the folder cannot be written.
+        If a file cannot be written; it says where it is kept instead.
     """
-    prepare_folder(folder)
+    write_all(_files(done, folder), replace=replace)
+    return files_of_turn(folder)
+
+
+def _files(done: Turn, folder: str | Path) -> Iterator[tuple[Path, Content]]:
+    """What cannot be made again comes first."""
     pixels, vector, record, page = files_of_turn(folder)
+    yield record, netcdf(done.record)
     with style.house_style():
         drawn = draw(done)
-        write_atomic(pixels, style.png(drawn))
-        write_atomic(vector, style.svg(drawn, "turn"))
-    write_atomic(record, netcdf(done.record))
+        files = (pixels, style.png(drawn)), (vector, style.svg(drawn, "turn"))
+    yield from files
     shown = done.record.isel(robot=slice(_SHOWN))
     labels = [
         f"walk {i + 1}" if done.record.sizes["robot"] > 1 else done.strategy.name for i in range(len(shown.robot))
     ]
     page_of = replay_3d if "pose" in shown else replay
-    write_atomic(page, page_of(shown, titles=labels, heading=_title(done)))
-    return [pixels, vector, record, page]
+    yield page, page_of(shown, titles=labels, heading=_title(done))
 
 
 def draw(done: Turn, narrow: bool = False) -> Figure:

@@ -125,6 +125,7 @@ def page(
     template = environment.from_string(folder.joinpath("page.html.j2").read_text(encoding="utf-8"))
     return template.render(
         title=_TITLE,
+        holds=" ".join([found.context.size.name, *(section.name for section in found.values)]),
         css=Markup(folder.joinpath("page.css").read_text(encoding="utf-8")),
         state=state.value,
         reload=_RELOAD,

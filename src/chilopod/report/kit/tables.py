@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import xarray as xr
 
-from chilopod.output import storable
+from chilopod.netcdf import storable
 
 
 def csv(data: xr.Dataset) -> str:

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from pathlib import Path
 from typing import Any, Final
 
-import av
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -25,15 +22,15 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from chilopod.errors import OutputError, ParameterError
-from chilopod.output import prepare_folder, write_atomic
+from chilopod.output import check_folder, write_atomic
 from chilopod.report.kit import style
+from chilopod.report.scene.encoder import ENCODER, encoded, has_encoder
 from chilopod.report.scene.frames import Outcome, Scene, scene
 from chilopod.report.scene.outline import SLIMNESS
 from chilopod.report.scene.replay import COLORS
 
 Array = NDArray[np.float64]
 
-_ENCODER: Final = "libx264"
 _SMALLEST, LARGEST = 240, 4096
 PIXEL: Final = 72.0  # points in an inch: at so many dots per inch, matplotlib's sizes are pixels
 GAP: Final = 12.0  # to the edges and from row to row, pixels
@@ -84,7 +81,7 @@ def movie(
     """
     times = frame_times(record, size, fps, speed)
     path = Path(path)
-    prepare_folder(path.parent)
+    check_folder(path.parent)
     shown = scene(record, titles, times)
     return write_atomic(path, encoded(_frames(shown, heading, size, speed), fps, size))
 
@@ -107,37 +104,12 @@ def frame_times(record: xr.Dataset, size: tuple[int, int], fps: int, speed: floa
         allowed = f"two even numbers from {_SMALLEST} to {LARGEST}"
         raise ParameterError("is no size of a film", field="size", value=size, allowed=allowed)
     if not has_encoder():
-        raise OutputError(f"PyAV was built without the encoder {_ENCODER}, which movies need")
+        raise OutputError(f"PyAV was built without the encoder {ENCODER}, which movies need")
     recorded = record["time"].values.astype(np.float64)
     # The last frame is at or before the last sample; the tolerance is for round-off in the duration.
     count = int((recorded[-1] - recorded[0]) * fps / speed + 1e-6) + 1
     times: Array = recorded[0] + np.arange(count) * (speed / fps)
     return times
-
-
-def has_encoder() -> bool:
-    """Whether :func:`movie` can encode its films here."""
-    try:
-        av.codec.Codec(_ENCODER, "w")
-    except (av.FFmpegError, av.codec.codec.UnknownCodecError):
-        return False
-    return True
-
-
-def encoded(frames: Iterator[NDArray[np.uint8]], fps: int, size: tuple[int, int]) -> bytes:
-    """The bytes of an mp4 of frames of shape (height, width, 4)."""
-    # Moving the index to the front takes a file: it is read again while it is written.
-    with tempfile.TemporaryDirectory(prefix="chilopod-") as folder:
-        file = Path(folder) / "movie.mp4"
-        with av.open(str(file), "w", format="mp4", options={"movflags": "+faststart"}) as container:
-            stream = container.add_stream(_ENCODER, rate=Fraction(fps), options={"crf": "20", "preset": "veryfast"})
-            stream.width, stream.height = size
-            stream.pix_fmt = "yuv420p"
-            stream.gop_size = 2 * fps  # so that a player finds any time within two seconds of film
-            for pixels in frames:
-                container.mux(stream.encode(av.VideoFrame.from_ndarray(pixels, format="rgba")))
-            container.mux(stream.encode())
-        return file.read_bytes()
 
 
 def _frames(shown: Scene, heading: str, size: tuple[int, int], speed: float) -> Iterator[NDArray[np.uint8]]:

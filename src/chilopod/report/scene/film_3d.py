@@ -19,8 +19,9 @@ from matplotlib.text import Text
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import ParameterError
-from chilopod.output import prepare_folder, write_atomic
+from chilopod.output import check_folder, write_atomic
 from chilopod.report.kit import style
+from chilopod.report.scene.encoder import encoded
 from chilopod.report.scene.film import (
     APART,
     GAP,
@@ -28,7 +29,6 @@ from chilopod.report.scene.film import (
     PIXEL,
     FilmPanel,
     Stage,
-    encoded,
     frame_times,
 )
 from chilopod.report.scene.frames import Scene, scene
@@ -83,7 +83,7 @@ def film_3d(
     times = frame_times(record, size, fps, speed)
     walks = _Walks(record, titles, times)
     path = Path(path)
-    prepare_folder(path.parent)
+    check_folder(path.parent)
     with gl.context(*size), style.house_style():
         stage = _Stage3D(walks, heading, size, speed, follow)
         try:
@@ -140,7 +140,7 @@ def stills(
         raise ParameterError("is no size of a picture", field="size", value=size, allowed=allowed)
     walks = _Walks(record, [""] * robots if titles is None else titles, wanted)
     path = Path(path)
-    prepare_folder(path.parent)
+    check_folder(path.parent)
     with gl.context(*size), style.house_style():
         studio = Studio(walks.shown.frames.robot, size, walks.view(size), fine=True)
         try:

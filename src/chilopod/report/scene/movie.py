@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from chilopod.errors import OutputError
-from chilopod.output import prepare_folder, write_atomic
+from chilopod.output import write_atomic
 from chilopod.paper.movies import Movie
 from chilopod.report.kit.page import Film
-from chilopod.report.scene.film import has_encoder, movie
+from chilopod.report.scene.encoder import has_encoder
+from chilopod.report.scene.film import movie
 from chilopod.report.scene.film_3d import film_3d, stills
 from chilopod.report.scene.replay import replay
 from chilopod.report.scene.replay_3d import replay_3d
@@ -27,7 +28,6 @@ def write_movie(shown: Movie, folder: Path) -> Film:
     OutputError
         If the folder cannot be written.
     """
-    prepare_folder(folder)
     solid = "pose" in shown.record
     page_of = replay_3d if solid else replay
     write_atomic(folder / f"{shown.name}.html", page_of(shown.record, titles=shown.titles, heading=shown.heading))

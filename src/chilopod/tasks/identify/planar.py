@@ -141,12 +141,23 @@ def identify_planar(
         Settings of the robot, by name, of which each point of the profile predicts the critical k1.
     progress
         Called as the work goes on.
+
+    Raises
+    ------
+    AnalysisError
+        If the robot has another number of modules than the data, or no pitchfork with any constants.
     """
     fits = []
     for index, start in enumerate(_STARTS):
         fits.append(_fit(robot, data, np.array(start), fixed=0))
         progress(0.3 * (index + 1) / len(_STARTS), f"fit from start {index + 1}")
     best = min(fits, key=lambda fit: float((fit[1] ** 2).sum()))
+    if (best[1] == _NO_PITCHFORK).all():
+        raise AnalysisError(
+            "its straight walk has no pitchfork with any constants that were tried, so nothing can be fitted",
+            field="robot",
+            value=robot.name,
+        )
     return Identification(
         given=robot,
         best=with_constants(robot, best[0]),

@@ -28,8 +28,9 @@ from numpy.typing import NDArray
 
 from chilopod import units
 from chilopod.analysis.parameters import K1, stiffness
+from chilopod.engine import engine_named
 from chilopod.errors import ChilopodError
-from chilopod.output import prepare_folder, write_atomic
+from chilopod.output import check_folder, write_atomic
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.tasks.identify.data import BaseSeries
@@ -218,7 +219,7 @@ def search(
     -------
     All evaluations, best first.
     """
-    kept = None if folder is None else prepare_folder(folder)
+    kept = None if folder is None else check_folder(folder)
     rng = np.random.default_rng(seed)
     fits: list[Fit] = []
     for number in range(starts):
@@ -369,8 +370,11 @@ def identify_twin(
     fresh
         Whether to begin without the known ones.
     """
-    kept = None if folder is None else prepare_folder(folder)
-    fits = [] if fresh else [evaluate(robot, fit.constants, data, kept) for fit in known()]
+    engine_named("twin").common(robot)  # refuses a robot without a twin
+    kept, fits = None if folder is None else check_folder(folder), []
+    for number, fit in enumerate([] if fresh else known()):
+        progress(0.0, f"known constants, set {number + 1}")
+        fits.append(evaluate(robot, fit.constants, data, kept))
     fits += search(robot, data, starts, generations, seed, folder, part(progress, 0.0, 0.85))
     fits.sort(key=lambda fit: fit.objective)
     fits += refined(robot, data, fits, kept, part(progress, 0.85, 0.95))

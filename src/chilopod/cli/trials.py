@@ -1,0 +1,189 @@
+"""``chilopod trials``: what is in a folder of trials, whether it is whole, and what may go."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from chilopod.cli.options import JsonOption, new_app, print_json
+from chilopod.cli.progress import progress_bar
+
+if TYPE_CHECKING:
+    from chilopod.trials.folder import Group
+
+BROKEN = 2
+"""Exit code where a file is not what it should be."""
+
+app = new_app("List, check and clean a folder in which trials are kept.")
+
+FolderArg = Annotated[
+    Path,
+    typer.Argument(
+        metavar="FOLDER", help="What --trials was given; of a report the folder trials in it, such as report/trials."
+    ),
+]
+
+
+@app.callback(invoke_without_command=True)
+def _group(ctx: typer.Context) -> None:
+    if ctx.invoked_subcommand is None:
+        typer.echo(ctx.get_help())
+
+
+@app.command("list")
+def listed(folder: FolderArg, as_json: JsonOption = False) -> None:
+    """Say which trials are kept in a folder: of which robots, how long, with which seeds.
+
+    Only the front of every file is read, ten thousand in some seconds; `chilopod trials check` reads all of it. Robots
+    of one name that differ in their numbers are counted.
+    """
+    from chilopod.memory import in_words
+    from chilopod.trials.folder import contents, groups, kept
+
+    there = contents(folder)
+    with progress_bar("trials") as show:
+        trials, wrong = kept(there.trials, lambda part, words: show("list", part, words))
+    rows, size = groups(trials), sum(each.size for each in trials)
+    others = sum(not each.found for each in trials)
+    if as_json:
+        print_json(
+            {
+                "folder": str(folder),
+                "trials": len(trials),
+                "bytes": size,
+                "of_other_versions": others,
+                "unreadable": [path.name for path, _ in wrong],
+                "set_aside": [path.name for path in there.aside],
+                "unfinished": [path.name for path in there.unfinished],
+                "foreign": [path.name for path in there.foreign],
+                "groups": [
+                    {
+                        "robot": row.robot,
+                        "robots": row.robots,
+                        "engine": row.engine,
+                        "controller": row.controller,
+                        "duration_s": row.duration,
+                        "target": {"bearing_rad": row.target[0], "distance_m": row.target[1]} if row.target else None,
+                        "seeds": _ranges(row.seeds),
+                        "trials": row.count,
+                        "bytes": row.size,
+                        "of_this_version": row.found,
+                    }
+                    for row in rows
+                ],
+            }
+        )
+        return
+    _print_table(rows)
+    typer.echo(f"{_trials(len(trials))}, {in_words(size)}")
+    if others:
+        typer.echo(f"{_trials(others)} of another version: this one does not find them (clean --old removes them)")
+    for paths, words in (
+        ([path for path, _ in wrong], "not to be read (chilopod trials check says why)"),
+        (there.aside, "set aside, because they were not what they should be (chilopod trials clean removes them)"),
+        (there.unfinished, "being written, or left over by who was killed (chilopod trials clean removes the latter)"),
+        (there.foreign, "not written by chilopod"),
+    ):
+        if paths:
+            typer.echo(f"{len(paths)} file{'s' * (len(paths) > 1)} {words}")
+
+
+def _print_table(rows: Sequence[Group]) -> None:
+    from chilopod.memory import in_words
+
+    table = [("robot", "engine", "walk", "target", "controller", "robots", "seeds", "trials", "size")]
+    for row in rows:
+        bearing, distance = row.target or (0.0, 0.0)
+        table.append(
+            (
+                row.robot,
+                row.engine,
+                f"{row.duration:g} s",
+                f"{math.degrees(bearing):.4g} deg, {distance:g} m" if row.target else "-",
+                row.controller.rpartition(":")[2] if row.controller else "-",
+                str(row.robots),
+                _ranges(row.seeds) or "-",
+                str(row.count),
+                f"{in_words(row.size)}{'' if row.found else ', another version'}",
+            )
+        )
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    for line in table if rows else ():
+        typer.echo("  ".join(f"{cell:<{width}}" for cell, width in zip(line, widths, strict=True)).rstrip())
+
+
+@app.command()
+def check(folder: FolderArg, as_json: JsonOption = False) -> None:
+    """Say whether every trial in a folder is whole: its checksum, and whether its name is that of what it holds.
+
+    All of every file is read. A line for each that is not what it should be; the exit code is 0, or 2 if there is one.
+    Who walks finds such a file too, sets it aside and walks the trial again. Trials of another version of chilopod, or
+    of MuJoCo where that walked, are counted: they are whole, but walk again too.
+    """
+    from chilopod.trials.folder import checked, contents
+
+    with progress_bar("trials") as show:
+        whole, wrong = checked(contents(folder).trials, lambda part, words: show("check", part, words))
+    others = sum(not each.found for each in whole)
+    if as_json:
+        print_json(
+            {
+                "folder": str(folder),
+                "whole": len(whole),
+                "of_other_versions": others,
+                "wrong": [{"file": path.name, "what": words} for path, words in wrong],
+            }
+        )
+    else:
+        for path, words in wrong:
+            typer.echo(f"{path} {words}")
+        found = f"{_trials(len(whole))} whole, {len(wrong)} not"
+        typer.echo(f"{found}; {others} of another version, which this one does not find" if others else found)
+    if wrong:
+        raise typer.Exit(BROKEN)
+
+
+@app.command()
+def clean(
+    folder: FolderArg,
+    old: Annotated[bool, typer.Option("--old", help="Remove the trials of other versions, too.")] = False,
+    dry: Annotated[bool, typer.Option("--dry-run", help="Say what would be removed, and remove nothing.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Remove what is of no use in a folder of trials: what was set aside, and what killed processes left unfinished.
+
+    What chilopod has not written stays and is listed, and so does what a process that walks there is just writing.
+    """
+    from chilopod.trials.folder import clean as cleaned
+
+    removed, left = cleaned(folder, old=old, dry=dry)
+    if as_json:
+        print_json(
+            {
+                "folder": str(folder),
+                "dry_run": dry,
+                "removed": [path.name for path in removed],
+                "left": [{"file": path.name, "why": why} for path, why in left],
+            }
+        )
+        return
+    for path in removed:
+        typer.echo(f"{'would remove' if dry else 'removed'} {path}")
+    for path, why in left:
+        typer.echo(f"left {path}: {why}")
+    typer.echo(f"{len(removed)} {'to be removed' if dry else 'removed'}, {len(left)} left")
+
+
+def _ranges(numbers: Sequence[int]) -> str:
+    """Numbers in order as ``1-4, 7``."""
+    runs = [[each for _, each in run] for _, run in groupby(enumerate(numbers), lambda pair: pair[1] - pair[0])]
+    return ", ".join(f"{run[0]}-{run[-1]}" if len(run) > 1 else str(run[0]) for run in runs)
+
+
+def _trials(count: int) -> str:
+    return f"{count} trial{'s' * (count != 1)}"

@@ -1,0 +1,59 @@
+"""What a walk of the planar model will take, before it is begun: the steps of its integrator."""
+
+from __future__ import annotations
+
+from chilopod.errors import ParameterError
+from chilopod.robot import Robot
+
+MOST_STEPS = 2e9
+"""Of all modules together: an hour or so of one robot on one core."""
+
+_REACH = 6.0
+"""About the fastest rate times the longest step with which the integrator is stable."""
+
+
+def check_steps(robot: Robot, seconds: float) -> None:
+    """Refuse a walk that would take more steps than anybody waits for.
+
+    Parameters
+    ----------
+    robot
+        The robot.
+    seconds
+        Length of the walk, s.
+
+    Raises
+    ------
+    ParameterError
+        Naming what makes it move so fast.
+    """
+    rates = {**_rates(robot), "gait.stance, gait.swing": _switches(robot)}
+    steps = robot.body.modules * seconds * sum(rates.values()) / _REACH
+    if steps > MOST_STEPS:
+        raise ParameterError(
+            f"the motion is too fast to follow for {seconds:g} s: about {steps:.0e} steps of modules",
+            field=max(rates, key=rates.__getitem__),
+            allowed=f"what takes at most {MOST_STEPS:.0e}",
+        )
+
+
+def _rates(robot: Robot) -> dict[str, float]:
+    """What each property adds to a bound on the fastest motion, 1/s.
+
+    The bounds are those of modules that nothing joins. Joints only take freedom away, and by Rayleigh's principle what
+    is left is damped and sprung no more strongly.
+    """
+    mass, inertia = robot.module_mass, robot.module_yaw_inertia
+    legs, springs, friction = robot.legs, robot.springs, robot.ground.friction
+    reach = (abs(legs.forward_offset) + 0.5 * robot.gait.stride) ** 2 + legs.half_width**2
+    return {
+        "ground.friction, body.mass": 2.0 * friction / mass,
+        "ground.friction, body.yaw_inertia": 2.0 * friction * reach / inertia,
+        "springs.stiffness": (4.0 * max(springs.stiffness) / inertia) ** 0.5,
+        "springs.damping": 4.0 * max(springs.damping) / inertia,
+    }
+
+
+def _switches(robot: Robot) -> float:
+    """Touch-downs and lift-offs, 1/s, as far as they differ; each ends a step."""
+    return _REACH * (len(robot.gait.schedule(robot.body.modules).times) - 1) / robot.gait.period

@@ -1,0 +1,148 @@
+"""Which trials of a folder are under way here, so that other processes walk others in the meantime."""
+
+from __future__ import annotations
+
+import os
+import struct
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+NAME = ".chilopod-claims"
+"""Of the file whose bytes are locked; there while somebody walks, and after one who was killed."""
+
+_NOT, _WITH_OTHERS, _ALONE = "F_UNLCK", "F_RDLCK", "F_WRLCK"  # how a byte is locked
+_PRESENT = 0  # the byte that all who are here have locked, with the others
+_DIGITS = 15  # of a trial's name: which byte is its own, of 2**63
+_TRIES, _PAUSE = 500, 2e-3  # s; whoever comes while the last one leaves tries again
+
+
+class Claims:
+    """What this process walks in a folder of trials.
+
+    A claim is a lock of the operating system's on one byte of an empty file in the folder; which byte follows from the
+    trial's name. It ends with the process that has it, however that ends, so nobody has to find out who is still alive.
+    On file systems of several machines it holds for all of them, where these have locks. Where there are no such locks
+    (they are Linux's, of open files) everybody is given every claim: then work is doubled, and nothing else, for who
+    walks the same trial writes the same file.
+
+    Parameters
+    ----------
+    folder
+        Of the trials.
+    sweep
+        Called at the end if nobody else is there: what is in the folder now and is no whole file was left over by
+        somebody who was killed.
+    """
+
+    def __init__(self, folder: Path, sweep: Callable[[], object]) -> None:
+        self._path, self._sweep = folder / NAME, sweep
+        self._handle: int | None = None
+
+    def __enter__(self) -> Self:
+        if sys.platform == "linux":
+            with suppress(OSError):
+                for _ in range(_TRIES):
+                    if self._entered():
+                        break
+                    time.sleep(_PAUSE)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._handle is not None:
+            handle, self._handle = self._handle, None
+            with suppress(OSError):
+                _locked(handle, _NOT, _PRESENT)  # of two who leave at once one has it alone
+                if _locked(handle, _ALONE, _PRESENT) and _is(handle, self._path):
+                    self._sweep()
+                    self._path.unlink()
+            os.close(handle)
+
+    def take(self, name: str) -> bool:
+        """Whether a trial may be walked here: nobody else has it, and nobody else will be given it.
+
+        Parameters
+        ----------
+        name
+            Of its file.
+        """
+        with suppress(OSError):
+            return self._handle is None or _locked(self._handle, _ALONE, _byte_of(name))
+        return True
+
+    def release(self, name: str) -> None:
+        """Let others have a trial that was taken."""
+        with suppress(OSError):
+            if self._handle is not None:
+                _locked(self._handle, _NOT, _byte_of(name))
+
+    def _entered(self) -> bool:
+        """Whether we are in; False if somebody is just leaving and takes the file along."""
+        was_there = self._path.exists()
+        handle = _opened(self._path, os.O_CREAT)
+        try:
+            if _locked(handle, _WITH_OTHERS, _PRESENT) and _is(handle, self._path):
+                self._handle = handle
+        except OSError:  # no locks here
+            if not was_there:
+                self._path.unlink()
+            raise
+        finally:
+            if self._handle is None:
+                os.close(handle)
+        return self._handle is not None
+
+
+def nobody_in(folder: Path) -> bool:
+    """Whether no process walks in a folder now, as far as can be told."""
+    try:
+        handle = _opened(folder / NAME)
+    except FileNotFoundError:
+        return True
+    except OSError:
+        return False
+    try:
+        return _locked(handle, _ALONE, _PRESENT)
+    except OSError:
+        return False
+    finally:
+        os.close(handle)
+
+
+def _byte_of(name: str) -> int:
+    return 1 + int(name.removesuffix(".nc")[-_DIGITS:], 16)
+
+
+def _opened(path: Path, more: int = 0) -> int:
+    # Neither what a link leads to nor a pipe.
+    return os.open(path, os.O_RDWR | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | more, 0o666)
+
+
+def _is(handle: int, path: Path) -> bool:
+    """Whether an open file still has that name."""
+    try:
+        return os.path.samestat(os.fstat(handle), path.stat(follow_symlinks=False))
+    except FileNotFoundError:
+        return False
+
+
+def _locked(handle: int, kind: str, byte: int) -> bool:
+    """Lock a byte, or let it go, unless somebody else has it."""
+    if sys.platform != "linux":
+        raise OSError("there are no such locks")
+    import fcntl
+
+    # Type, from where, first byte, how many, and the number of a process, which has to be 0.
+    asked = struct.pack("hhqqi", getattr(fcntl, kind), os.SEEK_SET, byte, 1, 0)
+    try:
+        # Those of an open file: threads exclude each other too, and none is lost when another file is closed.
+        fcntl.fcntl(handle, fcntl.F_OFD_SETLK, asked)
+    except (BlockingIOError, PermissionError):
+        return False
+    return True

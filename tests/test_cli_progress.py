@@ -1,0 +1,41 @@
+"""Progress on stderr: nothing of what is quick, a sign of life of all else."""
+
+import time
+
+import pytest
+
+from chilopod.cli import progress
+
+
+@pytest.fixture
+def hasty(monkeypatch):
+    """Seconds are hundredths."""
+    for name in ("_UNTIL_BAR", "_BETWEEN_LOOKS", "_UNTIL_LINE", "_BETWEEN_LINES"):
+        monkeypatch.setattr(progress, name, 0.01 * getattr(progress, name))
+
+
+def test_what_is_quick_says_nothing(capsys):
+    with progress.progress_bar("work") as show:
+        show("work", 0.5, "half")
+    assert capsys.readouterr().err == ""
+
+
+def test_lines_go_on_where_nothing_is_told(capsys, hasty):
+    with progress.progress_bar("work") as show:
+        time.sleep(0.1)
+        show("part", 0.5, "half")
+        time.sleep(0.15)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0].startswith("work: ")
+    assert lines[-1].startswith("part:  50 %  half, ")
+    assert len(lines) >= 3
+
+
+def test_a_terminal_gets_bars(capsys, hasty, monkeypatch):
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    with progress.progress_bar("work") as show:
+        time.sleep(0.1)
+        show("part", 0.5, "half")
+        time.sleep(0.05)
+        show("part", 1.0, "all of it")
+    assert "all of it" in capsys.readouterr().err

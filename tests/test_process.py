@@ -1,0 +1,65 @@
+"""Streams that may fail, and Ctrl-C, in the process of the command line."""
+
+import errno
+import os
+import signal
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+from chilopod import process
+
+
+class LeftError(Exception):
+    """Stands for the end of the process."""
+
+
+@pytest.fixture
+def answering(monkeypatch):
+    """Ctrl-C answered as by the command line, but the process stays."""
+    handler, hook = signal.getsignal(signal.SIGINT), sys.unraisablehook
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    def leave(words=""):
+        raise LeftError
+
+    monkeypatch.setattr(process, "leave", leave)
+    monkeypatch.setattr(process, "_pressed", [])
+    monkeypatch.setattr(process.threading, "Thread", lambda **told: SimpleNamespace(start=lambda: None))
+    process.answer_interrupts()
+    yield
+    os.close(signal.set_wakeup_fd(-1))
+    signal.signal(signal.SIGINT, handler)
+    sys.unraisablehook = hook
+
+
+def test_ctrl_c_is_an_exception_once_and_then_the_end(answering):
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
+    with pytest.raises(LeftError):
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_ctrl_c_ends_the_process_while_something_is_imported(answering, tmp_path, monkeypatch):
+    (tmp_path / "interrupted_import.py").write_text("import signal\nsignal.raise_signal(signal.SIGINT)\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(LeftError):
+        import interrupted_import  # noqa: F401
+
+
+def test_an_interrupt_that_nobody_can_raise_is_not_forgotten(answering):
+    with pytest.raises(LeftError):
+        sys.unraisablehook(SimpleNamespace(exc_type=KeyboardInterrupt))
+
+
+def test_what_cannot_be_written_is_lost_and_said_once():
+    reading, writing = os.pipe()
+    os.close(reading)
+    with process.Stream(writing, "wb") as stream:
+        assert stream.write(b"lost") == 4
+        assert stream.failure.errno == errno.EPIPE
+        assert process.unwritten(stream) is None  # whoever read it has seen enough
+    with process.Stream(os.open(os.devnull, os.O_RDONLY), "wb") as closed:
+        assert closed.write(b"lost") == 4
+        assert process.unwritten(closed) == os.strerror(errno.EBADF)
