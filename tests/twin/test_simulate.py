@@ -318,3 +318,9 @@ def test_bad_arguments_are_named(arguments, field):
     with pytest.raises(ParameterError) as caught:
         simulate(**{"robots": PRESET, "duration": 1.0, "controller": Sideways(), "target": (1.0, 0.0), **arguments})
     assert caught.value.field == field
+
+
+def test_more_steps_between_two_servo_targets_than_can_be_kept_are_refused():
+    with pytest.raises(ParameterError, match="more than can be kept of 1 robots") as caught:
+        simulate(PRESET.set_from_text(["twin.control_interval=1e9 s"]), 1.0)
+    assert caught.value.field == "twin.control_interval"
