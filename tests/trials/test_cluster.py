@@ -146,8 +146,16 @@ def gone(processes):
     return not alive
 
 
+@contextlib.contextmanager
 def started(*arguments):
-    return subprocess.Popen([sys.executable, *arguments], stderr=subprocess.PIPE, text=True, start_new_session=True)
+    """A client in a session of its own, which never outlives the test."""
+    client = subprocess.Popen([sys.executable, *arguments], stderr=subprocess.PIPE, text=True, start_new_session=True)
+    try:
+        yield client
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(client.pid, signal.SIGKILL)
+        client.communicate()
 
 
 def waited_for(what):
@@ -247,16 +255,16 @@ def test_a_client_that_is_killed_takes_its_workers_along_and_loses_nothing(tmp_p
     script, folder = tmp_path / "client.py", tmp_path / "trials"
     script.write_text(textwrap.dedent(CLIENT))
     folder.mkdir()
-    client = started(str(script), str(folder))
     rng = random.Random(seed)
     enough = rng.randrange(1, 60)
-    waited_for(lambda: len(written(folder)) >= enough)
-    time.sleep(rng.uniform(0.0, 0.2))
-    workers = worker_processes(client.pid)
-    client.kill()
-    client.communicate()
-    assert len(workers) == 2
-    assert gone(workers)
+    with started(str(script), str(folder)) as client:
+        waited_for(lambda: len(written(folder)) >= enough)
+        time.sleep(rng.uniform(0.0, 0.2))
+        workers = worker_processes(client.pid)
+        client.kill()
+        client.wait()
+        assert len(workers) == 2
+        assert gone(workers)
     assert resumed_as_if_nothing_was(folder, uninterrupted) >= enough
 
 
@@ -291,17 +299,17 @@ def waited_for_workers(address):
 
 def test_an_interrupted_client_says_so_and_leaves_no_process(tmp_path):
     arguments = ["aoi2022-planar", "--cluster", "2", "--seed", "1", "--repeats", "3000", "--duration", "200 s"]
-    client = started("-m", "chilopod", "walk", *arguments)
-    assert any("of 3000" in line for line in client.stderr)  # first it says that it waits for the workers
-    workers = waited_for(lambda: worker_processes(client.pid))
-    assert len(workers) == 2
-    os.killpg(client.pid, signal.SIGINT)
-    _, rest = client.communicate(timeout=PATIENCE)
-    assert [line for line in rest.splitlines() if not line.startswith(("walk:", "stopping ..."))] == [
-        "error: interrupted"
-    ]
-    assert client.returncode == 130
-    assert gone(workers)
+    with started("-m", "chilopod", "walk", *arguments) as client:
+        assert any("of 3000" in line for line in client.stderr)  # first it says that it waits for the workers
+        workers = waited_for(lambda: worker_processes(client.pid))
+        assert len(workers) == 2
+        os.killpg(client.pid, signal.SIGINT)
+        _, rest = client.communicate(timeout=PATIENCE)
+        assert [line for line in rest.splitlines() if not line.startswith(("walk:", "stopping ..."))] == [
+            "error: interrupted"
+        ]
+        assert client.returncode == 130
+        assert gone(workers)
 
 
 # ---- what goes wrong ------------------------------------------------------------------------------------------------

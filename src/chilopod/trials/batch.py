@@ -66,8 +66,7 @@ def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
 
     Returns
     -------
-    The record of each, with one ``robot``, and robot file and trial in the attributes. They share memory: each is a
-    view of all.
+    The record of each, with one ``robot``, and robot file and trial in the attributes.
 
     Raises
     ------
@@ -100,11 +99,14 @@ def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
 
 def _apart(data: xr.Dataset, trials: Sequence[Trial]) -> list[xr.Dataset]:
     """The records of single robots."""
-    # Slices are views; and to number each robot 0 afterwards would take longer than all else.
+    # To number each robot 0 afterwards would take longer than all else.
     data = data.assign_coords(robot=np.zeros(len(trials), dtype=np.int64))
     records = []
     for index, trial in enumerate(trials):
-        record = data.isel(robot=slice(index, index + 1))
+        view = data.isel(robot=slice(index, index + 1))
+        # Numbers that lie otherwise in memory are added up in another order: sums have the same bits whether a walk was
+        # one of many, alone, or read.
+        record = view.copy(data={name: np.ascontiguousarray(each.values) for name, each in view.data_vars.items()})
         record.attrs = {**data.attrs, "robot": file_text(trial.robot), "trial": trial.text}
         records.append(record)
     return records

@@ -9,6 +9,7 @@ import stat
 import zlib
 from pathlib import Path
 
+import numpy as np
 import xarray as xr
 
 from chilopod.errors import OutputError, in_words
@@ -67,7 +68,7 @@ def read_whole(path: Path) -> tuple[bytearray, Header]:
 
 
 def record_of(content: bytes | bytearray) -> xr.Dataset:
-    """What stands in the bytes of a file.
+    """What stands in the bytes of a file, as it was walked: of the same types, and with nothing about the file.
 
     Raises
     ------
@@ -75,11 +76,16 @@ def record_of(content: bytes | bytearray) -> xr.Dataset:
         If nothing does: whoever wrote them set the checksum himself.
     """
     try:
-        record = xr.load_dataset(io.BytesIO(content), engine="scipy")
+        record = xr.load_dataset(io.BytesIO(content), engine="scipy").drop_encoding()
     except (ValueError, TypeError, LookupError, AttributeError, OverflowError) as error:
         raise Unsound(f"cannot be read ({in_words(error)})") from None
     del record.attrs[_CHECKSUM]
-    return record
+    record.attrs = {name: value if isinstance(value, str) else float(value) for name, value in record.attrs.items()}
+    # The file has integers of 32 bits only, and all text is read as objects.
+    whole = {name: each.astype(np.int64) for name, each in record.data_vars.items() if each.dtype == np.int32}
+    kinds = {np.dtype(np.int32): np.int64, np.dtype(object): str}
+    wider = {name: each.astype(kinds[each.dtype]) for name, each in record.coords.items() if each.dtype in kinds}
+    return record.assign(whole).assign_coords(wider)
 
 
 def read_header(path: Path) -> Header:
