@@ -118,7 +118,8 @@ def with_bad_values(chance: Random) -> tuple[list[str], list[str]]:
         words.insert(0, "--version")
     elif how < 7:
         words.append("--force")
-    return words, [value[:30] for value in values if len(value) > 2]
+    parts = (part for value in values for part in (value[:30], f"error: {Path(value).parent}: ") if len(value) > 2)
+    return words, list(parts)
 
 
 def _bad(option: Option, chance: Random) -> str:

@@ -62,7 +62,7 @@ class FoundFault(Exception):
 
 @dataclass(frozen=True)
 class Ending:
-    """How a command ended: exit code (negative: killed by a signal), what it printed, what escaped it if anything did."""
+    """How a command ended: exit code (negative: killed by a signal), what it printed, what escaped it if anything."""
 
     code: int | None
     out: str

@@ -249,9 +249,7 @@ _ON_BYTES: tuple[Callable[[bytes, Random], bytes], ...] = (
     lambda content, chance: content[chance.randrange(len(content) + 1) :],
     lambda content, chance: content.replace(b"\n", chance.choice((b"\r\n", b"\r", b"\0", b"", b"\n\n"))),
     lambda content, chance: b"\xef\xbb\xbf" + content,
-    lambda content, chance: content.decode(errors="replace").encode(
-        chance.choice(("utf-16", "utf-16-le", "utf-32", "cp037"))
-    ),
+    lambda content, chance: content.decode("latin-1").encode(chance.choice(("utf-16", "utf-16-le", "utf-32", "cp500"))),
     lambda content, chance: chance.choice((b"", b" \n", b"\0", b"#", b"\x1f\x8b\x08", b"\x89HDF\r\n\x1a\n", b"name")),
     lambda content, chance: content * chance.choice((2, 3, 300)),
     lambda content, chance: content + b"#" * chance.choice((1, 900_000, 2_000_000)),

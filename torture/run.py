@@ -20,15 +20,37 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from arguments import Arguments
+from disks import Disks
+from environments import Environments
+from invariances import Invariances
+from kills import Kills
 from outcomes import FINE, SENTENCES, Kind
 from robot_files import RobotFiles
+from same_bits import SameBits
 from saved_branches import SavedBranches
 from saved_trials import SavedTrials
+from streams import Streams
 from workers import Attacks, tried
 
 RESULTS = Path(__file__).with_name("results.json")
+_KINDS = (
+    *(RobotFiles, Arguments, SavedTrials, SavedBranches, Kills, Disks, Streams, Environments),
+    *(SameBits, Invariances),
+)
 CLASSES: dict[str, Callable[[], Attacks]] = {
-    each.name: each for each in (RobotFiles, Arguments, SavedTrials, SavedBranches)
+    each.name: each
+    for each in (
+        RobotFiles,
+        Arguments,
+        SavedTrials,
+        SavedBranches,
+        Kills,
+        Disks,
+        Streams,
+        Environments,
+        SameBits,
+        Invariances,
+    )
 }
 _SHOWN = 12  # different faults of a class that are printed
 _BETWEEN = 5.0  # s between two lines of progress

@@ -26,15 +26,15 @@ class SavedBranches:
         other = whole(place, *BRANCH, "--set", "body.mass=8 kg", "--points", "1", "--out", "kept")
         right = whole(place, *BRANCH, "--points", "1", "--resume", "kept", begun=begun)
         folder = place.here / "kept"
-        put(begun.files, folder)
+        put(begun.kept, folder)
         path, how = folder / _FILE, chance.randrange(12)
         if how < 8:
-            path.write_bytes(on_bytes(begun.files[_FILE], chance))
+            path.write_bytes(on_bytes(begun.kept[_FILE], chance))
         elif how == 8:
-            beside = chance.choice([name for name in begun.files if name != _FILE])
-            (folder / beside).write_bytes(on_bytes(begun.files[beside], chance))
+            beside = chance.choice([name for name in begun.kept if name != _FILE])
+            (folder / beside).write_bytes(on_bytes(begun.kept[beside], chance))
         elif how == 9:
-            path.write_bytes(chance.choice((other.files[_FILE], begun.files["branch.csv"])))
+            path.write_bytes(chance.choice((other.kept[_FILE], begun.kept["branch.csv"])))
         elif how == 10:
             edited(path, chance, "h5netcdf", _attributes)
         else:
@@ -45,11 +45,11 @@ class SavedBranches:
         after = snapshot(place.root)
         kind = judged(ending, before, after, named=[_FILE, "kept"], interrupted=place.interrupted.exists())
         if kind is Kind.ENDED:
-            new = [name for name in changed(before, after) if not name.endswith(tuple(right.files))]
-            if ending.out != right.out or new:
+            new = [name for name in changed(before, after) if not name.endswith(tuple(right.kept))]
+            if ending.out != right.ending.out or new:
                 raise FoundFault(Kind.WRONG, f"goes on otherwise {' '.join(new)}")
             for name, each in content(folder).items():
-                if each != right.files.get(name):
+                if each != right.kept.get(name):
                     raise FoundFault(Kind.WRONG, f"{name} is another")
         return Outcome(kind, ending.err.strip()[-200:])
 

@@ -25,25 +25,25 @@ class SavedTrials:
         """One damage."""
         study = whole(place, *chance.choices((PLANAR, TWIN), (9, 1))[0], "--trials", "kept")
         folder = place.here / "kept"
-        put(study.files, folder)
-        names = [name for name in study.files if name.endswith(".nc")]
+        put(study.kept, folder)
+        names = [name for name in study.kept if name.endswith(".nc")]
         hit = chance.sample(names, chance.choice((1, 1, 2)))
         place.tried.write_text(f"chilopod {' '.join(study.command)} with {', '.join(hit)} damaged")
         for name in hit:
             damage(folder / name, [folder / each for each in names], chance, place)
         damaged = {name: _state(folder / name) for name in names}
-        touched = [name for name in names if damaged[name] != study.files[name]]
+        touched = [name for name in names if damaged[name] != study.kept[name]]
         ending = called(study.command, place)
         after = snapshot(place.root)
         # Whatever is in the folder may have been moved aside; what is temporary may not stay.
         kind = judged(ending, {}, after, named=[*names, "kept"], interrupted=place.interrupted.exists(), stays=False)
         if kind is Kind.REFUSED:
             return Outcome(kind, ending.err.strip()[-200:])
-        if ending.out != study.out:
+        if ending.out != study.ending.out:
             raise FoundFault(Kind.WRONG, "another result")
         now = content(folder)
         for name in names:
-            if now.get(name) != study.files[name]:
+            if now.get(name) != study.kept[name]:
                 raise FoundFault(Kind.WRONG, f"{name} is not what was asked for, and stays")
         aside = [_state(path) for path in folder.iterdir() if path.name not in names]
         for name in touched:

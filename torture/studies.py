@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import hashlib
+import pickle
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from chilopod.output import write_atomic
 from in_process import Place, called, new_place
+from outcomes import Ending
 
 PLANAR = ("walk", "aoi2022-planar", "--duration", "0.6 s", "--rate", "20", "--seed", "1", "--repeats", "3", "--json")
 TWIN = (
@@ -13,23 +19,31 @@ TWIN = (
     *("--seed", "1", "--repeats", "2", "--json"),
 )
 BRANCH = ("branch", "aoi2022-planar", "--between", "11 N*mm/deg", "13 N*mm/deg", "--json")
+_LARGEST = 1 << 26  # bytes of a result
 
 
 @dataclass(frozen=True)
 class Whole:
-    """What comes of a command where nothing happens to it: its output and its files."""
+    """What comes of a command where nothing happens to it: its ending, its files, and how long it takes, s."""
 
     command: tuple[str, ...]
-    out: str
+    ending: Ending
     files: dict[str, bytes]
+    seconds: float
+
+    @property
+    def kept(self) -> dict[str, bytes]:
+        """The files in the folder ``kept``."""
+        return {name.removeprefix("kept/"): each for name, each in self.files.items() if name.startswith("kept/")}
 
 
-_LARGEST = 1 << 26
 _KNOWN: dict[tuple[str, ...], Whole] = {}
 
 
-def whole(place: Place, *command: str, begun: Whole | None = None) -> Whole:
-    """What comes of a command that writes into the folder ``kept``; it runs once a process, elsewhere.
+def whole(
+    place: Place, *command: str, by: Callable[[tuple[str, ...], Place], Ending] = called, begun: Whole | None = None
+) -> Whole:
+    """What comes of a command; it runs once, elsewhere.
 
     Parameters
     ----------
@@ -37,30 +51,31 @@ def whole(place: Place, *command: str, begun: Whole | None = None) -> Whole:
         Of the case that asks.
     command
         As after ``chilopod``.
+    by
+        What calls it.
     begun
-        What is in the folder before.
-
-    Raises
-    ------
-    RuntimeError
-        If it fails.
+        Whose files are there before.
     """
     if command not in _KNOWN:
-        elsewhere = new_place(place.root.parent / "whole")
-        if begun:
-            put(begun.files, elsewhere.here / "kept")
-        ending = called(command, elsewhere)
-        if ending.code != 0:
-            raise RuntimeError(f"{' '.join(command)} fails: {ending}")
-        _KNOWN[command] = Whole(command, ending.out, content(elsewhere.here / "kept"))
+        file = place.out.parent.parent / f"whole-{hashlib.sha256(repr(command).encode()).hexdigest()[:16]}"
+        if file.exists():
+            _KNOWN[command] = pickle.loads(file.read_bytes())
+        else:
+            elsewhere = new_place(place.out.parent / "whole")
+            put(begun.files if begun else {}, elsewhere.here)
+            start = time.monotonic()
+            ending = by(command, elsewhere)
+            _KNOWN[command] = Whole(command, ending, content(elsewhere.here), time.monotonic() - start)
+            write_atomic(file, pickle.dumps(_KNOWN[command]))
     return _KNOWN[command]
 
 
 def put(files: dict[str, bytes], folder: Path) -> None:
     """Write files."""
-    folder.mkdir(parents=True, exist_ok=True)
     for name, each in files.items():
-        (folder / name).write_bytes(each)
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(each)
 
 
 def content(folder: Path) -> dict[str, bytes]:

@@ -189,9 +189,12 @@ def tried(
 def _watched(worker: _Worker) -> Outcome | None:
     """What came of a case that goes on for too long; the process is killed then."""
     now, said = time.monotonic(), _size(worker.home / "err") + _size(worker.home / "out")
+    computed = _processor_time(worker.process.pid)
+    if not (worker.home / "tried").exists():  # it prepares what the case is compared with
+        worker.begun, worker.heard = now, (now, computed)
+        return None
     if now - worker.begun < PATIENCE / 2:
         return None
-    computed = _processor_time(worker.process.pid)
     if said != worker.said:
         if worker.said >= 0 or now - worker.begun < SILENT:
             worker.heard = now, computed
