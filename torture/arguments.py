@@ -34,16 +34,22 @@ _ROBOT_VERBS = {
 }
 
 
+_QUICK = ("robot", "walk", "stability")
+
+
 class Arguments:
     """Command lines, and ``--set``."""
 
     name = "arguments"
     per_minute = 500
 
+    def __init__(self, quick: bool = False) -> None:
+        self._quick = quick
+
     def attack(self, chance: Random, place: Place) -> Outcome:
         """One command line."""
         furnish(place.here)
-        words, named = with_extreme(chance) if chance.random() < 0.4 else with_bad_values(chance)
+        words, named = (with_extreme if chance.random() < 0.4 else with_bad_values)(chance, self._quick)
         place.tried.write_text(shlex.join(["chilopod", *words])[:400], errors="replace")
         before = snapshot(place.root)
         ending = called(words, place)
@@ -71,10 +77,11 @@ def furnish(here: Path) -> None:
     os.symlink("file", here / "link")
 
 
-def with_extreme(chance: Random) -> tuple[list[str], list[str]]:
+def with_extreme(chance: Random, quick: bool) -> tuple[list[str], list[str]]:
     """A robot with one or two numbers changed; the words, and what they name."""
     verbs = {command.words: command for command in commands()}
-    (verb,) = chance.choices(tuple(_ROBOT_VERBS), tuple(_ROBOT_VERBS.values()))
+    known = {verb: often for verb, often in _ROBOT_VERBS.items() if verb[0] in _QUICK[:1] or not quick}
+    (verb,) = chance.choices(tuple(known), tuple(known.values()))
     words = given(verbs[verb])
     twin = chance.random() < 0.25
     if twin and verb != ("robot", "export"):
@@ -94,9 +101,9 @@ def with_extreme(chance: Random) -> tuple[list[str], list[str]]:
     return words, []
 
 
-def with_bad_values(chance: Random) -> tuple[list[str], list[str]]:
+def with_bad_values(chance: Random, quick: bool) -> tuple[list[str], list[str]]:
     """A command with one or two options that are wrong."""
-    all_commands = commands()
+    all_commands = [command for command in commands() if command.words[0] in _QUICK or not quick]
     (command,) = chance.choices(all_commands, [_SELDOM.get(each.words, 1.0) for each in all_commands])
     if not command.options:
         return [*command.words, any_text(chance)], []

@@ -30,9 +30,10 @@ _COMMANDS = {
     _BEGIN: 2,
     _RESUME: 2,
     (*_TURN, "--out", "kept"): 2,
-    ("robot", "new", "kept/new.toml"): 2,
-    ("robot", "export", "aoi2022", "--out", "kept/x.xml"): 1,
+    ("robot", "new", "new.toml"): 2,
+    ("robot", "export", "aoi2022", "--out", "x.xml"): 1,
 }
+_NAMED = ("kept", "new.toml", "x.xml", "/tmp: ")  # folders and files are as good as fields
 _SIZE = 64 << 20  # bytes of a disk of our own
 _NEW_NAMESPACE, _READ_ONLY, _REMOUNT, _PRIVATE = 0x20000, 1, 32, (1 << 14) | (1 << 18)
 
@@ -85,7 +86,7 @@ class Disks:
         if kind is Kind.ENDED and missing and way is not _deleted:
             raise FoundFault(Kind.REPEATED, f"{missing[0]} is not there")
         others = [name for name, each in before.items() if after.get(name) != each]
-        gone = [name for name in others if not _may_change(name, before, force, kind)]
+        gone = [name for name in others if not _may_change(name, before, command, kind)]
         if gone and way is not _deleted:
             raise FoundFault(Kind.LEFT, f"{gone[0]} was there, and is gone or another")
         new = [name for name in after if name not in before and after[name] == stat.S_IFDIR]
@@ -171,7 +172,7 @@ def _deleted(chance: Random, place: Place, study: Whole) -> Way:
 @contextlib.contextmanager
 def _in_the_way(chance: Random, place: Place, study: Whole) -> Way:
     """Something has the name of a file."""
-    path = place.here / chance.choice([name for name in study.files if name.startswith("kept/")])
+    path = place.here / chance.choice(sorted(study.files))
     path.parent.mkdir(exist_ok=True)
     path.unlink(missing_ok=True)
     how = chance.choice(("file", "folder", "pipe", "dangling link", "link", "device"))
@@ -194,11 +195,12 @@ def _in_the_way(chance: Random, place: Place, study: Whole) -> Way:
     yield f"{how} {path.name}", None
 
 
-def _may_change(name: str, before: dict[str, object], force: tuple[str, ...], kind: Kind) -> bool:
-    """Whether something that was there may be another now: files where it is allowed, and what is gone on with."""
+def _may_change(name: str, before: dict[str, object], command: tuple[str, ...], kind: Kind) -> bool:
+    """Whether something that was there may be another now: what is gone on with, and files where it is allowed."""
     about = before[name]
-    regular = isinstance(about, tuple) and stat.S_ISREG(about[0])
-    return not isinstance(about, tuple) or (regular and kind is Kind.ENDED) or (name.endswith(".nc") and not force)
+    if not isinstance(about, tuple):  # a folder
+        return True
+    return stat.S_ISREG(about[0]) and (kind is Kind.ENDED or command == _RESUME or "--trials" in command)
 
 
 def _mounted(path: Path) -> Path | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import shutil
 import signal
@@ -139,7 +140,8 @@ def _in(place: Place) -> Iterator[None]:
 @contextmanager
 def _captured(place: Place) -> Iterator[None]:
     """Whatever writes to stdout and stderr, native code included, writes into the files of the place."""
-    streams = sys.stdout, sys.stderr
+    streams, root = (sys.stdout, sys.stderr), logging.getLogger()
+    handlers, root.handlers = root.handlers, []  # those of tests would take what is told on stderr
     for stream in streams:
         stream.flush()
     kept = [os.dup(number) for number in (1, 2)]
@@ -159,3 +161,4 @@ def _captured(place: Place) -> Iterator[None]:
             os.dup2(handle, number)
             os.close(handle)
         sys.stdout, sys.stderr = streams
+        root.handlers = handlers

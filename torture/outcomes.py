@@ -72,7 +72,8 @@ class Ending:
 
 # What may stand on stderr beside an error.
 _SAID = re.compile(
-    r"^(?:[^:]+: +\d+ %.*|The page is .*|note: .*|wrote .*|kept .*|the controller took .*|.*: walked again, .*|)$"
+    r"^(?:[^:]+: +\d+ (?:%|s|min|h).*|The page is .*|note: .*|wrote .*|kept .*|the controller took .*|"
+    r".*: walked again, .*|)$"
 )
 _FIELD = re.compile(
     r"--[a-z0-9]|[a-z_0-9]+\.[a-z_0-9]+|(?:^error: |: )[a-z][a-z_0-9]*(?:\[\d+\])?(?: = .*?)?: |"

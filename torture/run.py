@@ -37,21 +37,7 @@ _KINDS = (
     *(RobotFiles, Arguments, SavedTrials, SavedBranches, Kills, Disks, Streams, Environments),
     *(SameBits, Invariances),
 )
-CLASSES: dict[str, Callable[[], Attacks]] = {
-    each.name: each
-    for each in (
-        RobotFiles,
-        Arguments,
-        SavedTrials,
-        SavedBranches,
-        Kills,
-        Disks,
-        Streams,
-        Environments,
-        SameBits,
-        Invariances,
-    )
-}
+CLASSES: dict[str, Callable[[], Attacks]] = {each.name: each for each in _KINDS}
 _SHOWN = 12  # different faults of a class that are printed
 _BETWEEN = 5.0  # s between two lines of progress
 

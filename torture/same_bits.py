@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from random import Random
@@ -24,7 +25,8 @@ class SameBits:
     per_minute = 120
 
     def __init__(self) -> None:
-        os.environ.setdefault("NUMBA_NUM_THREADS", str(_THREADS))  # read when it is imported
+        if "numba" not in sys.modules:  # which reads it once
+            os.environ.setdefault("NUMBA_NUM_THREADS", str(_THREADS))
 
     def attack(self, chance: Random, place: Place) -> Outcome:
         """One comparison."""
