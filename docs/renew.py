@@ -50,7 +50,9 @@ _SHOWN = re.compile(r"^```sh\n\$ (?P<command>chilopod [^\n]*)\n(?P<output>.*?)^`
 _BLOCK = re.compile(
     r"^<!-- run by make docs -->\n```python\n(?P<command>.*?)(?P<output>(?:^# [^\n]*\n)+)```$", re.M | re.S
 )
-_NAMED = re.compile(r"^<!-- (?P<command>(?:chilopod|make) [^\n]*)\n(?P<names>.*?) -->\n+(?P<text>.*?)(?=\n\n|\Z)", re.M | re.S)
+_NAMED = re.compile(
+    r"^<!-- (?P<command>(?:chilopod|make) [^\n]*)\n(?P<names>.*?) -->\n+(?P<text>.*?)(?=\n\n|\Z)", re.M | re.S
+)
 _NAME = re.compile(r"^\s*(?P<text>\S.*?) = (?P<path>.*?)(?: \* (?P<scale>[\d.e]+))?(?: ~ (?P<part>.*))?$", re.M)
 
 

@@ -68,17 +68,14 @@ class Disks:
             before, there = snapshot(place.root), content(place.here)
             ending = called((*command, *force), place, meanwhile)
             after = snapshot(place.root)
-        kind = judged(
-            ending,
-            before,
-            after,
-            named=["kept", "TMPDIR", str(place.tmp)],
-            interrupted=place.interrupted.exists(),
-            stays=False,
-        )
+        stopped, right = place.interrupted.exists(), study.ending.out
+        kind = judged(ending, before, after, named=_NAMED, interrupted=stopped, stays=False, printed=right)
         if kind is Kind.ENDED and way is not _deleted and ending.out != study.ending.out:
             raise FoundFault(Kind.WRONG, "another result")
         now = content(place.here)
+        for name, each in content(place.home).items():
+            if each not in study.files.values():
+                raise FoundFault(Kind.LEFT, f"{name} is kept elsewhere, but not whole")
         for name, each in now.items():
             if each not in (study.files.get(name), there.get(name)) and name.removeprefix("kept/") not in ending.err:
                 raise FoundFault(Kind.LEFT, f"{name} is not whole")
@@ -108,6 +105,7 @@ class Disks:
         there = Place(self._disk / "case", place.out, place.err)
         there.here.mkdir(parents=True)
         there.tmp.mkdir()
+        there.home.mkdir()
         return there
 
 

@@ -7,9 +7,9 @@ import resource
 from collections.abc import Callable
 from random import Random
 
-from in_process import Place, snapshot
+from in_process import Place, environment, snapshot
 from outcomes import FoundFault, Kind, Outcome, judged
-from processes import commanded, environment
+from processes import commanded
 from studies import content, whole
 
 _COMMANDS = {

@@ -43,6 +43,11 @@ class Place:
         return self.root / "tmp"
 
     @property
+    def home(self) -> Path:
+        """Where results may be kept that cannot be written elsewhere."""
+        return self.root / "home"
+
+    @property
     def tried(self) -> Path:
         """What is tried, in words."""
         return self.out.with_name("tried")
@@ -61,9 +66,18 @@ def new_place(home: Path) -> Place:
     place = Place(root, home / "out", home / "err")
     place.here.mkdir(parents=True)
     place.tmp.mkdir()
+    place.home.mkdir()
+    (home.parent / "matplotlib").mkdir(exist_ok=True)
     for told in (place.out, place.err, place.tried, place.interrupted):
         told.unlink(missing_ok=True)
     return place
+
+
+def environment(place: Place, **more: str) -> dict[str, str]:
+    """Variables with which nothing outside of a place is written."""
+    drawing = place.out.parent.parent / "matplotlib"  # which lists fonts once, for some seconds
+    own = {"TMPDIR": str(place.tmp), "HOME": str(place.home), "MPLCONFIGDIR": str(drawing)}
+    return {**os.environ, **own, **more}
 
 
 def called(arguments: Sequence[str], place: Place, meanwhile: Callable[[], None] | None = None) -> Ending:
@@ -123,18 +137,17 @@ def _text(path: Path) -> str:
 
 @contextmanager
 def _in(place: Place) -> Iterator[None]:
-    former, variable, folder = os.getcwd(), os.environ.get("TMPDIR"), tempfile.tempdir
+    former, variables, folder = os.getcwd(), dict(os.environ), tempfile.tempdir
     os.chdir(place.here)
-    os.environ["TMPDIR"] = tempfile.tempdir = str(place.tmp)
+    os.environ.update(environment(place))
+    tempfile.tempdir = str(place.tmp)
     try:
         yield
     finally:
         os.chdir(former)
         tempfile.tempdir = folder
-        if variable is None:
-            del os.environ["TMPDIR"]
-        else:
-            os.environ["TMPDIR"] = variable
+        os.environ.clear()
+        os.environ.update(variables)
 
 
 @contextmanager

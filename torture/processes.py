@@ -10,15 +10,10 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any
 
-from in_process import Place
+from in_process import Place, environment
 from outcomes import Ending, FoundFault, Kind
 
 LIMIT = 60.0  # s
-
-
-def environment(place: Place, **more: str) -> dict[str, str]:
-    """That of this process, with temporary files in the place."""
-    return {**os.environ, "TMPDIR": str(place.tmp), **more}
 
 
 def start(arguments: Sequence[str], place: Place, **options: Any) -> subprocess.Popen[bytes]:

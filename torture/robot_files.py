@@ -28,6 +28,10 @@ _VERBS = {
 }
 
 
+# What may be said of a file as a whole.
+_OF_ALL = ("is not valid TOML", "is not a text file", "the file is empty", "too large", "too deeply")
+
+
 class RobotFiles:
     """Presets, mutated once to four times, shown, checked, walked, analysed."""
 
@@ -48,9 +52,7 @@ class RobotFiles:
         place.tried.write_text(f"chilopod {' '.join(command)}")
         before = snapshot(place.root)
         ending = called(command, place)
-        kind = judged(
-            ending, before, snapshot(place.root), named=("robot.toml",), interrupted=place.interrupted.exists()
-        )
+        kind = judged(ending, before, snapshot(place.root), named=_OF_ALL, interrupted=place.interrupted.exists())
         if kind is Kind.ENDED and "--json" in command:
             found = strict_json(ending.out)
             if command[1] == "show":

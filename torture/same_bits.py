@@ -10,9 +10,9 @@ from random import Random
 
 import xarray as xr
 
-from in_process import Place, called
+from in_process import Place, called, environment
 from outcomes import FoundFault, Kind, Outcome
-from processes import commanded, environment
+from processes import commanded
 from some_robots import some_robot
 
 _THREADS = 7
