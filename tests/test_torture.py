@@ -14,10 +14,10 @@ run, workers, outcomes, in_process = map(importlib.import_module, ("run", "worke
 Kind = outcomes.Kind
 SEED = 13
 SHORT = {
-    "robot-files": (run.RobotFiles(quick=True), 60),
-    "arguments": (run.Arguments(quick=True), 30),
-    "trials": (run.SavedTrials(quick=True), 25),
-    "branches": (run.SavedBranches(), 8),
+    "robot-files": (run.RobotFiles(quick=True), 40),
+    "arguments": (run.Arguments(quick=True), 20),
+    "trials": (run.SavedTrials(quick=True), 15),
+    "branches": (run.SavedBranches(), 5),
     "same-bits": (run.SameBits(), 6),
     "invariances": (run.Invariances(), 8),
 }
@@ -71,7 +71,7 @@ def test_it_finds_records_that_depend_on_the_batch(tmp_path, monkeypatch):
         return done
 
     monkeypatch.setattr(chilopod.tasks, "walk", depending)
-    assert Kind.WRONG in {kind for kind, _, _ in attacked("same-bits", tmp_path, 12)}
+    assert Kind.WRONG in {kind for kind, _, _ in attacked("same-bits", tmp_path, 3)}
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,7 @@ from pathlib import Path
 from chilopod.cli import main
 from outcomes import Ending
 
+_FONTS = os.environ.get("MPLCONFIGDIR") or str(Path.home() / ".cache" / "matplotlib")  # listing them takes seconds
 HERE = "a/b/here"
 """Where commands run, below the folder of a case: deep enough for a stray ``..``."""
 
@@ -67,7 +68,6 @@ def new_place(home: Path) -> Place:
     place.here.mkdir(parents=True)
     place.tmp.mkdir()
     place.home.mkdir()
-    (home.parent / "matplotlib").mkdir(exist_ok=True)
     for told in (place.out, place.err, place.tried, place.interrupted):
         told.unlink(missing_ok=True)
     return place
@@ -75,8 +75,7 @@ def new_place(home: Path) -> Place:
 
 def environment(place: Place, **more: str) -> dict[str, str]:
     """Variables with which nothing outside of a place is written."""
-    drawing = place.out.parent.parent / "matplotlib"  # which lists fonts once, for some seconds
-    own = {"TMPDIR": str(place.tmp), "HOME": str(place.home), "MPLCONFIGDIR": str(drawing)}
+    own = {"TMPDIR": str(place.tmp), "HOME": str(place.home), "MPLCONFIGDIR": _FONTS}
     return {**os.environ, **own, **more}
 
 

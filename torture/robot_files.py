@@ -29,7 +29,7 @@ _VERBS = {
 
 
 # What may be said of a file as a whole.
-_OF_ALL = ("is not valid TOML", "is not a text file", "the file is empty", "too large", "too deeply")
+_OF_ALL = ("is not valid TOML", "is not a text file", "the file is empty", "too large", "too deeply", "dots in a key")
 
 
 class RobotFiles:

@@ -12,6 +12,7 @@ from outcomes import FoundFault, Kind, Outcome, changed, judged
 from studies import BRANCH, content, put, whole
 
 _FILE = "branch.nc"
+_RESUME = (*BRANCH, "--points", "1", "--resume", "kept")
 
 
 class SavedBranches:
@@ -23,8 +24,6 @@ class SavedBranches:
     def attack(self, chance: Random, place: Place) -> Outcome:
         """One damage."""
         begun = whole(place, *BRANCH, "--points", "3", "--out", "kept")
-        other = whole(place, *BRANCH, "--set", "body.mass=8 kg", "--points", "1", "--out", "kept")
-        right = whole(place, *BRANCH, "--points", "1", "--resume", "kept", begun=begun)
         folder = place.here / "kept"
         put(begun.kept, folder)
         path, how = folder / _FILE, chance.randrange(12)
@@ -34,17 +33,19 @@ class SavedBranches:
             beside = chance.choice([name for name in begun.kept if name != _FILE])
             (folder / beside).write_bytes(on_bytes(begun.kept[beside], chance))
         elif how == 9:
+            other = whole(place, *BRANCH, "--set", "body.mass=8 kg", "--points", "1", "--out", "kept")
             path.write_bytes(chance.choice((other.kept[_FILE], begun.kept["branch.csv"])))
         elif how == 10:
             edited(path, chance, "h5netcdf", _attributes)
         else:
             replaced(path, chance, place)
-        place.tried.write_text(f"chilopod {' '.join(right.command)} with {_FILE} damaged in way {how}")
+        place.tried.write_text(f"chilopod {' '.join(_RESUME)} with {_FILE} damaged in way {how}")
         before = snapshot(place.root)
-        ending = called(right.command, place)
+        ending = called(_RESUME, place)
         after = snapshot(place.root)
         kind = judged(ending, before, after, named=[_FILE, "kept"], interrupted=place.interrupted.exists())
         if kind is Kind.ENDED:
+            right = whole(place, *_RESUME, begun=begun)
             new = [name for name in changed(before, after) if not name.endswith(tuple(right.kept))]
             if ending.out != right.ending.out or new:
                 raise FoundFault(Kind.WRONG, f"goes on otherwise {' '.join(new)}")
