@@ -1,7 +1,7 @@
 # Everything here needs only make and a Python from 3.11 to 3.13. Choose another with: make setup PYTHON=/path/to/python3
 # The environment lives in .venv and is reused until pyproject.toml or requirements.lock changes.
 .DEFAULT_GOAL := help
-.PHONY: help setup reproduce test lint types format docs bench lock clean
+.PHONY: help setup reproduce test torture lint types format docs bench lock clean
 .DELETE_ON_ERROR:
 
 VENV := .venv
@@ -61,6 +61,9 @@ reproduce: $(RUNTIME)  ## compute the paper's results and write report/index.htm
 
 test: lint types  ## all checks and all tests
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder --benchmark-disable $(ARGS)
+
+torture: $(DEV)  ## attack it for ten minutes, and count what came of it; options in ARGS="kills --seed 7 --minutes 3"
+	$(BIN)/python torture/run.py --save $(ARGS)
 
 lint: $(DEV)  ## style and the contracts between layers
 	$(BIN)/ruff check .

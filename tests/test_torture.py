@@ -1,0 +1,104 @@
+"""The harness attacks for some seconds what is cheap to attack; and it finds faults that are planted."""
+
+import importlib
+import sys
+from pathlib import Path
+
+import pytest
+
+import chilopod.robot
+import chilopod.tasks
+
+sys.path.append(str(Path(__file__).parent.parent / "torture"))
+run, workers, outcomes, in_process = map(importlib.import_module, ("run", "workers", "outcomes", "in_process"))
+Kind = outcomes.Kind
+SEED = 13
+SHORT = {
+    "robot-files": (run.RobotFiles(quick=True), 40),
+    "arguments": (run.Arguments(quick=True), 20),
+    "trials": (run.SavedTrials(quick=True), 15),
+    "branches": (run.SavedBranches(), 5),
+    "same-bits": (run.SameBits(), 6),
+    "invariances": (run.Invariances(), 8),
+}
+
+
+def attacked(name, folder, count):
+    """What got through, of so many attacks of a class in this process."""
+    attacks, found = SHORT[name][0], []
+    for case in range(count):
+        outcome = workers.attempt(attacks, SEED, case, in_process.new_place(folder / "here"))
+        if outcome.kind not in outcomes.FINE:
+            found.append((outcome.kind, outcome.said, run.again(name, SEED, case)))
+    return found
+
+
+@pytest.mark.parametrize("name", SHORT)
+def test_nothing_gets_through(name, tmp_path):
+    assert attacked(name, tmp_path, SHORT[name][1]) == []
+
+
+def test_it_finds_a_fault_of_its_own(tmp_path, monkeypatch):
+    def broken(robot):
+        raise KeyError("planted")
+
+    monkeypatch.setattr(chilopod.robot, "load_robot", broken)
+    assert Kind.TRACEBACK in {kind for kind, _, _ in attacked("robot-files", tmp_path, 3)}
+
+
+def test_it_finds_what_is_left_behind(tmp_path, monkeypatch):
+    load = chilopod.robot.load_robot
+
+    def leaving(robot):
+        Path("left").mkdir()
+        return load(robot)
+
+    monkeypatch.setattr(chilopod.robot, "load_robot", leaving)
+    assert Kind.LEFT in {kind for kind, _, _ in attacked("robot-files", tmp_path, 5)}
+
+
+def test_it_finds_damaged_trials_that_are_accepted(tmp_path, monkeypatch):
+    monkeypatch.setattr("zlib.crc32", lambda content, value=0: 0)
+    assert Kind.WRONG in {kind for kind, _, _ in attacked("trials", tmp_path, 10)}
+
+
+def test_it_finds_records_that_depend_on_the_batch(tmp_path, monkeypatch):
+    walk = chilopod.tasks.walk
+
+    def depending(robot, duration, *, repeats=1, **more):
+        done = walk(robot, duration, repeats=repeats, **more)
+        done.record["heading"] = done.record.heading + 1e-15 * repeats
+        return done
+
+    monkeypatch.setattr(chilopod.tasks, "walk", depending)
+    assert Kind.WRONG in {kind for kind, _, _ in attacked("same-bits", tmp_path, 3)}
+
+
+@pytest.mark.parametrize(
+    ("ending", "kind"),
+    [
+        (outcomes.Ending(2, "", "error: body.mass = 'x': does not start with a number\n"), Kind.REFUSED),
+        (outcomes.Ending(2, "", "error: it does not work\n"), Kind.FIELD),
+        (outcomes.Ending(2, "", "error: body.mass = 1: no\nRuntimeWarning: overflow\n"), Kind.LINES),
+        (outcomes.Ending(2, "half a result", "error: body.mass = 1: no\n"), Kind.LINES),
+        (outcomes.Ending(0, "", "RuntimeWarning: overflow\n"), Kind.LINES),
+        (outcomes.Ending(130, "", "error: interrupted\n"), Kind.CODE),
+        (outcomes.Ending(-11, "", ""), Kind.CRASH),
+        (outcomes.Ending(None, "", "", "KeyError: 1"), Kind.TRACEBACK),
+    ],
+)
+def test_endings_are_told_apart(ending, kind):
+    try:
+        found = outcomes.judged(ending, {}, {})
+    except outcomes.FoundFault as fault:
+        found = fault.kind
+    assert found is kind
+
+
+def test_the_same_seed_makes_the_same_attacks(tmp_path):
+    def tried():
+        place = in_process.new_place(tmp_path / "here")
+        workers.attempt(SHORT["arguments"][0], SEED, 3, place)
+        return place.tried.read_text()
+
+    assert tried() == tried() != ""
