@@ -17,7 +17,6 @@ SHORT = {
     "robot-files": (run.RobotFiles(quick=True), 40),
     "arguments": (run.Arguments(quick=True), 20),
     "trials": (run.SavedTrials(quick=True), 15),
-    "branches": (run.SavedBranches(), 5),
     "same-bits": (run.SameBits(), 6),
     "invariances": (run.Invariances(), 8),
 }
