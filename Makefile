@@ -1,7 +1,7 @@
 # Everything here needs only make and a Python from 3.11 to 3.13. Choose another with: make setup PYTHON=/path/to/python3
 # The environment lives in .venv and is reused until pyproject.toml or requirements.lock changes.
 .DEFAULT_GOAL := help
-.PHONY: help setup reproduce test torture lint types format docs bench lock clean
+.PHONY: help setup reproduce test run-tests torture lint types format docs bench lock clean
 .DELETE_ON_ERROR:
 
 VENV := .venv
@@ -12,8 +12,9 @@ LOCK_BENCH := requirements-bench.lock
 RUNTIME := $(VENV)/.runtime-installed
 DEV := $(VENV)/.dev-installed
 BENCH := $(VENV)/.bench-installed
-# Test processes at once; each with one thread for linear algebra, as more would stand in each other's way.
-JOBS ?= 2
+# Test processes at once, one more than two cores have room for, as some tests wait for others' processes; each with one
+# thread for linear algebra, as more would stand in each other's way.
+JOBS ?= 3
 
 # Makes .venv with the first suitable Python, unless a working one is there.
 define make_venv
@@ -59,7 +60,10 @@ $(BENCH): $(RUNTIME) $(LOCK_BENCH)
 reproduce: $(RUNTIME)  ## compute the paper's results and write report/index.html; options in ARGS="--quick"
 	$(BIN)/chilopod reproduce $(ARGS)
 
-test: lint types  ## all checks and all tests
+test: lint  ## all checks and all tests
+	@$(MAKE) --no-print-directory -j 2 types run-tests
+
+run-tests: $(DEV)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder --benchmark-disable $(ARGS)
 
 torture: $(DEV)  ## attack it for ten minutes, and count what came of it; options in ARGS="kills --seed 7 --minutes 3"

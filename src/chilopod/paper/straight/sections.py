@@ -50,7 +50,7 @@ IDENTIFICATION: Section[Identification] = Section(
     CHAPTER,
     "the constants the paper does not print",
     lambda context, found, report: identify_planar(
-        context.robot, critical_mode_data(), context.size.of(25, 7, 3), variant_settings(), report
+        context.robot, critical_mode_data(), context.size.of(25, 7, 5), variant_settings(), report
     ),
     lambda fit, found: rows.identification_rows(fit),
     beyond=True,
