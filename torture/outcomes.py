@@ -70,6 +70,9 @@ class Ending:
     escaped: str = ""
 
 
+# Ctrl-C where Python can raise nothing: the command's own process ends there at once, which one of many in a worker
+# cannot.
+_UNRAISED = re.compile(r"^Exception ignored [^\n]*\n(?:[^\n]*\n)*?KeyboardInterrupt", re.MULTILINE)
 # What may stand on stderr beside an error.
 _SAID = re.compile(
     r"^(?:[^:]+: +\d+ (?:%|s|min|h).*|The page is .*|note: .*|wrote .*|kept .*|the controller took .*|"
@@ -118,6 +121,8 @@ def judged(
     FoundFault
         If something is not as promised.
     """
+    if interrupted and _UNRAISED.search(ending.err):
+        return Kind.STOPPED
     if ending.escaped:
         raise FoundFault(Kind.TRACEBACK, ending.escaped)
     lines = [line for line in ending.err.splitlines() if not _SAID.match(line)]
