@@ -12,9 +12,8 @@ LOCK_BENCH := requirements-bench.lock
 RUNTIME := $(VENV)/.runtime-installed
 DEV := $(VENV)/.dev-installed
 BENCH := $(VENV)/.bench-installed
-# Test processes at once, one more than two cores have room for, as some tests wait for others' processes; each with one
-# thread for linear algebra, as more would stand in each other's way.
-JOBS ?= 3
+# Test processes at once; each with one thread for linear algebra, as more would stand in each other's way.
+JOBS ?= 2
 
 # Makes .venv with the first suitable Python, unless a working one is there.
 define make_venv
