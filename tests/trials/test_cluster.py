@@ -147,9 +147,15 @@ def gone(processes):
 
 
 @contextlib.contextmanager
-def started(*arguments):
+def started(*arguments, **environment):
     """A client in a session of its own, which never outlives the test."""
-    client = subprocess.Popen([sys.executable, *arguments], stderr=subprocess.PIPE, text=True, start_new_session=True)
+    client = subprocess.Popen(
+        [sys.executable, *arguments],
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env=os.environ | environment,
+    )
     try:
         yield client
     finally:
@@ -299,7 +305,7 @@ def waited_for_workers(address):
 
 def test_an_interrupted_client_says_so_and_leaves_no_process(tmp_path):
     arguments = ["aoi2022-planar", "--cluster", "2", "--seed", "1", "--repeats", "3000", "--duration", "200 s"]
-    with started("-m", "chilopod", "walk", *arguments) as client:
+    with started("-m", "chilopod", "walk", *arguments, TMPDIR=str(tmp_path)) as client:
         assert any("of 3000" in line for line in client.stderr)  # first it says that it waits for the workers
         workers = waited_for(lambda: worker_processes(client.pid))
         assert len(workers) == 2
@@ -310,6 +316,7 @@ def test_an_interrupted_client_says_so_and_leaves_no_process(tmp_path):
         ]
         assert client.returncode == 130
         assert gone(workers)
+    assert list(tmp_path.iterdir()) == []
 
 
 # ---- what goes wrong ------------------------------------------------------------------------------------------------

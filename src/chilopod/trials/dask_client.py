@@ -58,6 +58,9 @@ def connected(where: str | int, threads: int | None, stack: ExitStack) -> Any:
     stack.enter_context(_quiet())
     stack.enter_context(dask.config.set(_SETTINGS))
     if isinstance(where, int):
+        folder = tempfile.TemporaryDirectory(prefix="chilopod-cluster-", ignore_cleanup_errors=True)
+        # Of the scheduler, which has no argument for it.
+        stack.enter_context(dask.config.set({"temporary-directory": stack.enter_context(folder)}))
         return _own(where, threads or max(1, usable_cores() // where), distributed, stack)
     return _there(where, distributed, stack)
 
@@ -115,7 +118,6 @@ def _check(client: Any, address: str) -> None:
 
 def _own(workers: int, threads: int, distributed: Any, stack: ExitStack) -> Any:
     """A client of worker processes on this machine, which die with it."""
-    folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="chilopod-cluster-", ignore_cleanup_errors=True))
     # Ctrl-C goes to all processes of the terminal; workers inherit from the thread that starts them, which is made
     # here, that it is not for them. (Whoever starts Python's resource tracker is told to listen again.)
     if sys.platform != "win32":
@@ -130,7 +132,6 @@ def _own(workers: int, threads: int, distributed: Any, stack: ExitStack) -> Any:
             scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
             silence_logs=logging.CRITICAL,
             memory_limit=None,
-            local_directory=folder,
             env=dict.fromkeys(("NUMBA_NUM_THREADS", *_BLAS), str(threads)),
             preload=["chilopod.trials.on_worker"],
         )
