@@ -169,7 +169,9 @@ def _stopped(cluster: Any, others: Sequence[BaseProcess]) -> None:
         child.kill()
     with suppress(Exception):
         cluster.close(timeout=_STOP)
-    cluster.shutdown_on_close = False  # it would try again for ten seconds when Python ends
+    # When Python ends dask would try again for ten seconds, and tell of processes whose end it has not noticed.
+    cluster.shutdown_on_close = False
+    logging.getLogger("distributed.process").setLevel(logging.CRITICAL + 1)
 
 
 @contextmanager
