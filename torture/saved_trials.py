@@ -67,7 +67,7 @@ def damage(path: Path, others: list[Path], chance: Random, place: Place) -> None
     if how < 6:
         path.write_bytes(on_bytes(path.read_bytes(), chance))
     elif how == 6:
-        path.write_bytes(chance.choice(others).read_bytes())
+        path.write_bytes(chance.choice([each for each in others if each.is_file()]).read_bytes())
     elif how == 7:
         edited(path, chance, "scipy", _attributes)
     elif how == 8:
