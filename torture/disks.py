@@ -194,11 +194,14 @@ def _in_the_way(chance: Random, place: Place, study: Whole) -> Way:
 
 
 def _may_change(name: str, before: dict[str, object], command: tuple[str, ...], kind: Kind) -> bool:
-    """Whether something that was there may be another now: what is gone on with, and files where it is allowed."""
+    """Whether something that was there may be another now: what is gone on with, what has the name of a trial and is set
+    aside, and files where it is allowed."""
     about = before[name]
     if not isinstance(about, tuple):  # a folder
         return True
-    return stat.S_ISREG(about[0]) and (kind is Kind.ENDED or command == _RESUME or "--trials" in command)
+    if "--trials" in command and "kept/" in name:
+        return True
+    return stat.S_ISREG(about[0]) and (kind is Kind.ENDED or command == _RESUME)
 
 
 def _mounted(path: Path) -> Path | None:

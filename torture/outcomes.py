@@ -82,7 +82,7 @@ _FIELD = re.compile(
     r"--[a-z0-9]|\b(?:body|springs|legs|gait|ground|twin|provenance)\b|"
     r"""(?:^error: |: )(?:[^\W\d]|['"])[^ :]*(?: = .*?)?: (?!/)|"""
     r"[Nn]o such command|extra argument|[Mm]issing (?:argument|option|command)|"
-    r"at line \d+|no such preset or file|'[A-Z\[\]]+'"
+    r"/branch\.nc: |at line \d+|no such preset or file|'[A-Z\[\]]+'"
 )
 
 

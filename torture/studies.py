@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from chilopod.output import write_atomic
+from chilopod.process import INTERRUPTED
 from in_process import Place, called, new_place
 from outcomes import Ending
 
@@ -65,6 +66,8 @@ def whole(
             put(begun.files if begun else {}, elsewhere.here)
             start = time.monotonic()
             ending = by(command, elsewhere)
+            if ending.code == INTERRUPTED:
+                raise RuntimeError("what is right is not known: the machine is too busy")
             _KNOWN[command] = Whole(command, ending, content(elsewhere.here), time.monotonic() - start)
             write_atomic(file, pickle.dumps(_KNOWN[command]))
     return _KNOWN[command]
