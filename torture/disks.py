@@ -194,8 +194,8 @@ def _in_the_way(chance: Random, place: Place, study: Whole) -> Way:
 
 
 def _may_change(name: str, before: dict[str, object], command: tuple[str, ...], kind: Kind) -> bool:
-    """Whether something that was there may be another now: what is gone on with, what has the name of a trial and is set
-    aside, and files where it is allowed."""
+    """Whether something that was there may be another now: what is gone on with, what has the name of a trial, which is
+    set aside, and files where it is allowed."""
     about = before[name]
     if not isinstance(about, tuple):  # a folder
         return True
