@@ -9,7 +9,7 @@ from random import Random
 
 import xarray as xr
 
-from damages import edited, on_bytes, replaced
+from damages import SPARSE, edited, on_bytes, replaced
 from in_process import Place, called, snapshot
 from outcomes import FoundFault, Kind, Outcome, judged
 from studies import PLANAR, TWIN, content, put, whole
@@ -63,17 +63,17 @@ class SavedTrials:
 
 def damage(path: Path, others: list[Path], chance: Random, place: Place) -> None:
     """Do something to one of the files."""
-    how = chance.randrange(10)
+    how, files = chance.randrange(10), [each for each in others if each.is_file() and each.stat().st_size < SPARSE]
     if how < 6:
         path.write_bytes(on_bytes(path.read_bytes(), chance))
     elif how == 6:
-        path.write_bytes(chance.choice([each for each in others if each.is_file()]).read_bytes())
+        path.write_bytes(chance.choice(files).read_bytes())
     elif how == 7:
         edited(path, chance, "scipy", _attributes)
     elif how == 8:
         replaced(path, chance, place)
     else:
-        one, other = path.read_bytes(), chance.choice(others)
+        one, other = path.read_bytes(), chance.choice(files)
         path.write_bytes(other.read_bytes())
         other.write_bytes(one)
 
