@@ -21,6 +21,12 @@ def test_goals_are_directions_or_places():
         assert str(Goal.parse(text)) == text
 
 
+def test_equal_courses_are_written_alike():
+    assert repr(Course((Goal(1, np.float32(2), relative=True),), 40)) == repr(
+        Course((Goal(1.0, 2.0, relative=True),), 40.0)
+    )
+
+
 def test_places_seen_from_the_robot_turn_with_it():
     poses = np.array([[0.0, 0.0, 0.0], [2.0, 1.0, 0.5 * math.pi]])
     assert Goal(1.0, 0.5, relative=True).place(poses) == pytest.approx(np.array([[1.0, 0.5], [1.5, 2.0]]))

@@ -5,6 +5,7 @@ from chilopod.steering.course import COURSES, Course, Goal, course_named, random
 from chilopod.steering.criteria import Criteria, Outcome, arrivals, earliest_arrival, evaluate
 from chilopod.steering.leg_yaw import LegYawController
 from chilopod.steering.radius_law import RadiusLaw
+from chilopod.steering.shortest import shortest_path
 from chilopod.steering.strategies import STRATEGIES, Strategy, steered, strategy_named
 from chilopod.steering.target import ARRIVAL_RADIUS, Target
 
@@ -25,6 +26,7 @@ __all__ = [
     "earliest_arrival",
     "evaluate",
     "random_course",
+    "shortest_path",
     "steered",
     "strategy_named",
 ]

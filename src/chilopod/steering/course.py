@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod import units
+from chilopod.engine.arguments import as_number
 from chilopod.errors import ParameterError, UnitError, nearest_name
 from chilopod.kinematics import directions
 from chilopod.record import in_range
@@ -53,6 +54,9 @@ class Goal:
     relative: bool
 
     def __post_init__(self) -> None:
+        # Equal trials have one text, whatever kinds of numbers they were given.
+        for name in ("x", "y"):
+            object.__setattr__(self, name, as_number(name, getattr(self, name)))
         distance = round(math.hypot(self.x, self.y), _DIGITS)
         if not (ARRIVAL_RADIUS if self.relative else -1.0) < distance <= FARTHEST:
             near = f"more than the {ARRIVAL_RADIUS:g} m that count as arrived, " if self.relative else ""
@@ -144,6 +148,8 @@ class Course:
     range: float = 4.095
 
     def __post_init__(self) -> None:
+        for name in ("patience", "view", "range"):
+            object.__setattr__(self, name, as_number(name, getattr(self, name)))
         in_range("patience", self.patience, _LONGEST_PATIENCE, "s")
         in_range("view", math.degrees(self.view), 360.0, "deg")
         in_range("range", self.range, FARTHEST, "m")
