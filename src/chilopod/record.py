@@ -223,11 +223,12 @@ def add_outcome(data: xr.Dataset, statuses: Sequence[str], target: Array | None)
     statuses
         Labels, one a robot.
     target
-        m, shape (robots, 2), or None.
+        m, shape (robots, 2), (times, robots, 2) if they moved, or None.
     """
     data["status"] = ("robot", np.array(statuses, dtype=object))
     if target is not None:
-        data["target"] = (("robot", "axis"), target.copy(), {"units": "m"})
+        over = ("time", "robot", "axis")[3 - target.ndim :]
+        data["target"] = (over, target.copy(), {"units": "m"})
         angle, away = bearing_and_distance(data.position.values, data.heading.values, target)
         data["distance"] = (("time", "robot"), away, {"units": "m"})
         data["bearing"] = (("time", "robot"), angle, {"units": "rad"})

@@ -25,7 +25,7 @@ def docs():
 
 
 def test_the_planar_model_keeps_every_promise():
-    assert len(check_engine(planar, ROBOT, seed=1)) == 12
+    assert len(check_engine(planar, ROBOT, seed=1)) == 15
 
 
 @pytest.mark.parametrize("changes", [["body.modules=3"], ["gait.side_phase=0 deg"], ["springs.damping=0.05"]])
@@ -35,11 +35,11 @@ def test_the_planar_model_keeps_them_with_other_robots(changes):
 
 def test_the_twin_keeps_every_promise():
     robot = load_robot("aoi2022").set_from_text(["twin.control_interval=4 ms", "springs.stiffness[0]=10 N*mm/deg"])
-    assert len(check_engine(twin, robot)) == 12
+    assert len(check_engine(twin, robot)) == 15
 
 
 def test_the_engine_in_the_docs_keeps_every_promise(docs):
-    assert len(check_engine(docs["Sketch"](), ROBOT)) == 12
+    assert len(check_engine(docs["Sketch"](), ROBOT)) == 15
 
 
 def _wrapped(walk_class, **changes):
@@ -145,18 +145,58 @@ def _never_fails(original):
 def _stops_everybody(original):
     def advance(self, until):
         original.advance(self, until)
-        self.failed = self.failed | self.failed.any()
+        if not self.walking.all():
+            self.ended[self.walking] = Status.OUT_OF_RANGE.name
 
     return {"advance": advance}
 
 
 def _records_robots_that_failed(original):
     def write(self):
-        failed, self.failed = self.failed, np.zeros_like(self.failed)
+        ended, self.ended = self.ended, np.full_like(self.ended, Status.WALKED.name)
         original.write(self)
-        self.failed = failed
+        self.ended = ended
 
     return {"write": write}
+
+
+def _has_no_halt(original):
+    return {"halt": property()}
+
+
+def _is_changed_by_a_look_at_its_pose(original):
+    def pose(self):
+        self.states = self.states + 1e-14
+        return original.pose(self)
+
+    return {"pose": pose}
+
+
+def _goes_where_it_is_aimed(original):
+    def aim(self, target):
+        original.aim(self, target)
+        self.states = self.states + 1e-12
+
+    return {"aim": aim}
+
+
+def _aims_all_alike(original):
+    def aim(self, target):
+        original.aim(self, np.asarray(target, dtype=float).reshape(-1, 2)[0])
+
+    return {"aim": aim}
+
+
+def _halts_everybody(original):
+    return {"halt": lambda self, which: original.halt(self, np.ones_like(which))}
+
+
+def _halts_for_a_moment(original):
+    def advance(self, until):
+        original.advance(self, until)
+        self.ended[self.ended == Status.HALTED.name] = Status.WALKED.name
+
+    return {"advance": advance}
 
 
 @pytest.mark.parametrize(
@@ -173,6 +213,12 @@ def _records_robots_that_failed(original):
         (_obeys_before_it_refuses, "refuses what is no command"),
         (_ignores_its_limits, "keeps springs within"),
         (_ignores_torques, "turns joints"),
+        (_has_no_halt, "sees in the units.*it has no halt"),
+        (_is_changed_by_a_look_at_its_pose, "says where robots are"),
+        (_goes_where_it_is_aimed, "shows targets that are moved"),
+        (_aims_all_alike, "shows targets that are moved"),
+        (_halts_everybody, "halts robots for good"),
+        (_halts_for_a_moment, "halts robots for good"),
         (_never_fails, "ends a robot that fails"),
         (_stops_everybody, "ends a robot that fails"),
         (_records_robots_that_failed, "ends a robot that fails"),

@@ -1,8 +1,8 @@
 """The contract between what walks and what steers: engines, walks that go on step by step, controllers.
 
 ``contract`` says what everybody may rely on, ``actuators`` does what a command asks for within the robot's limits,
-``loop`` lets a controller steer a walk, ``named`` finds engines and controllers by name, ``check`` tries an engine's
-promises.
+``targets`` knows where targets are and were, ``loop`` lets a controller steer a walk, ``named`` finds engines and
+controllers by name, ``check`` tries an engine's promises.
 """
 
 from chilopod.engine.actuators import Actuators, Ramps
@@ -21,6 +21,7 @@ from chilopod.engine.contract import (
 )
 from chilopod.engine.loop import Spent, event_times, steer, watched
 from chilopod.engine.named import ENGINES, controller_named, engine_named
+from chilopod.engine.targets import Targets
 
 __all__ = [
     "ENGINES",
@@ -35,6 +36,7 @@ __all__ = [
     "Ramps",
     "Spent",
     "Status",
+    "Targets",
     "Traits",
     "Walk",
     "check_engine",

@@ -67,6 +67,23 @@ def as_seeds(seeds: object, name: str = "seeds") -> list[int] | None:
     return whole
 
 
+def as_marks(name: str, value: object, count: int) -> NDArray[np.bool_]:
+    """An array of True and False, one each; a copy.
+
+    Raises
+    ------
+    ParameterError
+        If it is none.
+    """
+    try:
+        marks = np.array(value)
+    except (TypeError, ValueError):
+        marks = np.empty(0)
+    if marks.dtype != np.bool_ or marks.shape != (count,):
+        raise ParameterError("marks nothing", field=name, value=value, allowed=f"True or False, {count} of them")
+    return marks
+
+
 def as_robots(robots: object) -> list[Robot]:
     """One robot or several as a list.
 

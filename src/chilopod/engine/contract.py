@@ -32,6 +32,7 @@ class Status(enum.Enum):
     DIVERGED = "diverged", "the motion became too fast to follow or infinite"
     OUT_OF_RANGE = "out of range", "a yaw joint bent by more than a right angle, where modules run into each other"
     FALLEN = "fallen", "module 1 tipped over"
+    HALTED = "halted", "stopped where it was told to"
 
     def __init__(self, label: str, sentence: str) -> None:
         self.label = label
@@ -130,7 +131,8 @@ class Walk(Protocol):
     """Robots under way, each alone, all at the same time.
 
     The same bits come out whether a minute is one :meth:`advance` or a thousand, however often is looked, alone or in a
-    batch, with any number of threads, and after :meth:`save` and ``resume``. Only commands change a walk.
+    batch, with any number of threads, and after :meth:`save` and ``resume``. Only commands change a walk, and
+    :meth:`halt` ends it.
     """
 
     @property
@@ -143,10 +145,48 @@ class Walk(Protocol):
 
     @property
     def status(self) -> tuple[Status, ...]:
-        """One a robot: ``WALKED`` while nothing has gone wrong."""
+        """One a robot: ``WALKED`` while it walks."""
 
     def observe(self) -> Observation:
         """What the robots see now."""
+
+    def pose(self) -> Array:
+        """Where the robots are now: x and y of the centre of module 1, m, and its heading, rad, up to whole turns.
+
+        For referees and pages; controllers see no more than :meth:`observe` gives.
+
+        Returns
+        -------
+        Shape (robots, 3); NaN for robots that no longer walk.
+        """
+
+    def aim(self, target: ArrayLike) -> None:
+        """Put the targets of the robots elsewhere, from now on. The robots walk on as they would.
+
+        Parameters
+        ----------
+        target
+            m, shape (robots, 2) or (2,); a row of NaN: there is none, so nothing is seen.
+
+        Raises
+        ------
+        ParameterError
+            If it has the wrong shape, or is infinite. The walk is as before.
+        """
+
+    def halt(self, which: NDArray[np.bool_]) -> None:
+        """Stop some robots for good, now, with ``HALTED``; the others walk on to the same bits.
+
+        Parameters
+        ----------
+        which
+            Shape (robots,). Those that no longer walk stay as they are.
+
+        Raises
+        ------
+        ParameterError
+            If it is something else. The walk is as before.
+        """
 
     def command(self, command: Command) -> None:
         """Tell the actuators, from now on.
@@ -170,7 +210,12 @@ class Walk(Protocol):
         """Everything that it takes to go on, the record so far included."""
 
     def to_dataset(self) -> xr.Dataset:
-        """The record so far, see :func:`chilopod.record.walk_record`; robots are NaN from where they failed."""
+        """The record so far, see :func:`chilopod.record.walk_record`; robots are NaN from where they stopped."""
+
+
+def missing_parts(walk: object) -> list[str]:
+    """What an object lacks to be a :class:`Walk`."""
+    return [name for name in vars(Walk) if not name.startswith("_") and not hasattr(walk, name)]
 
 
 @dataclass(frozen=True)

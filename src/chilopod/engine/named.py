@@ -8,7 +8,7 @@ from collections.abc import Hashable, Mapping
 from importlib import import_module
 from typing import Any, Final
 
-from chilopod.engine.contract import Array, Controller, Engine, Traits, Walk
+from chilopod.engine.contract import Array, Controller, Engine, Traits, Walk, missing_parts
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError, in_words, nearest_name
 from chilopod.robot import Robot
 
@@ -74,9 +74,12 @@ class _Own:
         return self._blamed("initial_states", *arguments, **named)
 
     def start(self, *arguments: Any, **named: Any) -> Walk:
-        walk = self._blamed("start", *arguments, **named)
-        if not isinstance(walk, Walk):
-            raise AnalysisError("start gave no chilopod.engine.Walk", field=f"engine {self._name}")
+        walk: Walk = self._blamed("start", *arguments, **named)
+        missing = missing_parts(walk)
+        if missing:
+            raise AnalysisError(
+                f"start gave no chilopod.engine.Walk: it has no {', '.join(missing)}", field=f"engine {self._name}"
+            )
         return walk
 
     def resume(self, saved: bytes) -> Walk:

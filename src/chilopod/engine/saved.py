@@ -78,6 +78,11 @@ def unpack(traits: Traits, saved: object) -> tuple[list[Robot], dict[str, Any], 
         raise ParameterError(f"cannot be read ({error})", field="saved", allowed="what save() gave") from None
 
 
+def part(arrays: Mapping[str, Any], prefix: str) -> dict[str, Any]:
+    """Those of the arrays whose names begin so, by the rest of their names."""
+    return {name.removeprefix(prefix): each for name, each in arrays.items() if name.startswith(prefix)}
+
+
 @contextmanager
 def read_back() -> Iterator[None]:
     """While a walk is made from what was unpacked: what does not fit together is no saved walk.

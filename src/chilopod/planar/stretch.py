@@ -14,7 +14,7 @@ from chilopod.integrate import integrator
 from chilopod.planar.contact import MOMENTS, sum_moments
 from chilopod.planar.dynamics import BEHIND, DECAY, LEVEL, ORIGIN, SCRATCH, SLOPE, TORQUE, rhs
 
-WALKING, DIVERGED, OUT_OF_RANGE = range(3)
+WALKING, DIVERGED, OUT_OF_RANGE, HALTED = range(4)
 MOST_BENT = 0.5 * np.pi
 """Of a yaw joint, rad: beyond it modules run into each other."""
 
@@ -72,7 +72,7 @@ def walk(
     step
         To start with, s; 0 for a guess; the last one is left there, shape (robots,).
     status
-        WALKING, DIVERGED or OUT_OF_RANGE; robots that no longer walk are left alone, shape (robots,).
+        WALKING, DIVERGED, OUT_OF_RANGE or HALTED; robots that no longer walk are left alone, shape (robots,).
     record
         States over (samples, robots, 2N+4); what no robot reached is left alone.
     """

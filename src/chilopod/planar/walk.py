@@ -9,9 +9,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.engine import Actuators, Command, Observation, Status, Traits
-from chilopod.engine.arguments import as_array, as_number, as_robots, as_seeds, check_time, rows_of, standing
-from chilopod.engine.saved import pack, read_back, unpack
+from chilopod.engine import Actuators, Command, Observation, Status, Targets, Traits
+from chilopod.engine.arguments import as_marks, as_number, as_robots, as_seeds, check_time, rows_of, standing
+from chilopod.engine.saved import pack, part, read_back, unpack
 from chilopod.errors import ParameterError
 from chilopod.planar import stretch
 from chilopod.planar.foreseen import check_steps
@@ -39,6 +39,7 @@ _STATUS = {
     stretch.WALKING: Status.WALKED,
     stretch.DIVERGED: Status.DIVERGED,
     stretch.OUT_OF_RANGE: Status.OUT_OF_RANGE,
+    stretch.HALTED: Status.HALTED,
 }
 
 
@@ -136,7 +137,7 @@ def resume(saved: bytes) -> PlanarWalk:
             robots,
             arrays["states"],
             arrays["factors"],
-            as_array("target", arrays["target"]) if "target" in arrays else None,
+            None,
             None if settings["record"] is None else Recording(**settings["record"]),
             as_number("tolerance", settings["tolerance"]),
         )
@@ -164,7 +165,7 @@ class PlanarWalk:
         distinct: dict[int, PlanarModel] = {}
         self._models = [distinct.setdefault(id(robot), PlanarModel(robot)) for robot in robots]
         self._modules = self._models[0].modules
-        self._record, self._tolerance, self._target, self._factors = record, tolerance, target, factors
+        self._record, self._tolerance, self._factors = record, tolerance, factors
         own = np.array([robot.ground.friction for robot in robots])
         self._friction = own[:, None, None] * factors
         schedule = self._models[0].schedule
@@ -176,6 +177,7 @@ class PlanarWalk:
         self._stiffness = np.array([robot.springs.stiffness for robot in robots])
         self._damping = np.array([robot.springs.damping for robot in robots])
         self._actuators = Actuators(robots, keep=record is not None)
+        self._targets = Targets(len(robots), target, keep=record is not None)
         self._timeline = Timeline(schedule, record.rate if record else 0.0)
         self._time = 0.0
         self._states, self._step = states, np.zeros(len(robots))
@@ -206,27 +208,37 @@ class PlanarWalk:
 
     def observe(self) -> Observation:
         """See :class:`chilopod.engine.Walk`; a target is seen wherever it is."""
-        states, _, status = self._now()
-        # What fails is judged where the walk stops for good; what cannot be followed any more shows nothing.
-        n, gone = self._modules, (self._status != stretch.WALKING) | (status == stretch.DIVERGED)
-        target = np.full(2, np.nan) if self._target is None else self._target
-        bearing, distance = bearing_and_distance(states[:, 2 * n + 1 : 2 * n + 3], states[:, 2 * n + 3], target)
-        angles = states[:, 3 : n + 2].copy()
-        for seen in (bearing, distance, angles):
-            seen[gone] = np.nan
+        states, n = self._seen(), self._modules
+        bearing, distance = bearing_and_distance(
+            states[:, 2 * n + 1 : 2 * n + 3], states[:, 2 * n + 3], self._targets.present
+        )
         told = self._actuators
-        return Observation(self._time, bearing, distance, angles, told.leg_yaw.copy(), told.stiffness(self._time))
+        return Observation(
+            self._time, bearing, distance, states[:, 3 : n + 2], told.leg_yaw.copy(), told.stiffness(self._time)
+        )
+
+    def pose(self) -> Array:
+        """See :class:`chilopod.engine.Walk`."""
+        return self._seen()[:, 2 * self._modules + 1 :]
+
+    def aim(self, target: ArrayLike) -> None:
+        """See :class:`chilopod.engine.Walk`."""
+        self._targets.move(self._time, target)
+
+    def halt(self, which: NDArray[np.bool_]) -> None:
+        """See :class:`chilopod.engine.Walk`."""
+        marked = as_marks("which", which, len(self._robots))
+        self._arrive(marked)
+        marked &= self._status == stretch.WALKING
+        self._status[marked] = stretch.HALTED
+        if self._here is not None:
+            self._here[-1][marked] = stretch.HALTED
 
     def command(self, command: Command) -> None:
         """See :class:`chilopod.engine.Walk`."""
         *_, status = self._now()
         self._actuators.command(self._time, command, status == stretch.WALKING)
-        if self._here is not None:
-            self._states, self._step, self._status = self._here
-            for sample in self._timeline.rest(self._time)[-1]:
-                if sample >= 0:
-                    walking = self._status == stretch.WALKING
-                    self._samples.grown(sample + 1)[sample, walking] = self._states[walking]
+        self._arrive(np.ones(len(self._robots), dtype=np.bool_))
         self._timeline.cut_at(self._time)
         self._here = None
 
@@ -254,7 +266,7 @@ class PlanarWalk:
             "factors": self._factors,
             "position": self._timeline.position,
             "samples": self._samples.rows,
-            **({} if self._target is None else {"target": self._target}),
+            **{f"target_{name}": values for name, values in self._targets.state().items()},
             **{f"told_{name}": values for name, values in self._actuators.state().items()},
         }
         return pack(traits, self._robots, settings, arrays)
@@ -266,13 +278,15 @@ class PlanarWalk:
         self._timeline.position = arrays["position"]
         if len(arrays["samples"]):
             self._samples.grown(len(arrays["samples"]))[:] = arrays["samples"]
-        told = {name.removeprefix("told_"): each for name, each in arrays.items() if name.startswith("told_")}
-        self._actuators.restore(told)
+        self._actuators.restore(part(arrays, "told_"))
+        self._targets.restore(part(arrays, "target_"))
 
     def to_dataset(self, copy: bool = True) -> xr.Dataset:
         """The record so far, see :func:`chilopod.planar.simulate`; without a copy if the walk ends here."""
         rate = self._record.rate if self._record else 1.0
-        states = self._samples.rows.copy() if copy else self._samples.grown(0)
+        # Who was halted beside a switch may have a sample more than the others of the batch.
+        count = self._timeline.samples
+        states = self._samples.rows[:count].copy() if copy else self._samples.grown(0)[:count]
         times = np.arange(len(states)) / rate
         leg_yaw = self._actuators.leg_yaw_over(times)
         data = planar_record(self._models[0], times, states, leg_yaw)
@@ -280,7 +294,7 @@ class PlanarWalk:
         if self._record and self._record.forces:
             acting = self._actuators.leg_yaw_told(times)
             data["foot_force"] = foot_forces(self._models, times, states, acting, self._friction)
-        add_outcome(data, [each.label for each in self.status], self._target)
+        add_outcome(data, [each.label for each in self.status], self._targets.recorded(times))
         data.attrs = {
             "engine": traits.name,
             "robot": self._robots[0].to_toml(),
@@ -302,6 +316,24 @@ class PlanarWalk:
             self._carry((begins, starts, widths, interval, np.full(len(begins), -1)), *self._here)
         return self._here
 
+    def _seen(self) -> Array:
+        """States at the present time, NaN where nothing is seen of them; a copy."""
+        states, _, status = self._now()
+        # What fails is judged where the walk stops for good; what cannot be followed any more shows nothing.
+        gone = (self._status != stretch.WALKING) | (status == stretch.DIVERGED)
+        return np.where(gone[:, None], np.nan, states)
+
+    def _arrive(self, which: NDArray[np.bool_]) -> None:
+        """Let some robots be for good where they are at the present time, with the sample that is taken there."""
+        if self._time <= self._timeline.cut:
+            return
+        for mine, here in zip((self._states, self._step, self._status), self._now(), strict=True):
+            mine[which] = here[which]
+        for sample in self._timeline.rest(self._time)[-1]:
+            if sample >= 0:
+                walking = which & (self._status == stretch.WALKING)
+                self._samples.grown(sample + 1)[sample, walking] = self._states[walking]
+
     def _carry(
         self,
         pieces: tuple[Array, Array, Array, NDArray[np.intp], NDArray[np.intp]],
@@ -315,10 +347,11 @@ class PlanarWalk:
         told = self._actuators
         when = (starts, widths, interval, sample, *self._feet, *self._bodies)
         what = (self._damping, self._friction, told.leg_yaw, self._tolerance, states, step, status, record)
-        free = np.flatnonzero(~told.driven)
+        walking = status == stretch.WALKING
+        free, driven = np.flatnonzero(walking & ~told.driven), np.flatnonzero(walking & told.driven)
         if free.size == 1:
             stretch.walk_alone(free[0], *when, self._stiffness, *what)
         elif free.size:
             stretch.walk(free, *when, self._stiffness, *what)
-        if free.size < len(states):
-            stretch.drive(np.flatnonzero(told.driven), begins, *when, told.profile, told.lag, told.joint_torque, *what)
+        if driven.size:
+            stretch.drive(driven, begins, *when, told.profile, told.lag, told.joint_torque, *what)

@@ -38,6 +38,9 @@ SIDES = ("left", "right")
 POLE_GROUP = 4
 """Geom group of the pole that marks a target, the only thing that the scanner sees."""
 
+AWAY = (0.0, 0.0, -10.0)
+"""Where that pole is when there is no target, m."""
+
 _POLE_HEIGHT = 0.4  # m
 _SCANNER_ABOVE = 0.03  # m, of its beams above the body
 _SUNK = 1e-6  # m, of feet at the start, where else round-off would decide which of them touch the floor
@@ -140,7 +143,7 @@ def build(robot: Robot, forces: bool = False, edit: Edit | None = None) -> mujoc
     spec.option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     world = spec.worldbody
     world.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 0.05], contype=0, conaffinity=1)
-    pole = world.add_body(name="pole", mocap=True, pos=[0.0, 0.0, -10.0])
+    pole = world.add_body(name="pole", mocap=True, pos=AWAY)
     pole.add_geom(
         name="pole",
         type=mujoco.mjtGeom.mjGEOM_CYLINDER,

@@ -66,6 +66,10 @@ class Scanner:
             self._poses[ids] = poses[:, max(tick - before - 1, 0)]
             self._number = number
 
+    def forget(self) -> None:
+        """Make nothing of what was seen: targets are elsewhere now."""
+        self._looked = -1
+
     def look(self, ids: NDArray[np.intp]) -> Array:
         """Bearing (rad) and distance (m) of the target in the last scan of some robots, shape (2, len(ids))."""
         if self._number != self._looked:

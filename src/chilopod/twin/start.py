@@ -144,7 +144,7 @@ def resume(saved: bytes, threads: int = 0, *, edit: Edit | None = None, traits: 
             robots,
             arrays["positions"],
             arrays["factors"],
-            arrays.get("target"),
+            None,
             as_seeds(settings["seeds"]),
             None if settings["record"] is None else Recording(**settings["record"]),
             tolerance=as_number("tolerance", settings["tolerance"]),

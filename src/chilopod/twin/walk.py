@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from mujoco.batch import Batch
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chilopod.cores import cores
-from chilopod.engine import Actuators, Command, Observation, Ramps, Status, Traits
-from chilopod.engine.arguments import as_number, check_time
-from chilopod.engine.saved import pack
+from chilopod.engine import Actuators, Command, Observation, Ramps, Status, Targets, Traits
+from chilopod.engine.arguments import as_marks, as_number, check_time
+from chilopod.engine.saved import pack, part
 from chilopod.errors import ParameterError
 from chilopod.record import Recording, Samples, add_outcome, check_size, walk_record
 from chilopod.robot import Robot
 from chilopod.twin.failures import failures
 from chilopod.twin.legs import servo_targets
-from chilopod.twin.model import SIDES, Edit, compiled, silence, without_springs
+from chilopod.twin.model import AWAY, SIDES, Edit, compiled, silence, without_springs
 from chilopod.twin.scanner import Scanner, rotation
 
 Array = NDArray[np.float64]
@@ -58,7 +58,7 @@ class TwinWalk:
         expected: float = 0.0,
         edit: Edit | None = None,
     ) -> None:
-        self._traits, self._robots, self._factors, self._target = traits, tuple(robots), factors, target
+        self._traits, self._robots, self._factors = traits, tuple(robots), factors
         self._seeds, self._record, self._tolerance = seeds, record, tolerance
         self._plan = compiled(without_springs(robots[0]), bool(record and record.forces), edit)
         plan, count = self._plan, len(robots)
@@ -69,17 +69,15 @@ class TwinWalk:
         self._batch.expand("geom_friction")[:, plan.feet, 0] = plan.twin.sliding_friction * factors
         self._batch.expand("opt.tolerance")[:] = tolerance
         self._batch.bind("qpos")[:] = states
-        self._scanner = None
-        if target is not None:
-            self._batch.bind("mocap_pos")[:, 0, :2] = target
-            self._batch.bind("mocap_pos")[:, 0, 2] = 0.0
-            self._scanner = Scanner(plan.twin, self._batch, seeds)
+        self._scanner = Scanner(plan.twin, self._batch, seeds)
+        self._targets = Targets(count, target, keep=record is not None)
+        self._put_poles()
         self._actuators = Actuators(robots, keep=record is not None)
         self._leg_yaw = Ramps(np.zeros((count, 2)))
         self._time, self._tick = 0.0, 0
         self._status = [Status.WALKED] * count
         self._walking = np.arange(count)
-        self._targets_from, self._targets = 0, np.empty((0, plan.leg_controls.size))
+        self._servos_from, self._servos = 0, np.empty((0, plan.leg_controls.size))
         self._seen: list[tuple[Array, Array]] = []
 
         check_size(record, expected, count * (plan.model.nq + plan.model.nv))
@@ -129,6 +127,25 @@ class TwinWalk:
         told = self._actuators
         return Observation(self._time, bearing, distance, angles, told.leg_yaw.copy(), told.stiffness(self._time))
 
+    def pose(self) -> Array:
+        """See :class:`chilopod.engine.Walk`."""
+        places = self._batch.bind("qpos")[:, :7]
+        pose = np.column_stack([places[:, :2], _heading(rotation(places[:, 3:]))])
+        pose[~self._on_foot()] = np.nan
+        return pose
+
+    def aim(self, target: ArrayLike) -> None:
+        """See :class:`chilopod.engine.Walk`; a pole is seen in its new place from where the last scan was taken."""
+        self._targets.move(self._time, target)
+        self._put_poles()
+
+    def halt(self, which: NDArray[np.bool_]) -> None:
+        """See :class:`chilopod.engine.Walk`."""
+        marked = as_marks("which", which, len(self._robots)) & self._on_foot()
+        for robot in np.flatnonzero(marked):
+            self._status[robot] = Status.HALTED
+        self._walking = np.flatnonzero(self._on_foot())
+
     def command(self, command: Command) -> None:
         """See :class:`chilopod.engine.Walk`."""
         self._actuators.command(self._time, command, self._on_foot())
@@ -136,7 +153,7 @@ class TwinWalk:
             self._actuators.leg_yaw, self._tick, max(1, round(command.within / self._plan.twin.control_interval))
         )
         self._batch.bind("qfrc_applied")[:, self._plan.yaw_rates] = self._actuators.joint_torque
-        if self._record is not None and self._target is not None:
+        if self._record is not None:
             self._seen.append(self._look())
 
     def advance(self, until: float) -> None:
@@ -175,18 +192,14 @@ class TwinWalk:
             **{f"samples_{name}": samples.rows for name, samples in self._kept().items()},
             **{f"told_{name}": values for name, values in self._actuators.state().items()},
             **{f"yaw_{name}": values for name, values in self._leg_yaw.state().items()},
+            **{f"target_{name}": values for name, values in self._targets.state().items()},
+            **{f"scan_{name}": values for name, values in self._scanner.state().items()},
             "seen": np.array(self._seen).reshape(-1, 2, len(self._robots)),
         }
-        if self._target is not None and self._scanner is not None:
-            arrays |= {"target": self._target, **{f"scan_{k}": v for k, v in self._scanner.state().items()}}
         return pack(self._traits, self._robots, settings, arrays)
 
     def restore(self, settings: dict[str, Any], arrays: dict[str, Any]) -> None:
         """Become as the walk was that was saved, of the same robots."""
-
-        def part(prefix: str) -> dict[str, Any]:
-            return {name.removeprefix(prefix): each for name, each in arrays.items() if name.startswith(prefix)}
-
         self._time, self._tick = as_number("time", settings["time"]), operator.index(settings["tick"])
         self._status = [Status[name] for name in settings["status"]]
         self._walking = np.flatnonzero(self._on_foot())
@@ -195,11 +208,12 @@ class TwinWalk:
         for name, samples in self._kept().items():
             rows = arrays[f"samples_{name}"]
             samples.grown(len(rows))[:] = rows
-        self._actuators.restore(part("told_"))
-        self._leg_yaw.restore(part("yaw_"))
+        self._actuators.restore(part(arrays, "told_"))
+        self._leg_yaw.restore(part(arrays, "yaw_"))
         self._seen = [(each[0], each[1]) for each in arrays["seen"]]
-        if self._scanner is not None:
-            self._scanner.restore(part("scan_"))
+        self._targets.restore(part(arrays, "target_"))
+        self._scanner.restore(part(arrays, "scan_"))
+        self._put_poles()
 
     def to_dataset(self, copy: bool = True) -> xr.Dataset:
         """The record so far, see :func:`chilopod.twin.simulate`; without a copy if the walk ends here."""
@@ -207,10 +221,11 @@ class TwinWalk:
         positions, rates = (each.grown(0)[:count] for each in (self._positions, self._rates))
         positions, rates = (each.copy() if copy else each for each in (positions, rates))
         turn = rotation(positions[..., 3:7])
+        times = np.asarray(self._sample_steps(np.arange(len(positions))) * plan.twin.timestep, dtype=np.float64)
         data = walk_record(
-            np.asarray(self._sample_steps(np.arange(len(positions))) * plan.twin.timestep, dtype=np.float64),
+            times,
             position=positions[..., :2],
-            heading=np.unwrap(np.arctan2(turn[..., 1, 0], turn[..., 0, 0]), axis=0),
+            heading=np.unwrap(_heading(turn), axis=0),
             velocity=rates[..., :2],
             # Of the free joint, MuJoCo gives the rate of turn in the frame of the body.
             heading_rate=np.einsum("...j,...j->...", turn[..., 2, :], rates[..., 3:6]),
@@ -219,7 +234,8 @@ class TwinWalk:
             leg_yaw=positions[..., plan.leg_yaw_positions],
         )
         self._actuators.add_to(data)
-        if self._seen:
+        target = self._targets.recorded(times)
+        if self._seen and target is not None:
             seen = np.array(self._seen)
             data["seen_bearing"] = (("event", "robot"), seen[:, 0], {"units": "rad"})
             data["seen_distance"] = (("event", "robot"), seen[:, 1], {"units": "m"})
@@ -233,7 +249,7 @@ class TwinWalk:
             data["foot_load"] = (over, -forces.reshape(shape)[..., 2], {"units": "N"})
         if self._record and self._record.poses:
             data["pose"] = (("time", "robot", "coordinate"), positions, {"units": "m, 1, rad: MuJoCo's qpos"})
-        add_outcome(data, [each.label for each in self._status], self._target)
+        add_outcome(data, [each.label for each in self._status], target)
         data.attrs = {"engine": self._traits.name, "robot": self._robots[0].to_toml(), "duration": self._time}
         return data
 
@@ -271,9 +287,17 @@ class TwinWalk:
     def _look(self) -> tuple[Array, Array]:
         """Bearing and distance of the target in the last scan; NaN for robots that no longer walk."""
         seen = np.full((2, len(self._robots)), np.nan)
-        if self._scanner is not None and len(self._walking):
-            seen[:, self._walking] = self._scanner.look(self._walking)
+        looking = self._walking[self._targets.there[self._walking]]
+        if len(looking):
+            seen[:, looking] = self._scanner.look(looking)
         return seen[0], seen[1]
+
+    def _put_poles(self) -> None:
+        """Put the poles where the targets are."""
+        there, poles = self._targets.there, self._batch.bind("mocap_pos")
+        poles[:, 0] = AWAY
+        poles[there, 0, :2], poles[there, 0, 2] = self._targets.present[there], 0.0
+        self._scanner.forget()
 
     def _step_to(self, tick: int) -> None:
         plan, batch, walking = self._plan, self._batch, self._walking
@@ -282,8 +306,7 @@ class TwinWalk:
         kept = self._kept()
         before = batch.bind("qpos")[walking], batch.bind("qvel")[walking]
         out = batch.rollout(count, self._controls(tick), record=list(kept), ids=walking)
-        if self._scanner is not None:
-            self._scanner.passed(self._tick, tick, out["qpos"][:, per_tick - 1 :: per_tick, :7], walking)
+        self._scanner.passed(self._tick, tick, out["qpos"][:, per_tick - 1 :: per_tick, :7], walking)
         samples = self._samples(first, first + count)
         at = self._sample_steps(samples) - first - 1
         for name, store in kept.items():
@@ -321,9 +344,15 @@ class TwinWalk:
 
     def _leg_targets(self, ticks: NDArray[np.intp]) -> Array:
         """Servo targets of all hips and knees, shape (ticks, legs times 2)."""
-        if ticks[-1] >= self._targets_from + len(self._targets):
-            self._targets_from = int(ticks[0])
+        if ticks[-1] >= self._servos_from + len(self._servos):
+            self._servos_from = int(ticks[0])
             ahead = np.arange(ticks[0], ticks[0] + max(len(ticks), _TARGETS_AHEAD))
             targets = servo_targets(self._plan.robot, ahead * self._plan.twin.control_interval)
-            self._targets = targets.reshape(len(ahead), -1)
-        return self._targets[ticks - self._targets_from]
+            self._servos = targets.reshape(len(ahead), -1)
+        return self._servos[ticks - self._servos_from]
+
+
+def _heading(turn: Array) -> Array:
+    """Of rotation matrices (..., 3, 3), rad."""
+    heading: Array = np.arctan2(turn[..., 1, 0], turn[..., 0, 0])
+    return heading

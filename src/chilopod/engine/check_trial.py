@@ -1,0 +1,108 @@
+"""The walks with which an engine's promises are tried, and what is expected of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chilopod.engine.contract import Array, Command, Engine, Walk
+from chilopod.errors import ChilopodError
+from chilopod.record import Recording
+from chilopod.robot import Robot
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+TIMES = (0.35, 0.8, 1.3)
+"""s, of the commands that every trial gets."""
+
+END = 2.0
+"""s, of every trial."""
+
+_BENT = 0.2  # rad in all at the start
+
+
+class Broken(Exception):
+    """What was seen where something else was promised."""
+
+
+class Trial:
+    """An engine and the walks that it is tried with."""
+
+    def __init__(self, engine: Engine, robot: Robot, random: np.random.Generator) -> None:
+        self.engine, self.random = engine, random
+        adjustable = robot.override("springs.adjustable", True)
+        softer = [
+            adjustable.with_value("springs.stiffness[0]", part * max(robot.springs.stiffness)) for part in (0.3, 1)
+        ]
+        self.robot, self.robots = robot, (adjustable, *softer)
+        joints = robot.body.modules - 1
+        self.bends = _BENT / joints * random.uniform(-1.0, 1.0, (len(self.robots), joints))
+
+    def start(
+        self, which: Sequence[int] = (0, 1, 2), seeds: Sequence[int] | None = (7, 8, 9), **options: object
+    ) -> Walk:
+        """Some of the robots, bent, with a target."""
+        given = {"target": (0.9, 0.4), "record": Recording(rate=50.0), "expected": END, **options}
+        headings, places = np.full(len(which), 0.3), np.tile([0.2, -0.1], (len(which), 1))
+        initial = self.engine.initial_states(self.robot, self.bends[list(which)], headings, places)
+        chosen = None if seeds is None else [seeds[i] for i in which]
+        return self.engine.start([self.robots[i] for i in which], initial=initial, seeds=chosen, **given)  # type: ignore[arg-type]
+
+    def commands(self, which: Sequence[int] = (0, 1, 2)) -> list[Command]:
+        """What every walk is told, at :data:`TIMES`."""
+        count, joints = len(which), self.robot.body.modules - 1
+        stiffness = np.array([self.robots[i].springs.stiffness for i in which])
+        stiffness[:, 0] *= 0.6
+        torque = np.zeros((count, joints))
+        torque[:, -1] = 0.02 * stiffness[:, -1]
+        return [
+            Command(leg_yaw=np.full((count, 2), 0.08), within=0.1),
+            Command(stiffness=stiffness, within=0.4),
+            Command(joint_torque=torque),
+        ]
+
+    def walked(self, walk: Walk, which: Sequence[int] = (0, 1, 2), stops: Sequence[float] = ()) -> xr.Dataset:
+        """The record of a walk with the commands, interrupted and looked at besides."""
+        told = dict(zip(TIMES, self.commands(which), strict=True))
+        for time in sorted({*TIMES, *stops, END}):
+            if time > walk.time:
+                walk.advance(time)
+            walk.observe()
+            if time in told:
+                walk.command(told[time])
+        return walk.to_dataset()
+
+
+def expect_same(a: xr.Dataset, b: xr.Dataset, what: str) -> None:
+    """Two records that are the same to the bit."""
+    if set(a.variables) != set(b.variables):
+        raise Broken(f"{what}: variables {sorted(set(a.variables) ^ set(b.variables), key=str)} are in one record only")
+    for name in a.variables:
+        if not a[name].equals(b[name]):
+            raise Broken(f"{what}: {name} is another")
+
+
+def expect(condition: object, otherwise: str) -> None:
+    """Something that holds, or what else was seen."""
+    if not condition:
+        raise Broken(otherwise)
+
+
+def expect_refused(what: str, attempt: Callable[[], object]) -> None:
+    """An attempt that ends in an error of ours."""
+    try:
+        attempt()
+    except ChilopodError:
+        return
+    except Exception as error:
+        raise Broken(f"{what} ends in {type(error).__name__}, not in a ChilopodError") from None
+    raise Broken(f"{what} is accepted")
+
+
+def expect_near(found: Array, wanted: Array, within: float, what: str) -> None:
+    """Numbers that are as wanted within so much; NaN where NaN is wanted."""
+    if found.shape != wanted.shape or not np.allclose(found, wanted, rtol=0.0, atol=within, equal_nan=True):
+        raise Broken(f"{what}: {np.array2string(found.ravel()[:6], precision=6)} instead of {wanted.ravel()[:6]}")

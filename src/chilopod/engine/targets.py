@@ -1,0 +1,99 @@
+"""Where the targets of a batch of robots are, and were: one object serves one walk of any engine."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chilopod.engine.arguments import as_array
+from chilopod.errors import ParameterError
+
+Array = NDArray[np.float64]
+
+
+class Targets:
+    """Targets on the floor, one a robot, that may be put elsewhere while the robots walk.
+
+    Parameters
+    ----------
+    robots
+        How many.
+    start
+        Places at the start, m, shape (robots, 2), or None.
+    keep
+        Whether to keep where they were, for :meth:`recorded`.
+
+    Attributes
+    ----------
+    present
+        Places now, m, shape (robots, 2), NaN for a robot without one; never written into, only replaced.
+    """
+
+    def __init__(self, robots: int, start: Array | None = None, keep: bool = True) -> None:
+        self.present: Array = np.full((robots, 2), np.nan) if start is None else start
+        self._given, self._moved = start is not None, False
+        self._log: list[tuple[float, Array]] | None = [(0.0, self.present)] if keep else None
+
+    @property
+    def there(self) -> NDArray[np.bool_]:
+        """Which robots have one now, shape (robots,)."""
+        there: NDArray[np.bool_] = np.isfinite(self.present[:, 0])
+        return there
+
+    def move(self, time: float, target: ArrayLike) -> None:
+        """Put them elsewhere from now on.
+
+        Parameters
+        ----------
+        time
+            s, not before that of the last move.
+        target
+            m, shape (robots, 2) or (2,); a row of NaN where there is none.
+
+        Raises
+        ------
+        ParameterError
+            If these are no places for these robots; nothing has changed then.
+        """
+        given, shape = as_array("target", target), self.present.shape
+        if given.shape not in (shape, (2,)):
+            raise ParameterError("has the wrong shape", field="target", value=given.shape, allowed=f"(2,) or {shape}")
+        none = np.isnan(given)
+        if np.isinf(given).any() or (none.any(axis=-1) != none.all(axis=-1)).any():
+            raise ParameterError("is no place", field="target", allowed="x and y in m, or NaN for both: no target")
+        places = np.array(np.broadcast_to(given, shape))
+        if np.array_equal(places, self.present, equal_nan=True):
+            return
+        self.present, self._given, self._moved = places, True, True
+        if self._log is not None:
+            self._log.append((time, places))
+
+    def over(self, times: Array) -> Array:
+        """Places at any times of the walk, rising, m, shape (times, robots, 2); at a move they are those before it."""
+        log = self._log or [(0.0, self.present)]
+        moves = np.array([when for when, _ in log[1:]])
+        return np.array([places for _, places in log])[np.searchsorted(moves, times, side="left")]
+
+    def recorded(self, times: Array) -> Array | None:
+        """For :func:`chilopod.record.add_outcome`: as :meth:`over`; without times if they stayed where they were at the
+        start, None if there never were any."""
+        if not self._given:
+            return None
+        return self.over(times) if self._moved else self.present
+
+    def state(self) -> dict[str, Array]:
+        """All there is to it, for :meth:`restore`."""
+        state: dict[str, Array] = {"present": self.present, "known": np.array([self._given, self._moved])}
+        if self._log is not None:
+            state["times"] = np.array([when for when, _ in self._log])
+            state["places"] = np.array([places for _, places in self._log])
+        return state
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Become as another was, of as many robots."""
+        self.present = as_array("target", state["present"])
+        self._given, self._moved = (bool(each) for each in state["known"])
+        if self._log is not None:
+            self._log = list(zip(state["times"].tolist(), state["places"], strict=True))
