@@ -17,13 +17,17 @@ from chilopod import units
 from chilopod.netcdf import netcdf
 from chilopod.output import Content, write_all
 from chilopod.report.kit import style
+from chilopod.report.scene.encoder import has_encoder
+from chilopod.report.scene.film import filmed
 from chilopod.report.scene.frames import body_frames
 from chilopod.report.scene.replay import replay
 from chilopod.report.scene.replay_3d import replay_3d
 from chilopod.steering import ARRIVAL_RADIUS, Strategy
 
 _LAYOUTS = (style.Layout("AB;AC", 4.6, widths=(1.5, 1.0)), style.Layout("A;B;C", 9.0, heights=(2.0, 1.0, 1.0)))
-_SHOWN = 6  # walks in a replay
+_SHOWN = 6  # walks in a replay or a film
+_LONGEST_FILM = 20.0  # s
+_FILM_SIZE = (960, 640)
 _ARRIVED = "arrived"
 
 
@@ -49,12 +53,13 @@ class Driven(Protocol):
 
 
 def files_of_course(folder: str | Path) -> list[Path]:
-    """What :func:`write_course` writes."""
-    return [Path(folder) / f"course.{kind}" for kind in ("png", "svg", "nc", "html")]
+    """What :func:`write_course` writes; the film, which comes last, only where films can be encoded."""
+    kinds = ("png", "svg", "nc", "html", *(("mp4",) if has_encoder() else ()))
+    return [Path(folder) / f"course.{kind}" for kind in kinds]
 
 
 def write_course(done: Driven, folder: str | Path, *, replace: bool = True) -> list[Path]:
-    """Write a course as a picture (``.png``, ``.svg``), its record (``.nc``) and a replay (``.html``).
+    """Write a course as a picture (``.png``, ``.svg``), record (``.nc``), replay (``.html``) and film (``.mp4``).
 
     Parameters
     ----------
@@ -80,7 +85,7 @@ def write_course(done: Driven, folder: str | Path, *, replace: bool = True) -> l
 
 def _files(done: Driven, folder: str | Path) -> Iterator[tuple[Path, Content]]:
     """What cannot be made again comes first."""
-    pixels, vector, record, page = files_of_course(folder)
+    pixels, vector, record, page, *film = files_of_course(folder)
     yield record, netcdf(done.record)
     with style.house_style():
         drawn = draw(done)
@@ -91,6 +96,11 @@ def _files(done: Driven, folder: str | Path) -> Iterator[tuple[Path, Content]]:
     labels = [f"walk {i + 1}" if count > 1 else done.strategy.name for i in range(len(shown.robot))]
     page_of = replay_3d if "pose" in shown else replay
     yield page, page_of(shown, titles=labels, heading=_title(done))
+    for file in film:
+        # As many times faster as makes it short; from above all of a course is seen.
+        seconds = float(shown.time[-1] - shown.time[0])
+        speed = max(1.0, np.ceil(seconds / _LONGEST_FILM))
+        yield file, filmed(shown, titles=labels, heading=_title(done), speed=speed, size=_FILM_SIZE)
 
 
 def draw(done: Driven, narrow: bool = False) -> Figure:

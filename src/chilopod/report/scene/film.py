@@ -79,11 +79,23 @@ def movie(
     OutputError
         If the file cannot be written, or PyAV was built without its H.264 encoder.
     """
-    times = frame_times(record, size, fps, speed)
     path = Path(path)
     check_folder(path.parent)
-    shown = scene(record, titles, times)
-    return write_atomic(path, encoded(_frames(shown, heading, size, speed), fps, size))
+    return write_atomic(path, filmed(record, titles=titles, heading=heading, fps=fps, speed=speed, size=size))
+
+
+def filmed(
+    record: xr.Dataset,
+    *,
+    titles: Mapping[Any, str] | Sequence[str],
+    heading: str,
+    fps: int = 25,
+    speed: float = 1.0,
+    size: tuple[int, int] = (960, 480),
+) -> bytes:
+    """The film that :func:`movie` writes; parameters and errors are those."""
+    times = frame_times(record, size, fps, speed)
+    return encoded(_frames(scene(record, titles, times), heading, size, speed), fps, size)
 
 
 def frame_times(record: xr.Dataset, size: tuple[int, int], fps: int, speed: float) -> Array:
