@@ -79,11 +79,23 @@ def movie(
     OutputError
         If the file cannot be written, or PyAV was built without its H.264 encoder.
     """
-    times = frame_times(record, size, fps, speed)
     path = Path(path)
     check_folder(path.parent)
-    shown = scene(record, titles, times)
-    return write_atomic(path, encoded(_frames(shown, heading, size, speed), fps, size))
+    return write_atomic(path, filmed(record, titles=titles, heading=heading, fps=fps, speed=speed, size=size))
+
+
+def filmed(
+    record: xr.Dataset,
+    *,
+    titles: Mapping[Any, str] | Sequence[str],
+    heading: str,
+    fps: int = 25,
+    speed: float = 1.0,
+    size: tuple[int, int] = (960, 480),
+) -> bytes:
+    """The film that :func:`movie` writes; parameters and errors are those."""
+    times = frame_times(record, size, fps, speed)
+    return encoded(_frames(scene(record, titles, times), heading, size, speed), fps, size)
 
 
 def frame_times(record: xr.Dataset, size: tuple[int, int], fps: int, speed: float) -> Array:
@@ -147,16 +159,16 @@ class Stage:
         self._fit(title, room)
         below = self._legend()
         self._panels(GAP + below, top - 1.9 * self.font)
-        self.known: tuple[bool, ...] = ()
+        self.known: tuple[object, ...] = ()
         self.background: Any = None
 
     def drawn(self, index: int) -> NDArray[np.uint8]:
         """The frame of a time."""
         now = self.shown.frames.time[index]
-        known = tuple(bool(now >= outcome.time - 1e-9) for outcome in self.shown.outcomes)
+        known = tuple(panel.known(now) for panel in self.panels)
         if self.background is None or known != self.known:
-            for panel, is_known in zip(self.panels, known, strict=True):
-                panel.tell(is_known)
+            for panel in self.panels:
+                panel.tell(now)
             self.canvas.draw()
             self.known, self.background = known, self.canvas.copy_from_bbox(self.figure.bbox)
         self.canvas.restore_region(self.background)
@@ -195,7 +207,7 @@ class Stage:
             _dot("white", COLORS["air"], 0.6 * self.font, label="foot in the air"),
             Line2D([], [], color=COLORS["path"], label="path of module 1"),
         ]
-        if np.isfinite(self.shown.targets).any():
+        if any(self.shown.aims):
             handles.append(
                 Line2D([], [], ls="", marker="+", ms=0.8 * self.font, mew=2, color=COLORS["target"], label="target")
             )
@@ -270,6 +282,7 @@ class FilmPanel:
     def __init__(self, shown: Scene, robot: int, axes: Axes, zoom: float, font: float, label: Text) -> None:
         self.shown, self.robot, self.label = shown, robot, label
         self.outcome, self.told = shown.outcomes[robot], label.get_text()
+        self.rings: list[tuple[Circle, Line2D]] = []
         floor, frames = shown.floor, shown.frames
         axes.set(xlim=(floor.x0, floor.x1), ylim=(floor.y0, floor.y1), xticks=[], yticks=[])
         axes.spines[:].set(visible=True, color=COLORS["grid"])
@@ -278,12 +291,11 @@ class FilmPanel:
         for line in np.arange(math.ceil(floor.y0 / floor.grid), floor.y1 / floor.grid):
             axes.axhline(line * floor.grid, color=COLORS["grid"], lw=1.0)
         self._scale_bar(axes, zoom, font)
-        self.ring: Circle | None = None
-        if np.isfinite(shown.targets[robot]).all():
-            x, y = shown.targets[robot]
-            self.ring = Circle((x, y), shown.arrival_radius, ec=COLORS["target"], lw=1.5)
-            axes.add_patch(self.ring)
-            axes.plot(x, y, "+", color=COLORS["target"], ms=10.0, mew=2.0)
+        for aim in shown.aims[robot]:
+            ring = Circle(aim.place, shown.arrival_radius, ec=COLORS["target"], lw=1.5)
+            axes.add_patch(ring)
+            (cross,) = axes.plot(*aim.place, "+", color=COLORS["target"], ms=10.0, mew=2.0)
+            self.rings.append((ring, cross))
 
         length = frames.robot.module_length
         thin = max(0.8, min(1.5, 0.02 * length * zoom))
@@ -306,15 +318,23 @@ class FilmPanel:
             axes.add_artist(artist)
             artist.set_clip_path(axes.patch)
 
-    def tell(self, known: bool) -> None:
-        """Show the outcome, or that there is none yet."""
+    def known(self, now: float) -> tuple[object, ...]:
+        """What :meth:`tell` shows depends on this alone: the outcome, and of each target that has begun its own."""
+        begun = self.shown.begun(self.robot, now)
+        return (bool(now >= self.outcome.time - 1e-9), *(aim.is_reached(now) for aim in begun))
+
+    def tell(self, now: float) -> None:
+        """Show the outcome, or that there is none yet, and the targets so far."""
+        known, *reached = self.known(now)
         self.label.set_text(self.told if known else "walking")
         self.label.set_color(_MARKS[self.outcome.kind][1] if known else "#555555")
         self.label.set_fontweight("bold" if known else "normal")
-        if self.ring is not None:
-            arrived = known and self.outcome.kind == "arrived"
-            self.ring.set_facecolor((COLORS["target"], 0.35 if arrived else 0.1))
-            self.ring.set_linestyle("-" if arrived else (0, (4, 3)))
+        for index, (ring, cross) in enumerate(self.rings):
+            ring.set_visible(index < len(reached))
+            cross.set_visible(index < len(reached))
+            arrived = index < len(reached) and reached[index]
+            ring.set_facecolor((COLORS["target"], 0.35 if arrived else 0.1))
+            ring.set_linestyle("-" if arrived else (0, (4, 3)))
 
     def placed(self, index: int) -> Sequence[Any]:
         """What moves, where it is then."""

@@ -3,8 +3,9 @@
 A *record* is a dataset over ``time`` (s), ``robot``, ``axis`` (x, y), ``joint`` and ``side`` (left, right) with
 ``position`` (m, centre of module 1), ``heading`` (rad), ``joint_angle`` (rad, heading of a module less that of the one
 in front of it), ``leg_yaw`` (rad, of the legs of module 1) and ``status`` (text). Where there was a task there are
-``target`` (m) and ``distance`` (m) as well. After a robot stopped its values are NaN. The attribute ``robot`` is the
-text of the robot file.
+``target`` (m) and ``distance`` (m) as well; where there was a course, over ``robot`` and ``goal``, ``goal_place`` (m),
+``goal_begin`` and ``goal_end`` (s) and ``goal_verdict`` (text). After a robot stopped its values are NaN. The attribute
+``robot`` is the text of the robot file.
 """
 
 from __future__ import annotations
@@ -17,10 +18,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from chilopod.engine import Status
 from chilopod.errors import ParameterError
 from chilopod.kinematics import directions, foot_places, from_modules, module_centres, module_headings
+from chilopod.report.scene.aims import Aim, aims_of, places_of
 from chilopod.robot import Robot
-from chilopod.steering import ARRIVAL_RADIUS, arrivals
+from chilopod.steering import ARRIVAL_RADIUS
 
 Array = NDArray[np.float64]
 
@@ -153,9 +156,9 @@ class Outcome:
     Attributes
     ----------
     text
-        Such as "arrived at 18.4 s", "target not reached", or the status; nothing is said before its time.
+        Such as "arrived at 18.4 s", "3 of 5 targets", or the status; nothing is said before its time.
     kind
-        "arrived", "stopped" (its record ends early) or "ended" (with the record).
+        "arrived", "stopped" (its record ends early) or "ended" (with the record, or where it was told to halt).
     time
         From when on it is known, s.
     """
@@ -196,8 +199,8 @@ class Scene:
         What is seen of the floor.
     titles, outcomes
         One for each robot.
-    targets
-        (R, 2) m; NaN where there is none.
+    aims
+        One sequence for each robot: its targets in the order of their turns.
     arrival_radius
         m; 0 where there are no targets.
     """
@@ -206,8 +209,12 @@ class Scene:
     floor: Floor
     titles: tuple[str, ...]
     outcomes: tuple[Outcome, ...]
-    targets: Array
+    aims: tuple[tuple[Aim, ...], ...]
     arrival_radius: float
+
+    def begun(self, robot: int, now: float) -> tuple[Aim, ...]:
+        """The targets of a robot that have had their turn at a time (s), or have it."""
+        return tuple(aim for aim in self.aims[robot] if now >= aim.since - 1e-9)
 
 
 def scene(record: xr.Dataset, titles: Mapping[Any, str] | Sequence[str], times: ArrayLike | None = None) -> Scene:
@@ -228,18 +235,14 @@ def scene(record: xr.Dataset, titles: Mapping[Any, str] | Sequence[str], times: 
         If the record does not go with its robot, or a robot has no title.
     """
     frames = body_frames(record, times)
-    count = record.sizes["robot"]
-    targets = np.full((count, 2), np.nan)
-    if "target" in record:
-        targets = record["target"].transpose("robot", "axis").values.astype(np.float64)
-    radius = ARRIVAL_RADIUS if "target" in record else 0.0
-    arrived = arrivals(record) if "target" in record else np.full(count, np.nan)
+    aims = aims_of(record)
+    radius = ARRIVAL_RADIUS if any(aims) else 0.0
     return Scene(
         frames,
-        _floor(frames, targets, radius),
+        _floor(frames, places_of(aims), radius),
         _titles(record, titles),
-        tuple(_outcome(record, frames, robot, float(arrived[robot])) for robot in range(count)),
-        targets,
+        tuple(_outcome(record, frames, robot, each) for robot, each in enumerate(aims)),
+        aims,
         radius,
     )
 
@@ -256,20 +259,24 @@ def _titles(record: xr.Dataset, titles: Mapping[Any, str] | Sequence[str]) -> tu
     return tuple(titles)
 
 
-def _outcome(record: xr.Dataset, frames: BodyFrames, robot: int, arrival: float) -> Outcome:
+def _outcome(record: xr.Dataset, frames: BodyFrames, robot: int, aims: tuple[Aim, ...]) -> Outcome:
     status, walks = str(record["status"].values[robot]), frames.walks[:, robot]
-    if np.isfinite(arrival):
-        return Outcome(f"arrived at {arrival:.1f} s", "arrived", arrival)
+    reached = [aim.reached for aim in aims if aim.reached is not None]
+    goals = record.sizes.get("goal", 1)
+    if len(reached) == goals:
+        words = f"arrived at {reached[-1]:.1f} s" if goals == 1 else f"all {goals} targets by {reached[-1]:.1f} s"
+        return Outcome(words, "arrived", reached[-1])
     if not walks.any():
         return Outcome(status, "stopped", float(frames.time[0]))
     end = float(frames.time[walks][-1])
-    if not walks[-1]:
+    if not walks[-1] and status != Status.HALTED.label:
         return Outcome(f"{status} at {end:.1f} s", "stopped", end)
-    missed = "target" in record and bool(np.isfinite(record["target"].isel(robot=robot)).all())
-    return Outcome("target not reached" if missed else status, "ended", end)
+    if goals > 1:
+        return Outcome(f"{len(reached)} of {goals} targets", "ended", end)
+    return Outcome("target not reached" if aims else status, "ended", end)
 
 
-def _floor(frames: BodyFrames, targets: Array, radius: float) -> Floor:
+def _floor(frames: BodyFrames, aims: Array, radius: float) -> Floor:
     """The box around all bodies and targets, a little larger, and neither a slit nor a tower."""
     robot, n = frames.robot, frames.robot.body.modules
     flat = np.concatenate([frames.spine, frames.feet.reshape(*frames.centres.shape[:2], 2 * n, 2)], axis=2)
@@ -279,7 +286,6 @@ def _floor(frames: BodyFrames, targets: Array, radius: float) -> Floor:
     furthest = 2.0 * (robot.body.length + robot.gait.speed * duration)
     start = frames.centres[:1, :, :1]
     seen &= np.abs(np.where(seen[..., None], flat - start, np.inf)).max(axis=-1) <= furthest
-    aims = targets[np.isfinite(targets).all(-1)]
     points = np.concatenate([flat[seen], aims - radius, aims + radius, np.zeros((0 if seen.any() else 1, 2))])
     low, high = points.min(axis=0), points.max(axis=0)
     low[1] -= _FOOT_ROOM * max(high[1] - low[1], (high[0] - low[0]) / _FLATTEST)

@@ -63,7 +63,7 @@
     context.clearRect(0, 0, robot.width, robot.height);
     context.globalAlpha = 1;
     drawGrid(context, robot, X, Y, left, top, zoom);
-    if (robot.target) drawTarget(context, robot, now, X, Y, zoom);
+    for (const aim of begun(robot, now)) drawTarget(context, aim, now, X, Y, zoom);
     if (shown) {
       if (robot.outcome.kind === "stopped" && now > robot.outcome.time) context.globalAlpha = 0.45;
       const feet = drawModules(context, robot, frame, on, zoom);
@@ -90,9 +90,9 @@
     context.stroke();
   }
 
-  function drawTarget(context, robot, now, X, Y, zoom) {
-    const [x, y] = [X(robot.target[0]), Y(robot.target[1])];
-    const arrived = robot.outcome.kind === "arrived" && now >= robot.outcome.time;
+  function drawTarget(context, aim, now, X, Y, zoom) {
+    const [x, y] = [X(aim.place[0]), Y(aim.place[1])];
+    const arrived = isReached(aim, now);
     context.strokeStyle = context.fillStyle = colors.target;
     context.beginPath();
     context.arc(x, y, data.arrivalRadius * zoom, 0, 2 * Math.PI);

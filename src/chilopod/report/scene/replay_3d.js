@@ -37,12 +37,14 @@
     for (let frame = 0; frame < time.count && poses.exists(robot.raw); frame++) {
       robot.path.push([poses.value(robot.raw, frame, 0), poses.value(robot.raw, frame, 1)]);
     }
-    robot.pole = robot.target && {
-      kind: "cylinder",
-      size: [data.pole.radius, 0.5 * data.pole.height],
-      matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, ...robot.target, 0.5 * data.pole.height, 1],
-      color: colors.target,
-    };
+    for (const aim of robot.aims) {
+      aim.pole = {
+        kind: "cylinder",
+        size: [data.pole.radius, 0.5 * data.pole.height],
+        matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, ...aim.place, 0.5 * data.pole.height, 1],
+        color: colors.target,
+      };
+    }
   }
 
   const marked = landmarks();
@@ -86,9 +88,10 @@
           if (["front", "module", "foot"].includes(shapes[i].role) && inside(place)) points.push(place);
         });
       }
-      if (!robot.target) continue;
-      const [x, y] = robot.target, r = data.arrivalRadius;
-      points.push([x - r, y, 0], [x + r, y, 0], [x, y - r, 0], [x, y + r, 0], [x, y, data.pole.height]);
+      for (const { place: [x, y] } of robot.aims) {
+        const r = data.arrivalRadius;
+        points.push([x - r, y, 0], [x + r, y, 0], [x, y - r, 0], [x, y + r, 0], [x, y, data.pole.height]);
+      }
     }
     return points.length ? points : [[floor.x0, floor.y0, 0], [floor.x1, floor.y1, 0]];
   }
@@ -147,11 +150,11 @@
     const mean = (i) => modules.reduce((sum, matrix) => sum + matrix[12 + i], 0) / modules.length;
     const camera = cameraOn(robot, follow.checked && exists ? [0, 1, 2].map(mean) : null);
     const ratio = canvas.width / robot.width;
-    const arrived = robot.outcome.kind === "arrived" && now >= robot.outcome.time;
+    const aim = begun(robot, now).at(-1);
     const pale = robot.outcome.kind === "stopped" && now > robot.outcome.time;
-    const pole = robot.pole ? [robot.pole] : [];
+    const pole = aim ? [aim.pole] : [];
     painter.start(canvas.width, canvas.height, camera);
-    painter.paintFloor(camera, ratio, robot.target, arrived);
+    painter.paintFloor(camera, ratio, aim?.place, Boolean(aim) && isReached(aim, now));
     if (pole.length) painter.paintSolids(camera, pole, true, false);
     painter.paintSolids(camera, solids, true, pale);
     const width = 6 * camera.distance * NARROW / robot.height, pieces = exists ? frame : 0;

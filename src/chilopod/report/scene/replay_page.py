@@ -86,7 +86,7 @@ def page(
         ],
         colors=COLORS,
         grid=f"{shown.floor.grid:g} m",
-        has_targets=bool(np.isfinite(shown.targets).all(-1).any()),
+        has_targets=any(shown.aims),
         data={**_common(shown), **data, "robots": _robots(shown, data["robots"])},
         **words,
     )
@@ -124,8 +124,8 @@ def _robots(shown: Scene, more: Sequence[Mapping[str, Any]]) -> list[dict[str, A
     return [
         {
             "outcome": {"text": outcome.text, "kind": outcome.kind, "time": outcome.time},
-            "target": target.tolist() if np.isfinite(target).all() else None,
+            "aims": [{"place": aim.place, "since": aim.since, "reached": aim.reached} for aim in aims],
             **each,
         }
-        for outcome, target, each in zip(shown.outcomes, shown.targets, more, strict=True)
+        for outcome, aims, each in zip(shown.outcomes, shown.aims, more, strict=True)
     ]

@@ -1,4 +1,8 @@
 "use strict";
+// The targets of a robot that have had their turn, or have it, and whether one of them has been reached.
+const begun = (robot, now) => robot.aims.filter(({ since }) => now >= since - 1e-9);
+const isReached = ({ reached }, now) => reached !== null && now >= reached;
+
 // Time and its controls, and the panels of all robots, of every kind of replay. The kind draws: it calls start with a
 // function of a robot, the frame that is shown and the time in s, which may lie between two frames.
 function replayPlayer(data, aspect) {
