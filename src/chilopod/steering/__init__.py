@@ -10,13 +10,16 @@ from chilopod.steering.radius_law import RadiusLaw
 from chilopod.steering.referee import CourseReferee, Verdict, decisions
 from chilopod.steering.shortest import shortest_path
 from chilopod.steering.spring_law import SpringLaw
-from chilopod.steering.strategies import STRATEGIES, Strategy, steered, strategy_named
+from chilopod.steering.strategies import ACTUATED, ON_COURSES, STRATEGIES, VARIABLE, Strategy, steered, strategy_named
 from chilopod.steering.target import ARRIVAL_RADIUS, Target
 
 __all__ = [
+    "ACTUATED",
     "ARRIVAL_RADIUS",
     "COURSES",
+    "ON_COURSES",
     "STRATEGIES",
+    "VARIABLE",
     "ActuatedAxis",
     "Course",
     "CourseReferee",

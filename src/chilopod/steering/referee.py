@@ -89,7 +89,7 @@ class CourseReferee:
             self._judge(arrived, now, Verdict.ARRIVED)
             self._judge(over & self._seen_once, now, Verdict.LATE)
             self._judge(over & ~self._seen_once, now, Verdict.UNSEEN)
-            self._number[gone] = [len(self._courses[robot].goals) for robot in np.flatnonzero(gone)]
+            self._number[gone] = [len(self._courses[robot].goals) for robot in np.flatnonzero(gone).tolist()]
             self._next(walk, pose, arrived | over)
         return bool(self._busy.any())
 
@@ -142,7 +142,7 @@ class CourseReferee:
         return self._number < np.array([len(each.goals) for each in self._courses])
 
     def _judge(self, which: NDArray[np.bool_], now: float, verdict: Verdict) -> None:
-        for robot in np.flatnonzero(which):
+        for robot in np.flatnonzero(which).tolist():
             number, count = self._number[robot], len(self._courses[robot].goals)
             self._end[robot, number], self._verdicts[robot, number] = now, verdict.label
             if verdict is Verdict.STOPPED:
@@ -151,7 +151,7 @@ class CourseReferee:
     def _next(self, walk: Walk, pose: Array, which: NDArray[np.bool_]) -> None:
         """Put up the next target that can be reached."""
         now, most = walk.time, self._common.patience * self._speed
-        for robot in np.flatnonzero(which):
+        for robot in np.flatnonzero(which).tolist():
             self._aims[robot] = np.nan
             for number in range(self._number[robot] + 1, len(self._courses[robot].goals)):
                 place = self._courses[robot].goals[number].place(pose[robot : robot + 1])[0]

@@ -103,6 +103,15 @@ class SpringLaw(ReadOnlyArrays):
         arm = (robot.body.modules - 1) * robot.module_length
         return cls(softest, stiffest, curvatures[::-1], law.values[::-1], arm)
 
+    def remarks(self, law: RadiusLaw) -> list[str]:
+        """What the actuator keeps from a robot that its radius law would allow."""
+        if self.softest <= law.values[0]:
+            return []
+        return [
+            f"the actuator goes no softer than {self.softest:.4g} N*m/rad: circles of less than "
+            f"{law.radius(self.softest):.3g} m, of {law.tightest:.3g} m otherwise, are out of its reach"
+        ]
+
     def events(self, gait: Gait) -> Sequence[Event]:
         """Those of the legs of module 1."""
         return self.leg_yaw.events(gait)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Final
 
 from chilopod.errors import ParameterError, nearest_name
 from chilopod.robot import Robot
@@ -47,26 +48,41 @@ STRATEGIES: Mapping[str, Strategy] = {
         ),
     )
 }
-"""By name."""
+"""For one turn, by name."""
+
+VARIABLE: Final = Strategy(
+    "variable",
+    "the first spring is set anew in every gait cycle, leg yaw chooses the side",
+    "springs.stiffness[0]",
+    True,
+)
+ACTUATED: Final = Strategy(
+    "actuated", "torques at all joints bend the body axis into the circle to the target, with leg yaw", None, True
+)
+
+ON_COURSES: Mapping[str, Strategy] = {
+    each.name: each for each in (VARIABLE, STRATEGIES["pitchfork"], STRATEGIES["hopf"], STRATEGIES["leg-yaw"], ACTUATED)
+}
+"""For courses, by name."""
 
 
-def strategy_named(name: str) -> Strategy:
-    """One of :data:`STRATEGIES`.
+def strategy_named(name: str, among: Mapping[str, Strategy] = STRATEGIES) -> Strategy:
+    """One of :data:`STRATEGIES`, or of others.
 
     Raises
     ------
     ParameterError
         If there is none of this name.
     """
-    if name not in STRATEGIES:
+    if name not in among:
         raise ParameterError(
             "there is no such strategy",
             field="strategy",
             value=name,
-            allowed=", ".join(STRATEGIES),
-            nearest=nearest_name(name, STRATEGIES),
+            allowed=", ".join(among),
+            nearest=nearest_name(name, among),
         )
-    return STRATEGIES[name]
+    return among[name]
 
 
 def steered(robot: Robot, strategy: Strategy, stiffness: float | None) -> tuple[Robot, LegYawController | None]:

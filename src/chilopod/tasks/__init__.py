@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from chilopod.lazy import exports
 
 if TYPE_CHECKING:
+    from chilopod.tasks.course import Driven, Driver, drive, driver
     from chilopod.tasks.identify import identify_planar, identify_twin
     from chilopod.tasks.radius_law import radius_law
     from chilopod.tasks.turn import Turn, best_spring, turn
@@ -13,6 +14,7 @@ else:
     __getattr__, __dir__ = exports(
         __name__,
         {
+            "course": ("Driven", "Driver", "drive", "driver"),
             "identify": ("identify_planar", "identify_twin"),
             "radius_law": ("radius_law",),
             "turn": ("Turn", "best_spring", "turn"),
@@ -21,10 +23,14 @@ else:
     )
 
 __all__ = [
+    "Driven",
+    "Driver",
     "Ends",
     "Turn",
     "Walks",
     "best_spring",
+    "drive",
+    "driver",
     "ends",
     "foot_creep",
     "identify_planar",

@@ -1,0 +1,326 @@
+"""Courses: targets one after another, walked with a strategy, and what became of each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from chilopod.engine import Controller, engine_named
+from chilopod.engine.named import check_controller, path_of
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.progress import Progress, silent
+from chilopod.robot import Robot
+from chilopod.steering import (
+    ACTUATED,
+    VARIABLE,
+    ActuatedAxis,
+    Course,
+    RadiusLaw,
+    SpringLaw,
+    Strategy,
+    Verdict,
+    random_course,
+    steered,
+)
+from chilopod.tasks.radius_law import radius_law
+from chilopod.tasks.walk import check_repeats, foot_creep, repeated
+from chilopod.trials import Trial, check_fits, run
+
+GRAVITY = 9.81
+"""m/s^2"""
+
+_RATE = 20.0  # Hz, of records: looks of the referee fall on samples
+_PATIENCE = 25.0  # s for a target, of an engine whose walks are as fast as the straight walk without slip
+
+
+@dataclass(frozen=True)
+class Driver:
+    """A robot made ready for courses.
+
+    Attributes
+    ----------
+    robot
+        With the springs of the strategy, and the actuator that it needs.
+    strategy
+        What was asked for.
+    controller
+        What steers; None for nothing.
+    law
+        The robot's radius law; None where it has none and the strategy needs none.
+    remarks
+        What is to be said of it.
+    """
+
+    robot: Robot
+    strategy: Strategy
+    controller: Controller | None
+    law: RadiusLaw | None
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Driven:
+    """Walks along a course, and what became of its targets.
+
+    Attributes
+    ----------
+    driver
+        What walked.
+    course, engine
+        What was asked for.
+    trials
+        With all that makes each walk.
+    records
+        Of every walk, up to where it ended, see :func:`chilopod.steering.of_course`.
+    """
+
+    driver: Driver
+    course: Course
+    engine: str
+    trials: tuple[Trial, ...]
+    records: tuple[xr.Dataset, ...]
+
+    @property
+    def robot(self) -> Robot:
+        """That walked."""
+        return self.driver.robot
+
+    @property
+    def strategy(self) -> Strategy:
+        """How."""
+        return self.driver.strategy
+
+    @property
+    def pitchfork(self) -> float | None:
+        """First spring below which the straight walk bends, N*m/rad; None where it is not known."""
+        return self.driver.law.pitchfork if self.driver.law else None
+
+    @cached_property
+    def record(self) -> xr.Dataset:
+        """Of all walks together, NaN from where each ended."""
+        longest = max(self.records, key=lambda each: each.sizes.get("time", 0))
+        joined = xr.concat(
+            self.records, dim="robot", data_vars="minimal", coords="minimal", compat="override", join="outer"
+        ).assign_coords(robot=np.arange(len(self.records)))
+        return joined.assign(within=longest.within) if "within" in longest else joined
+
+    @cached_property
+    def foot_creep(self) -> float | None:
+        """See :func:`chilopod.tasks.walk.foot_creep`."""
+        return foot_creep(self.robot, self.engine)
+
+    def as_json(self) -> dict[str, Any]:
+        """Plain numbers; null for what there is not."""
+        first = self.trials[0]
+        return {
+            "robot": self.robot.name,
+            "engine": self.engine,
+            "strategy": self.strategy.name,
+            "controller": None if first.controller is None else path_of(type(first.controller)),
+            "patience_s": self.course.patience,
+            "tightest_radius_m": self.course.tightest,
+            "pitchfork_N_m_rad": self.pitchfork,
+            "remarks": list(self.driver.remarks),
+            "walks": [_walk_json(*each) for each in zip(self.trials, self.records, strict=True)],
+            "foot_creep_N_s_m": self.foot_creep,
+        }
+
+
+def _walk_json(trial: Trial, record: xr.Dataset) -> dict[str, Any]:
+    def plain(value: float) -> float | None:
+        return float(value) if np.isfinite(value) else None
+
+    sentences = {verdict.label: verdict.sentence for verdict in Verdict}
+    goals = []
+    for goal in record.isel(robot=0).transpose("goal", ...).goal.values:
+        found = record.isel(robot=0).sel(goal=goal)
+        verdict = str(found.goal_verdict.item())
+        goals.append(
+            {
+                "verdict": verdict,
+                "sentence": sentences[verdict],
+                "place_m": [plain(each) for each in found.goal_place.values],
+                "begin_s": plain(found.goal_begin.item()),
+                "end_s": plain(found.goal_end.item()),
+                "nearest_m": plain(found.goal_nearest.item()),
+                "path_m": plain(found.goal_path.item()),
+                "shortest_m": plain(found.goal_shortest.item()),
+                "leg_yaw_effort_rad2_s": plain(found.goal_effort.item()),
+                "spring_work_J": plain(found.goal_spring_work.item()),
+                "drive_work_J": plain(found.goal_drive_work.item()),
+            }
+        )
+    return {
+        "seed": trial.seed,
+        "status": str(record.status.values[0]),
+        "arrived": int((record.goal_verdict == Verdict.ARRIVED.label).sum()),
+        "time_s": plain(float(np.nanmax(record.goal_end.values))),
+        "steering_cost_of_transport": plain(steering_cost(trial.robot, record)),
+        "targets": goals,
+    }
+
+
+def steering_cost(robot: Robot, record: xr.Dataset) -> float:
+    """Work that the spring's actuator and the joints' torques did on a course, over weight and way: the part of the
+    cost of transport that steering adds to walking."""
+    work = float(record.goal_spring_work.sum() + record.goal_drive_work.sum())
+    return work / (robot.body.mass * GRAVITY * float(record.goal_path.sum()))
+
+
+def driver(
+    robot: Robot,
+    strategy: Strategy,
+    spring: float | None = None,
+    *,
+    engine: str = "planar",
+    controller: Controller | None = None,
+    folder: str | Path | None = None,
+    progress: Progress = silent,
+) -> Driver:
+    """Make a robot ready for courses.
+
+    Parameters
+    ----------
+    robot
+        The robot.
+    strategy
+        One of :data:`chilopod.steering.ON_COURSES`.
+    spring
+        That the strategies ``pitchfork`` and ``hopf`` walk with, N*m/rad.
+    engine
+        Whose radius law it is, see :func:`chilopod.tasks.radius_law`.
+    controller
+        In place of the strategy's.
+    folder
+        Where trials of the radius law are kept.
+    progress
+        Called with the part done (0 to 1) and a few words.
+
+    Raises
+    ------
+    ParameterError
+        If the strategy wants a spring and has none, or has one and wants none; if the spring has no actuator.
+    AnalysisError
+        If the strategy stands on the pitchfork and the robot has none.
+    """
+    chooses = strategy.springs is not None and strategy is not VARIABLE
+    if chooses and spring is None:
+        raise ParameterError(
+            f"the strategy {strategy.name} walks with one spring: say which", field="k1", allowed="a stiffness"
+        )
+    if spring is not None and not chooses:
+        raise ParameterError(f"the strategy {strategy.name} has no spring to choose", field="k1", value=spring)
+    law: RadiusLaw | None = None
+    remarks: list[str] = []
+    try:
+        law = radius_law(robot, engine, folder, progress)
+    except AnalysisError as error:
+        if strategy in (VARIABLE, ACTUATED) and controller is None:
+            raise AnalysisError(
+                f"the strategy {strategy.name} stands on the pitchfork of the straight walk, and {error}",
+                allowed="a robot that bends (softer springs behind, a longer stride), or the strategy leg-yaw",
+            ) from error
+        remarks.append(f"no radius law: {error}")
+    walker, steering = _steered(robot, strategy, spring, law, remarks)
+    return Driver(walker, strategy, controller or steering, law, tuple(remarks))
+
+
+def _steered(
+    robot: Robot, strategy: Strategy, spring: float | None, law: RadiusLaw | None, remarks: list[str]
+) -> tuple[Robot, Controller | None]:
+    if strategy is VARIABLE and law is not None:
+        walker = _with_actuator(robot, remarks)
+        steering = SpringLaw.of(walker, law)
+        remarks += steering.remarks(law)
+        return walker, steering
+    if strategy is ACTUATED and law is not None:
+        return robot, ActuatedAxis.of(robot, law)
+    return steered(robot, strategy, spring)
+
+
+def drive(
+    driver: Driver,
+    course: Course,
+    *,
+    seed: int | None = None,
+    repeats: int = 1,
+    engine: str = "planar",
+    folder: str | Path | None = None,
+    progress: Progress = silent,
+) -> Driven:
+    """Let a robot walk a course.
+
+    Parameters
+    ----------
+    driver
+        The robot and what steers it.
+    course
+        With any radius of the tightest circle: that of the robot takes its place where it is known.
+    seed
+        Of the first walk's disturbances, the others count up from it; None for no disturbance at all.
+    repeats
+        How many walks.
+    engine
+        Of :data:`chilopod.engine.ENGINES`, or one's own as ``package.module:object``.
+    folder
+        Where trials are kept; without one nothing is kept.
+    progress
+        Called with the part done (0 to 1) and a few words.
+    """
+    check_repeats(seed, repeats)
+    if driver.controller is not None:
+        check_controller(driver.controller)
+    if driver.law is not None:
+        course = replace(course, tightest=driver.law.tightest)
+    trials = repeated(trial_of(driver, course, engine=engine, poses=engine_named(engine).traits.poses), seed, repeats)
+    check_fits(trials)
+    records = run(trials, folder, progress)
+    return Driven(driver, course, engine, trials, tuple(records))
+
+
+def trial_of(
+    driver: Driver, course: Course, seed: int = 0, *, engine: str = "planar", poses: bool = False, brief: bool = False
+) -> Trial:
+    """The trial of a course, with the disturbance that all studies have."""
+    return Trial(
+        driver.robot,
+        course.duration,
+        seed,
+        target=course,
+        controller=driver.controller,
+        rate=_RATE,
+        engine=engine,
+        poses=poses,
+        brief=brief,
+    )
+
+
+def patience_of(engine: str) -> float:
+    """For one target, s: more than a minute where walks slip, 40 s in the planar model."""
+    return _PATIENCE * engine_named(engine).traits.haste
+
+
+def random_courses(seeds: Sequence[int], engine: str = "planar") -> list[Course]:
+    """Random courses of five targets, see :func:`chilopod.steering.random_course`, with the engine's patience."""
+    return [random_course(seed, patience_of(engine)) for seed in seeds]
+
+
+def _with_actuator(robot: Robot, remarks: list[str]) -> Robot:
+    adjustable = robot.springs.adjustable
+    if adjustable is None:
+        remarks.append("the robot file names no actuator: the first spring is taken to change as fast as it is told to")
+        return robot.override("springs.adjustable[0]", True)
+    if not adjustable[0]:
+        raise ParameterError(
+            "the first spring has no actuator, and the strategy variable sets it on the way",
+            field="springs.adjustable[0]",
+            value=False,
+            allowed="true",
+        )
+    return robot
