@@ -26,6 +26,7 @@ from chilopod.output import check_folder, write_atomic
 from chilopod.report.kit import style
 from chilopod.report.scene.encoder import ENCODER, encoded, has_encoder
 from chilopod.report.scene.frames import Outcome, Scene, scene
+from chilopod.report.scene.goals import Goal
 from chilopod.report.scene.outline import SLIMNESS
 from chilopod.report.scene.replay import COLORS
 
@@ -35,6 +36,7 @@ _SMALLEST, LARGEST = 240, 4096
 PIXEL: Final = 72.0  # points in an inch: at so many dots per inch, matplotlib's sizes are pixels
 GAP: Final = 12.0  # to the edges and from row to row, pixels
 APART: Final = 28.0  # from column to column: outcome and next title stand side by side
+_RINGS: Final = {"ahead": (0.0, 0.0), "present": (0.1, 1.0), "reached": (0.35, 1.0), "behind": (0.0, 0.4)}
 _MARKS: Final = {"arrived": ("✓ ", "#00563f"), "stopped": ("✕ ", "#8f3d00"), "ended": ("", style.BLACK)}
 
 
@@ -147,18 +149,16 @@ class Stage:
         self._fit(title, room)
         below = self._legend()
         self._panels(GAP + below, top - 1.9 * self.font)
-        self.known: tuple[bool, ...] = ()
+        self.told: list[Any] = []
         self.background: Any = None
 
     def drawn(self, index: int) -> NDArray[np.uint8]:
         """The frame of a time."""
         now = self.shown.frames.time[index]
-        known = tuple(bool(now >= outcome.time - 1e-9) for outcome in self.shown.outcomes)
-        if self.background is None or known != self.known:
-            for panel, is_known in zip(self.panels, known, strict=True):
-                panel.tell(is_known)
+        told = [panel.tell(now) for panel in self.panels]
+        if self.background is None or told != self.told:
             self.canvas.draw()
-            self.known, self.background = known, self.canvas.copy_from_bbox(self.figure.bbox)
+            self.told, self.background = told, self.canvas.copy_from_bbox(self.figure.bbox)
         self.canvas.restore_region(self.background)
         renderer = self.canvas.get_renderer()
         self.clock.set_text(self._time(index))
@@ -195,7 +195,7 @@ class Stage:
             _dot("white", COLORS["air"], 0.6 * self.font, label="foot in the air"),
             Line2D([], [], color=COLORS["path"], label="path of module 1"),
         ]
-        if np.isfinite(self.shown.targets).any():
+        if any(self.shown.goals):
             handles.append(
                 Line2D([], [], ls="", marker="+", ms=0.8 * self.font, mew=2, color=COLORS["target"], label="target")
             )
@@ -278,12 +278,12 @@ class FilmPanel:
         for line in np.arange(math.ceil(floor.y0 / floor.grid), floor.y1 / floor.grid):
             axes.axhline(line * floor.grid, color=COLORS["grid"], lw=1.0)
         self._scale_bar(axes, zoom, font)
-        self.ring: Circle | None = None
-        if np.isfinite(shown.targets[robot]).all():
-            x, y = shown.targets[robot]
-            self.ring = Circle((x, y), shown.arrival_radius, ec=COLORS["target"], lw=1.5)
-            axes.add_patch(self.ring)
-            axes.plot(x, y, "+", color=COLORS["target"], ms=10.0, mew=2.0)
+        self.rings: list[tuple[Goal, Circle, Line2D]] = []
+        for goal in shown.goals[robot]:
+            ring = Circle(goal.place, shown.arrival_radius, lw=1.5)
+            axes.add_patch(ring)
+            (cross,) = axes.plot(*goal.place, "+", color=COLORS["target"], ms=10.0, mew=2.0)
+            self.rings.append((goal, ring, cross))
 
         length = frames.robot.module_length
         thin = max(0.8, min(1.5, 0.02 * length * zoom))
@@ -306,15 +306,20 @@ class FilmPanel:
             axes.add_artist(artist)
             artist.set_clip_path(axes.patch)
 
-    def tell(self, known: bool) -> None:
-        """Show the outcome, or that there is none yet."""
+    def tell(self, now: float) -> tuple[bool, list[str]]:
+        """Show the outcome, or that there is none yet, and the targets as they are at a time; returns what is shown."""
+        known = bool(now >= self.outcome.time - 1e-9)
         self.label.set_text(self.told if known else "walking")
         self.label.set_color(_MARKS[self.outcome.kind][1] if known else "#555555")
         self.label.set_fontweight("bold" if known else "normal")
-        if self.ring is not None:
-            arrived = known and self.outcome.kind == "arrived"
-            self.ring.set_facecolor((COLORS["target"], 0.35 if arrived else 0.1))
-            self.ring.set_linestyle("-" if arrived else (0, (4, 3)))
+        stages: list[str] = [goal.stage(now) for goal, *_ in self.rings]
+        for stage, (_, ring, cross) in zip(stages, self.rings, strict=True):
+            fill, line = _RINGS[stage]
+            ring.set_facecolor((COLORS["target"], fill))
+            ring.set_edgecolor((COLORS["target"], line))
+            ring.set_linestyle((0, (4, 3)) if stage == "present" else "-")
+            cross.set_visible(stage in ("present", "reached"))
+        return known, stages
 
     def placed(self, index: int) -> Sequence[Any]:
         """What moves, where it is then."""
@@ -324,7 +329,7 @@ class FilmPanel:
             return ()
         headings, feet = frames.headings[index, robot], frames.feet[index, robot]
         self.modules.set_verts(list(_on_modules(centres, headings, self.outline)))
-        self.modules.set_alpha(1.0 if frames.walks[index, robot] else 0.45)
+        self.modules.set_alpha(1.0 if frames.walks[index, robot] or self.outcome.kind == "ended" else 0.45)
         hips = _on_modules(centres, headings, self.hips)
         self.legs.set_segments(list(np.stack([hips, feet], axis=-2).reshape(-1, 2, 2)))
         self.legs.set_color([COLORS["ink"] if each else COLORS["air"] for each in stands.ravel()])

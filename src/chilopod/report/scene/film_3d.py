@@ -32,6 +32,7 @@ from chilopod.report.scene.film import (
     frame_times,
 )
 from chilopod.report.scene.frames import Scene, scene
+from chilopod.report.scene.goals import places_of
 from chilopod.report.scene.stage_3d import TILE, Look, Studio, View, framing
 from chilopod.twin import gl
 
@@ -187,7 +188,7 @@ class _Walks:
             places = np.array([[floor.x0, floor.y0], [floor.x1, floor.y1]])
         beside = _BESIDE * np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])
         solid = [np.concatenate([_at(places + each, 0.0), _at(places + each, _TALL)]) for each in beside]
-        targets = self.shown.targets[np.isfinite(self.shown.targets).all(axis=-1)]
+        targets = places_of(self.shown.goals)
         if robot is None:
             solid += [_at(targets + self.shown.arrival_radius * each, 0.0) for each in np.sign(beside)]
             solid += [_at(targets, _POLE)]
@@ -196,16 +197,14 @@ class _Walks:
     def look(self, index: int, robot: int) -> Look:
         """Of a robot at a time."""
         shown, sample = self.shown, int(self.samples[index])
-        last, outcome, target = int(self.last[sample, robot]), shown.outcomes[robot], shown.targets[robot]
-        arrived = outcome.kind == "arrived" and shown.frames.time[index] >= outcome.time - 1e-9
+        last, now = int(self.last[sample, robot]), float(shown.frames.time[index])
         return Look(
             pose=self.poses[last, robot] if last >= 0 else None,
             stands=shown.frames.stands[index, robot],
-            walks=bool(shown.frames.walks[index, robot]),
+            walks=bool(shown.frames.walks[index, robot]) or shown.outcomes[robot].kind == "ended",
             path=self.positions[: last + 1, robot],
-            target=target if np.isfinite(target).all() else None,
+            targets=tuple((goal.place, goal.stage(now)) for goal in shown.goals[robot]),
             radius=shown.arrival_radius,
-            arrived=arrived,
         )
 
 
@@ -252,7 +251,8 @@ class _Panel3D(FilmPanel):
         self, stage: _Stage3D, robot: int, size: tuple[int, int], corner: tuple[int, int], label: Text
     ) -> None:
         self.stage, self.robot, self.size, self.label = stage, robot, size, label
-        self.outcome, self.told, self.ring = stage.shown.outcomes[robot], label.get_text(), None
+        self.outcome, self.told = stage.shown.outcomes[robot], label.get_text()
+        self.rings = []
         (left, above), (width, height) = corner, size
         self.box = (slice(above, above + height), slice(left, left + width), slice(0, 3))
         self.whole = stage.walks.view(size)

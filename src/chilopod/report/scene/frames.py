@@ -3,8 +3,8 @@
 A *record* is a dataset over ``time`` (s), ``robot``, ``axis`` (x, y), ``joint`` and ``side`` (left, right) with
 ``position`` (m, centre of module 1), ``heading`` (rad), ``joint_angle`` (rad, heading of a module less that of the one
 in front of it), ``leg_yaw`` (rad, of the legs of module 1) and ``status`` (text). Where there was a task there are
-``target`` (m) and ``distance`` (m) as well. After a robot stopped its values are NaN. The attribute ``robot`` is the
-text of the robot file.
+``target`` (m), over time if it moved, and ``distance`` (m) as well. After a robot stopped its values are NaN. The
+attribute ``robot`` is the text of the robot file.
 """
 
 from __future__ import annotations
@@ -17,10 +17,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from chilopod.engine import Status
 from chilopod.errors import ParameterError
 from chilopod.kinematics import directions, foot_places, from_modules, module_centres, module_headings
+from chilopod.report.scene.goals import Goal, goals, places_of
 from chilopod.robot import Robot
-from chilopod.steering import ARRIVAL_RADIUS, arrivals
+from chilopod.steering import ARRIVAL_RADIUS
 
 Array = NDArray[np.float64]
 
@@ -153,9 +155,10 @@ class Outcome:
     Attributes
     ----------
     text
-        Such as "arrived at 18.4 s", "target not reached", or the status; nothing is said before its time.
+        Such as "arrived at 18.4 s", "finished at 81.2 s", "target not reached", or the status; nothing is said before
+        its time.
     kind
-        "arrived", "stopped" (its record ends early) or "ended" (with the record).
+        "arrived", "stopped" (its record ends early) or "ended" (with the record, or where it was told to stop).
     time
         From when on it is known, s.
     """
@@ -196,8 +199,8 @@ class Scene:
         What is seen of the floor.
     titles, outcomes
         One for each robot.
-    targets
-        (R, 2) m; NaN where there is none.
+    goals
+        The targets of each robot.
     arrival_radius
         m; 0 where there are no targets.
     """
@@ -206,7 +209,7 @@ class Scene:
     floor: Floor
     titles: tuple[str, ...]
     outcomes: tuple[Outcome, ...]
-    targets: Array
+    goals: tuple[tuple[Goal, ...], ...]
     arrival_radius: float
 
 
@@ -228,18 +231,13 @@ def scene(record: xr.Dataset, titles: Mapping[Any, str] | Sequence[str], times: 
         If the record does not go with its robot, or a robot has no title.
     """
     frames = body_frames(record, times)
-    count = record.sizes["robot"]
-    targets = np.full((count, 2), np.nan)
-    if "target" in record:
-        targets = record["target"].transpose("robot", "axis").values.astype(np.float64)
-    radius = ARRIVAL_RADIUS if "target" in record else 0.0
-    arrived = arrivals(record) if "target" in record else np.full(count, np.nan)
+    sought, radius = goals(record), ARRIVAL_RADIUS if "target" in record else 0.0
     return Scene(
         frames,
-        _floor(frames, targets, radius),
+        _floor(frames, sought, radius),
         _titles(record, titles),
-        tuple(_outcome(record, frames, robot, float(arrived[robot])) for robot in range(count)),
-        targets,
+        tuple(_outcome(record, frames, robot, each) for robot, each in enumerate(sought)),
+        sought,
         radius,
     )
 
@@ -256,20 +254,24 @@ def _titles(record: xr.Dataset, titles: Mapping[Any, str] | Sequence[str]) -> tu
     return tuple(titles)
 
 
-def _outcome(record: xr.Dataset, frames: BodyFrames, robot: int, arrival: float) -> Outcome:
+def _outcome(record: xr.Dataset, frames: BodyFrames, robot: int, sought: Sequence[Goal]) -> Outcome:
     status, walks = str(record["status"].values[robot]), frames.walks[:, robot]
+    halted = status == Status.HALTED.label
+    # Where there are several, the last may be reached and the robot fall all the same.
+    arrival = sought[-1].arrival if len(sought) == 1 or (sought and walks[-1]) else np.nan
     if np.isfinite(arrival):
         return Outcome(f"arrived at {arrival:.1f} s", "arrived", arrival)
     if not walks.any():
         return Outcome(status, "stopped", float(frames.time[0]))
     end = float(frames.time[walks][-1])
+    if halted and not walks[-1]:
+        return Outcome(f"finished at {end:.1f} s", "ended", end)
     if not walks[-1]:
         return Outcome(f"{status} at {end:.1f} s", "stopped", end)
-    missed = "target" in record and bool(np.isfinite(record["target"].isel(robot=robot)).all())
-    return Outcome("target not reached" if missed else status, "ended", end)
+    return Outcome("target not reached" if sought else status, "ended", end)
 
 
-def _floor(frames: BodyFrames, targets: Array, radius: float) -> Floor:
+def _floor(frames: BodyFrames, sought: Sequence[Sequence[Goal]], radius: float) -> Floor:
     """The box around all bodies and targets, a little larger, and neither a slit nor a tower."""
     robot, n = frames.robot, frames.robot.body.modules
     flat = np.concatenate([frames.spine, frames.feet.reshape(*frames.centres.shape[:2], 2 * n, 2)], axis=2)
@@ -279,7 +281,7 @@ def _floor(frames: BodyFrames, targets: Array, radius: float) -> Floor:
     furthest = 2.0 * (robot.body.length + robot.gait.speed * duration)
     start = frames.centres[:1, :, :1]
     seen &= np.abs(np.where(seen[..., None], flat - start, np.inf)).max(axis=-1) <= furthest
-    aims = targets[np.isfinite(targets).all(-1)]
+    aims = places_of(sought)
     points = np.concatenate([flat[seen], aims - radius, aims + radius, np.zeros((0 if seen.any() else 1, 2))])
     low, high = points.min(axis=0), points.max(axis=0)
     low[1] -= _FOOT_ROOM * max(high[1] - low[1], (high[0] - low[0]) / _FLATTEST)

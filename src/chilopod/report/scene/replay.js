@@ -63,7 +63,7 @@
     context.clearRect(0, 0, robot.width, robot.height);
     context.globalAlpha = 1;
     drawGrid(context, robot, X, Y, left, top, zoom);
-    if (robot.target) drawTarget(context, robot, now, X, Y, zoom);
+    for (const goal of robot.goals) drawTarget(context, goal, player.stage(goal, now), X, Y, zoom);
     if (shown) {
       if (robot.outcome.kind === "stopped" && now > robot.outcome.time) context.globalAlpha = 0.45;
       const feet = drawModules(context, robot, frame, on, zoom);
@@ -90,19 +90,21 @@
     context.stroke();
   }
 
-  function drawTarget(context, robot, now, X, Y, zoom) {
-    const [x, y] = [X(robot.target[0]), Y(robot.target[1])];
-    const arrived = robot.outcome.kind === "arrived" && now >= robot.outcome.time;
+  function drawTarget(context, goal, stage, X, Y, zoom) {
+    if (stage === "ahead") return;
+    const [x, y] = [X(goal.place[0]), Y(goal.place[1])];
     context.strokeStyle = context.fillStyle = colors.target;
     context.beginPath();
     context.arc(x, y, data.arrivalRadius * zoom, 0, 2 * Math.PI);
-    context.globalAlpha = arrived ? 0.35 : 0.1;
+    context.globalAlpha = { present: 0.1, reached: 0.35, behind: 0 }[stage];
     context.fill();
-    context.globalAlpha = 1;
+    context.globalAlpha = stage === "behind" ? 0.4 : 1;
     context.lineWidth = 1.5;
-    context.setLineDash(arrived ? [] : [4, 3]);
+    context.setLineDash(stage === "present" ? [4, 3] : []);
     context.stroke();
     context.setLineDash([]);
+    context.globalAlpha = 1;
+    if (stage === "behind") return;
     context.lineWidth = 2;
     context.beginPath();
     context.moveTo(x - 5, y);

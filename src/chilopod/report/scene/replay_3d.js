@@ -37,12 +37,6 @@
     for (let frame = 0; frame < time.count && poses.exists(robot.raw); frame++) {
       robot.path.push([poses.value(robot.raw, frame, 0), poses.value(robot.raw, frame, 1)]);
     }
-    robot.pole = robot.target && {
-      kind: "cylinder",
-      size: [data.pole.radius, 0.5 * data.pole.height],
-      matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, ...robot.target, 0.5 * data.pole.height, 1],
-      color: colors.target,
-    };
   }
 
   const marked = landmarks();
@@ -86,9 +80,10 @@
           if (["front", "module", "foot"].includes(shapes[i].role) && inside(place)) points.push(place);
         });
       }
-      if (!robot.target) continue;
-      const [x, y] = robot.target, r = data.arrivalRadius;
-      points.push([x - r, y, 0], [x + r, y, 0], [x, y - r, 0], [x, y + r, 0], [x, y, data.pole.height]);
+      for (const { place: [x, y] } of robot.goals) {
+        const r = data.arrivalRadius;
+        points.push([x - r, y, 0], [x + r, y, 0], [x, y - r, 0], [x, y + r, 0], [x, y, data.pole.height]);
+      }
     }
     return points.length ? points : [[floor.x0, floor.y0, 0], [floor.x1, floor.y1, 0]];
   }
@@ -147,11 +142,11 @@
     const mean = (i) => modules.reduce((sum, matrix) => sum + matrix[12 + i], 0) / modules.length;
     const camera = cameraOn(robot, follow.checked && exists ? [0, 1, 2].map(mean) : null);
     const ratio = canvas.width / robot.width;
-    const arrived = robot.outcome.kind === "arrived" && now >= robot.outcome.time;
+    const targets = robot.goals.map((goal) => ({ place: goal.place, stage: player.stage(goal, now) }));
     const pale = robot.outcome.kind === "stopped" && now > robot.outcome.time;
-    const pole = robot.pole ? [robot.pole] : [];
+    const pole = targets.filter(({ stage }) => ["present", "reached"].includes(stage)).map(poleAt);
     painter.start(canvas.width, canvas.height, camera);
-    painter.paintFloor(camera, ratio, robot.target, arrived);
+    painter.paintFloor(camera, ratio, targets);
     if (pole.length) painter.paintSolids(camera, pole, true, false);
     painter.paintSolids(camera, solids, true, pale);
     const width = 6 * camera.distance * NARROW / robot.height, pieces = exists ? frame : 0;
@@ -164,6 +159,15 @@
     context.drawImage(surface, 0, 0);
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     drawMarks(context, robot, camera);
+  }
+
+  function poleAt({ place }) {
+    return {
+      kind: "cylinder",
+      size: [data.pole.radius, 0.5 * data.pole.height],
+      matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, ...place, 0.5 * data.pole.height, 1],
+      color: colors.target,
+    };
   }
 
   function dressed(robot, now) {

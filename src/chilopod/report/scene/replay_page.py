@@ -86,7 +86,7 @@ def page(
         ],
         colors=COLORS,
         grid=f"{shown.floor.grid:g} m",
-        has_targets=bool(np.isfinite(shown.targets).all(-1).any()),
+        has_targets=any(shown.goals),
         data={**_common(shown), **data, "robots": _robots(shown, data["robots"])},
         **words,
     )
@@ -124,8 +124,17 @@ def _robots(shown: Scene, more: Sequence[Mapping[str, Any]]) -> list[dict[str, A
     return [
         {
             "outcome": {"text": outcome.text, "kind": outcome.kind, "time": outcome.time},
-            "target": target.tolist() if np.isfinite(target).all() else None,
+            "goals": [
+                {
+                    "place": goal.place,
+                    "since": goal.since,
+                    # What JSON has no number for: for ever, and never.
+                    "until": goal.until if np.isfinite(goal.until) else None,
+                    "arrival": goal.arrival if np.isfinite(goal.arrival) else None,
+                }
+                for goal in sought
+            ],
             **each,
         }
-        for outcome, target, each in zip(shown.outcomes, shown.targets, more, strict=True)
+        for outcome, sought, each in zip(shown.outcomes, shown.goals, more, strict=True)
     ]

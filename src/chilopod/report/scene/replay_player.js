@@ -121,6 +121,13 @@ function replayPlayer(data, aspect) {
     if (!asked && !matchMedia("(prefers-reduced-motion: reduce)").matches) setPlaying(true);
   }
 
+  // What a target is at a time: nothing yet, the target, the target and reached, or a former one.
+  function stage(goal, time) {
+    if (time < goal.since) return "ahead";
+    if (goal.until !== null && time >= goal.until) return "behind";
+    return goal.arrival !== null && time >= goal.arrival ? "reached" : "present";
+  }
+
   const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
-  return { robots, follow, actions, bytes, redraw, start };
+  return { robots, follow, actions, bytes, stage, redraw, start };
 }
