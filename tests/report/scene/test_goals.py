@@ -51,9 +51,9 @@ def test_every_target_has_its_time_and_its_arrival(record):
         ["present", "ahead", "ahead"],
         ["reached", "ahead", "ahead"],
         ["behind", "present", "ahead"],
-        ["behind", "behind", "ahead"],
-        ["behind", "behind", "present"],
-        ["behind", "behind", "reached"],
+        ["behind", "missed", "ahead"],
+        ["behind", "missed", "present"],
+        ["behind", "missed", "reached"],
     ]
 
 

@@ -36,7 +36,13 @@ _SMALLEST, LARGEST = 240, 4096
 PIXEL: Final = 72.0  # points in an inch: at so many dots per inch, matplotlib's sizes are pixels
 GAP: Final = 12.0  # to the edges and from row to row, pixels
 APART: Final = 28.0  # from column to column: outcome and next title stand side by side
-_RINGS: Final = {"ahead": (0.0, 0.0), "present": (0.1, 1.0), "reached": (0.35, 1.0), "behind": (0.0, 0.4)}
+_RINGS: Final = {
+    "ahead": (0.0, 0.0),
+    "present": (0.1, 1.0),
+    "reached": (0.35, 1.0),
+    "behind": (0.0, 0.4),
+    "missed": (0.0, 0.4),
+}
 _MARKS: Final = {"arrived": ("✓ ", "#00563f"), "stopped": ("✕ ", "#8f3d00"), "ended": ("", style.BLACK)}
 
 
@@ -317,7 +323,7 @@ class FilmPanel:
             fill, line = _RINGS[stage]
             ring.set_facecolor((COLORS["target"], fill))
             ring.set_edgecolor((COLORS["target"], line))
-            ring.set_linestyle((0, (4, 3)) if stage == "present" else "-")
+            ring.set_linestyle((0, (4, 3)) if stage in ("present", "missed") else "-")
             cross.set_visible(stage in ("present", "reached"))
         return known, stages
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from chilopod.steering import arrivals
 
-Stage = Literal["ahead", "present", "reached", "behind"]
+Stage = Literal["ahead", "present", "reached", "behind", "missed"]
 
 _SAME_INSTANT = 1e-9  # s
 
@@ -37,12 +37,12 @@ class Goal:
     arrival: float
 
     def stage(self, now: float) -> Stage:
-        """What it is at a time, s: still to come, the target, the target and reached, or a former one."""
+        """What it is at a time, s: to come, the target, the target and reached, a former one: reached, or missed."""
         now += _SAME_INSTANT
         if now < self.since:
             return "ahead"
         if now >= self.until:
-            return "behind"
+            return "missed" if np.isnan(self.arrival) else "behind"
         return "reached" if now >= self.arrival else "present"
 
 

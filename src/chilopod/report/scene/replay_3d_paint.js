@@ -4,7 +4,7 @@ function replayPainter(gl, data) {
   const LIGHT = [-0.32, -0.42, 0.85];
   const ROUNDING = 0.006;  // m, of the edges of boxes
   const MOST_TARGETS = 60;  // the latest
-  const MARKS = { present: [0.14, -1], reached: [0.4, 1], behind: [0, 0.4] };
+  const MARKS = { present: [0.14, -1], reached: [0.4, 1], behind: [0, 0.4], missed: [0, -0.4] };
 
   const SOLID = `#version 300 es
     uniform mat4 seen, model;

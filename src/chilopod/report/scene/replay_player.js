@@ -121,10 +121,10 @@ function replayPlayer(data, aspect) {
     if (!asked && !matchMedia("(prefers-reduced-motion: reduce)").matches) setPlaying(true);
   }
 
-  // What a target is at a time: nothing yet, the target, the target and reached, or a former one.
+  // What a target is at a time: nothing yet, the target, the target and reached, or a former one that was reached or missed.
   function stage(goal, time) {
     if (time < goal.since) return "ahead";
-    if (goal.until !== null && time >= goal.until) return "behind";
+    if (goal.until !== null && time >= goal.until) return goal.arrival === null ? "missed" : "behind";
     return goal.arrival !== null && time >= goal.arrival ? "reached" : "present";
   }
 
