@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import datetime
 import json
-import os
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -12,9 +11,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from chilopod.errors import RobotFileError, nearest_name
+from chilopod.text_file import read_text
 
 _PRESETS: Final = Path(__file__).parent.parent / "robots"
-_LARGEST_FILE: Final = 1_000_000
 _MOST_DOTS: Final = 200
 _BETWEEN_KEYS: Final = re.compile(r"[\n=,\[\]{}]")
 _BARE_KEY: Final = re.compile(r"[A-Za-z0-9_-]+")
@@ -70,23 +69,14 @@ def read_table(robot: str | Path) -> tuple[dict[str, Any], str]:
     if source in names:
         path = _PRESETS / f"{source}.toml"
     try:
-        if not path.is_file():
-            raise _not_found(robot, names)
-        # Some files that the system makes up call themselves regular, and keep waiting for news.
-        with open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as file:
-            content = file.read(_LARGEST_FILE + 1) or b""
-    except (OSError, ValueError) as error:
-        if isinstance(error, RobotFileError):
-            raise
-        raise RobotFileError(f"cannot be read ({getattr(error, 'strerror', None) or error})", source=source) from None
-    if len(content) > _LARGEST_FILE:
-        raise RobotFileError("too large for a robot file", source=source, allowed=f"up to {_LARGEST_FILE} bytes")
-    if not content.strip():
-        raise RobotFileError("the file is empty", source=source)
+        missing = not (source and path.exists())
+    except OSError:
+        missing = False  # reading it says why it cannot be
+    if missing:
+        raise _not_found(robot, names)
+    text = read_text(path, "robot file", RobotFileError)
     try:
-        return parsed(content.decode()), source
-    except UnicodeDecodeError:
-        raise RobotFileError("is not a text file (UTF-8)", source=source) from None
+        return parsed(text), source
     except RobotFileError as error:
         error.source = source
         raise
@@ -120,10 +110,6 @@ def to_toml(table: Mapping[str, Any]) -> str:
 
 def _not_found(robot: str | Path, names: list[str]) -> RobotFileError:
     source, path = str(robot), Path(robot)
-    if source and path.is_dir():
-        return RobotFileError("is a folder, not a robot file", source=source)
-    if source and path.exists():
-        return RobotFileError("is not a regular file", source=source)
     if isinstance(robot, Path) or len(path.parts) > 1 or path.suffix:
         return RobotFileError("no such file", source=source, nearest=nearest_name(source, names))
     allowed = f"a robot file or one of the presets {', '.join(names)}"

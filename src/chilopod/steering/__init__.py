@@ -1,23 +1,32 @@
-"""What to command: the radius a target asks for, the spring that gives it, the leg-yaw controller, how well it went."""
+"""What to command: courses of targets, the radius a target asks for, the spring that gives it, the leg-yaw controller;
+and how well it went."""
 
+from chilopod.steering.course import COURSES, Course, Goal, course_named, random_course
 from chilopod.steering.criteria import Criteria, Outcome, arrivals, earliest_arrival, evaluate
 from chilopod.steering.leg_yaw import LegYawController
 from chilopod.steering.radius_law import RadiusLaw
+from chilopod.steering.shortest import shortest_path
 from chilopod.steering.strategies import STRATEGIES, Strategy, steered, strategy_named
 from chilopod.steering.target import ARRIVAL_RADIUS, Target
 
 __all__ = [
     "ARRIVAL_RADIUS",
+    "COURSES",
     "STRATEGIES",
+    "Course",
     "Criteria",
+    "Goal",
     "LegYawController",
     "Outcome",
     "RadiusLaw",
     "Strategy",
     "Target",
     "arrivals",
+    "course_named",
     "earliest_arrival",
     "evaluate",
+    "random_course",
+    "shortest_path",
     "steered",
     "strategy_named",
 ]

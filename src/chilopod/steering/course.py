@@ -1,0 +1,293 @@
+"""Courses: targets one after another, and how they are read."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod import units
+from chilopod.engine.arguments import as_number
+from chilopod.errors import ParameterError, UnitError, nearest_name
+from chilopod.kinematics import directions
+from chilopod.record import in_range
+from chilopod.steering.target import ARRIVAL_RADIUS, FARTHEST
+from chilopod.text_file import read_text
+
+Array = NDArray[np.float64]
+
+MOST_GOALS = 1000
+"""More targets than this are a slip of the pen."""
+
+_LONGEST_PATIENCE = 1e4
+_FORM = 'a direction and a distance, such as "45 deg, 1.3 m", or a place on the floor, such as "1.2 m, 0.5 m"'
+_RANDOM = "random:"
+_LONGEST_SEED = 18  # digits: a 64-bit whole number holds them
+_WIDEST_BEARING = math.radians(75.0)
+_DISTANCES = (0.8, 2.0)
+_DIGITS = 9  # of a distance: what rounding does to the 0.15 m or 10 km that somebody typed is not held against them
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A target of a course: a place on the floor, or one seen from where the robot is when its turn comes.
+
+    Attributes
+    ----------
+    x, y
+        On the floor, where the robot starts at the origin along x; or ahead of module 1 and to its left, m.
+    relative
+        Whether seen from module 1 when the goal before is done with.
+
+    Raises
+    ------
+    ParameterError
+        If it is too far to be a target, or is relative and on the robot already.
+    """
+
+    x: float
+    y: float
+    relative: bool
+
+    def __post_init__(self) -> None:
+        # Equal trials have one text, whatever kinds of numbers they were given.
+        for name in ("x", "y"):
+            object.__setattr__(self, name, as_number(name, getattr(self, name)))
+        distance = round(math.hypot(self.x, self.y), _DIGITS)
+        if not (ARRIVAL_RADIUS if self.relative else -1.0) < distance <= FARTHEST:
+            near = f"more than the {ARRIVAL_RADIUS:g} m that count as arrived, " if self.relative else ""
+            raise ParameterError(
+                "is no way to go",
+                field="target distance",
+                value=f"{distance:g} m",
+                allowed=f"{near}at most {FARTHEST:g} m",
+            )
+
+    @classmethod
+    def parse(cls, text: str) -> Goal:
+        """Read ``"45 deg, 1.3 m"``: direction and distance from module 1, or ``"1.2 m, 0.5 m"``: x and y on the floor.
+
+        A direction is relative to the heading, left positive, -180 to 180 deg.
+
+        Raises
+        ------
+        ParameterError, UnitError
+            If it is neither, or no place to go to.
+        """
+        first, comma, second = (part.strip() for part in text.partition(","))
+        fits = [unit for unit in ("rad", "m") if _is_quantity(first, unit)]
+        if not comma or len(fits) != 1:
+            # Of a bare number nobody could tell whether it is an angle or a length.
+            problem = "needs a unit behind its first number" if comma and fits else "is no target"
+            raise ParameterError(problem, field="target", value=text.strip(), allowed=_FORM)
+        value = units.parse(first, fits[0])
+        try:
+            other = units.parse(second, "m")
+        except UnitError as error:
+            error.field = "target"
+            raise
+        if fits == ["m"]:
+            return cls(value, other, relative=False)
+        if not abs(value) <= math.pi or other < 0.0:
+            raise ParameterError(
+                "is no direction and distance",
+                field="target",
+                value=text.strip(),
+                allowed="-180 to 180 deg, a positive distance",
+            )
+        return cls(other * math.cos(value), other * math.sin(value), relative=True)
+
+    def __str__(self) -> str:
+        if not self.relative:
+            return f"{self.x:g} m, {self.y:g} m"
+        return f"{math.degrees(math.atan2(self.y, self.x)):g} deg, {math.hypot(self.x, self.y):g} m"
+
+    def place(self, poses: Array) -> Array:
+        """Where it is on the floor, m, shape (robots, 2).
+
+        Parameters
+        ----------
+        poses
+            Of module 1 of each robot when the goal's turn comes: x and y (m) and heading (rad), shape (robots, 3).
+        """
+        if not self.relative:
+            return np.tile([self.x, self.y], (len(poses), 1))
+        ahead, left = directions(poses[:, 2])
+        return np.asarray(poses[:, :2] + self.x * ahead + self.y * left)
+
+
+@dataclass(frozen=True)
+class Course:
+    """Targets one after another.
+
+    Attributes
+    ----------
+    goals
+        At least one, none where the one before is.
+    patience
+        For each goal, s; then the next has its turn.
+    view
+        Whole angle ahead of module 1 within which its scanner sees, rad; by default that of the paper's (Hokuyo
+        URG-04LX, section Robot).
+    range
+        How far the scanner sees, m; by default that of the same one (its data sheet).
+
+    Raises
+    ------
+    ParameterError
+        If that is no course.
+    """
+
+    goals: tuple[Goal, ...]
+    patience: float
+    view: float = math.radians(240.0)
+    range: float = 4.095
+
+    def __post_init__(self) -> None:
+        for name in ("patience", "view", "range"):
+            object.__setattr__(self, name, as_number(name, getattr(self, name)))
+        in_range("patience", self.patience, _LONGEST_PATIENCE, "s")
+        in_range("view", math.degrees(self.view), 360.0, "deg")
+        in_range("range", self.range, FARTHEST, "m")
+        if not 1 <= len(self.goals) <= MOST_GOALS:
+            raise _wrong_count(len(self.goals))
+        before, where = Goal(0.0, 0.0, relative=False), "where the robot starts"
+        for number, goal in enumerate(self.goals, 1):
+            apart = math.hypot(goal.x - before.x, goal.y - before.y)
+            if not (goal.relative or before.relative or apart > ARRIVAL_RADIUS):
+                raise ParameterError(
+                    f"lies {where}",
+                    field=f"target {number}",
+                    value=str(goal),
+                    allowed=f"more than {ARRIVAL_RADIUS:g} m from it",
+                )
+            before, where = goal, f"where target {number} does"
+
+    @property
+    def duration(self) -> float:
+        """Nothing takes longer, s."""
+        return self.patience * len(self.goals)
+
+    def __str__(self) -> str:
+        return "; ".join(map(str, self.goals))
+
+
+def _floor(*places: tuple[float, float]) -> tuple[Goal, ...]:
+    return tuple(Goal(x, y, relative=False) for x, y in places)
+
+
+COURSES: Mapping[str, tuple[Goal, ...]] = {
+    "slalom": _floor((1.5, 0.5), (3.0, -0.5), (4.5, 0.5), (6.0, -0.5), (7.5, 0.5)),
+    "square": _floor((2.0, 0.0), (2.0, 2.0), (0.0, 2.0), (0.0, 0.0)),
+    "eight": _floor(
+        (1.0, 1.0), (0.0, 2.0), (-1.0, 1.0), (0.0, 0.0), (1.0, -1.0), (0.0, -2.0), (-1.0, -1.0), (0.0, 0.0)
+    ),
+}
+"""By name, for a robot as long as the paper's, 1.35 m, which turns within about 0.35 m.
+
+======  ===============================================================
+slalom  gates left and right of the way ahead, 1.5 m from each other
+square  the corners of a square of 2 m, all turns to the left
+eight   a circle of 1 m to the left and one to the right, back each time
+======  ===============================================================
+"""
+
+
+def random_course(seed: int, patience: float, count: int = 5) -> Course:
+    """Targets seen from module 1 at random: bearings within 75 deg of the heading, distances of 0.8 to 2 m.
+
+    Parameters
+    ----------
+    seed
+        The same seed makes the same course; 0 or more.
+    patience
+        For each target, s.
+    count
+        How many targets.
+    """
+    rng = np.random.default_rng(seed)
+    bearings = rng.uniform(-_WIDEST_BEARING, _WIDEST_BEARING, count)
+    distances = rng.uniform(*_DISTANCES, count)
+    x, y = distances * np.cos(bearings), distances * np.sin(bearings)
+    return Course(tuple(Goal(float(a), float(b), relative=True) for a, b in zip(x, y, strict=True)), patience)
+
+
+def course_named(text: str, patience: float) -> Course:
+    """Read a course.
+
+    Parameters
+    ----------
+    text
+        Targets as :meth:`Goal.parse` reads them with semicolons between, ``"45 deg, 1.3 m; -60 deg, 1.5 m"``; or the
+        path of a file with a target a line, ``#`` before comments; or a name of :data:`COURSES`; or ``random:SEED``.
+        A file that is named like a course is reached as ``./name``.
+    patience
+        For each target, s.
+
+    Raises
+    ------
+    ParameterError, UnitError
+        If it is none of these, saying which target is wrong.
+    """
+    if text in COURSES:
+        return Course(COURSES[text], patience)
+    if text.startswith(_RANDOM):
+        return random_course(_seed(text), patience)
+    if text and os.path.exists(text):
+        return Course(_goals_in(text), patience)
+    if "," in text or ";" in text:
+        return Course(_goals(text.split(";")), patience)
+    raise ParameterError(
+        "there is no such course or file",
+        field="targets",
+        value=text,
+        allowed=f'targets such as "45 deg, 1.3 m; -60 deg, 1.5 m", a file, {", ".join(COURSES)}, {_RANDOM}SEED',
+        nearest=nearest_name(text, [*COURSES, f"{_RANDOM}1"]),
+    )
+
+
+def _goals_in(path: str) -> tuple[Goal, ...]:
+    lines = (line.partition("#")[0].strip() for line in read_text(path, "course", ParameterError).splitlines())
+    try:
+        return _goals([line for line in lines if line])
+    except (ParameterError, UnitError) as error:
+        error.source = path
+        raise
+
+
+def _goals(texts: list[str]) -> tuple[Goal, ...]:
+    if not 1 <= len(texts) <= MOST_GOALS:
+        raise _wrong_count(len(texts))
+    return tuple(_goal(number, text) for number, text in enumerate(texts, 1))
+
+
+def _goal(number: int, text: str) -> Goal:
+    try:
+        return Goal.parse(text)
+    except (ParameterError, UnitError) as error:
+        error.field = f"target {number}"
+        raise
+
+
+def _seed(text: str) -> int:
+    digits = text.removeprefix(_RANDOM)
+    if not (digits.isascii() and digits.isdigit() and len(digits) <= _LONGEST_SEED):
+        allowed = f"a whole number from 0, at most {_LONGEST_SEED} digits, such as {_RANDOM}1"
+        raise ParameterError("has no seed", field="targets", value=text, allowed=allowed)
+    return int(digits)
+
+
+def _wrong_count(count: int) -> ParameterError:
+    return ParameterError("is no number of targets", field="targets", value=count, allowed=f"1 to {MOST_GOALS}")
+
+
+def _is_quantity(text: str, unit: str) -> bool:
+    try:
+        units.parse(text, unit)
+    except UnitError:
+        return False
+    return True
