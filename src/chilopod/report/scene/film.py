@@ -335,7 +335,7 @@ class FilmPanel:
             return ()
         headings, feet = frames.headings[index, robot], frames.feet[index, robot]
         self.modules.set_verts(list(_on_modules(centres, headings, self.outline)))
-        self.modules.set_alpha(1.0 if frames.walks[index, robot] or self.outcome.kind == "ended" else 0.45)
+        self.modules.set_alpha(1.0 if frames.walks[index, robot] or self.outcome.kind != "stopped" else 0.45)
         hips = _on_modules(centres, headings, self.hips)
         self.legs.set_segments(list(np.stack([hips, feet], axis=-2).reshape(-1, 2, 2)))
         self.legs.set_color([COLORS["ink"] if each else COLORS["air"] for each in stands.ravel()])

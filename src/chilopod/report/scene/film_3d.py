@@ -201,7 +201,7 @@ class _Walks:
         return Look(
             pose=self.poses[last, robot] if last >= 0 else None,
             stands=shown.frames.stands[index, robot],
-            walks=bool(shown.frames.walks[index, robot]) or shown.outcomes[robot].kind == "ended",
+            walks=bool(shown.frames.walks[index, robot]) or shown.outcomes[robot].kind != "stopped",
             path=self.positions[: last + 1, robot],
             targets=tuple((goal.place, goal.stage(now)) for goal in shown.goals[robot]),
             radius=shown.arrival_radius,

@@ -93,7 +93,7 @@ class Look:
     stands
         Whether each foot is on the floor, (N, 2).
     walks
-        Whether the robot still walks, or stands where it was told to; if not, it is pale.
+        Whether the robot still walks, or has arrived or finished; if not, it is pale.
     path
         Of the centre of module 1 up to then, m, (P, 2).
     targets
