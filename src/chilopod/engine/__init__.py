@@ -19,7 +19,7 @@ from chilopod.engine.contract import (
     Traits,
     Walk,
 )
-from chilopod.engine.loop import Spent, event_times, steer, watched
+from chilopod.engine.loop import Referee, Spent, event_times, steer, watched
 from chilopod.engine.named import ENGINES, controller_named, engine_named
 from chilopod.engine.targets import Targets
 
@@ -34,6 +34,7 @@ __all__ = [
     "HasFootCreep",
     "Observation",
     "Ramps",
+    "Referee",
     "Spent",
     "Status",
     "Targets",

@@ -7,7 +7,9 @@ import time as clock
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from heapq import merge
+from itertools import count, takewhile
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +69,21 @@ def watched(progress: Progress = silent) -> Iterator[Spent]:
         _watching[:] = [each for each in _watching if each is not spent]
 
 
+class Referee(Protocol):
+    """Somebody who looks at a walk while it is steered: knows where the robots are, and stands between what they sense
+    and their controller."""
+
+    @property
+    def every(self) -> float:
+        """Between two looks, s; the first is at the beginning."""
+
+    def look(self, walk: Walk) -> bool:
+        """Look, aim, halt, and say whether the walk is to go on."""
+
+    def through(self, index: int, seen: Observation) -> Observation:
+        """What gets through to the controller of what is sensed at the event of that number."""
+
+
 def event_times(controller: Controller, gait: Gait, duration: float) -> Iterator[tuple[float, Event]]:
     """All instants in [0, duration) at which a controller is asked, in order, one after the other.
 
@@ -98,9 +115,10 @@ def steer(
     controller: Controller | None = None,
     *,
     bearing_noise: Array | None = None,
+    referee: Referee | None = None,
     progress: Progress = silent,
 ) -> None:
-    """Walk on to a time, commanded by a controller at its events.
+    """Walk on to a time, commanded by a controller at its events; or until its referee says that it is over.
 
     Parameters
     ----------
@@ -140,15 +158,22 @@ def steer(
 
     pace = _Pace()
     since, thought = clock.perf_counter(), 0.0
-    for index, (time, event) in enumerate(event_times(controller, gait, until) if controller else ()):
+    for time, index, event in _instants(controller, gait, referee, until):
         if time < begun:
             continue
         pace.advance(walk, time, tell)
+        if event is None:
+            if referee is not None and not referee.look(walk):
+                until = time
+                break
+            continue
         seen = walk.observe()
         if bearing_noise is not None:
             if index >= bearing_noise.shape[1]:
                 raise ParameterError("is for fewer events", field="bearing_noise", value=bearing_noise.shape[1])
             seen = replace(seen, bearing=(seen.bearing + bearing_noise[:, index] + np.pi) % (2.0 * np.pi) - np.pi)
+        if referee is not None:
+            seen = referee.through(index, seen)
         assert controller is not None
         asked = clock.perf_counter()
         command = _answer(controller, event, seen)
@@ -164,6 +189,20 @@ def steer(
     for spent in _watching:
         spent.controller += thought
         spent.total += clock.perf_counter() - since
+
+
+def _instants(
+    controller: Controller | None, gait: Gait, referee: Referee | None, until: float
+) -> Iterator[tuple[float, int, Event | None]]:
+    """Instants before ``until`` (s) at which somebody looks: the number of the event and the event; no event where it
+    is the referee, who looks first."""
+    events = enumerate(event_times(controller, gait, until) if controller else ())
+    asked: Iterator[tuple[float, int, Event | None]] = ((time, index, event) for index, (time, event) in events)
+    looks: Iterator[tuple[float, int, Event | None]] = iter(())
+    if referee is not None:
+        every = referee.every
+        looks = ((time, -1, None) for time in takewhile(lambda time: time < until, (n * every for n in count())))
+    return merge(asked, looks, key=lambda each: each[:2])
 
 
 @dataclass

@@ -1,11 +1,15 @@
 """What to command: courses of targets, the radius a target asks for, the spring that gives it, the leg-yaw controller;
 and how well it went."""
 
+from chilopod.steering.actuated import ActuatedAxis
 from chilopod.steering.course import COURSES, Course, Goal, course_named, random_course
 from chilopod.steering.criteria import Criteria, Outcome, arrivals, earliest_arrival, evaluate
 from chilopod.steering.leg_yaw import LegYawController
+from chilopod.steering.measures import of_course
 from chilopod.steering.radius_law import RadiusLaw
+from chilopod.steering.referee import CourseReferee, Verdict, decisions
 from chilopod.steering.shortest import shortest_path
+from chilopod.steering.spring_law import SpringLaw
 from chilopod.steering.strategies import STRATEGIES, Strategy, steered, strategy_named
 from chilopod.steering.target import ARRIVAL_RADIUS, Target
 
@@ -13,18 +17,24 @@ __all__ = [
     "ARRIVAL_RADIUS",
     "COURSES",
     "STRATEGIES",
+    "ActuatedAxis",
     "Course",
+    "CourseReferee",
     "Criteria",
     "Goal",
     "LegYawController",
     "Outcome",
     "RadiusLaw",
+    "SpringLaw",
     "Strategy",
     "Target",
+    "Verdict",
     "arrivals",
     "course_named",
+    "decisions",
     "earliest_arrival",
     "evaluate",
+    "of_course",
     "random_course",
     "shortest_path",
     "steered",

@@ -135,6 +135,9 @@ class Course:
         URG-04LX, section Robot).
     range
         How far the scanner sees, m; by default that of the same one (its data sheet).
+    tightest
+        Radius of the tightest circle that the robot walks, m: what it takes for the shortest path to a target. 0 for a
+        robot that turns on the spot.
 
     Raises
     ------
@@ -146,13 +149,18 @@ class Course:
     patience: float
     view: float = math.radians(240.0)
     range: float = 4.095
+    tightest: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("patience", "view", "range"):
+        for name in ("patience", "view", "range", "tightest"):
             object.__setattr__(self, name, as_number(name, getattr(self, name)))
         in_range("patience", self.patience, _LONGEST_PATIENCE, "s")
         in_range("view", math.degrees(self.view), 360.0, "deg")
         in_range("range", self.range, FARTHEST, "m")
+        if not 0.0 <= self.tightest <= FARTHEST:
+            raise ParameterError(
+                "is no radius", field="tightest", value=f"{self.tightest:g} m", allowed=f"0 to {FARTHEST:g} m"
+            )
         if not 1 <= len(self.goals) <= MOST_GOALS:
             raise _wrong_count(len(self.goals))
         before, where = Goal(0.0, 0.0, relative=False), "where the robot starts"

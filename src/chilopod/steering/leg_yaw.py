@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,7 +12,8 @@ from chilopod.engine import Command, Event, Observation
 from chilopod.errors import ParameterError
 from chilopod.gait import Gait
 
-_SIDES = ("left", "right")
+SIDES = ("left", "right")
+"""Of the legs of module 1: what their events are called."""
 
 
 @dataclass(frozen=True)
@@ -52,14 +53,20 @@ class LegYawController:
         """``start`` of the swings of the left and the right leg."""
         at = gait.duty + self.start * (1.0 - gait.duty)
         ramp = (self.end - self.start) * gait.swing
-        phases = zip(_SIDES, gait.leg_phases(1)[0], strict=True)
+        phases = zip(SIDES, gait.leg_phases(1)[0], strict=True)
         return [Event(side, float((at - phase) % 1.0), ramp) for side, phase in phases]
 
     def act(self, event: Event, seen: Observation) -> Command:
         """New yaw for the leg whose swing this is."""
-        side = _SIDES.index(event.name)
+        side = SIDES.index(event.name)
         yaw = seen.leg_yaw.copy()
         change = np.clip(seen.bearing - yaw[:, side], -self.step, self.step)
         wanted = np.clip(yaw[:, side] + change, -self.limit, self.limit)
         yaw[:, side] = np.where(np.isnan(wanted), yaw[:, side], wanted)
         return Command(leg_yaw=yaw, within=event.window)
+
+    def towards(self, event: Event, seen: Observation) -> Command:
+        """As :meth:`act`, but a target that is not seen is looked for: the leg yaws on to the side that the left one is
+        turned to, to the left if it is straight."""
+        sought = np.copysign(0.5 * math.pi, seen.leg_yaw[:, 0])
+        return self.act(event, replace(seen, bearing=np.where(np.isnan(seen.bearing), sought, seen.bearing)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from chilopod.cores import cores
 from chilopod.engine import engine_named, event_times, steer
 from chilopod.errors import AnalysisError
+from chilopod.steering import CourseReferee, Target, of_course
 from chilopod.trials.description import file_text, plain
 from chilopod.trials.trial import Trial
 
@@ -21,6 +22,9 @@ Array = NDArray[np.float64]
 
 _MOST_BYTES = 256e6
 """Of the records of a batch, about."""
+
+_SLICK = 1e-3
+"""Friction that a foot without grip has left."""
 
 
 def batches(trials: Sequence[Trial], on_cores: int | None = None) -> list[list[Trial]]:
@@ -42,10 +46,11 @@ def batches(trials: Sequence[Trial], on_cores: int | None = None) -> list[list[T
             trial.robot.body.modules,
             trial.duration,
             trial.recording,
-            trial.target is None,
+            _sight(trial),
             json.dumps(trial.steering, sort_keys=True),
             # Whether its sensors are noisy is said once for a batch.
             trial.disturbance.bearing > 0.0,
+            trial.brief,
         )
         groups.setdefault(alike, []).append(trial)
     split = []
@@ -74,27 +79,48 @@ def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
         If an argument is out of range, or the controller fails.
     """
     first = trials[0]
-    engine, seen = engine_named(first.engine), first.target is not None
+    engine, targets = (
+        engine_named(first.engine),
+        [each.target.position for each in trials if isinstance(each.target, Target)],
+    )
+    courses = [each.course for each in trials if each.course]
     asked = sum(1 for _ in event_times(first.controller, first.robot.gait, first.duration)) if first.controller else 0
     drawn = [_drawn(trial, asked) for trial in trials]
-    own_noise = engine.traits.noisy
+    own_noise, noisy = engine.traits.noisy, first.target is not None and first.disturbance.bearing > 0.0
     walk = engine.start(
         [trial.robot for trial in trials],
         initial=engine.initial_states(
             first.robot, np.stack([each.joint_angles for each in drawn]), np.array([each.heading for each in drawn])
         ),
         friction=np.stack([each.friction for each in drawn]),
-        target=np.stack([trial.target.position for trial in trials if trial.target]) if seen else None,
-        seeds=[each.scan_seed for each in drawn] if own_noise and seen and first.disturbance.bearing > 0.0 else None,
+        target=np.stack(targets) if targets else None,
+        seeds=[each.scan_seed for each in drawn] if noisy and own_noise else None,
         record=first.recording,
         expected=first.duration,
     )
     noise = None if own_noise or not asked else np.stack([each.bearing for each in drawn])
-    steer(walk, first.duration, first.controller, bearing_noise=noise)
+    missed = np.stack([each.missed for each in drawn])
+    referee = CourseReferee(courses, first.robot.gait, missed if missed.any() else None) if courses else None
+    steer(walk, first.duration, first.controller, bearing_noise=noise, referee=referee)
     name = type(first.controller).__name__
     if first.controller is not None and json.dumps(plain(first.controller, name)) != json.dumps(first.steering):
         raise AnalysisError("changed its own fields while it steered, so its trials are not what they say", field=name)
-    return _apart(walk.to_dataset(), trials)
+    data = walk.to_dataset()
+    if referee is not None:
+        referee.add_to(data, walk)
+    records = _apart(data, trials)
+    return [
+        of_course(record, trial.robot, trial.brief) if referee else record
+        for record, trial in zip(records, trials, strict=True)
+    ]
+
+
+def _sight(trial: Trial) -> Hashable:
+    """What targets of a batch have in common."""
+    course = trial.course
+    if course is None:
+        return trial.target is None
+    return course.patience, course.view, course.range, course.tightest
 
 
 def _apart(data: xr.Dataset, trials: Sequence[Trial]) -> list[xr.Dataset]:
@@ -126,19 +152,25 @@ class _Drawn:
     heading: float
     friction: Array
     bearing: Array
+    missed: NDArray[np.bool_]
     scan_seed: int
 
 
 def _drawn(trial: Trial, events: int) -> _Drawn:
     """What a trial's seed makes of its disturbance; each kind has its own stream of numbers."""
     n, spread = trial.robot.body.modules, trial.disturbance
-    streams = np.random.SeedSequence(trial.seed).spawn(5)
+    streams = np.random.SeedSequence(trial.seed).spawn(6)
     joints, heading, friction, bearing = (np.random.default_rng(each) for each in streams[:4])
+    feet = np.exp(spread.friction * friction.standard_normal((n, 2)))
+    if spread.slick is not None:
+        feet[spread.slick] *= _SLICK
+    missed = np.random.default_rng(streams[5])
     nominal = np.array(trial.joint_angles) if trial.joint_angles else np.zeros(n - 1)
     return _Drawn(
         nominal + spread.joint_angle * joints.standard_normal(n - 1),
         float(spread.heading * heading.standard_normal()),
-        np.exp(spread.friction * friction.standard_normal((n, 2))),
+        feet,
         spread.bearing * bearing.standard_normal(events),
+        missed.random(events) < spread.missed,
         int(streams[4].generate_state(1)[0]),
     )

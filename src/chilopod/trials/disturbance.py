@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,15 +28,24 @@ class Disturbance:
         Of the logarithm of every foot's friction coefficient.
     bearing
         Of every measured bearing, rad. The twin's scanner has noise of its own instead, if this is not zero.
+    missed
+        Part of its looks at which the scanner misses the target, on a course.
+    slick
+        A foot that has lost its grip, as good as a leg: module and side (left 0, right 1), counted from 0; None: none.
     """
 
     joint_angle: float = float(np.deg2rad(1.0))
     heading: float = float(np.deg2rad(1.0))
     friction: float = 0.04
     bearing: float = float(np.deg2rad(0.5))
+    missed: float = 0.0
+    slick: tuple[int, int] | None = None
 
     def __post_init__(self) -> None:
-        for name, value in asdict(self).items():
+        if not 0.0 <= self.missed <= 1.0:
+            raise ParameterError("is no part", field="missed", value=self.missed, allowed="0 to 1")
+        for name in ("joint_angle", "heading", "friction", "bearing"):
+            value = getattr(self, name)
             if not 0.0 <= value < 10.0:
                 raise ParameterError("is out of range", field=name, value=value, allowed="0 or more, less than 10")
 

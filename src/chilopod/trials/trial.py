@@ -17,11 +17,11 @@ from chilopod.engine.named import check_controller, path_of
 from chilopod.errors import ParameterError
 from chilopod.record import LONGEST, RATE, Recording, in_range
 from chilopod.robot import Robot
-from chilopod.steering import Target
+from chilopod.steering import Course, Target
 from chilopod.trials.description import classes_in, is_findable, plain, robot_text
 from chilopod.trials.disturbance import Disturbance
 
-RECORD_VERSION = 5
+RECORD_VERSION = 6
 """Goes up whenever the same trial would give another record; files of other versions are left alone."""
 
 
@@ -40,7 +40,7 @@ class Trial:
     joint_angles
         At the start, before disturbance, rad, (N-1,); empty for straight.
     target
-        Where the robot is to go, if anywhere.
+        Where the robot is to go, if anywhere: one target, or a course of them, which ends the walk.
     controller
         What steers it, if anything: any frozen dataclass with ``events`` and ``act``, whose fields are plain data. Its
         class, the text of that class and its fields are part of what the trial is.
@@ -54,6 +54,8 @@ class Trial:
         One of :data:`chilopod.engine.ENGINES`, or one's own as ``package.module:object``.
     poses
         Whether the record has the positions of all joints, to be drawn, which not every engine has.
+    brief
+        Of a course: whether only what became of its targets is kept, not what happened over time.
 
     Raises
     ------
@@ -66,22 +68,24 @@ class Trial:
     duration: float
     seed: int = 0
     joint_angles: tuple[float, ...] = ()
-    target: Target | None = None
+    target: Target | Course | None = None
     controller: Controller | None = None
     disturbance: Disturbance = field(default_factory=Disturbance)
     rate: float = RATE
     forces: bool = False
     engine: str = "planar"
     poses: bool = False
+    brief: bool = False
 
     def __post_init__(self) -> None:
         for name, kind, allowed in (
             ("robot", Robot, "a chilopod.Robot"),
             ("engine", str, "its name"),
-            ("target", Target | None, "a chilopod.steering.Target, or None"),
+            ("target", Target | Course | None, "a chilopod.steering.Target or Course, or None"),
             ("disturbance", Disturbance, "a chilopod.trials.Disturbance"),
             ("forces", bool | np.bool_, "True or False"),
             ("poses", bool | np.bool_, "True or False"),
+            ("brief", bool | np.bool_, "True or False"),
         ):
             if not isinstance(getattr(self, name), kind):
                 raise ParameterError("is none", field=name, value=getattr(self, name), allowed=allowed)
@@ -99,10 +103,20 @@ class Trial:
             "rate": as_number("rate", self.rate),
             "forces": bool(self.forces),
             "poses": bool(self.poses),
+            "brief": bool(self.brief),
         }
         for name, value in told.items():
             object.__setattr__(self, name, value)
         in_range("duration", self.duration, LONGEST, "s")
+        if self.brief and self.course is None:
+            raise ParameterError("is for courses", field="brief", value=True, allowed="False, or a course as target")
+        if self.course is not None and self.duration != self.course.duration:
+            raise ParameterError(
+                "is not that of the course",
+                field="duration",
+                value=self.duration,
+                allowed=f"{self.course.duration:g} s",
+            )
         engine = engine_named(self.engine)
         engine.common(self.robot)
         if self.recording.poses and not engine.traits.poses:
@@ -116,6 +130,11 @@ class Trial:
         return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @property
+    def course(self) -> Course | None:
+        """The target if it is a course."""
+        return self.target if isinstance(self.target, Course) else None
+
+    @property
     def recording(self) -> Recording:
         """What is written down."""
         return Recording(self.rate, self.forces, self.poses)
@@ -123,6 +142,8 @@ class Trial:
     @property
     def least_bytes(self) -> float:
         """What its record takes, at least."""
+        if self.brief:
+            return 0.0
         return self.recording.least_bytes(self.robot.body.modules, self.duration)
 
     @cached_property
@@ -141,15 +162,22 @@ class Trial:
                 "duration": self.duration,
                 "seed": self.seed,
                 "joint_angles": list(self.joint_angles),
-                "target": [float(self.target.bearing), float(self.target.distance)] if self.target else None,
+                "target": self._target_text,
                 "controller": self.steering,
                 "disturbance": asdict(self.disturbance),
                 "rate": self.rate,
                 "forces": self.forces,
                 "poses": self.poses,
+                "brief": self.brief,
             },
             sort_keys=True,
         )
+
+    @property
+    def _target_text(self) -> Any:
+        if isinstance(self.target, Course):
+            return asdict(self.target)
+        return [float(self.target.bearing), float(self.target.distance)] if self.target else None
 
     @cached_property
     def file_name(self) -> str:

@@ -1,0 +1,72 @@
+"""A body axis that is driven joint by joint: what steering by a spring is held against."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from chilopod.engine import Command, Event, Observation
+from chilopod.gait import Gait
+from chilopod.robot import Robot
+from chilopod.steering.leg_yaw import SIDES, LegYawController
+from chilopod.steering.radius_law import RadiusLaw
+from chilopod.steering.target import ARRIVAL_RADIUS
+
+_A_CYCLE = 6  # the paper's scanner scans ten times a second
+
+
+@dataclass(frozen=True)
+class ActuatedAxis:
+    """Torques bend the axis into the circle to the target, the same angle in all joints.
+
+    At each of six instants of a gait cycle the torque of every joint is what holds its spring at the wanted angle, and
+    as much again for what is missing of it. Legs yaw as in the paper; a target that is not seen is looked for to the
+    side that they were last turned to.
+
+    Attributes
+    ----------
+    stiffness
+        Of the springs that it works against, N*m/rad, (N-1,).
+    module_length
+        m.
+    most_bent
+        Wanted of one joint, rad.
+    leg_yaw
+        Of the legs of module 1.
+    """
+
+    stiffness: tuple[float, ...]
+    module_length: float
+    most_bent: float
+    leg_yaw: LegYawController = field(default_factory=LegYawController)
+
+    @classmethod
+    def of(cls, robot: Robot, law: RadiusLaw) -> ActuatedAxis:
+        """That of a robot, which bends no tighter than its softest spring would bend it.
+
+        Parameters
+        ----------
+        robot
+            Size and springs.
+        law
+            Its radius law.
+        """
+        return cls(robot.springs.stiffness, robot.module_length, robot.module_length / law.tightest)
+
+    def events(self, gait: Gait) -> Sequence[Event]:
+        """Six of the axis, and those of the legs of module 1."""
+        window = gait.period / _A_CYCLE
+        axis = [Event("axis", number / _A_CYCLE, window) for number in range(_A_CYCLE)]
+        return [*axis, *self.leg_yaw.events(gait)]
+
+    def act(self, event: Event, seen: Observation) -> Command:
+        """Torques, or the yaw of the leg that swings."""
+        if event.name in SIDES:
+            return self.leg_yaw.towards(event, seen)
+        curvature = 2.0 * np.sin(seen.bearing) / np.maximum(seen.distance, ARRIVAL_RADIUS)
+        sought = np.copysign(np.inf, seen.leg_yaw[:, 0])
+        wanted = -self.module_length * np.where(np.isnan(curvature), sought, curvature)
+        angle = np.clip(wanted, -self.most_bent, self.most_bent)[:, None]
+        return Command(joint_torque=np.array(self.stiffness) * (2.0 * angle - seen.joint_angles))

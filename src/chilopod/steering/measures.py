@@ -1,0 +1,92 @@
+"""What walking a course came to, target by target: time, way, and what it cost to steer."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from chilopod.robot import Robot
+
+Array = NDArray[np.float64]
+
+_OVER = ("robot", "goal")
+
+
+def of_course(record: xr.Dataset, robot: Robot, brief: bool = False) -> xr.Dataset:
+    """The record of one robot on a course, up to where it ended, with what every target came to.
+
+    Added are, over (robot, goal), between the moment a target was put up and that at which it was done with:
+
+    ``goal_path``
+        Way of module 1, m, from gait cycle to gait cycle: swaying to and fro within a step is no way.
+    ``goal_effort``
+        Integral of the squared yaw of both legs, as commanded, rad^2 s.
+    ``goal_spring_work``
+        That actuators did on springs, 1/2 theta^2 dk where it is positive, J: they take nothing back.
+    ``goal_drive_work``
+        That joint torques did, joint by joint and command by command, where it is positive, J.
+
+    Parameters
+    ----------
+    record
+        With what :class:`chilopod.steering.CourseReferee` adds, of one robot.
+    robot
+        It.
+    brief
+        Whether to leave out what is over time and over events.
+    """
+    begin, end = (record[f"goal_{name}"].values[0] for name in ("begin", "end"))
+    last = np.nanmax(end) + 1e-9
+    data = record.isel(time=record.time.values <= last)
+    if "event" in data.dims:
+        data = data.isel(event=data.event.values < last)
+    sums = {
+        "path": (_path(data, robot.gait.period), "m"),
+        "effort": (_effort(data), "rad^2*s"),
+        "spring_work": (_spring_work(data), "J"),
+        "drive_work": (_drive_work(data), "J"),
+    }
+    for name, ((times, so_far), unit) in sums.items():
+        between = np.interp(end, times, so_far) - np.interp(begin, times, so_far)
+        data[f"goal_{name}"] = (_OVER, between[None], {"units": unit})
+    return data.drop_dims(["time", "event"], errors="ignore") if brief else data
+
+
+def _so_far(times: Array, steps: Array) -> tuple[Array, Array]:
+    """Times, and the sum up to each of them of what comes to it from one to the next; what is not there counts 0."""
+    return times, np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])
+
+
+def _path(data: xr.Dataset, period: float) -> tuple[Array, Array]:
+    recorded = data.time.values
+    place = data.position.values[:, 0]
+    times = np.append(np.arange(recorded[0], recorded[-1], period), recorded[-1])
+    known = np.isfinite(place[:, 0])
+    at = np.stack([np.interp(times, recorded[known], each) for each in place[known].T], axis=1)
+    return _so_far(times, np.linalg.norm(np.diff(at, axis=0), axis=1))
+
+
+def _effort(data: xr.Dataset) -> tuple[Array, Array]:
+    yaw = data.leg_yaw.values[:, 0]
+    # Exact where the yaw is straight between samples.
+    square = (yaw[1:] ** 2 + yaw[1:] * yaw[:-1] + yaw[:-1] ** 2).sum(axis=1) / 3.0
+    return _so_far(data.time.values, square * np.diff(data.time.values))
+
+
+def _spring_work(data: xr.Dataset) -> tuple[Array, Array]:
+    times = data.time.values
+    if "time" not in data.stiffness.dims:
+        return _so_far(times, np.zeros(len(times) - 1))
+    squares = 0.5 * data.joint_angle.values[:, 0] ** 2
+    work = 0.5 * (squares[1:] + squares[:-1]) * np.diff(data.stiffness.values[:, 0], axis=0)
+    return _so_far(times, np.maximum(work, 0.0).sum(axis=1))
+
+
+def _drive_work(data: xr.Dataset) -> tuple[Array, Array]:
+    if "command_torque" not in data or len(data.event) < 2:
+        return _so_far(data.time.values[:1], np.zeros(0))
+    # A torque is held from one command to the next, so its work is exact.
+    moved = np.diff(data.seen_joint_angles.values[:, 0], axis=0)
+    work = data.command_torque.values[:-1, 0] * moved
+    return _so_far(data.event.values, np.maximum(work, 0.0).sum(axis=1))

@@ -1,0 +1,202 @@
+"""Who sees to it that a course is walked: puts up one target after another, and says what became of each."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.engine import Command, Controller, Observation, Status, Walk, event_times
+from chilopod.gait import Gait
+from chilopod.record import bearing_and_distance
+from chilopod.steering.course import Course
+from chilopod.steering.shortest import shortest_path
+from chilopod.steering.target import ARRIVAL_RADIUS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Array = NDArray[np.float64]
+
+LOOK = 0.1
+"""s between two looks at where the robots are: the paper's robot goes 6 mm meanwhile."""
+
+
+class Verdict(enum.Enum):
+    """What became of a target of a course; each member's ``sentence`` says it in words."""
+
+    ARRIVED = "arrived", f"came within {ARRIVAL_RADIUS:g} m of it"
+    LATE = "out of time", "did not get there in its time"
+    UNSEEN = "never seen", "never had it in the scanner's view, in its time"
+    TOO_FAR = "out of reach", "farther than the robot can walk in its time"
+    STOPPED = "stopped", "did not walk to the end"
+
+    def __init__(self, label: str, sentence: str) -> None:
+        self.label = label
+        self.sentence = sentence
+
+
+class CourseReferee:
+    """Referee of robots that walk one course each, see :class:`chilopod.engine.Referee`.
+
+    A robot's next target is put up when it has arrived at the one before, or that one's time is over, or it cannot be
+    reached in its time at all: the shortest path, with circles as tight as the course says, is longer than what feet
+    cover. After its last one the robot is halted.
+
+    Parameters
+    ----------
+    courses
+        One a robot; how long they have for a target, and what they see, is the same in all.
+    gait
+        Of the robots.
+    missed
+        Whether a target is missed by the scanner, by event, shape (robots, at least as many as events); None: never.
+    """
+
+    every = LOOK
+
+    def __init__(self, courses: Sequence[Course], gait: Gait, missed: NDArray[np.bool_] | None = None) -> None:
+        robots, most = len(courses), max(len(each.goals) for each in courses)
+        self._courses, self._missed, self._speed = courses, missed, gait.speed
+        self._common = courses[0]
+        self._number = np.full(robots, -1)
+        self._places = np.full((robots, most, 2), np.nan)
+        self._begin, self._end = np.full((2, robots, most), np.nan)
+        self._shortest, self._nearest = np.full((2, robots, most), np.nan)
+        self._verdicts = np.full((robots, most), "", dtype=object)
+        self._seen_once = np.zeros(robots, dtype=np.bool_)
+        self._aims = np.full((robots, 2), np.nan)
+        self._log: list[Observation] = []
+
+    def look(self, walk: Walk) -> bool:
+        """Judge, put up what comes next, halt who is done; whether anybody walks on."""
+        now, pose, busy = walk.time, walk.pose(), self._busy
+        if now == 0.0:
+            self._next(walk, pose, busy)
+            return bool(self._busy.any())
+        gone = busy & np.isnan(pose[:, 0])
+        rows, numbers = np.arange(len(pose)), np.minimum(self._number, self._places.shape[1] - 1)
+        away = np.hypot(*(self._places[rows, numbers] - pose[:, :2]).T)
+        self._nearest[rows[busy], numbers[busy]] = np.fmin(self._nearest[rows[busy], numbers[busy]], away[busy])
+        arrived = busy & (away < ARRIVAL_RADIUS)
+        over = busy & ~arrived & ~gone & (now - self._begin[rows, numbers] >= self._common.patience - 1e-9)
+        if gone.any() or arrived.any() or over.any():
+            self._judge(gone, now, Verdict.STOPPED)
+            self._judge(arrived, now, Verdict.ARRIVED)
+            self._judge(over & self._seen_once, now, Verdict.LATE)
+            self._judge(over & ~self._seen_once, now, Verdict.UNSEEN)
+            self._number[gone] = [len(self._courses[robot].goals) for robot in np.flatnonzero(gone)]
+            self._next(walk, pose, arrived | over)
+        return bool(self._busy.any())
+
+    def through(self, index: int, seen: Observation) -> Observation:
+        """What a scanner with this view sees; it is kept."""
+        hidden = np.abs(seen.bearing) > 0.5 * self._common.view
+        hidden |= seen.distance > self._common.range
+        if self._missed is not None:
+            hidden |= self._missed[:, index]
+        bearing, distance = (np.where(hidden, np.nan, each) for each in (seen.bearing, seen.distance))
+        self._seen_once |= np.isfinite(bearing)
+        found = replace(seen, bearing=bearing, distance=distance)
+        self._log.append(found)
+        return replace(found, **{name: getattr(found, name).copy() for name in _KEPT})
+
+    def add_to(self, data: xr.Dataset, walk: Walk) -> None:
+        """Add to the record of the walk what became of every target, and what the controller was shown.
+
+        Parameters
+        ----------
+        data
+            From :meth:`chilopod.engine.Walk.to_dataset`; changed in place.
+        walk
+            As it ended.
+        """
+        busy = self._busy
+        stopped = busy & np.array([each is not Status.WALKED for each in walk.status])
+        self._judge(stopped, walk.time, Verdict.STOPPED)
+        self._judge(busy & ~stopped & self._seen_once, walk.time, Verdict.LATE)
+        self._judge(busy & ~stopped & ~self._seen_once, walk.time, Verdict.UNSEEN)
+        over = ("robot", "goal")
+        data.coords["goal"] = np.arange(1, self._places.shape[1] + 1)
+        data["goal_place"] = ((*over, "axis"), self._places, {"units": "m"})
+        for name, values, unit in (
+            ("begin", self._begin, "s"),
+            ("end", self._end, "s"),
+            ("shortest", self._shortest, "m"),
+            ("nearest", self._nearest, "m"),
+        ):
+            data[f"goal_{name}"] = (over, values, {"units": unit})
+        data["goal_verdict"] = (over, self._verdicts)
+        for name, (dims, unit) in _KEPT.items():
+            shown = np.array([getattr(each, name) for each in self._log])
+            if len(shown):
+                data[f"seen_{name}"] = (("event", "robot", *dims), shown, {"units": unit})
+
+    @property
+    def _busy(self) -> NDArray[np.bool_]:
+        """Who has a target still."""
+        return self._number < np.array([len(each.goals) for each in self._courses])
+
+    def _judge(self, which: NDArray[np.bool_], now: float, verdict: Verdict) -> None:
+        for robot in np.flatnonzero(which):
+            number, count = self._number[robot], len(self._courses[robot].goals)
+            self._end[robot, number], self._verdicts[robot, number] = now, verdict.label
+            if verdict is Verdict.STOPPED:
+                self._verdicts[robot, number + 1 : count] = verdict.label
+
+    def _next(self, walk: Walk, pose: Array, which: NDArray[np.bool_]) -> None:
+        """Put up the next target that can be reached."""
+        now, most = walk.time, self._common.patience * self._speed
+        for robot in np.flatnonzero(which):
+            self._aims[robot] = np.nan
+            for number in range(self._number[robot] + 1, len(self._courses[robot].goals)):
+                place = self._courses[robot].goals[number].place(pose[robot : robot + 1])[0]
+                bearing, away = bearing_and_distance(pose[robot, :2], pose[robot, 2], place)
+                seen_from = away * np.array([np.cos(bearing), np.sin(bearing)])
+                path = float(shortest_path(seen_from, self._common.tightest))
+                self._number[robot], self._places[robot, number] = number, place
+                self._begin[robot, number], self._shortest[robot, number] = now, path
+                if path <= most:
+                    self._aims[robot] = place
+                    break
+                self._end[robot, number], self._verdicts[robot, number] = now, Verdict.TOO_FAR.label
+            else:
+                self._number[robot] = len(self._courses[robot].goals)
+        self._seen_once &= ~which
+        walk.aim(self._aims)
+        done = which & ~self._busy
+        if done.any():
+            walk.halt(done)
+
+
+_KEPT = {
+    "bearing": ((), "rad"),
+    "distance": ((), "m"),
+    "joint_angles": (("joint",), "rad"),
+    "leg_yaw": (("side",), "rad"),
+    "stiffness": (("joint",), "N*m/rad"),
+}
+"""What a controller is shown, over what besides event and robot, and its unit."""
+
+
+def decisions(record: xr.Dataset, controller: Controller, gait: Gait) -> list[Command]:
+    """What a controller commands when it is shown again what the record says that it was shown.
+
+    Parameters
+    ----------
+    record
+        Of a course.
+    controller, gait
+        That steered, and of the robots.
+    """
+    shown = {name: record[f"seen_{name}"].transpose("event", "robot", ...).values for name in _KEPT}
+    until = float(record.event[-1]) + gait.period
+    asked = zip(event_times(controller, gait, until), range(record.sizes["event"]), strict=False)
+    return [
+        controller.act(event, Observation(time, **{name: values[index].copy() for name, values in shown.items()}))
+        for (time, event), index in asked
+    ]
