@@ -29,6 +29,15 @@ def test_a_target_that_is_told_where_it_is_has_not_moved():
     assert still.recorded(np.zeros(3)).shape == (1, 2)
 
 
+@BOTH
+def test_a_target_that_is_told_at_time_0_is_there_from_the_start(engine, robot):
+    began, told = engine.start(robot, target=(0.4, 0.3)), engine.start(robot)
+    told.aim((0.4, 0.3))
+    for walk in (began, told):
+        walk.advance(0.2)
+    assert told.to_dataset().equals(began.to_dataset())
+
+
 @pytest.mark.parametrize("wrong", [None, "there", 1.0, [1.0], [[1.0, 0.0]], [1.0, np.inf], [1.0, np.nan], [[[1, 2]]]])
 def test_what_is_no_place_is_refused_and_changes_nothing(wrong):
     targets = Targets(2)

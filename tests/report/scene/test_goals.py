@@ -61,6 +61,8 @@ def test_a_robot_that_was_halted_has_finished(record):
     finished, arrived = scene(record, ["a", "b"]).outcomes
     assert (finished.text, finished.kind, finished.time) == ("finished at 3.0 s", "ended", 3.0)
     assert arrived.text == "arrived at 0.5 s"
+    cut, _ = scene(record.sel(time=slice(0.0, 3.0)), ["a", "b"]).outcomes
+    assert cut == finished
     last, _ = scene(course(halts=False), ["a", "b"]).outcomes
     assert (last.text, last.kind) == ("arrived at 2.1 s", "arrived")
 

@@ -257,14 +257,14 @@ def _titles(record: xr.Dataset, titles: Mapping[Any, str] | Sequence[str]) -> tu
 def _outcome(record: xr.Dataset, frames: BodyFrames, robot: int, sought: Sequence[Goal]) -> Outcome:
     status, walks = str(record["status"].values[robot]), frames.walks[:, robot]
     halted = status == Status.HALTED.label
-    # Where there are several, the last may be reached and the robot fall all the same.
-    arrival = sought[-1].arrival if len(sought) == 1 or (sought and walks[-1]) else np.nan
+    # Where there are several, arriving at the last is not all that is to be said of robots that stopped.
+    arrival = sought[-1].arrival if len(sought) == 1 or (sought and walks[-1] and not halted) else np.nan
     if np.isfinite(arrival):
         return Outcome(f"arrived at {arrival:.1f} s", "arrived", arrival)
     if not walks.any():
         return Outcome(status, "stopped", float(frames.time[0]))
     end = float(frames.time[walks][-1])
-    if halted and not walks[-1]:
+    if halted:
         return Outcome(f"finished at {end:.1f} s", "ended", end)
     if not walks[-1]:
         return Outcome(f"{status} at {end:.1f} s", "stopped", end)
