@@ -59,3 +59,33 @@ def walk(*curvatures, duration=6.0, step=0.02, stops=(), targets=None, robot=ROB
         data["distance"] = (("time", "robot"), away, {"units": "m"})
     coords = {"time": time, "robot": np.arange(count), "axis": ["x", "y"]}
     return xr.Dataset(data, {**coords, "joint": np.arange(1, joints + 1), "side": ["left", "right"]}, attrs)
+
+
+def on_course(record, places, turns, verdicts):
+    """The record with goals.
+
+    Parameters
+    ----------
+    record
+        As from :func:`walk`.
+    places
+        (R, G, 2) m.
+    turns
+        (R, G, 2) s, when each began and ended.
+    verdicts
+        (R, G) text.
+    """
+    places, turns = np.asarray(places, dtype=float), np.asarray(turns, dtype=float)
+    target = np.full((record.sizes["time"], record.sizes["robot"], 2), np.nan)
+    for robot, goal in np.ndindex(*turns.shape[:2]):
+        begin, end = turns[robot, goal]
+        target[(record.time.values >= begin) & (record.time.values <= end), robot] = places[robot, goal]
+    stiffness = np.tile(ROBOT.springs.stiffness, (record.sizes["robot"], 1))
+    return record.assign(
+        target=(("time", "robot", "axis"), target, {"units": "m"}),
+        stiffness=(("robot", "joint"), stiffness, {"units": "N*m/rad"}),
+        goal_place=(("robot", "goal", "axis"), places, {"units": "m"}),
+        goal_begin=(("robot", "goal"), turns[..., 0], {"units": "s"}),
+        goal_end=(("robot", "goal"), turns[..., 1], {"units": "s"}),
+        goal_verdict=(("robot", "goal"), np.array(verdicts, dtype=object)),
+    )

@@ -30,8 +30,9 @@ class SpringLaw(ReadOnlyArrays):
     - as soft as it goes where the body bends less: beside the pitchfork the bend that a spring leads to grows by a few
       percent a second, too slowly to wait for;
     - that of the inverse radius law, the paper's k1-hat, where it bends as wanted: this keeps the bend;
-    - as stiff as it goes where it bends more or to the wrong side, where the target is ahead, and where a joint is bent
-      as far as it may: this straightens it.
+    - as stiff as it goes where it bends more or to the wrong side, where the target is ahead, where it lies so far
+      within the tightest circle that the robot would walk round it for ever, and where a joint is bent as far as it
+      may: this straightens it.
 
     The legs of module 1 yaw as in the paper, and so tell a new bend its side. A target that is not seen is looked for
     by turning as tightly as can be to the side that the legs were last turned to: it comes into view again.
@@ -123,6 +124,13 @@ class SpringLaw(ReadOnlyArrays):
         steady = np.interp(np.abs(curvature), self.curvatures, self.springs)
         as_wanted = np.where(size < 1.0 + self.band, np.clip(steady, self.softest, self.stiffest), self.stiffest)
         spring = np.where(size < 1.0 - self.band, self.softest, as_wanted)
-        turns = right_side & (np.abs(wanted) > self.straight)
+        turns = right_side & (np.abs(wanted) > self.straight) & ~self._too_near(seen)
         spring = np.where(np.isnan(wanted), self.softest, np.where(turns, spring, self.stiffest))
         return np.where(np.abs(seen.joint_angles).max(axis=1) > self.most_bent, self.stiffest, spring)
+
+    def _too_near(self, seen: Observation) -> NDArray[np.bool_]:
+        """Whether the tightest circle leads round the target and not to it."""
+        radius = 1.0 / self.curvatures[-1]
+        ahead, aside = seen.distance * np.cos(seen.bearing), np.abs(seen.distance * np.sin(seen.bearing))
+        inside: NDArray[np.bool_] = np.hypot(ahead, aside - radius) < radius - ARRIVAL_RADIUS
+        return inside

@@ -12,7 +12,8 @@ from chilopod.errors import OutputError, ParameterError
 from chilopod.report.kit import style
 from chilopod.report.scene.film import movie
 
-walk = runpy.run_path(str(Path(__file__).parents[1] / "walks.py"))["walk"]
+_WALKS = runpy.run_path(str(Path(__file__).parents[1] / "walks.py"))
+walk, on_course = _WALKS["walk"], _WALKS["on_course"]
 
 
 def decoded(path) -> np.ndarray:
@@ -44,6 +45,14 @@ def test_length_and_size(tmp_path, fps, speed, count):
     with av.open(str(path)) as container:
         assert container.streams.video[0].average_rate == fps
     assert [each.name for each in path.parent.iterdir()] == ["film.mp4"]
+
+
+def test_targets_of_a_course_appear_when_their_turn_comes(tmp_path):
+    record = on_course(walk(0.0), [[[0.5, 0.0], [1.5, 0.0]]], [[[0.0, 3.0], [3.0, 6.0]]], [["given up", "given up"]])
+    frames = decoded(movie(record, tmp_path / "a.mp4", titles=["a"], heading="h", fps=1))
+    x = [right_end_of(frame, style.GREEN) for frame in frames]
+    assert x[0] == pytest.approx(x[2], abs=2.0)
+    assert x[3] > x[2] + 50.0
 
 
 def test_index_stands_in_front(tmp_path):

@@ -35,7 +35,7 @@ def near(pixels, color, far=60.0):
 
 def look(pose, **more):
     stands = np.ones((N, 2), bool)
-    rest = {"walks": True, "path": np.zeros((0, 2)), "targets": (), "radius": 0.15}
+    rest = {"walks": True, "path": np.zeros((0, 2)), "target": None, "radius": 0.15, "arrived": False}
     return Look(pose=pose, stands=stands, **{**rest, **more})
 
 
@@ -86,8 +86,8 @@ def test_floor_target_path_and_robots_that_stopped(studio):
     assert not near(floor, style.BLUE).any()
     assert np.ptp(floor.astype(int), axis=-1).max() < 20  # nothing but greys
     assert len(np.unique(floor[..., 0])) > 3  # tiles
-    target = studio(look(None, targets=[((0.0, 0.0), "present")]))
-    arrived = studio(look(None, targets=[((0.0, 0.0), "reached")]))
+    target = studio(look(None, target=np.array([0.0, 0.0])))
+    arrived = studio(look(None, target=np.array([0.0, 0.0]), arrived=True))
     assert near(arrived, style.GREEN, 50.0).sum() > near(target, style.GREEN, 50.0).sum()
     path = np.column_stack([np.linspace(-1.0, 0.4, 50), np.full(50, -0.3)])
     assert near(studio(look(None, path=path)), style.ORANGE).sum() > 50

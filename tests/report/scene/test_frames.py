@@ -11,7 +11,7 @@ from chilopod.errors import ParameterError
 from chilopod.report.scene.frames import body_frames, scene
 
 _WALKS = runpy.run_path(str(Path(__file__).parents[1] / "walks.py"))
-walk, ROBOT = _WALKS["walk"], _WALKS["ROBOT"]
+walk, on_course, ROBOT = _WALKS["walk"], _WALKS["on_course"], _WALKS["ROBOT"]
 
 
 def standing_through(frames, robot=0):
@@ -119,6 +119,24 @@ def test_outcomes():
     assert (ended.text, ended.kind, ended.time) == ("target not reached", "ended", 6.0)
     (ended,) = scene(walk(0.0), ["a"]).outcomes
     assert (ended.text, ended.kind, ended.time) == ("walked", "ended", 6.0)
+
+
+def test_targets_of_a_course_have_their_turns():
+    nan = [np.nan, np.nan]
+    record = on_course(
+        walk(0.0, 0.0, stops=[(1, 4.0)]),
+        [[[0.3, 0.0], [0.5, 0.0]], [[0.3, 0.0], nan]],
+        [[[0.0, 3.0], [3.0, 5.0]], [[0.0, 4.0], nan]],
+        [["arrived", "arrived"], ["given up", "not tried"]],
+    )
+    record["status"].values[1] = "halted"
+    shown = scene(record, ["a", "b"])
+    assert [aim.place for aim in shown.begun(0, 2.9)] == [(0.3, 0.0)]
+    assert [aim.place for aim in shown.begun(0, 3.0)] == [(0.3, 0.0), (0.5, 0.0)]
+    assert [aim.is_reached(3.0) for aim in shown.begun(0, 3.0)] == [True, False]
+    assert [aim.reached for aim in shown.begun(1, 6.0)] == [None]
+    told = [(each.text, each.kind, each.time) for each in shown.outcomes]
+    assert told == [("all 2 targets by 5.0 s", "arrived", 5.0), ("0 of 2 targets", "ended", pytest.approx(3.98))]
 
 
 def test_floor_holds_all_that_happens_and_nothing_absurd():

@@ -87,11 +87,11 @@ def test_points_are_those_of_the_frames(record, data):
 def test_outcomes_and_targets(data, record):
     kinds = [robot["outcome"]["kind"] for robot in data["robots"]]
     assert kinds == ["arrived", "stopped", "ended", "stopped"]
-    assert [robot["goals"][0]["place"] for robot in data["robots"]] == record.target.values.tolist()
+    assert [aim["place"] for robot in data["robots"] for aim in robot["aims"]] == record.target.values.tolist()
     assert data["arrivalRadius"] == 0.15
     straight = replay(walk(0.0), titles=["a"], heading="h")
     assert "reached within" not in straight
-    assert json.loads(Page(straight).data)["robots"][0]["goals"] == []
+    assert json.loads(Page(straight).data)["robots"][0]["aims"] == []
 
 
 def test_positions_beyond_all_bounds(record):

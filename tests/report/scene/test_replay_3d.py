@@ -171,7 +171,7 @@ def test_robots_stay_where_they_stopped(record, data):
     assert data["robots"][2]["outcome"]["kind"] == "stopped"
     np.testing.assert_array_equal(found[26:], np.tile(found[25], (len(found) - 26, 1)))
     np.testing.assert_allclose(found[25, :2], record.pose.values[100, 2, :2], atol=2e-4)
-    assert data["robots"][1]["goals"][0]["place"] == [-1.0, 0.3]
+    assert [aim["place"] for aim in data["robots"][1]["aims"]] == [[-1.0, 0.3]]
     assert data["arrivalRadius"] == 0.15
 
 

@@ -26,7 +26,6 @@ from chilopod.output import check_folder, write_atomic
 from chilopod.report.kit import style
 from chilopod.report.scene.encoder import ENCODER, encoded, has_encoder
 from chilopod.report.scene.frames import Outcome, Scene, scene
-from chilopod.report.scene.goals import Goal
 from chilopod.report.scene.outline import SLIMNESS
 from chilopod.report.scene.replay import COLORS
 
@@ -36,13 +35,6 @@ _SMALLEST, LARGEST = 240, 4096
 PIXEL: Final = 72.0  # points in an inch: at so many dots per inch, matplotlib's sizes are pixels
 GAP: Final = 12.0  # to the edges and from row to row, pixels
 APART: Final = 28.0  # from column to column: outcome and next title stand side by side
-_RINGS: Final = {
-    "ahead": (0.0, 0.0),
-    "present": (0.1, 1.0),
-    "reached": (0.35, 1.0),
-    "behind": (0.0, 0.4),
-    "missed": (0.0, 0.4),
-}
 _MARKS: Final = {"arrived": ("✓ ", "#00563f"), "stopped": ("✕ ", "#8f3d00"), "ended": ("", style.BLACK)}
 
 
@@ -87,11 +79,23 @@ def movie(
     OutputError
         If the file cannot be written, or PyAV was built without its H.264 encoder.
     """
-    times = frame_times(record, size, fps, speed)
     path = Path(path)
     check_folder(path.parent)
-    shown = scene(record, titles, times)
-    return write_atomic(path, encoded(_frames(shown, heading, size, speed), fps, size))
+    return write_atomic(path, filmed(record, titles=titles, heading=heading, fps=fps, speed=speed, size=size))
+
+
+def filmed(
+    record: xr.Dataset,
+    *,
+    titles: Mapping[Any, str] | Sequence[str],
+    heading: str,
+    fps: int = 25,
+    speed: float = 1.0,
+    size: tuple[int, int] = (960, 480),
+) -> bytes:
+    """The film that :func:`movie` writes; parameters and errors are those."""
+    times = frame_times(record, size, fps, speed)
+    return encoded(_frames(scene(record, titles, times), heading, size, speed), fps, size)
 
 
 def frame_times(record: xr.Dataset, size: tuple[int, int], fps: int, speed: float) -> Array:
@@ -155,16 +159,18 @@ class Stage:
         self._fit(title, room)
         below = self._legend()
         self._panels(GAP + below, top - 1.9 * self.font)
-        self.told: list[Any] = []
+        self.known: tuple[object, ...] = ()
         self.background: Any = None
 
     def drawn(self, index: int) -> NDArray[np.uint8]:
         """The frame of a time."""
         now = self.shown.frames.time[index]
-        told = [panel.tell(now) for panel in self.panels]
-        if self.background is None or told != self.told:
+        known = tuple(panel.known(now) for panel in self.panels)
+        if self.background is None or known != self.known:
+            for panel in self.panels:
+                panel.tell(now)
             self.canvas.draw()
-            self.told, self.background = told, self.canvas.copy_from_bbox(self.figure.bbox)
+            self.known, self.background = known, self.canvas.copy_from_bbox(self.figure.bbox)
         self.canvas.restore_region(self.background)
         renderer = self.canvas.get_renderer()
         self.clock.set_text(self._time(index))
@@ -201,7 +207,7 @@ class Stage:
             _dot("white", COLORS["air"], 0.6 * self.font, label="foot in the air"),
             Line2D([], [], color=COLORS["path"], label="path of module 1"),
         ]
-        if any(self.shown.goals):
+        if any(self.shown.aims):
             handles.append(
                 Line2D([], [], ls="", marker="+", ms=0.8 * self.font, mew=2, color=COLORS["target"], label="target")
             )
@@ -276,6 +282,7 @@ class FilmPanel:
     def __init__(self, shown: Scene, robot: int, axes: Axes, zoom: float, font: float, label: Text) -> None:
         self.shown, self.robot, self.label = shown, robot, label
         self.outcome, self.told = shown.outcomes[robot], label.get_text()
+        self.rings: list[tuple[Circle, Line2D]] = []
         floor, frames = shown.floor, shown.frames
         axes.set(xlim=(floor.x0, floor.x1), ylim=(floor.y0, floor.y1), xticks=[], yticks=[])
         axes.spines[:].set(visible=True, color=COLORS["grid"])
@@ -284,12 +291,11 @@ class FilmPanel:
         for line in np.arange(math.ceil(floor.y0 / floor.grid), floor.y1 / floor.grid):
             axes.axhline(line * floor.grid, color=COLORS["grid"], lw=1.0)
         self._scale_bar(axes, zoom, font)
-        self.rings: list[tuple[Goal, Circle, Line2D]] = []
-        for goal in shown.goals[robot]:
-            ring = Circle(goal.place, shown.arrival_radius, lw=1.5)
+        for aim in shown.aims[robot]:
+            ring = Circle(aim.place, shown.arrival_radius, ec=COLORS["target"], lw=1.5)
             axes.add_patch(ring)
-            (cross,) = axes.plot(*goal.place, "+", color=COLORS["target"], ms=10.0, mew=2.0)
-            self.rings.append((goal, ring, cross))
+            (cross,) = axes.plot(*aim.place, "+", color=COLORS["target"], ms=10.0, mew=2.0)
+            self.rings.append((ring, cross))
 
         length = frames.robot.module_length
         thin = max(0.8, min(1.5, 0.02 * length * zoom))
@@ -312,20 +318,26 @@ class FilmPanel:
             axes.add_artist(artist)
             artist.set_clip_path(axes.patch)
 
-    def tell(self, now: float) -> tuple[bool, list[str]]:
-        """Show the outcome, or that there is none yet, and the targets as they are at a time; returns what is shown."""
-        known = bool(now >= self.outcome.time - 1e-9)
+    def known(self, now: float) -> tuple[object, ...]:
+        """What :meth:`tell` shows depends on this alone: the outcome, and of each target that has begun its own."""
+        begun = self.shown.begun(self.robot, now)
+        return (bool(now >= self.outcome.time - 1e-9), *(aim.is_reached(now) for aim in begun))
+
+    def tell(self, now: float) -> None:
+        """Show the outcome, or that there is none yet, and the targets so far."""
+        known, *reached = self.known(now)
         self.label.set_text(self.told if known else "walking")
         self.label.set_color(_MARKS[self.outcome.kind][1] if known else "#555555")
         self.label.set_fontweight("bold" if known else "normal")
-        stages: list[str] = [goal.stage(now) for goal, *_ in self.rings]
-        for stage, (_, ring, cross) in zip(stages, self.rings, strict=True):
-            fill, line = _RINGS[stage]
-            ring.set_facecolor((COLORS["target"], fill))
-            ring.set_edgecolor((COLORS["target"], line))
-            ring.set_linestyle((0, (4, 3)) if stage in ("present", "missed") else "-")
-            cross.set_visible(stage in ("present", "reached"))
-        return known, stages
+        for index, (ring, cross) in enumerate(self.rings):
+            # Of those that have had their turn a faint ring stays.
+            now_or_before, present = index < len(reached), index == len(reached) - 1
+            ring.set_visible(now_or_before)
+            cross.set_visible(present)
+            arrived = now_or_before and reached[index]
+            ring.set_facecolor((COLORS["target"], (0.35 if arrived else 0.1) if present else 0.0))
+            ring.set_edgecolor((COLORS["target"], 1.0 if present else 0.4))
+            ring.set_linestyle("-" if arrived else (0, (4, 3)))
 
     def placed(self, index: int) -> Sequence[Any]:
         """What moves, where it is then."""

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import ParameterError
 from chilopod.output import check_folder, write_atomic
 from chilopod.report.kit import style
+from chilopod.report.scene.aims import places_of
 from chilopod.report.scene.encoder import encoded
 from chilopod.report.scene.film import (
     APART,
@@ -32,7 +33,6 @@ from chilopod.report.scene.film import (
     frame_times,
 )
 from chilopod.report.scene.frames import Scene, scene
-from chilopod.report.scene.goals import places_of
 from chilopod.report.scene.stage_3d import TILE, Look, Studio, View, framing
 from chilopod.twin import gl
 
@@ -188,7 +188,7 @@ class _Walks:
             places = np.array([[floor.x0, floor.y0], [floor.x1, floor.y1]])
         beside = _BESIDE * np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])
         solid = [np.concatenate([_at(places + each, 0.0), _at(places + each, _TALL)]) for each in beside]
-        targets = places_of(self.shown.goals)
+        targets = places_of(self.shown.aims)
         if robot is None:
             solid += [_at(targets + self.shown.arrival_radius * each, 0.0) for each in np.sign(beside)]
             solid += [_at(targets, _POLE)]
@@ -198,13 +198,15 @@ class _Walks:
         """Of a robot at a time."""
         shown, sample = self.shown, int(self.samples[index])
         last, now = int(self.last[sample, robot]), float(shown.frames.time[index])
+        begun = shown.begun(robot, now)
         return Look(
             pose=self.poses[last, robot] if last >= 0 else None,
             stands=shown.frames.stands[index, robot],
             walks=bool(shown.frames.walks[index, robot]) or shown.outcomes[robot].kind != "stopped",
             path=self.positions[: last + 1, robot],
-            targets=tuple((goal.place, goal.stage(now)) for goal in shown.goals[robot]),
+            target=np.array(begun[-1].place) if begun else None,
             radius=shown.arrival_radius,
+            arrived=bool(begun) and begun[-1].is_reached(now),
         )
 
 
@@ -250,9 +252,8 @@ class _Panel3D(FilmPanel):
     def __init__(
         self, stage: _Stage3D, robot: int, size: tuple[int, int], corner: tuple[int, int], label: Text
     ) -> None:
-        self.stage, self.robot, self.size, self.label = stage, robot, size, label
-        self.outcome, self.told = stage.shown.outcomes[robot], label.get_text()
-        self.rings = []
+        self.stage, self.shown, self.robot, self.size, self.label = stage, stage.shown, robot, size, label
+        self.outcome, self.told, self.rings = stage.shown.outcomes[robot], label.get_text(), []
         (left, above), (width, height) = corner, size
         self.box = (slice(above, above + height), slice(left, left + width), slice(0, 3))
         self.whole = stage.walks.view(size)

@@ -3,8 +3,9 @@
 A *record* is a dataset over ``time`` (s), ``robot``, ``axis`` (x, y), ``joint`` and ``side`` (left, right) with
 ``position`` (m, centre of module 1), ``heading`` (rad), ``joint_angle`` (rad, heading of a module less that of the one
 in front of it), ``leg_yaw`` (rad, of the legs of module 1) and ``status`` (text). Where there was a task there are
-``target`` (m), over time if it moved, and ``distance`` (m) as well. After a robot stopped its values are NaN. The
-attribute ``robot`` is the text of the robot file.
+``target`` (m), over time if it moved, and ``distance`` (m) as well; where there was a course, over ``robot`` and
+``goal``, ``goal_place`` (m), ``goal_begin`` and ``goal_end`` (s) and ``goal_verdict`` (text). After a robot stopped its
+values are NaN. The attribute ``robot`` is the text of the robot file.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.engine import Status
 from chilopod.errors import ParameterError
 from chilopod.kinematics import directions, foot_places, from_modules, module_centres, module_headings
-from chilopod.report.scene.goals import Goal, goals, places_of
+from chilopod.report.scene.aims import Aim, aims_of, places_of
 from chilopod.robot import Robot
 from chilopod.steering import ARRIVAL_RADIUS
 
@@ -155,10 +156,9 @@ class Outcome:
     Attributes
     ----------
     text
-        Such as "arrived at 18.4 s", "finished at 81.2 s", "target not reached", or the status; nothing is said before
-        its time.
+        Such as "arrived at 18.4 s", "3 of 5 targets", or the status; nothing is said before its time.
     kind
-        "arrived", "stopped" (its record ends early) or "ended" (with the record, or where it was told to stop).
+        "arrived", "stopped" (its record ends early) or "ended" (with the record, or where it was told to halt).
     time
         From when on it is known, s.
     """
@@ -199,8 +199,8 @@ class Scene:
         What is seen of the floor.
     titles, outcomes
         One for each robot.
-    goals
-        The targets of each robot.
+    aims
+        One sequence for each robot: its targets in the order of their turns.
     arrival_radius
         m; 0 where there are no targets.
     """
@@ -209,8 +209,12 @@ class Scene:
     floor: Floor
     titles: tuple[str, ...]
     outcomes: tuple[Outcome, ...]
-    goals: tuple[tuple[Goal, ...], ...]
+    aims: tuple[tuple[Aim, ...], ...]
     arrival_radius: float
+
+    def begun(self, robot: int, now: float) -> tuple[Aim, ...]:
+        """The targets of a robot that have had their turn at a time (s), or have it."""
+        return tuple(aim for aim in self.aims[robot] if now >= aim.since - 1e-9)
 
 
 def scene(record: xr.Dataset, titles: Mapping[Any, str] | Sequence[str], times: ArrayLike | None = None) -> Scene:
@@ -231,13 +235,14 @@ def scene(record: xr.Dataset, titles: Mapping[Any, str] | Sequence[str], times: 
         If the record does not go with its robot, or a robot has no title.
     """
     frames = body_frames(record, times)
-    sought, radius = goals(record), ARRIVAL_RADIUS if "target" in record else 0.0
+    aims = aims_of(record)
+    radius = ARRIVAL_RADIUS if any(aims) else 0.0
     return Scene(
         frames,
-        _floor(frames, sought, radius),
+        _floor(frames, places_of(aims), radius),
         _titles(record, titles),
-        tuple(_outcome(record, frames, robot, each) for robot, each in enumerate(sought)),
-        sought,
+        tuple(_outcome(record, frames, robot, each) for robot, each in enumerate(aims)),
+        aims,
         radius,
     )
 
@@ -254,24 +259,24 @@ def _titles(record: xr.Dataset, titles: Mapping[Any, str] | Sequence[str]) -> tu
     return tuple(titles)
 
 
-def _outcome(record: xr.Dataset, frames: BodyFrames, robot: int, sought: Sequence[Goal]) -> Outcome:
+def _outcome(record: xr.Dataset, frames: BodyFrames, robot: int, aims: tuple[Aim, ...]) -> Outcome:
     status, walks = str(record["status"].values[robot]), frames.walks[:, robot]
-    halted = status == Status.HALTED.label
-    # Where there are several, arriving at the last is not all that is to be said of robots that stopped.
-    arrival = sought[-1].arrival if len(sought) == 1 or (sought and walks[-1] and not halted) else np.nan
-    if np.isfinite(arrival):
-        return Outcome(f"arrived at {arrival:.1f} s", "arrived", arrival)
+    reached = [aim.reached for aim in aims if aim.reached is not None]
+    goals = record.sizes.get("goal", max(len(aims), 1))
+    if len(reached) == goals:
+        words = f"arrived at {reached[-1]:.1f} s" if goals == 1 else f"all {goals} targets by {reached[-1]:.1f} s"
+        return Outcome(words, "arrived", reached[-1])
     if not walks.any():
         return Outcome(status, "stopped", float(frames.time[0]))
     end = float(frames.time[walks][-1])
-    if halted:
-        return Outcome(f"finished at {end:.1f} s", "ended", end)
-    if not walks[-1]:
+    if not walks[-1] and status != Status.HALTED.label:
         return Outcome(f"{status} at {end:.1f} s", "stopped", end)
-    return Outcome("target not reached" if sought else status, "ended", end)
+    if goals > 1:
+        return Outcome(f"{len(reached)} of {goals} targets", "ended", end)
+    return Outcome("target not reached" if aims else status, "ended", end)
 
 
-def _floor(frames: BodyFrames, sought: Sequence[Sequence[Goal]], radius: float) -> Floor:
+def _floor(frames: BodyFrames, aims: Array, radius: float) -> Floor:
     """The box around all bodies and targets, a little larger, and neither a slit nor a tower."""
     robot, n = frames.robot, frames.robot.body.modules
     flat = np.concatenate([frames.spine, frames.feet.reshape(*frames.centres.shape[:2], 2 * n, 2)], axis=2)
@@ -281,7 +286,6 @@ def _floor(frames: BodyFrames, sought: Sequence[Sequence[Goal]], radius: float) 
     furthest = 2.0 * (robot.body.length + robot.gait.speed * duration)
     start = frames.centres[:1, :, :1]
     seen &= np.abs(np.where(seen[..., None], flat - start, np.inf)).max(axis=-1) <= furthest
-    aims = places_of(sought)
     points = np.concatenate([flat[seen], aims - radius, aims + radius, np.zeros((0 if seen.any() else 1, 2))])
     low, high = points.min(axis=0), points.max(axis=0)
     low[1] -= _FOOT_ROOM * max(high[1] - low[1], (high[0] - low[0]) / _FLATTEST)

@@ -37,6 +37,14 @@
     for (let frame = 0; frame < time.count && poses.exists(robot.raw); frame++) {
       robot.path.push([poses.value(robot.raw, frame, 0), poses.value(robot.raw, frame, 1)]);
     }
+    for (const aim of robot.aims) {
+      aim.pole = {
+        kind: "cylinder",
+        size: [data.pole.radius, 0.5 * data.pole.height],
+        matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, ...aim.place, 0.5 * data.pole.height, 1],
+        color: colors.target,
+      };
+    }
   }
 
   const marked = landmarks();
@@ -80,7 +88,7 @@
           if (["front", "module", "foot"].includes(shapes[i].role) && inside(place)) points.push(place);
         });
       }
-      for (const { place: [x, y] } of robot.goals) {
+      for (const { place: [x, y] } of robot.aims) {
         const r = data.arrivalRadius;
         points.push([x - r, y, 0], [x + r, y, 0], [x, y - r, 0], [x, y + r, 0], [x, y, data.pole.height]);
       }
@@ -142,11 +150,11 @@
     const mean = (i) => modules.reduce((sum, matrix) => sum + matrix[12 + i], 0) / modules.length;
     const camera = cameraOn(robot, follow.checked && exists ? [0, 1, 2].map(mean) : null);
     const ratio = canvas.width / robot.width;
-    const targets = robot.goals.map((goal) => ({ place: goal.place, stage: player.stage(goal, now) }));
+    const aim = begun(robot, now).at(-1);
     const pale = robot.outcome.kind === "stopped" && now > robot.outcome.time;
-    const pole = targets.filter(({ stage }) => ["present", "reached"].includes(stage)).map(poleAt);
+    const pole = aim ? [aim.pole] : [];
     painter.start(canvas.width, canvas.height, camera);
-    painter.paintFloor(camera, ratio, targets);
+    painter.paintFloor(camera, ratio, aim?.place, Boolean(aim) && isReached(aim, now));
     if (pole.length) painter.paintSolids(camera, pole, true, false);
     painter.paintSolids(camera, solids, true, pale);
     const width = 6 * camera.distance * NARROW / robot.height, pieces = exists ? frame : 0;
@@ -159,15 +167,6 @@
     context.drawImage(surface, 0, 0);
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     drawMarks(context, robot, camera);
-  }
-
-  function poleAt({ place }) {
-    return {
-      kind: "cylinder",
-      size: [data.pole.radius, 0.5 * data.pole.height],
-      matrix: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, ...place, 0.5 * data.pole.height, 1],
-      color: colors.target,
-    };
   }
 
   function dressed(robot, now) {

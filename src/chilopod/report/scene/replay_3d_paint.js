@@ -3,8 +3,7 @@
 function replayPainter(gl, data) {
   const LIGHT = [-0.32, -0.42, 0.85];
   const ROUNDING = 0.006;  // m, of the edges of boxes
-  const MOST_TARGETS = 60;  // the latest
-  const MARKS = { present: [0.14, -1], reached: [0.4, 1], behind: [0, 0.4], missed: [0, -0.4] };
+
 
   const SOLID = `#version 300 es
     uniform mat4 seen, model;
@@ -45,10 +44,9 @@ function replayPainter(gl, data) {
   const FLOOR_COLOR = `#version 300 es
     precision highp float;
     uniform vec2 middle;
-    uniform vec4 targets[${MOST_TARGETS}];  // place, how much of the disc and of the ring is seen; negative: dashed
-    uniform vec3 targetColor, lineColor;
-    uniform float reach, grid, fine, pixel, radius;
-    uniform int count;
+    uniform vec3 target, targetColor, lineColor;
+    uniform float reach, grid, fine, pixel;
+    uniform bool arrived;
     in vec2 spot;
     out vec4 result;
     // How much of a pixel lines of a width in pixels cover; none where they would stand too close to be told apart.
@@ -61,13 +59,13 @@ function replayPainter(gl, data) {
     void main() {
       vec3 color = vec3(0.972, 0.976, 0.980);
       color = mix(color, lineColor, max(0.38 * lines(fine, 1.0), lines(grid, 1.3)));
-      for (int i = 0; i < count; i++) {
-        vec2 from = spot - targets[i].xy;
+      if (target.z > 0.0) {
+        vec2 from = spot - target.xy;
         float away = length(from), size = fwidth(away);
-        color = mix(color, targetColor, targets[i].z * clamp((radius - away) / size + 0.5, 0.0, 1.0));
-        float ring = clamp(0.9 * pixel + 0.5 - abs(away - radius) / size, 0.0, 1.0);
-        float dash = targets[i].w < 0.0 ? step(fract(atan(from.y, from.x) * 3.8197186), 0.6) : 1.0;
-        color = mix(color, targetColor, ring * dash * abs(targets[i].w));
+        color = mix(color, targetColor, (arrived ? 0.4 : 0.14) * clamp((target.z - away) / size + 0.5, 0.0, 1.0));
+        float ring = clamp(0.9 * pixel + 0.5 - abs(away - target.z) / size, 0.0, 1.0);
+        float dash = arrived ? 1.0 : step(fract(atan(from.y, from.x) * 3.8197186), 0.6);
+        color = mix(color, targetColor, ring * dash);
       }
       result = vec4(mix(color, vec3(1.0), smoothstep(0.35, 0.95, length(spot - middle) / reach)), 1.0);
     }`;
@@ -205,20 +203,16 @@ function replayPainter(gl, data) {
     gl.uniformMatrix4fv(floor.places.seen, false, camera.seen);
   }
 
-  function paintFloor(camera, ratio, targets) {
-    const seen = targets.filter(({ stage }) => stage !== "ahead").slice(-MOST_TARGETS);
+  function paintFloor(camera, ratio, target, arrived) {
     gl.uniform2fv(floor.places.middle, camera.target.slice(0, 2));
     gl.uniform1f(floor.places.reach, 5 * camera.distance);
     gl.uniform1f(floor.places.grid, data.floor.grid);
     gl.uniform1f(floor.places.fine, data.floor.grid / data.fine);
     gl.uniform1f(floor.places.pixel, ratio);
     gl.uniform3fv(floor.places.lineColor, rgb(data.colors.grid).map((each) => 0.9 * each));
-    if (seen.length) {
-      gl.uniform4fv(floor.places["targets[0]"], seen.flatMap(({ place, stage }) => [...place, ...MARKS[stage]]));
-    }
-    gl.uniform1i(floor.places.count, seen.length);
-    gl.uniform1f(floor.places.radius, data.arrivalRadius);
+    gl.uniform3fv(floor.places.target, target ? [...target, data.arrivalRadius] : [0, 0, 0]);
     gl.uniform3fv(floor.places.targetColor, rgb(data.colors.target));
+    gl.uniform1i(floor.places.arrived, arrived);
     gl.bindVertexArray(quad.array);
     gl.drawElements(gl.TRIANGLES, quad.count, gl.UNSIGNED_SHORT, 0);
   }

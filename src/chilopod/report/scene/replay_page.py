@@ -86,7 +86,7 @@ def page(
         ],
         colors=COLORS,
         grid=f"{shown.floor.grid:g} m",
-        has_targets=any(shown.goals),
+        has_targets=any(shown.aims),
         data={**_common(shown), **data, "robots": _robots(shown, data["robots"])},
         **words,
     )
@@ -124,17 +124,8 @@ def _robots(shown: Scene, more: Sequence[Mapping[str, Any]]) -> list[dict[str, A
     return [
         {
             "outcome": {"text": outcome.text, "kind": outcome.kind, "time": outcome.time},
-            "goals": [
-                {
-                    "place": goal.place,
-                    "since": goal.since,
-                    # What JSON has no number for: for ever, and never.
-                    "until": goal.until if np.isfinite(goal.until) else None,
-                    "arrival": goal.arrival if np.isfinite(goal.arrival) else None,
-                }
-                for goal in sought
-            ],
+            "aims": [{"place": aim.place, "since": aim.since, "reached": aim.reached} for aim in aims],
             **each,
         }
-        for outcome, sought, each in zip(shown.outcomes, shown.goals, more, strict=True)
+        for outcome, aims, each in zip(shown.outcomes, shown.aims, more, strict=True)
     ]

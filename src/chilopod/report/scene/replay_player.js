@@ -1,4 +1,8 @@
 "use strict";
+// The targets of a robot that have had their turn, or have it, and whether one of them has been reached.
+const begun = (robot, now) => robot.aims.filter(({ since }) => now >= since - 1e-9);
+const isReached = ({ reached }, now) => reached !== null && now >= reached;
+
 // Time and its controls, and the panels of all robots, of every kind of replay. The kind draws: it calls start with a
 // function of a robot, the frame that is shown and the time in s, which may lie between two frames.
 function replayPlayer(data, aspect) {
@@ -121,13 +125,6 @@ function replayPlayer(data, aspect) {
     if (!asked && !matchMedia("(prefers-reduced-motion: reduce)").matches) setPlaying(true);
   }
 
-  // What a target is at a time: nothing yet, the target, the target and reached, or a former one that was reached or missed.
-  function stage(goal, time) {
-    if (time < goal.since) return "ahead";
-    if (goal.until !== null && time >= goal.until) return goal.arrival === null ? "missed" : "behind";
-    return goal.arrival !== null && time >= goal.arrival ? "reached" : "present";
-  }
-
   const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
-  return { robots, follow, actions, bytes, stage, redraw, start };
+  return { robots, follow, actions, bytes, redraw, start };
 }

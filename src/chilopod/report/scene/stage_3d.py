@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import ParameterError
 from chilopod.report.kit import style
-from chilopod.report.scene.goals import Stage
 from chilopod.report.scene.replay_page import COLORS
 from chilopod.robot import Robot
 from chilopod.twin.legs import twin_of
@@ -36,8 +35,6 @@ _LIGHT: Final = np.array([0.25, 0.35, -1.0])
 _PALE: Final = 0.4  # what is left of the colours of a robot that no longer walks
 _BRIGHT: Final = 0.88  # of the floor, for what is pale
 _MOST_PIECES: Final = 2000  # of a path
-_MOST_DISCS: Final = 60  # of targets, the latest
-_DISCS: Final = {"present": 0.25, "reached": 0.55, "behind": 0.12, "missed": 0.05}  # how much of them is seen
 _PATH_WIDTH: Final = 0.01  # m, and three pixels at least
 _FLAT: Final = 0.0005  # m, half the thickness of what lies on the floor
 _SHADOW, _DISC, _PATH = 0.001, 0.002, 0.003  # m above the floor, one above the other
@@ -93,21 +90,24 @@ class Look:
     stands
         Whether each foot is on the floor, (N, 2).
     walks
-        Whether the robot still walks, or has arrived or finished; if not, it is pale.
+        Whether the robot still walks, or has arrived or was halted; if not, it is pale.
     path
         Of the centre of module 1 up to then, m, (P, 2).
-    targets
-        Place of each, m, and what it is then.
+    target
+        m, (2,), or None.
     radius
-        Within which a target counts as reached, m.
+        Within which the target counts as reached, m.
+    arrived
+        Whether it has been.
     """
 
     pose: Array | None
     stands: NDArray[np.bool_]
     walks: bool
     path: Array
-    targets: Sequence[tuple[tuple[float, float], Stage]]
+    target: Array | None
     radius: float
+    arrived: bool
 
 
 class Studio:
@@ -139,7 +139,7 @@ class Studio:
         )
         self.of_robot = np.flatnonzero(self.model.body_rootid[self.model.geom_bodyid] == self.modules[0])
         self.colors: Array = self.model.geom_rgba[:, :3].astype(np.float64)
-        self.scene = mujoco.MjvScene(self.model, self.model.ngeom + count + _MOST_PIECES + _MOST_DISCS + 100)
+        self.scene = mujoco.MjvScene(self.model, self.model.ngeom + count + _MOST_PIECES + 100)
         self.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = fine
         self.scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
         self.option = mujoco.MjvOption()
@@ -176,18 +176,16 @@ class Studio:
         self.colors[self.shins] = np.where(look.stands[..., None, None], stands, swings)
         model.geom_rgba[self.of_robot, :3] = (_BRIGHT + strength * (self.colors - _BRIGHT))[self.of_robot]
         model.geom_rgba[self.of_robot, 3] = look.pose is not None
-        here = [place for place, stage in look.targets if stage in ("present", "reached")]
-        data.mocap_pos[0] = (*here[0], 0.0) if here else AWAY
+        data.mocap_pos[0] = AWAY if look.target is None else (*look.target, 0.0)
         model.light_pos[0] = view.middle - view.distance * _LIGHT
         mujoco.mj_kinematics(model, data)
         mujoco.mj_camlight(model, data)
         mujoco.mjv_updateScene(model, data, self.option, None, _camera(view), mujoco.mjtCatBit.mjCAT_ALL, scene)
         if not self.fine and look.pose is not None:
             self._shade(strength)
-        for place, stage in look.targets[-_MOST_DISCS:]:
-            if stage != "ahead":
-                disc = (*to_rgb(COLORS["target"]), _DISCS[stage])
-                self._lay(mujoco.mjtGeom.mjGEOM_CYLINDER, place, _DISC, (look.radius, _FLAT, 0.0), 0.0, disc)
+        if look.target is not None:
+            disc = (*to_rgb(COLORS["target"]), 0.55 if look.arrived else 0.25)
+            self._lay(mujoco.mjtGeom.mjGEOM_CYLINDER, look.target, _DISC, (look.radius, _FLAT, 0.0), 0.0, disc)
         pixel = 2.0 * view.distance * math.tan(0.5 * _OPENING) / self.rect.height
         self._trace(look.path, max(_PATH_WIDTH, 3.0 * pixel))
         mujoco.mjr_render(self.rect, scene, self.context)
@@ -219,13 +217,7 @@ class Studio:
             self._lay(mujoco.mjtGeom.mjGEOM_BOX, start + 0.5 * step, _PATH, half, math.atan2(step[1], step[0]), ink)
 
     def _lay(
-        self,
-        kind: Any,
-        at: Sequence[float] | Array,
-        above: float,
-        size: Sequence[float],
-        yaw: float,
-        rgba: Sequence[float],
+        self, kind: Any, at: Array, above: float, size: Sequence[float], yaw: float, rgba: Sequence[float]
     ) -> None:
         """Put something flat on the floor."""
         scene = self.scene

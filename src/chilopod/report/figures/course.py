@@ -1,0 +1,209 @@
+"""A course: the way over the floor from target to target, the spring that bends it, and where the targets were seen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+from numpy.typing import NDArray
+
+from chilopod import units
+from chilopod.netcdf import netcdf
+from chilopod.output import Content, write_all
+from chilopod.report.kit import style
+from chilopod.report.scene.encoder import has_encoder
+from chilopod.report.scene.film import filmed
+from chilopod.report.scene.frames import body_frames
+from chilopod.report.scene.replay import replay
+from chilopod.report.scene.replay_3d import replay_3d
+from chilopod.steering import ARRIVAL_RADIUS, Strategy
+
+_LAYOUTS = (style.Layout("AB;AC", 4.6, widths=(1.5, 1.0)), style.Layout("A;B;C", 9.0, heights=(2.0, 1.0, 1.0)))
+_SHOWN = 6  # walks in a replay or a film
+_LONGEST_FILM = 20.0  # s
+_FILM_SIZE = (960, 640)
+_ARRIVED = "arrived"
+
+
+class Driven(Protocol):
+    """What is drawn of a course that was driven."""
+
+    @property
+    def strategy(self) -> Strategy:
+        """How."""
+
+    @property
+    def engine(self) -> str:
+        """Where."""
+
+    @property
+    def pitchfork(self) -> float | None:
+        """First spring below which the straight walk bends, N*m/rad; None where there is none."""
+
+    @property
+    def record(self) -> xr.Dataset:
+        """Of all walks, with ``goal_place`` over (robot, goal, axis), m, ``goal_begin`` and ``goal_end`` over (robot,
+        goal), s, and ``goal_verdict`` over (robot, goal), all but the last NaN for goals that had no turn."""
+
+
+def files_of_course(folder: str | Path) -> list[Path]:
+    """What :func:`write_course` writes; the film, which comes last, only where films can be encoded."""
+    kinds = ("png", "svg", "nc", "html", *(("mp4",) if has_encoder() else ()))
+    return [Path(folder) / f"course.{kind}" for kind in kinds]
+
+
+def write_course(done: Driven, folder: str | Path, *, replace: bool = True) -> list[Path]:
+    """Write a course as a picture (``.png``, ``.svg``), record (``.nc``), replay (``.html``) and film (``.mp4``).
+
+    Parameters
+    ----------
+    done
+        The course.
+    folder
+        Created where there is none.
+    replace
+        Whether files that are already there may be replaced.
+
+    Returns
+    -------
+    The files.
+
+    Raises
+    ------
+    OutputError
+        If a file cannot be written; it says where it is kept instead.
+    """
+    write_all(_files(done, folder), replace=replace)
+    return files_of_course(folder)
+
+
+def _files(done: Driven, folder: str | Path) -> Iterator[tuple[Path, Content]]:
+    """What cannot be made again comes first."""
+    pixels, vector, record, page, *film = files_of_course(folder)
+    yield record, netcdf(done.record)
+    with style.house_style():
+        drawn = draw(done)
+        files = (pixels, style.png(drawn)), (vector, style.svg(drawn, "course"))
+    yield from files
+    shown = done.record.isel(robot=slice(_SHOWN))
+    count = done.record.sizes["robot"]
+    labels = [f"walk {i + 1}" if count > 1 else done.strategy.name for i in range(len(shown.robot))]
+    page_of = replay_3d if "pose" in shown else replay
+    yield page, page_of(shown, titles=labels, heading=_title(done))
+    for file in film:
+        # As many times faster as makes it short; from above all of a course is seen.
+        seconds = float(shown.time[-1] - shown.time[0])
+        speed = max(1.0, np.ceil(seconds / _LONGEST_FILM))
+        yield file, filmed(shown, titles=labels, heading=_title(done), speed=speed, size=_FILM_SIZE)
+
+
+def draw(done: Driven, narrow: bool = False) -> Figure:
+    """The figure; call it within :func:`chilopod.report.kit.style.house_style`."""
+    figure, axes = style.figure(*_LAYOUTS, narrow)
+    record = done.record
+    _floor(axes["A"], record)
+    axes["A"].set_title(_title(done))
+    for robot in reversed(range(record.sizes["robot"])):
+        walk, color = record.isel(robot=robot), style.CURVES[robot % len(style.CURVES)]
+        # Of springs that nobody changed the record has one value for all times.
+        spring = units.from_si(1.0, "N*mm/deg") * walk.stiffness.isel(joint=0).broadcast_like(walk.time).values
+        axes["B"].plot(walk.time, spring, color=color, linewidth=1.2)
+        axes["C"].plot(walk.time, _bearing(walk), color=color, linewidth=1.2)
+    axes["B"].set_yscale("log")
+    axes["B"].set_ylabel("k1 (N·mm/deg)")
+    # As on other axes, and not as powers of ten.
+    axes["B"].yaxis.set_major_formatter("{x:g}")
+    axes["B"].yaxis.set_minor_formatter("{x:g}")
+    if done.pitchfork is not None:
+        at = units.from_si(done.pitchfork, "N*mm/deg")
+        axes["B"].axhline(at, color=style.VERMILLION, linestyle=(0, (4, 2)), linewidth=1.2)
+        where = {"xycoords": ("axes fraction", "data"), "color": style.VERMILLION}
+        style.note(axes["B"], "bends below", (0.02, at), (0, 3), **where)
+    axes["C"].axhline(0.0, color=style.GREY, linewidth=0.8)
+    axes["C"].set_ylabel("target angle (deg)")
+    for name in "BC":
+        _turns(axes[name], record.isel(robot=0), numbered=name == "B")
+        axes[name].set_xlabel("time (s)")
+        style.grid(axes[name], "y")
+    return figure
+
+
+def _title(done: Driven) -> str:
+    reached = (done.record.goal_verdict == _ARRIVED).values
+    return f"{done.strategy.name}: {reached.sum()} of {reached.size} targets"
+
+
+def _bearing(walk: xr.Dataset) -> NDArray[np.float64]:
+    """Of the target whose turn it is, deg; a line does not cross the picture where it jumps."""
+    place, target = (walk[name].transpose("time", "axis").values for name in ("position", "target"))
+    away = target - place
+    angle = np.arctan2(away[:, 1], away[:, 0]) - walk.heading.values
+    angle = np.rad2deg((angle + np.pi) % (2.0 * np.pi) - np.pi)
+    angle[1:][(np.abs(np.diff(angle)) > 180.0) | (np.diff(target, axis=0) != 0.0).any(-1)] = np.nan
+    return angle
+
+
+def _turns(axes: Axes, walk: xr.Dataset, *, numbered: bool) -> None:
+    """When each goal of the first walk had its turn: bands, and their numbers above."""
+    begins, ends = walk.goal_begin.values, walk.goal_end.values
+    for index, (begin, end) in enumerate(zip(begins, ends, strict=True)):
+        if not (np.isfinite(begin) and np.isfinite(end)):
+            continue
+        if index % 2 == 0:
+            axes.axvspan(begin, end, color=style.PALE, alpha=0.5, linewidth=0.0, zorder=0)
+        if numbered:
+            middle = (0.5 * (begin + end), 1.0)
+            look = {"ha": "center", "xycoords": ("data", "axes fraction"), "color": _color(walk, index)}
+            style.note(axes, str(index + 1), middle, (0, 2), **look)
+
+
+def _color(walk: xr.Dataset, goal: int) -> str:
+    return style.GREEN if str(walk.goal_verdict.values[goal]) == _ARRIVED else style.VERMILLION
+
+
+def _floor(axes: Axes, record: xr.Dataset) -> None:
+    """Paths and targets, and the first walk's body where it starts, arrives or gives up."""
+    axes.set_aspect("equal", adjustable="datalim")
+    for robot in reversed(range(record.sizes["robot"])):
+        walk = record.isel(robot=robot)
+        path = walk.position.transpose("time", "axis").values
+        color = style.CURVES[robot % len(style.CURVES)]
+        axes.plot(path[:, 0], path[:, 1], color=color, zorder=3, linewidth=1.8 if robot == 0 else 1.0)
+        _goals(axes, walk, named=robot == 0)
+    _bodies(axes, record.isel(robot=[0]))
+    axes.set(xlabel="x (m)", ylabel="y (m)")
+    style.grid(axes)
+
+
+def _goals(axes: Axes, walk: xr.Dataset, *, named: bool) -> None:
+    """Rings; those of the walk that is told of with a number, and what became of those that were not reached."""
+    places = walk.goal_place.transpose("goal", "axis").values
+    for index, (x, y) in enumerate(places):
+        if not np.isfinite([x, y]).all():
+            continue
+        color = _color(walk, index) if named else style.GREY
+        axes.add_patch(Circle((x, y), ARRIVAL_RADIUS, fill=False, ec=color, lw=1.5 if named else 0.8, zorder=4))
+        if not named:
+            continue
+        verdict = str(walk.goal_verdict.values[index])
+        # A place that comes again, such as the crossing of an eight, has its numbers one above the other.
+        again = sum(bool(np.allclose(each, (x, y))) for each in places[:index])
+        text = f"{index + 1}" if verdict == _ARRIVED else f"{index + 1} {verdict}"
+        look = {"color": color, "weight": "bold", "zorder": 6, "bbox": {"fc": "white", "ec": "none", "pad": 0.4}}
+        style.note(axes, text, (x, y), (9, 9 + 12 * again), **look)
+        axes.plot(x, y, "+", color=color, markersize=6, markeredgewidth=1.5, zorder=4)
+
+
+def _bodies(axes: Axes, record: xr.Dataset) -> None:
+    ends = record.goal_end.values[0]
+    walked = record.time.values[np.isfinite(record.heading.values[:, 0])]
+    moments = np.unique(np.clip([0.0, *ends[np.isfinite(ends)]], walked[0], walked[-1]))
+    for spine in body_frames(record, moments).spine[:, 0]:
+        axes.plot(spine[:, 0], spine[:, 1], "-o", color=style.BLACK, alpha=0.35, linewidth=2.5, markersize=3, zorder=2)
+        axes.plot(*spine[0], "o", color=style.BLACK, markersize=4.5, zorder=4)

@@ -1,0 +1,55 @@
+"""The picture and the replay of a course: what they say is what the record has."""
+
+import json
+import runpy
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from chilopod.errors import OutputError
+from chilopod.report.figures.course import draw, files_of_course, write_course
+from chilopod.report.kit import style
+from chilopod.steering import STRATEGIES
+
+_TESTS = Path(__file__).parents[1]
+_WALKS = runpy.run_path(str(_TESTS / "walks.py"))
+walk, on_course = _WALKS["walk"], _WALKS["on_course"]
+Page = runpy.run_path(str(_TESTS / "html_page.py"))["Page"]
+
+
+@pytest.fixture(scope="module")
+def done():
+    nan = [np.nan, np.nan]
+    record = on_course(
+        walk(0.0, 0.5),
+        [[[0.3, 0.0], [0.6, 0.5], nan], [[0.3, 0.0], [0.3, 0.0], [0.5, 0.2]]],
+        [[[0.0, 2.0], [2.0, 6.0], nan], [[0.0, 1.0], [1.0, 2.0], [2.0, 6.0]]],
+        [["arrived", "given up", "not tried"], ["arrived"] * 3],
+    )
+    return SimpleNamespace(record=record, strategy=STRATEGIES["pitchfork"], engine="planar", pitchfork=0.7)
+
+
+@pytest.mark.parametrize("narrow", [False, True])
+def test_the_picture_names_targets_and_what_became_of_them(done, narrow):
+    with style.house_style():
+        floor, spring, angle = draw(done, narrow).axes
+        assert floor.get_title(loc="left") == "pitchfork: 4 of 6 targets"
+        assert floor.get_aspect() == 1.0
+        assert [each.get_text() for each in floor.texts] == ["1", "2 given up"]
+        assert [each.get_text() for each in spring.texts] == ["bends below", "1", "2"]
+        # Of the second target the line starts anew.
+        (line,) = [each for each in angle.lines if each.get_color() == style.CURVES[0]]
+        assert np.flatnonzero(np.isnan(line.get_ydata())).tolist() == [100]
+
+
+def test_its_files(done, tmp_path):
+    assert write_course(done, tmp_path, replace=False) == files_of_course(tmp_path)
+    page = Page((tmp_path / "course.html").read_text())
+    first, second = json.loads(page.data)["robots"]
+    assert [aim["reached"] for aim in first["aims"]] == [2.0, None]
+    assert second["outcome"]["text"] == "all 3 targets by 6.0 s"
+    assert "reached within" in page.text
+    with pytest.raises(OutputError):
+        write_course(done, tmp_path, replace=False)
