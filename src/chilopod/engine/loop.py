@@ -152,7 +152,8 @@ def steer(
         )
 
     def tell() -> None:
-        done, words = walk.time / until, f"{walk.time:.1f} of {until:g} s"
+        # A referee may find that it is over before it has begun.
+        done, words = walk.time / until if until > 0.0 else 1.0, f"{walk.time:.1f} of {until:g} s"
         for each in (progress, *(spent.progress for spent in _watching)):
             each(done, words)
 
