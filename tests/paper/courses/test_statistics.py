@@ -21,7 +21,7 @@ def test_no_trials_say_nothing():
 
 
 def test_the_bootstrap_of_normal_numbers():
-    values = np.random.default_rng(1).normal(3.0, 2.0, 4000)
+    values = np.random.default_rng(1).normal(3.0, 2.0, 2000)
     found, half = bootstrap_mean(values), norm.ppf(0.975) * values.std(ddof=1) / np.sqrt(values.size)
     assert found.value == pytest.approx(values.mean())
     assert found.high - found.low == pytest.approx(2.0 * half, rel=0.06)

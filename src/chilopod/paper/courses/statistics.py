@@ -74,11 +74,27 @@ def bootstrap_mean(values: ArrayLike, seed: int = 0) -> Interval:
     """
     table = np.asarray(values, dtype=np.float64)
     table = table.reshape(len(table), -1)
-    sums, counts = np.nansum(table, axis=1), np.isfinite(table).sum(axis=1)
-    groups = np.flatnonzero(counts)
-    if not groups.size:
+    return bootstrap_ratio(np.nansum(table, axis=1), np.isfinite(table).sum(axis=1), seed)
+
+
+def bootstrap_ratio(of: ArrayLike, to: ArrayLike, seed: int = 0) -> Interval:
+    """Sum over sum, with the percentile interval of the bootstrap.
+
+    Parameters
+    ----------
+    of, to
+        Of independent groups, which are drawn anew as a whole, shape (groups,); groups in which both are 0 count for
+        nothing.
+    seed
+        Of what is drawn.
+    """
+    above, below = np.asarray(of, dtype=np.float64), np.asarray(to, dtype=np.float64)
+    groups = np.flatnonzero((above != 0.0) | (below != 0.0))
+    if not below.any():
         return Interval(float("nan"), float("nan"), float("nan"))
-    sums, counts = sums[groups], counts[groups]
-    times = np.random.default_rng(seed).multinomial(len(groups), np.full(len(groups), 1.0 / len(groups)), size=_DRAWN)
-    low, high = np.quantile((times @ sums) / (times @ counts), [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL])
-    return Interval(float(sums.sum() / counts.sum()), float(low), float(high))
+    above, below = above[groups], below[groups]
+    picked = np.random.default_rng(seed).integers(len(groups), size=(_DRAWN, len(groups)))
+    sums, counts = above[picked].sum(axis=1), below[picked].sum(axis=1)
+    drawn = sums[counts > 0.0] / counts[counts > 0.0]
+    low, high = np.quantile(drawn, [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL])
+    return Interval(float(above.sum() / below.sum()), float(low), float(high))

@@ -40,10 +40,10 @@ def steps(law: SpringLaw) -> Mapping[str, SpringLaw]:
     own = {each.name: getattr(law, each.name) for each in fields(SpringLaw)}
     # A circle that leads round no target: the law never straightens for one that lies within it.
     curvatures = np.append(law.curvatures, max(1.0 / ARRIVAL_RADIUS, 1.01 * law.curvatures[-1]))
-    onwards = {"curvatures": curvatures, "springs": np.append(law.springs, law.springs[-1])}
+    springs = np.append(law.springs, law.springs[-1])
     return {
         "the spring of the circle, once a cycle": InverseLaw(**own),
-        "its bend against the bend there is": WithoutSearch(**{**own, **onwards}),
-        "looking for what is lost": replace(law, **onwards),
+        "its bend against the bend there is": WithoutSearch(**{**own, "curvatures": curvatures, "springs": springs}),
+        "looking for what is lost": replace(law, curvatures=curvatures, springs=springs),
         "straightening for what lies within its circle": law,
     }

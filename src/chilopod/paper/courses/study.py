@@ -53,7 +53,7 @@ _FEW = {"pitchfork": (14, 16), "hopf": (7, 9)}
 PLANAR: Mapping[Size, Plan] = {
     Size.FULL: Plan(range(1000, 2000), range(100), {"pitchfork": range(12, 21), "hopf": range(6, 12)}),
     Size.QUICK: Plan(range(1000, 1100), range(20), {"pitchfork": (13, 15, 17), "hopf": (7, 9)}),
-    Size.TINY: Plan(range(1000, 1003), range(2), _FEW),
+    Size.TINY: Plan(range(1000, 1002), range(1), _FEW),
 }
 WHOLE: Mapping[Size, Plan] = {
     Size.FULL: Plan(range(1000, 1050), range(10), {"pitchfork": (20, 24, 28), "hopf": (9, 11, 13)}),
