@@ -118,9 +118,9 @@ def frame_times(record: xr.Dataset, size: tuple[int, int], fps: int, speed: floa
     if not has_encoder():
         raise OutputError(f"PyAV was built without the encoder {ENCODER}, which movies need")
     recorded = record["time"].values.astype(np.float64)
-    # The last frame is at or before the last sample; the tolerance is for round-off in the duration.
-    count = int((recorded[-1] - recorded[0]) * fps / speed + 1e-6) + 1
-    times: Array = recorded[0] + np.arange(count) * (speed / fps)
+    # The last frame is the last sample, with what it came to; the tolerance is for round-off in the duration.
+    count = math.ceil((recorded[-1] - recorded[0]) * fps / speed - 1e-6) + 1
+    times: Array = np.minimum(recorded[0] + np.arange(count) * (speed / fps), recorded[-1])
     return times
 
 
