@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
+from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 
 from chilopod import units
@@ -22,34 +22,16 @@ from chilopod.report.scene.film import filmed
 from chilopod.report.scene.frames import body_frames
 from chilopod.report.scene.replay import replay
 from chilopod.report.scene.replay_3d import replay_3d
-from chilopod.steering import ARRIVAL_RADIUS, Strategy
+from chilopod.steering import ARRIVAL_RADIUS, Verdict
+from chilopod.tasks.course import Driven
 
 _LAYOUTS = (style.Layout("AB;AC", 4.6, widths=(1.5, 1.0)), style.Layout("A;B;C", 9.0, heights=(2.0, 1.0, 1.0)))
 _SHOWN = 6  # walks in a replay or a film
-_LONGEST_FILM = 20.0  # s
+_LONGEST_FILM = 15.0  # s: it takes half as long to make
 _FILM_SIZE = (960, 640)
-_ARRIVED = "arrived"
-
-
-class Driven(Protocol):
-    """What is drawn of a course that was driven."""
-
-    @property
-    def strategy(self) -> Strategy:
-        """How."""
-
-    @property
-    def engine(self) -> str:
-        """Where."""
-
-    @property
-    def pitchfork(self) -> float | None:
-        """First spring below which the straight walk bends, N*m/rad; None where there is none."""
-
-    @property
-    def record(self) -> xr.Dataset:
-        """Of all walks, with ``goal_place`` over (robot, goal, axis), m, ``goal_begin`` and ``goal_end`` over (robot,
-        goal), s, and ``goal_verdict`` over (robot, goal), all but the last NaN for goals that had no turn."""
+_ON_WHITE = {"fc": "white", "ec": "none", "pad": 0.4}
+_ARRIVED = Verdict.ARRIVED.label
+_WAYS = tuple(each for each in style.CURVES if each != style.GREEN)  # which is for targets that were reached
 
 
 def files_of_course(folder: str | Path) -> list[Path]:
@@ -110,7 +92,7 @@ def draw(done: Driven, narrow: bool = False) -> Figure:
     _floor(axes["A"], record)
     axes["A"].set_title(_title(done))
     for robot in reversed(range(record.sizes["robot"])):
-        walk, color = record.isel(robot=robot), style.CURVES[robot % len(style.CURVES)]
+        walk, color = record.isel(robot=robot), _WAYS[robot % len(_WAYS)]
         # Of springs that nobody changed the record has one value for all times.
         spring = units.from_si(1.0, "N*mm/deg") * walk.stiffness.isel(joint=0).broadcast_like(walk.time).values
         axes["B"].plot(walk.time, spring, color=color, linewidth=1.2)
@@ -119,11 +101,12 @@ def draw(done: Driven, narrow: bool = False) -> Figure:
     axes["B"].set_ylabel("k1 (N·mm/deg)")
     # As on other axes, and not as powers of ten.
     axes["B"].yaxis.set_major_formatter("{x:g}")
+    axes["B"].yaxis.set_minor_locator(LogLocator(subs=(2.0, 4.0, 6.0)))
     axes["B"].yaxis.set_minor_formatter("{x:g}")
     if done.pitchfork is not None:
         at = units.from_si(done.pitchfork, "N*mm/deg")
         axes["B"].axhline(at, color=style.VERMILLION, linestyle=(0, (4, 2)), linewidth=1.2)
-        where = {"xycoords": ("axes fraction", "data"), "color": style.VERMILLION}
+        where = {"xycoords": ("axes fraction", "data"), "color": style.VERMILLION, "bbox": _ON_WHITE}
         style.note(axes["B"], "bends below", (0.02, at), (0, 3), **where)
     axes["C"].axhline(0.0, color=style.GREY, linewidth=0.8)
     axes["C"].set_ylabel("target angle (deg)")
@@ -173,16 +156,18 @@ def _floor(axes: Axes, record: xr.Dataset) -> None:
     for robot in reversed(range(record.sizes["robot"])):
         walk = record.isel(robot=robot)
         path = walk.position.transpose("time", "axis").values
-        color = style.CURVES[robot % len(style.CURVES)]
+        color = _WAYS[robot % len(_WAYS)]
         axes.plot(path[:, 0], path[:, 1], color=color, zorder=3, linewidth=1.8 if robot == 0 else 1.0)
         _goals(axes, walk, named=robot == 0)
+    missed = _missed(record.isel(robot=0))
+    style.note(axes, missed, (0.0, 0.0), (4, 4), xycoords="axes fraction", color=style.VERMILLION, bbox=_ON_WHITE)
     _bodies(axes, record.isel(robot=[0]))
     axes.set(xlabel="x (m)", ylabel="y (m)")
     style.grid(axes)
 
 
 def _goals(axes: Axes, walk: xr.Dataset, *, named: bool) -> None:
-    """Rings; those of the walk that is told of with a number, and what became of those that were not reached."""
+    """Rings; those of the walk that is told of with a number."""
     places = walk.goal_place.transpose("goal", "axis").values
     for index, (x, y) in enumerate(places):
         if not np.isfinite([x, y]).all():
@@ -191,13 +176,20 @@ def _goals(axes: Axes, walk: xr.Dataset, *, named: bool) -> None:
         axes.add_patch(Circle((x, y), ARRIVAL_RADIUS, fill=False, ec=color, lw=1.5 if named else 0.8, zorder=4))
         if not named:
             continue
-        verdict = str(walk.goal_verdict.values[index])
         # A place that comes again, such as the crossing of an eight, has its numbers one above the other.
         again = sum(bool(np.allclose(each, (x, y))) for each in places[:index])
-        text = f"{index + 1}" if verdict == _ARRIVED else f"{index + 1} {verdict}"
-        look = {"color": color, "weight": "bold", "zorder": 6, "bbox": {"fc": "white", "ec": "none", "pad": 0.4}}
-        style.note(axes, text, (x, y), (9, 9 + 12 * again), **look)
+        look = {"color": color, "weight": "bold", "zorder": 6, "bbox": _ON_WHITE}
+        style.note(axes, f"{index + 1}", (x, y), (9, 9 + 12 * again), **look)
         axes.plot(x, y, "+", color=color, markersize=6, markeredgewidth=1.5, zorder=4)
+
+
+def _missed(walk: xr.Dataset) -> str:
+    """Which targets were not reached, and why, such as "3, 5 out of time"."""
+    numbers: dict[str, list[str]] = {}
+    for number, verdict in enumerate(walk.goal_verdict.values, 1):
+        if verdict not in (_ARRIVED, ""):
+            numbers.setdefault(str(verdict), []).append(str(number))
+    return "; ".join(f"{', '.join(each)} {verdict}" for verdict, each in numbers.items())
 
 
 def _bodies(axes: Axes, record: xr.Dataset) -> None:
