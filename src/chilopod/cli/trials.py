@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chilopod.cli.options import JsonOption, new_app, print_json
+from chilopod.cli.options import JsonOption, new_app, print_json, print_table
 from chilopod.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -112,9 +112,7 @@ def _print_table(rows: Sequence[Group]) -> None:
                 f"{in_words(row.size)}{'' if row.found else ', another version'}",
             )
         )
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    for line in table if rows else ():
-        typer.echo("  ".join(f"{cell:<{width}}" for cell, width in zip(line, widths, strict=True)).rstrip())
+    print_table(table if rows else ())
 
 
 @app.command()

@@ -30,7 +30,7 @@ from chilopod.steering import (
 )
 from chilopod.tasks.radius_law import radius_law
 from chilopod.tasks.walk import check_repeats, foot_creep, repeated
-from chilopod.trials import Trial, check_fits, run
+from chilopod.trials import NONE, Trial, check_fits, run
 
 GRAVITY = 9.81
 """m/s^2"""
@@ -157,10 +157,12 @@ def _walk_json(trial: Trial, record: xr.Dataset) -> dict[str, Any]:
             }
         )
     return {
-        "seed": trial.seed,
+        "seed": None if trial.disturbance == NONE else trial.seed,
         "status": str(record.status.values[0]),
         "arrived": int((record.goal_verdict == Verdict.ARRIVED.label).sum()),
         "time_s": plain(float(np.nanmax(record.goal_end.values))),
+        "spring_work_J": float(record.goal_spring_work.sum()),
+        "drive_work_J": float(record.goal_drive_work.sum()),
         "steering_cost_of_transport": plain(steering_cost(trial.robot, record)),
         "targets": goals,
     }
@@ -168,9 +170,10 @@ def _walk_json(trial: Trial, record: xr.Dataset) -> dict[str, Any]:
 
 def steering_cost(robot: Robot, record: xr.Dataset) -> float:
     """Work that the spring's actuator and the joints' torques did on a course, over weight and way: the part of the
-    cost of transport that steering adds to walking."""
+    cost of transport that steering adds to walking. NaN of a robot that went nowhere."""
     work = float(record.goal_spring_work.sum() + record.goal_drive_work.sum())
-    return work / (robot.body.mass * GRAVITY * float(record.goal_path.sum()))
+    way = float(record.goal_path.sum())
+    return work / (robot.body.mass * GRAVITY * way) if way > 0.0 else np.nan
 
 
 def driver(
@@ -228,7 +231,7 @@ def driver(
             ) from error
         remarks.append(f"no radius law: {error}")
     walker, steering = _steered(robot, strategy, spring, law, remarks)
-    return Driver(walker, strategy, controller or steering, law, tuple(remarks))
+    return Driver(walker, strategy, steering if controller is None else controller, law, tuple(remarks))
 
 
 def _steered(
