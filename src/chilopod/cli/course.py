@@ -193,15 +193,17 @@ def _print(done: Driven) -> None:
 def _of_targets(goals: list[dict[str, Any]]) -> Iterable[tuple[str, ...]]:
     yield "target", "verdict", "time (s)", "path / shortest", "leg yaw (rad2 s)", "springs (J)", "drives (J)"
     for number, goal in enumerate(goals, 1):
-        begin, end, path, shortest = (goal[name] for name in ("begin_s", "end_s", "path_m", "shortest_m"))
+        if not goal["path_m"]:  # it had no turn
+            yield str(number), goal["verdict"], *"-----"
+            continue
         yield (
             str(number),
             goal["verdict"],
-            "-" if begin is None else f"{end - begin:.1f}",
-            f"{path:.2f} / {shortest:.2f} m" if path and shortest else "-",
-            _shown(goal["leg_yaw_effort_rad2_s"], ".4f"),
-            _shown(goal["spring_work_J"], ".3f"),
-            _shown(goal["drive_work_J"], ".3f"),
+            f"{goal['end_s'] - goal['begin_s']:.1f}",
+            f"{goal['path_m']:.2f} / {goal['shortest_m']:.2f} m",
+            f"{goal['leg_yaw_effort_rad2_s']:.4f}",
+            f"{goal['spring_work_J']:.3f}",
+            f"{goal['drive_work_J']:.3f}",
         )
 
 

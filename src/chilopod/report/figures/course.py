@@ -96,7 +96,8 @@ def draw(done: Driven, narrow: bool = False) -> Figure:
         # Of springs that nobody changed the record has one value for all times.
         spring = units.from_si(1.0, "N*mm/deg") * walk.stiffness.isel(joint=0).broadcast_like(walk.time).values
         axes["B"].plot(walk.time, spring, color=color, linewidth=1.2)
-        axes["C"].plot(walk.time, _bearing(walk), color=color, linewidth=1.2)
+        if "target" in walk:  # where none can be reached there is none
+            axes["C"].plot(walk.time, _bearing(walk), color=color, linewidth=1.2)
     axes["B"].set_yscale("log")
     axes["B"].set_ylabel("k1 (N·mm/deg)")
     # As on other axes, and not as powers of ten.
