@@ -113,12 +113,15 @@ def course(
     described = read_robot(robot, overrides)
     chosen = strategy_named(strategy, ON_COURSES)
     with reading("k1"):
-        spring = None if k1 is None else units.parse(k1, "N*m/rad")
+        path = chosen.springs or "springs.stiffness"
+        spring = None if k1 is None else described.override(path, k1).get(path)
     with reading("patience"):
         seconds = None if patience is None else units.parse(patience, "s")
-    from chilopod.tasks.course import drive, driver, patience_of
+    from chilopod.tasks.course import check_drive, drive, driver, patience_of
 
+    own = own_controller(controller)
     goals = course_named(targets, patience_of(engine) if seconds is None else seconds)
+    check_drive(described, goals, seed=seed, repeats=repeats, engine=engine)
     if out:
         from chilopod.report.figures.course import files_of_course
 
@@ -130,7 +133,7 @@ def course(
             chosen,
             spring,
             engine=engine,
-            controller=own_controller(controller),
+            controller=own,
             folder=trials,
             progress=lambda part, words: show("radius law", part, words),
         )
