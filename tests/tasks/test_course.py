@@ -10,7 +10,7 @@ from chilopod import load_robot
 from chilopod.engine import Command, Event
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.steering import ON_COURSES, VARIABLE, LegYawController, Verdict, course_named, decisions
-from chilopod.tasks import drive, driver
+from chilopod.tasks import Driver, drive, driver
 from chilopod.tasks.course import patience_of, trial_of
 from chilopod.trials import run
 
@@ -130,6 +130,15 @@ def test_the_law_uses_the_actuator_that_there_is(ready, monkeypatch):
 def test_what_cannot_be_driven_is_refused(changed, strategy, spring, error, words):
     with pytest.raises(error, match=words):
         driver(ROBOT.set_from_text(changed), ON_COURSES[strategy], spring)
+
+
+def test_the_whole_robot_walks_a_course():
+    whole = Driver(load_robot("aoi2022"), ON_COURSES["leg-yaw"], LegYawController(), None)
+    done = drive(whole, course_named("0 deg, 0.25 m; 170 deg, 6 m", 1.5), engine="twin")
+    (record,) = done.records
+    assert "pose" in record
+    assert record.goal_verdict.values[0].tolist() == ["out of time", "out of reach"]
+    assert done.as_json()["walks"][0]["targets"][0]["nearest_m"] == pytest.approx(0.25, abs=0.1)
 
 
 def test_leg_yaw_needs_no_pitchfork():
