@@ -41,6 +41,37 @@ def test_the_record_goes_on_when_nobody_walks_any_more(engine, robot):
             assert np.isnan(values.values[-1]).all(), name
 
 
+@BOTH
+@pytest.mark.parametrize("time", [0.0, 0.31, 0.3137, 0.62])  # of the start, a switch, between samples, a cycle
+def test_a_robot_is_halted_at_once_and_the_others_never_know(engine, robot, time):
+    free, walk = (engine.start([robot, robot], record=Recording(rate=100.0)) for _ in range(2))
+    for each in (free, walk):
+        each.advance(0.1 * time)
+        each.advance(time)
+    walk.observe()
+    walk.halt(np.array([False, True]))
+    walk.aim((1.0, 1.0))
+    assert np.isnan(walk.pose()[1]).all()
+    np.testing.assert_array_equal(walk.pose()[0], free.pose()[0])
+    assert walk.to_dataset().sizes["time"] == free.to_dataset().sizes["time"]
+    for each in (free, walk):
+        each.advance(0.8)
+    data, whole = walk.to_dataset(), free.to_dataset()
+    samples = int((whole.time.values <= time + 1e-9).sum())
+    for name in ("position", "heading", "joint_angle"):
+        np.testing.assert_array_equal(data[name].values[:, 0], whole[name].values[:, 0])
+        np.testing.assert_array_equal(data[name].values[:samples, 1], whole[name].values[:samples, 1])
+        assert np.isnan(data[name].values[samples:, 1]).all()
+    assert walk.status == (Status.WALKED, Status.HALTED)
+
+
+@BOTH
+def test_a_robot_that_failed_is_not_halted(engine, robot):
+    walk = torn(engine, robot, 1)
+    walk.halt(np.array([True]))
+    assert walk.status == (Status.OUT_OF_RANGE,)
+
+
 @pytest.mark.parametrize("period", ["25 ms", "33 ms", "1 ms", "100 ms"])
 def test_what_the_scanner_shows_does_not_hang_on_how_the_robot_is_advanced(period):
     robot = TWIN.override("twin.scanner_period", period)
@@ -194,7 +225,7 @@ def test_what_was_saved_and_edited_is_no_walk(engine, robot):
     assert engine.resume(edited(arrays)).save() == saved
     for name in arrays:
         with pytest.raises(ChilopodError):
-            engine.resume(edited({key: each for key, each in arrays.items() if key != name} | _needed(arrays, name)))
+            engine.resume(edited({key: each for key, each in arrays.items() if key != name}))
     for key in header["settings"]:
         settings = {**header["settings"], key: {"a": "dict"}}
         with pytest.raises(ChilopodError):
@@ -202,11 +233,6 @@ def test_what_was_saved_and_edited_is_no_walk(engine, robot):
     for wrong in (None, 3, "text", bytearray(b"x"), b""):
         with pytest.raises(ParameterError):
             engine.resume(wrong)
-
-
-def _needed(arrays, name):
-    """A target may be missing; then it is another walk, so it is made no number here."""
-    return {"target": np.array("there")} if name == "target" else {}
 
 
 @BOTH

@@ -37,13 +37,20 @@ import sys
 sketch = Sketch()
 class Lazy(Sketch):
     def start(self, robots, **given): return None
+class OldWalk(SketchWalk):
+    aim = halt = property()
+class Old(Sketch):
+    def start(self, robots, **given):
+        walk = Sketch.start(self, robots, **given)
+        walk.__class__ = OldWalk
+        return walk
 class Shared(Sketch):
     def common(self, robot): return [robot]
 class Raising(Sketch):
     def initial_states(self, *given, **named): raise ZeroDivisionError("no\\nfloor")
 class Silent(Sketch):
     traits = None
-lazy, shared, raising, silent, three = Lazy(), Shared(), Raising(), Silent(), 3
+lazy, old, shared, raising, silent, three = Lazy(), Old(), Shared(), Raising(), Silent(), 3
 class Unprintable(Exception):
     def __str__(self): raise RuntimeError
 from dataclasses import dataclass
@@ -126,7 +133,13 @@ def test_an_engine_that_is_none_is_named(folder, name, words):
 
 
 @pytest.mark.parametrize(
-    ("name", "words"), [("lazy", "start gave no"), ("shared", "no hash"), ("raising", "ZeroDivisionError: no floor")]
+    ("name", "words"),
+    [
+        ("lazy", "start gave no"),
+        ("old", "it has no aim, halt"),
+        ("shared", "no hash"),
+        ("raising", "ZeroDivisionError: no floor"),
+    ],
 )
 def test_what_goes_wrong_in_an_engine_is_its_own_fault(folder, name, words):
     with pytest.raises(AnalysisError, match=f"engine own_engines:{name}.*{words}"):

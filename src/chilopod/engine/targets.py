@@ -43,7 +43,7 @@ class Targets:
         return there
 
     def move(self, time: float, target: ArrayLike) -> None:
-        """Put them elsewhere from now on.
+        """Put them elsewhere from now on; what is told at time 0 is where they are at the start.
 
         Parameters
         ----------
@@ -66,8 +66,10 @@ class Targets:
         places = np.array(np.broadcast_to(given, shape))
         if np.array_equal(places, self.present, equal_nan=True):
             return
-        self.present, self._given, self._moved = places, True, True
+        self.present, self._given, self._moved = places, True, time > 0.0
         if self._log is not None:
+            if not self._moved:
+                self._log.clear()
             self._log.append((time, places))
 
     def over(self, times: Array) -> Array:

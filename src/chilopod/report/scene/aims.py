@@ -49,6 +49,8 @@ def aims_of(record: xr.Dataset) -> tuple[tuple[Aim, ...], ...]:
         return tuple(_course(goals.isel(robot=robot)) for robot in range(record.sizes["robot"]))
     if "target" not in record:
         return ((),) * record.sizes["robot"]
+    if "time" in record["target"].dims:
+        return tuple(_moved(record.isel(robot=[robot])) for robot in range(record.sizes["robot"]))
     places = record["target"].transpose("robot", "axis").values.astype(np.float64)
     reached = [float(when) if np.isfinite(when) else None for when in arrivals(record)]
     return tuple(
@@ -60,6 +62,19 @@ def aims_of(record: xr.Dataset) -> tuple[tuple[Aim, ...], ...]:
 def places_of(aims: Iterable[Iterable[Aim]]) -> NDArray[np.float64]:
     """Of all targets of all robots, m, shape (P, 2)."""
     return np.array([aim.place for each in aims for aim in each]).reshape(-1, 2)
+
+
+def _moved(record: xr.Dataset) -> tuple[Aim, ...]:
+    """Of one robot, whose target is over time."""
+    time, places = record["time"].values, record["target"].isel(robot=0).transpose("time", "axis").values
+    edges = [0, *(np.flatnonzero((np.diff(places, axis=0) != 0.0).any(axis=1)) + 1).tolist(), len(time)]
+    aims = []
+    for first, last in zip(edges[:-1], edges[1:], strict=True):
+        x, y = places[first].tolist()
+        if np.isfinite([x, y]).all():
+            (reached,) = arrivals(record.isel(time=slice(first, last)))
+            aims.append(Aim((x, y), float(time[first]), float(reached) if np.isfinite(reached) else None))
+    return tuple(aims)
 
 
 def _course(goals: xr.Dataset) -> tuple[Aim, ...]:

@@ -330,10 +330,13 @@ class FilmPanel:
         self.label.set_color(_MARKS[self.outcome.kind][1] if known else "#555555")
         self.label.set_fontweight("bold" if known else "normal")
         for index, (ring, cross) in enumerate(self.rings):
-            ring.set_visible(index < len(reached))
-            cross.set_visible(index < len(reached))
-            arrived = index < len(reached) and reached[index]
-            ring.set_facecolor((COLORS["target"], 0.35 if arrived else 0.1))
+            # Of those that have had their turn a faint ring stays.
+            now_or_before, present = index < len(reached), index == len(reached) - 1
+            ring.set_visible(now_or_before)
+            cross.set_visible(present)
+            arrived = now_or_before and reached[index]
+            ring.set_facecolor((COLORS["target"], (0.35 if arrived else 0.1) if present else 0.0))
+            ring.set_edgecolor((COLORS["target"], 1.0 if present else 0.4))
             ring.set_linestyle("-" if arrived else (0, (4, 3)))
 
     def placed(self, index: int) -> Sequence[Any]:
@@ -344,7 +347,7 @@ class FilmPanel:
             return ()
         headings, feet = frames.headings[index, robot], frames.feet[index, robot]
         self.modules.set_verts(list(_on_modules(centres, headings, self.outline)))
-        self.modules.set_alpha(1.0 if frames.walks[index, robot] else 0.45)
+        self.modules.set_alpha(1.0 if frames.walks[index, robot] or self.outcome.kind != "stopped" else 0.45)
         hips = _on_modules(centres, headings, self.hips)
         self.legs.set_segments(list(np.stack([hips, feet], axis=-2).reshape(-1, 2, 2)))
         self.legs.set_color([COLORS["ink"] if each else COLORS["air"] for each in stands.ravel()])

@@ -202,7 +202,7 @@ class _Walks:
         return Look(
             pose=self.poses[last, robot] if last >= 0 else None,
             stands=shown.frames.stands[index, robot],
-            walks=bool(shown.frames.walks[index, robot]),
+            walks=bool(shown.frames.walks[index, robot]) or shown.outcomes[robot].kind != "stopped",
             path=self.positions[: last + 1, robot],
             target=np.array(begun[-1].place) if begun else None,
             radius=shown.arrival_radius,

@@ -3,9 +3,9 @@
 A *record* is a dataset over ``time`` (s), ``robot``, ``axis`` (x, y), ``joint`` and ``side`` (left, right) with
 ``position`` (m, centre of module 1), ``heading`` (rad), ``joint_angle`` (rad, heading of a module less that of the one
 in front of it), ``leg_yaw`` (rad, of the legs of module 1) and ``status`` (text). Where there was a task there are
-``target`` (m) and ``distance`` (m) as well; where there was a course, over ``robot`` and ``goal``, ``goal_place`` (m),
-``goal_begin`` and ``goal_end`` (s) and ``goal_verdict`` (text). After a robot stopped its values are NaN. The attribute
-``robot`` is the text of the robot file.
+``target`` (m), over time if it moved, and ``distance`` (m) as well; where there was a course, over ``robot`` and
+``goal``, ``goal_place`` (m), ``goal_begin`` and ``goal_end`` (s) and ``goal_verdict`` (text). After a robot stopped its
+values are NaN. The attribute ``robot`` is the text of the robot file.
 """
 
 from __future__ import annotations
@@ -262,7 +262,7 @@ def _titles(record: xr.Dataset, titles: Mapping[Any, str] | Sequence[str]) -> tu
 def _outcome(record: xr.Dataset, frames: BodyFrames, robot: int, aims: tuple[Aim, ...]) -> Outcome:
     status, walks = str(record["status"].values[robot]), frames.walks[:, robot]
     reached = [aim.reached for aim in aims if aim.reached is not None]
-    goals = record.sizes.get("goal", 1)
+    goals = record.sizes.get("goal", max(len(aims), 1))
     if len(reached) == goals:
         words = f"arrived at {reached[-1]:.1f} s" if goals == 1 else f"all {goals} targets by {reached[-1]:.1f} s"
         return Outcome(words, "arrived", reached[-1])

@@ -63,7 +63,7 @@
     context.clearRect(0, 0, robot.width, robot.height);
     context.globalAlpha = 1;
     drawGrid(context, robot, X, Y, left, top, zoom);
-    for (const aim of begun(robot, now)) drawTarget(context, aim, now, X, Y, zoom);
+    begun(robot, now).forEach((aim, i, all) => drawTarget(context, aim, i + 1 === all.length, now, X, Y, zoom));
     if (shown) {
       if (robot.outcome.kind === "stopped" && now > robot.outcome.time) context.globalAlpha = 0.45;
       const feet = drawModules(context, robot, frame, on, zoom);
@@ -90,19 +90,22 @@
     context.stroke();
   }
 
-  function drawTarget(context, aim, now, X, Y, zoom) {
+  // Of a target that has had its turn a faint ring stays.
+  function drawTarget(context, aim, present, now, X, Y, zoom) {
     const [x, y] = [X(aim.place[0]), Y(aim.place[1])];
     const arrived = isReached(aim, now);
     context.strokeStyle = context.fillStyle = colors.target;
     context.beginPath();
     context.arc(x, y, data.arrivalRadius * zoom, 0, 2 * Math.PI);
     context.globalAlpha = arrived ? 0.35 : 0.1;
-    context.fill();
-    context.globalAlpha = 1;
+    if (present) context.fill();
+    context.globalAlpha = present ? 1 : 0.4;
     context.lineWidth = 1.5;
     context.setLineDash(arrived ? [] : [4, 3]);
     context.stroke();
     context.setLineDash([]);
+    context.globalAlpha = 1;
+    if (!present) return;
     context.lineWidth = 2;
     context.beginPath();
     context.moveTo(x - 5, y);

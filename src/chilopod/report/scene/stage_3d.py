@@ -20,7 +20,7 @@ from chilopod.report.kit import style
 from chilopod.report.scene.replay_page import COLORS
 from chilopod.robot import Robot
 from chilopod.twin.legs import twin_of
-from chilopod.twin.model import POLE_GROUP, SIDES, build, scanner_place
+from chilopod.twin.model import AWAY, POLE_GROUP, SIDES, build, scanner_place
 
 Array = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
@@ -90,7 +90,7 @@ class Look:
     stands
         Whether each foot is on the floor, (N, 2).
     walks
-        Whether the robot still walks; if not, it is pale.
+        Whether the robot still walks, or has arrived or was halted; if not, it is pale.
     path
         Of the centre of module 1 up to then, m, (P, 2).
     target
@@ -176,7 +176,7 @@ class Studio:
         self.colors[self.shins] = np.where(look.stands[..., None, None], stands, swings)
         model.geom_rgba[self.of_robot, :3] = (_BRIGHT + strength * (self.colors - _BRIGHT))[self.of_robot]
         model.geom_rgba[self.of_robot, 3] = look.pose is not None
-        data.mocap_pos[0] = (0.0, 0.0, -10.0) if look.target is None else (*look.target, 0.0)
+        data.mocap_pos[0] = AWAY if look.target is None else (*look.target, 0.0)
         model.light_pos[0] = view.middle - view.distance * _LIGHT
         mujoco.mj_kinematics(model, data)
         mujoco.mj_camlight(model, data)
