@@ -44,6 +44,18 @@ def test_the_picture_names_targets_and_what_became_of_them(done, narrow):
         assert np.flatnonzero(np.isnan(line.get_ydata())).tolist() == [100]
 
 
+@pytest.mark.parametrize(("targets", "lines"), [(1, 3), (0, 1)])
+def test_a_target_that_stays_or_none_at_all_is_drawn_too(done, targets, lines):
+    """As of a course that ends with its first target, or has none that can be reached."""
+    kept = done.record.drop_vars("target")
+    if targets:
+        kept["target"] = done.record.target.isel(time=0)
+    with style.house_style():
+        *_, angle = draw(SimpleNamespace(**{**vars(done), "record": kept})).axes
+        assert len(angle.lines) == lines
+        assert not any(np.isnan(line.get_ydata()).any() for line in angle.lines)
+
+
 def test_its_files(done, tmp_path):
     assert write_course(done, tmp_path, replace=False) == files_of_course(tmp_path)
     page = Page((tmp_path / "course.html").read_text())

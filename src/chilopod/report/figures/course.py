@@ -125,7 +125,9 @@ def _title(done: Driven) -> str:
 
 def _bearing(walk: xr.Dataset) -> NDArray[np.float64]:
     """Of the target whose turn it is, deg; a line does not cross the picture where it jumps."""
-    place, target = (walk[name].transpose("time", "axis").values for name in ("position", "target"))
+    place = walk.position.transpose("time", "axis")
+    # One that was the target all the time has one place for all times.
+    place, target = place.values, walk.target.broadcast_like(place).transpose("time", "axis").values
     away = target - place
     angle = np.arctan2(away[:, 1], away[:, 0]) - walk.heading.values
     angle = np.rad2deg((angle + np.pi) % (2.0 * np.pi) - np.pi)
