@@ -37,7 +37,7 @@ def test_the_picture_names_targets_and_what_became_of_them(done, narrow):
         floor, spring, angle = draw(done, narrow).axes
         assert floor.get_title(loc="left") == "pitchfork: 4 of 6 targets"
         assert floor.get_aspect() == 1.0
-        assert [each.get_text() for each in floor.texts] == ["1", "2", "2 given up; 3 not tried"]
+        assert [each.get_text() for each in floor.texts] == ["1", "2", "walk 1: 2 given up; 3 not tried"]
         assert [each.get_text() for each in spring.texts] == ["bends below", "1", "2"]
         # Of the second target the line starts anew.
         (line,) = [each for each in angle.lines if each.get_color() == style.CURVES[0]]

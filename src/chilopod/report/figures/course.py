@@ -18,7 +18,7 @@ from chilopod.netcdf import netcdf
 from chilopod.output import Content, write_all
 from chilopod.report.kit import style
 from chilopod.report.scene.encoder import has_encoder
-from chilopod.report.scene.film import filmed
+from chilopod.report.scene.film import FASTEST, filmed
 from chilopod.report.scene.frames import body_frames
 from chilopod.report.scene.replay import replay
 from chilopod.report.scene.replay_3d import replay_3d
@@ -81,7 +81,7 @@ def _files(done: Driven, folder: str | Path) -> Iterator[tuple[Path, Content]]:
     for file in film:
         # As many times faster as makes it short; from above all of a course is seen.
         seconds = float(shown.time[-1] - shown.time[0])
-        speed = max(1.0, np.ceil(seconds / _LONGEST_FILM))
+        speed = min(max(1.0, np.ceil(seconds / _LONGEST_FILM)), FASTEST)
         yield file, filmed(shown, titles=labels, heading=_title(done), speed=speed, size=_FILM_SIZE)
 
 
@@ -163,6 +163,8 @@ def _floor(axes: Axes, record: xr.Dataset) -> None:
         axes.plot(path[:, 0], path[:, 1], color=color, zorder=3, linewidth=1.8 if robot == 0 else 1.0)
         _goals(axes, walk, named=robot == 0)
     missed = _missed(record.isel(robot=0))
+    if missed and record.sizes["robot"] > 1:
+        missed = f"walk 1: {missed}"
     style.note(axes, missed, (0.0, 0.0), (4, 4), xycoords="axes fraction", color=style.VERMILLION, bbox=_ON_WHITE)
     _bodies(axes, record.isel(robot=[0]))
     axes.set(xlabel="x (m)", ylabel="y (m)")
