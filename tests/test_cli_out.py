@@ -17,6 +17,7 @@ COMMANDS = {
     "identification.svg": ["identify", "planar", "--points", "3"],
     "identified.toml": ["identify", "twin"],
     "turn.html": ["turn", ROBOT, "--target", "45 deg, 1.3 m", "--k1", "10 N*mm/deg", "--duration", "1 s"],
+    "course.html": ["course", ROBOT, "--targets", "0 deg, 0.5 m"],
 }
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from chilopod import load_robot
 from chilopod.cli import main
-from chilopod.steering import LegYawController, Target
+from chilopod.steering import Course, Goal, LegYawController, Target
 from chilopod.trials import NONE, Store, Trial, claims, run, trial
 
 ROBOT = load_robot("aoi2022-planar")
@@ -59,6 +59,14 @@ def test_a_list_groups_what_differs_in_robots_and_seeds(folder, printed):
     groups = [(group["robots"], group["seeds"], group["trials"]) for group in found["groups"]]
     assert groups == [(1, "", 1), (2, "1-2, 4", 6)]
     assert found["foreign"] == ["notes.txt"]
+
+
+def test_a_list_says_how_many_targets_courses_have(tmp_path, printed):
+    goals = (Goal(1.0, 0.0, relative=True), Goal(1.0, 0.5, relative=True))
+    run([replace(BASE, target=Course(each, 0.5), duration=0.5 * len(each)) for each in (goals, goals[:1])], tmp_path)
+    _, lines, found = printed("list", tmp_path)
+    assert ["course of 1" in lines[1], "course of 2" in lines[2]] == [True, True]
+    assert [(group["target"], group["targets"]) for group in found["groups"]] == [(None, 1), (None, 2)]
 
 
 def test_a_check_names_what_is_not_whole(folder, printed):

@@ -403,6 +403,7 @@ def test_what_is_adjustable_is_part_of_the_file_and_absent_means_fixed():
     assert robot.get("springs.rate") == pytest.approx(0.1 * 180.0 / np.pi)
     assert robot.with_value("body.modules", 8).springs.adjustable == (True,) + (False,) * 6
     assert robot.override("springs.adjustable", "true").springs.adjustable == (True,) * 5
+    assert fixed.override("springs.adjustable[0]", "false").springs.adjustable == (False,) * 5
     table = {"adjustable": True, "lag": "50 ms", "stiffness": "41 N*mm/deg", "damping": 0.0}
     assert Robot(**{**dict(fixed), "springs": table}).springs.lag == (0.05,) * 5
 

@@ -16,7 +16,7 @@ from chilopod.errors import ChilopodError
 
 if TYPE_CHECKING:
     from chilopod.robot import Robot
-    from chilopod.tasks import Ends, Turn
+    from chilopod.tasks import Driven, Ends, Turn
 
 STAYS_STRAIGHT = "nothing disturbed it, so nothing bends it, even where the straight walk is unstable"
 
@@ -209,7 +209,16 @@ def json_text(result: dict[str, Any]) -> str:
     return json.dumps(result, indent=2, allow_nan=False)
 
 
-def creep(done: Turn | Ends) -> None:
+def print_table(rows: Iterable[Sequence[str]], indent: str = "") -> None:
+    """Print rows in columns, the first of them as headings."""
+    table = list(rows)
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    for line in table:
+        cells = (f"{cell:<{width}}" for cell, width in zip(line, widths, strict=True))
+        typer.echo(f"{indent}{'  '.join(cells)}".rstrip())
+
+
+def creep(done: Turn | Driven | Ends) -> None:
     """Measure how firmly the floor holds standing feet, which may take as long as the walk, while that is shown."""
     with progress_bar("creep of the feet"):
         _ = done.foot_creep

@@ -6,11 +6,11 @@ import math
 from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from chilopod.cli.options import JsonOption, new_app, print_json
+from chilopod.cli.options import JsonOption, new_app, print_json, print_table
 from chilopod.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def listed(folder: FolderArg, as_json: JsonOption = False) -> None:
                         "engine": row.engine,
                         "controller": row.controller,
                         "duration_s": row.duration,
-                        "target": {"bearing_rad": row.target[0], "distance_m": row.target[1]} if row.target else None,
+                        **_target_json(row),
                         "seeds": _ranges(row.seeds),
                         "trials": row.count,
                         "bytes": row.size,
@@ -98,13 +98,12 @@ def _print_table(rows: Sequence[Group]) -> None:
 
     table = [("robot", "engine", "walk", "target", "controller", "robots", "seeds", "trials", "size")]
     for row in rows:
-        bearing, distance = row.target or (0.0, 0.0)
         table.append(
             (
                 row.robot,
                 row.engine,
                 f"{row.duration:g} s",
-                f"{math.degrees(bearing):.4g} deg, {distance:g} m" if row.target else "-",
+                _target(row),
                 row.controller.rpartition(":")[2] if row.controller else "-",
                 str(row.robots),
                 _ranges(row.seeds) or "-",
@@ -112,9 +111,20 @@ def _print_table(rows: Sequence[Group]) -> None:
                 f"{in_words(row.size)}{'' if row.found else ', another version'}",
             )
         )
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    for line in table if rows else ():
-        typer.echo("  ".join(f"{cell:<{width}}" for cell, width in zip(line, widths, strict=True)).rstrip())
+    print_table(table if rows else ())
+
+
+def _target(row: Group) -> str:
+    if isinstance(row.target, tuple):
+        return f"{math.degrees(row.target[0]):.4g} deg, {row.target[1]:g} m"
+    return f"course of {row.target}" if row.target else "-"
+
+
+def _target_json(row: Group) -> dict[str, Any]:
+    """One target, or how many there are one after another."""
+    if isinstance(row.target, tuple):
+        return {"target": {"bearing_rad": row.target[0], "distance_m": row.target[1]}, "targets": 1}
+    return {"target": None, "targets": row.target or 0}
 
 
 @app.command()

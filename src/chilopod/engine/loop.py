@@ -152,7 +152,7 @@ def steer(
         )
 
     def tell() -> None:
-        # A referee may find that it is over before it has begun.
+        # Where there is nowhere to go, a referee ends the walk before it begins.
         done, words = walk.time / until if until > 0.0 else 1.0, f"{walk.time:.1f} of {until:g} s"
         for each in (progress, *(spent.progress for spent in _watching)):
             each(done, words)

@@ -314,7 +314,7 @@ class Robot(Description):
                     raise ParameterError("this robot has none", allowed=f"{path.partition('[')[0]} for all of them")
                 old = (False,) * (self.body.modules - 1)
             new = tuple(value if place.index in (None, index) else item for index, item in enumerate(old))
-        if new == old:
+        if new == getattr(section, place.key):
             return self
         changed = section.model_copy(update={place.key: new})
         if place.section == "twin" or place.key in ("softest", "stiffest"):

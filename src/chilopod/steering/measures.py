@@ -37,8 +37,10 @@ def of_course(record: xr.Dataset, robot: Robot, brief: bool = False) -> xr.Datas
         Whether to leave out what is over time and over events.
     """
     begin, end = (record[f"goal_{name}"].values[0] for name in ("begin", "end"))
-    last = np.nanmax(end) + 1e-9
-    data = record.isel(time=record.time.values <= last)
+    over = float(np.nanmax(end))
+    last = over + 1e-9
+    # How long others walked on that were simulated with it is no part of it.
+    data = record.isel(time=record.time.values <= last).assign_attrs(duration=over)
     if "event" in data.dims:
         data = data.isel(event=data.event.values < last)
     sums = {

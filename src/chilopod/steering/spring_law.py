@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from chilopod import units
 from chilopod.engine import Command, Event, Observation
 from chilopod.errors import ParameterError
 from chilopod.frozen import ReadOnlyArrays
@@ -19,23 +20,26 @@ from chilopod.steering.target import ARRIVAL_RADIUS
 
 Array = NDArray[np.float64]
 
+_AHEAD = 2.0  # modules
+
 
 @dataclass(frozen=True)
 class SpringLaw(ReadOnlyArrays):
-    """The bend that the body has against the bend of the circle that leads to the target.
+    """The bend that the body has against the bend that leads to the target.
 
-    When the left leg of module 1 swings, the curvature 2 sin(psi) / R of the circle to the target is compared with that
-    of the body axis, the sum of joint angles over (N-1) L. The first spring is then
+    When the left leg of module 1 swings, a curvature is wanted: 2 sin(psi) / D, that of the circle to a place on the
+    line to the target a distance D ahead, no farther than the target itself (pure pursuit). It is compared with that of
+    the body axis, the sum of joint angles over (N-1) L. The first spring is then
 
     - as soft as it goes where the body bends less: beside the pitchfork the bend that a spring leads to grows by a few
       percent a second, too slowly to wait for;
     - that of the inverse radius law, the paper's k1-hat, where it bends as wanted: this keeps the bend;
-    - as stiff as it goes where it bends more or to the wrong side, where the target is ahead, where it lies so far
-      within the tightest circle that the robot would walk round it for ever, and where a joint is bent as far as it
-      may: this straightens it.
+    - as stiff as it goes where it bends more or to the wrong side, where hardly a bend is wanted, and where a joint is
+      bent as far as it may: this straightens it.
 
-    The legs of module 1 yaw as in the paper, and so tell a new bend its side. A target that is not seen is looked for
-    by turning as tightly as can be to the side that the legs were last turned to: it comes into view again.
+    No bend is wanted where the target lies so far within the tightest circle that the robot would walk round it for
+    ever, and the tightest where the target is not seen, to the side that the legs were last turned to: it comes into
+    view again. The legs of module 1 yaw as in the paper, and so tell a new bend its side.
 
     The law keeps nothing in mind: what it commands follows from one observation.
 
@@ -45,10 +49,16 @@ class SpringLaw(ReadOnlyArrays):
         Of the first spring, N*m/rad.
     curvatures, springs
         The inverse radius law: 1/m, rising from 0 at the pitchfork, and N*m/rad.
+    tightest
+        Radius of the tightest circle, m.
     arm
         (N-1) L of the paper's radius, m.
+    ahead
+        D, m. Two modules long: as far as the joints of the first spring and of the next reach. Half of that and half
+        as much again do as well, see the documentation; a circle all the way to a far target is too wide.
     band
-        Part of the wanted bend by which the bend may differ and still be as wanted.
+        Part of the wanted bend by which the bend may differ and still be as wanted. Between 0.15 and 0.3 it hardly
+        matters.
     straight
         A wanted bend of all joints together that is left to the legs, rad.
     most_bent
@@ -61,7 +71,9 @@ class SpringLaw(ReadOnlyArrays):
     stiffest: float
     curvatures: Array
     springs: Array
+    tightest: float
     arm: float
+    ahead: float
     band: float = 0.25
     straight: float = 0.1
     most_bent: float = 1.25
@@ -84,7 +96,7 @@ class SpringLaw(ReadOnlyArrays):
         Raises
         ------
         ParameterError
-            If the actuator cannot make the robot turn: its softest spring lies beyond the pitchfork.
+            If the actuator leaves no range.
         """
         own = robot.springs
         softest, stiffest = float(law.values[0]), max(own.stiffness)
@@ -92,25 +104,41 @@ class SpringLaw(ReadOnlyArrays):
             softest = max(softest, own.softest[0])
         if own.stiffest is not None:
             stiffest = min(stiffest, own.stiffest[0])
-        if not softest < min(law.pitchfork, stiffest):
+        if not softest < stiffest:
+            low, high = (units.format(each, law.unit, digits=4) for each in (softest, stiffest))
             raise ParameterError(
-                "leaves the first spring no stiffness at which the walk bends",
-                field="springs.softest",
-                value=f"{softest:.4g} N*m/rad",
-                allowed=f"less than {min(law.pitchfork, stiffest):.4g} N*m/rad, where the pitchfork or the stiffest is",
+                "leaves the first spring no range to steer with",
+                field="springs.softest, springs.stiffest",
+                value=f"{low} to {high}",
+                allowed="the softest below the stiffest, and below the stiffest spring of the axis",
             )
         curvatures = np.where(np.isfinite(law.radii), 1.0 / law.radii, 0.0)
-        arm = (robot.body.modules - 1) * robot.module_length
-        return cls(softest, stiffest, curvatures[::-1], law.values[::-1], arm)
+        return cls(
+            softest,
+            stiffest,
+            curvatures[::-1],
+            law.values[::-1],
+            law.radius(softest) if softest < law.pitchfork else law.tightest,
+            (robot.body.modules - 1) * robot.module_length,
+            _AHEAD * robot.module_length,
+        )
 
     def remarks(self, law: RadiusLaw) -> list[str]:
         """What the actuator keeps from a robot that its radius law would allow."""
-        if self.softest <= law.values[0]:
-            return []
-        return [
-            f"the actuator goes no softer than {self.softest:.4g} N*m/rad: circles of less than "
-            f"{law.radius(self.softest):.3g} m, of {law.tightest:.3g} m otherwise, are out of its reach"
-        ]
+        said = []
+        softest, stiffest, pitchfork = (
+            units.format(each, law.unit, digits=4) for each in (self.softest, self.stiffest, law.pitchfork)
+        )
+        if self.softest >= law.pitchfork:
+            said.append(f"at {softest}, its softest, the first spring bends no straight walk ({pitchfork} does)")
+        elif self.softest > law.values[0]:
+            said.append(
+                f"at {softest}, its softest, the first spring makes circles of {self.tightest:.3g} m; tighter ones, "
+                f"down to {law.tightest:.3g} m, are out of its reach"
+            )
+        if self.stiffest <= law.pitchfork:
+            said.append(f"at {stiffest}, its stiffest, the first spring holds no straight walk ({pitchfork} does)")
+        return said
 
     def events(self, gait: Gait) -> Sequence[Event]:
         """Those of the legs of module 1."""
@@ -127,19 +155,28 @@ class SpringLaw(ReadOnlyArrays):
 
     def spring(self, seen: Observation) -> Array:
         """Stiffness of the first spring for what is seen, N*m/rad, shape (robots,)."""
-        curvature = 2.0 * np.sin(seen.bearing) / np.maximum(seen.distance, ARRIVAL_RADIUS)
+        curvature = self._curvature(seen)
         wanted, bend = self.arm * curvature, -seen.joint_angles.sum(axis=1)
-        right_side, size = wanted * bend >= 0.0, np.abs(bend) / np.maximum(np.abs(wanted), self.straight)
-        steady = np.interp(np.abs(curvature), self.curvatures, self.springs)
-        as_wanted = np.where(size < 1.0 + self.band, np.clip(steady, self.softest, self.stiffest), self.stiffest)
-        spring = np.where(size < 1.0 - self.band, self.softest, as_wanted)
-        turns = right_side & (np.abs(wanted) > self.straight) & ~self._too_near(seen)
-        spring = np.where(np.isnan(wanted), self.softest, np.where(turns, spring, self.stiffest))
-        return np.where(np.abs(seen.joint_angles).max(axis=1) > self.most_bent, self.stiffest, spring)
+        # Of what is wanted that there is; negative to the wrong side.
+        share = bend * np.sign(wanted) / np.maximum(np.abs(wanted), self.straight)
+        steady = np.clip(np.interp(np.abs(curvature), self.curvatures, self.springs), self.softest, self.stiffest)
+        spring = np.where(
+            share < 1.0 - self.band, self.softest, np.where(share < 1.0 + self.band, steady, self.stiffest)
+        )
+        straightens = (share < 0.0) | (np.abs(wanted) < self.straight)
+        straightens |= np.abs(seen.joint_angles).max(axis=1) > self.most_bent
+        return np.where(straightens, self.stiffest, spring)
+
+    def _curvature(self, seen: Observation) -> Array:
+        """That is wanted, 1/m, left positive, shape (robots,)."""
+        bearing = np.clip(seen.bearing, -0.5 * np.pi, 0.5 * np.pi)
+        pursued = 2.0 * np.sin(bearing) / np.clip(seen.distance, ARRIVAL_RADIUS, self.ahead)
+        sought = np.copysign(1.0 / self.tightest, seen.leg_yaw[:, 0])
+        return np.where(np.isnan(pursued), sought, np.where(self._too_near(seen), 0.0, pursued))
 
     def _too_near(self, seen: Observation) -> NDArray[np.bool_]:
         """Whether the tightest circle leads round the target and not to it."""
-        radius = 1.0 / self.curvatures[-1]
+        radius = self.tightest
         ahead, aside = seen.distance * np.cos(seen.bearing), np.abs(seen.distance * np.sin(seen.bearing))
         inside: NDArray[np.bool_] = np.hypot(ahead, aside - radius) < radius - ARRIVAL_RADIUS
         return inside

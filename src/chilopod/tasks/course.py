@@ -30,7 +30,7 @@ from chilopod.steering import (
 )
 from chilopod.tasks.radius_law import radius_law
 from chilopod.tasks.walk import check_repeats, foot_creep, repeated
-from chilopod.trials import Trial, check_fits, run
+from chilopod.trials import NONE, Trial, check_fits, run
 
 GRAVITY = 9.81
 """m/s^2"""
@@ -157,10 +157,12 @@ def _walk_json(trial: Trial, record: xr.Dataset) -> dict[str, Any]:
             }
         )
     return {
-        "seed": trial.seed,
+        "seed": None if trial.disturbance == NONE else trial.seed,
         "status": str(record.status.values[0]),
         "arrived": int((record.goal_verdict == Verdict.ARRIVED.label).sum()),
         "time_s": plain(float(np.nanmax(record.goal_end.values))),
+        "spring_work_J": float(record.goal_spring_work.sum()),
+        "drive_work_J": float(record.goal_drive_work.sum()),
         "steering_cost_of_transport": plain(steering_cost(trial.robot, record)),
         "targets": goals,
     }
@@ -168,9 +170,10 @@ def _walk_json(trial: Trial, record: xr.Dataset) -> dict[str, Any]:
 
 def steering_cost(robot: Robot, record: xr.Dataset) -> float:
     """Work that the spring's actuator and the joints' torques did on a course, over weight and way: the part of the
-    cost of transport that steering adds to walking."""
+    cost of transport that steering adds to walking. NaN of a robot that went nowhere."""
     work = float(record.goal_spring_work.sum() + record.goal_drive_work.sum())
-    return work / (robot.body.mass * GRAVITY * float(record.goal_path.sum()))
+    way = float(record.goal_path.sum())
+    return work / (robot.body.mass * GRAVITY * way) if way > 0.0 else np.nan
 
 
 def driver(
@@ -218,30 +221,28 @@ def driver(
         raise ParameterError(f"the strategy {strategy.name} has no spring to choose", field="k1", value=spring)
     law: RadiusLaw | None = None
     remarks: list[str] = []
+    walker = _with_actuator(robot, remarks) if strategy is VARIABLE else robot
     try:
         law = radius_law(robot, engine, folder, progress)
     except AnalysisError as error:
         if strategy in (VARIABLE, ACTUATED) and controller is None:
             raise AnalysisError(
-                f"the strategy {strategy.name} stands on the pitchfork of the straight walk, and {error}",
-                allowed="a robot that bends (softer springs behind, a longer stride), or the strategy leg-yaw",
+                f"the strategy {strategy.name} stands on how tightly the first spring turns the robot: {error.problem}",
+                allowed="a robot that bends (narrower, softer behind, with a longer stride), or the strategy leg-yaw",
             ) from error
-        remarks.append(f"no radius law: {error}")
-    walker, steering = _steered(robot, strategy, spring, law, remarks)
-    return Driver(walker, strategy, controller or steering, law, tuple(remarks))
-
-
-def _steered(
-    robot: Robot, strategy: Strategy, spring: float | None, law: RadiusLaw | None, remarks: list[str]
-) -> tuple[Robot, Controller | None]:
-    if strategy is VARIABLE and law is not None:
-        walker = _with_actuator(robot, remarks)
-        steering = SpringLaw.of(walker, law)
-        remarks += steering.remarks(law)
-        return walker, steering
-    if strategy is ACTUATED and law is not None:
-        return robot, ActuatedAxis.of(robot, law)
-    return steered(robot, strategy, spring)
+        remarks.append(
+            f"how tightly the robot turns is not known, so shortest paths are straight lines: {error.problem}"
+        )
+    if controller is not None:
+        walker, _ = steered(walker, strategy, spring)
+    elif strategy is VARIABLE and law is not None:
+        controller = own = SpringLaw.of(walker, law)
+        remarks += own.remarks(law)
+    elif strategy is ACTUATED and law is not None:
+        controller = ActuatedAxis.of(walker, law)
+    else:
+        walker, controller = steered(walker, strategy, spring)
+    return Driver(walker, strategy, controller, law, tuple(remarks))
 
 
 def drive(
@@ -272,16 +273,35 @@ def drive(
         Where trials are kept; without one nothing is kept.
     progress
         Called with the part done (0 to 1) and a few words.
+
+    Raises
+    ------
+    ParameterError
+        If memory cannot hold the records, or something is out of range.
     """
-    check_repeats(seed, repeats)
+    check_drive(driver.robot, course, seed=seed, repeats=repeats, engine=engine)
     if driver.controller is not None:
         check_controller(driver.controller)
     if driver.law is not None:
         course = replace(course, tightest=driver.law.tightest)
     trials = repeated(trial_of(driver, course, engine=engine, poses=engine_named(engine).traits.poses), seed, repeats)
-    check_fits(trials)
     records = run(trials, folder, progress)
     return Driven(driver, course, engine, trials, tuple(records))
+
+
+def check_drive(
+    robot: Robot, course: Course, *, seed: int | None = None, repeats: int = 1, engine: str = "planar"
+) -> None:
+    """Refuse what :func:`drive` would refuse of a robot, before :func:`driver` takes its time.
+
+    Raises
+    ------
+    ParameterError
+        If the engine does not know such a robot, several walks are all alike, or memory cannot hold their records.
+    """
+    check_repeats(seed, repeats)
+    one = Trial(robot, course.duration, target=course, rate=_RATE, engine=engine)
+    check_fits([one] * repeats)
 
 
 def trial_of(

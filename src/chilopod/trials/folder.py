@@ -160,7 +160,8 @@ def clean(folder: Path, *, old: bool = False, dry: bool = False) -> tuple[list[P
 
 @dataclass(frozen=True)
 class Group:
-    """Trials of robots of one name that differ in nothing but the robots' numbers and their seeds.
+    """Trials of robots of one name that differ in nothing but the robots' numbers, their seeds, and where the
+    targets of a course are.
 
     Attributes
     ----------
@@ -169,7 +170,7 @@ class Group:
     duration
         s.
     target
-        Bearing, rad, and distance, m; None where there is none.
+        Bearing, rad, and distance, m; of a course how many targets it has; None where there is none.
     found
         See :class:`Kept`.
     robots
@@ -186,7 +187,7 @@ class Group:
     engine: str
     controller: str | None
     duration: float
-    target: tuple[float, float] | None
+    target: tuple[float, float] | int | None
     found: bool
     robots: int
     seeds: tuple[int, ...]
@@ -222,15 +223,22 @@ def groups(trials: Sequence[Kept]) -> list[Group]:
 def _what_groups_share(trial: Kept) -> tuple[Any, ...]:
     # Other versions may tell less, or otherwise.
     told = trial.told
-    controller, target = told.get("controller"), told.get("target")
+    controller = told.get("controller")
     return (
         trial.robot,
         told["engine"],
         str(controller.get("class", "")).partition(" ")[0] if isinstance(controller, dict) else None,
         told["duration"],
-        tuple(target) if isinstance(target, list) else None,
+        _target_of(told),
         trial.found,
     )
+
+
+def _target_of(told: dict[str, Any]) -> tuple[float, ...] | int | None:
+    target = told.get("target")
+    if isinstance(target, dict):
+        return len(target.get("goals", ()))
+    return tuple(target) if isinstance(target, list) else None
 
 
 def _looked_at(

@@ -55,20 +55,23 @@ def seen(bearing, bend, spring):
 
 def test_each_step_of_the_law_does_what_it_says(variable):
     law = variable.controller
-    circle, bend, search, last = steps(law).values()
+    circle, bend, search, near, last = steps(law).values()
     assert last is law
     # Straight, with a target to the left: the spring of the circle; from then on as soft as it goes.
     ahead = seen(0.5, 0.0, 2.3)
-    wanted = np.interp(2.0 * np.sin(0.5), law.curvatures, law.springs)
-    assert circle.spring(ahead) == pytest.approx(wanted)
-    assert [each.spring(ahead)[0] for each in (bend, search, last)] == [law.softest] * 3
+    assert circle.spring(ahead) == pytest.approx(np.interp(2.0 * np.sin(0.5), law.curvatures, law.springs))
+    assert [each.spring(ahead)[0] for each in (bend, search, near, last)] == [law.softest] * 4
     # Out of sight.
     lost = seen(np.nan, 0.0, 1.9)
     assert [each.spring(lost)[0] for each in (circle, bend, search)] == [1.9, 1.9, law.softest]
     # Beside the robot, within its tightest circle.
-    near = replace(seen(1.5, 1.5, 1.0), distance=np.array([0.3]))
-    assert search.spring(near)[0] < law.stiffest
-    assert last.spring(near)[0] == law.stiffest
+    beside = replace(seen(1.5, 1.5, 1.0), distance=np.array([0.3]))
+    assert search.spring(beside)[0] < law.stiffest
+    assert near.spring(beside)[0] == law.stiffest
+    # A bend that is that of the circle all the way, and not that of a place ahead.
+    bent = seen(0.5, law.arm * 2.0 * np.sin(0.5), 1.0)
+    assert near.spring(bent) == pytest.approx(np.interp(2.0 * np.sin(0.5), law.curvatures, law.springs))
+    assert last.spring(bent)[0] == law.softest
 
 
 def test_conditions_change_the_robot_and_not_its_law(context, variable):

@@ -37,11 +37,23 @@ def test_the_picture_names_targets_and_what_became_of_them(done, narrow):
         floor, spring, angle = draw(done, narrow).axes
         assert floor.get_title(loc="left") == "pitchfork: 4 of 6 targets"
         assert floor.get_aspect() == 1.0
-        assert [each.get_text() for each in floor.texts] == ["1", "2 given up"]
+        assert [each.get_text() for each in floor.texts] == ["1", "2", "walk 1: 2 given up; 3 not tried"]
         assert [each.get_text() for each in spring.texts] == ["bends below", "1", "2"]
         # Of the second target the line starts anew.
         (line,) = [each for each in angle.lines if each.get_color() == style.CURVES[0]]
         assert np.flatnonzero(np.isnan(line.get_ydata())).tolist() == [100]
+
+
+@pytest.mark.parametrize(("targets", "lines"), [(1, 3), (0, 1)])
+def test_a_target_that_stays_or_none_at_all_is_drawn_too(done, targets, lines):
+    """As of a course that ends with its first target, or has none that can be reached."""
+    kept = done.record.drop_vars("target")
+    if targets:
+        kept["target"] = done.record.target.isel(time=0)
+    with style.house_style():
+        *_, angle = draw(SimpleNamespace(**{**vars(done), "record": kept})).axes
+        assert len(angle.lines) == lines
+        assert not any(np.isnan(line.get_ydata()).any() for line in angle.lines)
 
 
 def test_its_files(done, tmp_path):

@@ -13,6 +13,8 @@ from chilopod.steering import ARRIVAL_RADIUS, SpringLaw
 
 Array = NDArray[np.float64]
 
+_ALL_THE_WAY = 1e9  # m: to the target, however far
+
 
 @dataclass(frozen=True)
 class InverseLaw(SpringLaw):
@@ -27,23 +29,32 @@ class InverseLaw(SpringLaw):
 
 
 @dataclass(frozen=True)
-class WithoutSearch(SpringLaw):
-    """As the law, but a target that is not seen leaves the spring as it is."""
+class EarlierLaw(SpringLaw):
+    """As the law, but it never straightens for a target within its tightest circle.
+
+    Attributes
+    ----------
+    searches
+        Whether a target that is not seen is looked for, else it leaves the spring as it is.
+    """
+
+    searches: bool = True
 
     def spring(self, seen: Observation) -> Array:
         """Stiffness of the first spring for what is seen, N*m/rad, shape (robots,)."""
-        return np.where(np.isnan(seen.bearing), seen.stiffness[:, 0], super().spring(seen))
+        # A circle that leads round no target.
+        towards = SpringLaw.spring(replace(self, tightest=ARRIVAL_RADIUS), seen)
+        lost = super().spring(seen) if self.searches else seen.stiffness[:, 0]
+        return np.where(np.isnan(seen.bearing), lost, towards)
 
 
 def steps(law: SpringLaw) -> Mapping[str, SpringLaw]:
     """Laws from the first step to the last, which is the one that is given, by what each has beyond the one before."""
-    own = {each.name: getattr(law, each.name) for each in fields(SpringLaw)}
-    # A circle that leads round no target: the law never straightens for one that lies within it.
-    curvatures = np.append(law.curvatures, max(1.0 / ARRIVAL_RADIUS, 1.01 * law.curvatures[-1]))
-    springs = np.append(law.springs, law.springs[-1])
+    circle = {each.name: getattr(law, each.name) for each in fields(SpringLaw)} | {"ahead": _ALL_THE_WAY}
     return {
-        "the spring of the circle, once a cycle": InverseLaw(**own),
-        "its bend against the bend there is": WithoutSearch(**{**own, "curvatures": curvatures, "springs": springs}),
-        "looking for what is lost": replace(law, curvatures=curvatures, springs=springs),
-        "straightening for what lies within its circle": law,
+        "the spring of the circle to the target, once a cycle": InverseLaw(**circle),
+        "its bend against the bend there is": EarlierLaw(**circle, searches=False),
+        "looking for what is lost": EarlierLaw(**circle),
+        "straightening for what lies within the tightest circle": replace(law, ahead=_ALL_THE_WAY),
+        "a place ahead in place of the target": law,
     }

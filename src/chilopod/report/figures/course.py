@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
+from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 
 from chilopod import units
@@ -18,38 +18,20 @@ from chilopod.netcdf import netcdf
 from chilopod.output import Content, write_all
 from chilopod.report.kit import style
 from chilopod.report.scene.encoder import has_encoder
-from chilopod.report.scene.film import filmed
+from chilopod.report.scene.film import FASTEST, filmed
 from chilopod.report.scene.frames import body_frames
 from chilopod.report.scene.replay import replay
 from chilopod.report.scene.replay_3d import replay_3d
-from chilopod.steering import ARRIVAL_RADIUS, Strategy
+from chilopod.steering import ARRIVAL_RADIUS, Verdict
+from chilopod.tasks.course import Driven
 
 _LAYOUTS = (style.Layout("AB;AC", 4.6, widths=(1.5, 1.0)), style.Layout("A;B;C", 9.0, heights=(2.0, 1.0, 1.0)))
 _SHOWN = 6  # walks in a replay or a film
-_LONGEST_FILM = 20.0  # s
+_LONGEST_FILM = 15.0  # s: it takes half as long to make
 _FILM_SIZE = (960, 640)
-_ARRIVED = "arrived"
-
-
-class Driven(Protocol):
-    """What is drawn of a course that was driven."""
-
-    @property
-    def strategy(self) -> Strategy:
-        """How."""
-
-    @property
-    def engine(self) -> str:
-        """Where."""
-
-    @property
-    def pitchfork(self) -> float | None:
-        """First spring below which the straight walk bends, N*m/rad; None where there is none."""
-
-    @property
-    def record(self) -> xr.Dataset:
-        """Of all walks, with ``goal_place`` over (robot, goal, axis), m, ``goal_begin`` and ``goal_end`` over (robot,
-        goal), s, and ``goal_verdict`` over (robot, goal), all but the last NaN for goals that had no turn."""
+_ON_WHITE = {"fc": "white", "ec": "none", "pad": 0.4}
+_ARRIVED = Verdict.ARRIVED.label
+_WAYS = tuple(each for each in style.CURVES if each != style.GREEN)  # which is for targets that were reached
 
 
 def files_of_course(folder: str | Path) -> list[Path]:
@@ -99,7 +81,7 @@ def _files(done: Driven, folder: str | Path) -> Iterator[tuple[Path, Content]]:
     for file in film:
         # As many times faster as makes it short; from above all of a course is seen.
         seconds = float(shown.time[-1] - shown.time[0])
-        speed = max(1.0, np.ceil(seconds / _LONGEST_FILM))
+        speed = min(max(1.0, np.ceil(seconds / _LONGEST_FILM)), FASTEST)
         yield file, filmed(shown, titles=labels, heading=_title(done), speed=speed, size=_FILM_SIZE)
 
 
@@ -110,20 +92,22 @@ def draw(done: Driven, narrow: bool = False) -> Figure:
     _floor(axes["A"], record)
     axes["A"].set_title(_title(done))
     for robot in reversed(range(record.sizes["robot"])):
-        walk, color = record.isel(robot=robot), style.CURVES[robot % len(style.CURVES)]
+        walk, color = record.isel(robot=robot), _WAYS[robot % len(_WAYS)]
         # Of springs that nobody changed the record has one value for all times.
         spring = units.from_si(1.0, "N*mm/deg") * walk.stiffness.isel(joint=0).broadcast_like(walk.time).values
         axes["B"].plot(walk.time, spring, color=color, linewidth=1.2)
-        axes["C"].plot(walk.time, _bearing(walk), color=color, linewidth=1.2)
+        if "target" in walk:  # where none can be reached there is none
+            axes["C"].plot(walk.time, _bearing(walk), color=color, linewidth=1.2)
     axes["B"].set_yscale("log")
     axes["B"].set_ylabel("k1 (N·mm/deg)")
     # As on other axes, and not as powers of ten.
     axes["B"].yaxis.set_major_formatter("{x:g}")
+    axes["B"].yaxis.set_minor_locator(LogLocator(subs=(2.0, 4.0, 6.0)))
     axes["B"].yaxis.set_minor_formatter("{x:g}")
     if done.pitchfork is not None:
         at = units.from_si(done.pitchfork, "N*mm/deg")
         axes["B"].axhline(at, color=style.VERMILLION, linestyle=(0, (4, 2)), linewidth=1.2)
-        where = {"xycoords": ("axes fraction", "data"), "color": style.VERMILLION}
+        where = {"xycoords": ("axes fraction", "data"), "color": style.VERMILLION, "bbox": _ON_WHITE}
         style.note(axes["B"], "bends below", (0.02, at), (0, 3), **where)
     axes["C"].axhline(0.0, color=style.GREY, linewidth=0.8)
     axes["C"].set_ylabel("target angle (deg)")
@@ -141,7 +125,9 @@ def _title(done: Driven) -> str:
 
 def _bearing(walk: xr.Dataset) -> NDArray[np.float64]:
     """Of the target whose turn it is, deg; a line does not cross the picture where it jumps."""
-    place, target = (walk[name].transpose("time", "axis").values for name in ("position", "target"))
+    place = walk.position.transpose("time", "axis")
+    # One that was the target all the time has one place for all times.
+    place, target = place.values, walk.target.broadcast_like(place).transpose("time", "axis").values
     away = target - place
     angle = np.arctan2(away[:, 1], away[:, 0]) - walk.heading.values
     angle = np.rad2deg((angle + np.pi) % (2.0 * np.pi) - np.pi)
@@ -173,16 +159,20 @@ def _floor(axes: Axes, record: xr.Dataset) -> None:
     for robot in reversed(range(record.sizes["robot"])):
         walk = record.isel(robot=robot)
         path = walk.position.transpose("time", "axis").values
-        color = style.CURVES[robot % len(style.CURVES)]
+        color = _WAYS[robot % len(_WAYS)]
         axes.plot(path[:, 0], path[:, 1], color=color, zorder=3, linewidth=1.8 if robot == 0 else 1.0)
         _goals(axes, walk, named=robot == 0)
+    missed = _missed(record.isel(robot=0))
+    if missed and record.sizes["robot"] > 1:
+        missed = f"walk 1: {missed}"
+    style.note(axes, missed, (0.0, 0.0), (4, 4), xycoords="axes fraction", color=style.VERMILLION, bbox=_ON_WHITE)
     _bodies(axes, record.isel(robot=[0]))
     axes.set(xlabel="x (m)", ylabel="y (m)")
     style.grid(axes)
 
 
 def _goals(axes: Axes, walk: xr.Dataset, *, named: bool) -> None:
-    """Rings; those of the walk that is told of with a number, and what became of those that were not reached."""
+    """Rings; those of the walk that is told of with a number."""
     places = walk.goal_place.transpose("goal", "axis").values
     for index, (x, y) in enumerate(places):
         if not np.isfinite([x, y]).all():
@@ -191,13 +181,20 @@ def _goals(axes: Axes, walk: xr.Dataset, *, named: bool) -> None:
         axes.add_patch(Circle((x, y), ARRIVAL_RADIUS, fill=False, ec=color, lw=1.5 if named else 0.8, zorder=4))
         if not named:
             continue
-        verdict = str(walk.goal_verdict.values[index])
         # A place that comes again, such as the crossing of an eight, has its numbers one above the other.
         again = sum(bool(np.allclose(each, (x, y))) for each in places[:index])
-        text = f"{index + 1}" if verdict == _ARRIVED else f"{index + 1} {verdict}"
-        look = {"color": color, "weight": "bold", "zorder": 6, "bbox": {"fc": "white", "ec": "none", "pad": 0.4}}
-        style.note(axes, text, (x, y), (9, 9 + 12 * again), **look)
+        look = {"color": color, "weight": "bold", "zorder": 6, "bbox": _ON_WHITE}
+        style.note(axes, f"{index + 1}", (x, y), (9, 9 + 12 * again), **look)
         axes.plot(x, y, "+", color=color, markersize=6, markeredgewidth=1.5, zorder=4)
+
+
+def _missed(walk: xr.Dataset) -> str:
+    """Which targets were not reached, and why, such as "3, 5 out of time"."""
+    numbers: dict[str, list[str]] = {}
+    for number, verdict in enumerate(walk.goal_verdict.values, 1):
+        if verdict not in (_ARRIVED, ""):
+            numbers.setdefault(str(verdict), []).append(str(number))
+    return "; ".join(f"{', '.join(each)} {verdict}" for verdict, each in numbers.items())
 
 
 def _bodies(axes: Axes, record: xr.Dataset) -> None:

@@ -24,6 +24,7 @@ _STEP_TITLES = (
     "+ the bend\nthere is",
     "+ looking for\nwhat is lost",
     "+ straightening\nfor what is near",
+    "+ a place ahead",
 )
 
 
@@ -94,7 +95,7 @@ def _draw(found: Robust, narrow: bool) -> Figure:
     targets, courses = ([share(each) for each in arrived] for share in (share_of_targets, share_of_courses))
     intervals(axes["A"], targets, rows - 0.12, style.BLUE, "o", "targets", 100.0)
     intervals(axes["A"], courses, rows + 0.12, style.ORANGE, "s", "whole courses", 100.0)
-    axes["A"].set_yticks(rows, list(_STEP_TITLES))
+    axes["A"].set_yticks(rows, list(_STEP_TITLES[: len(rows)]))
     _scaled(axes["A"], len(rows), "A  The law, step by step")
     _conditions(axes["B"], found.conditions, "B  Under other conditions")
     figure.legend(*axes["B"].get_legend_handles_labels(), loc="outside lower center", ncols=1 if narrow else 4)

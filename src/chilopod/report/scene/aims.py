@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from chilopod.steering import Outcome, arrivals
+from chilopod.steering import Verdict, arrivals
 
 
 @dataclass(frozen=True)
@@ -85,5 +85,5 @@ def _course(goals: xr.Dataset) -> tuple[Aim, ...]:
         begin, end = float(one["goal_begin"]), float(one["goal_end"])
         # What had no turn is nowhere yet.
         if np.isfinite([x, y, begin]).all():
-            aims.append(Aim((x, y), begin, end if str(one["goal_verdict"].values) == Outcome.ARRIVED.label else None))
+            aims.append(Aim((x, y), begin, end if str(one["goal_verdict"].values) == Verdict.ARRIVED.label else None))
     return tuple(aims)

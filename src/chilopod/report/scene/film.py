@@ -32,6 +32,7 @@ from chilopod.report.scene.replay import COLORS
 Array = NDArray[np.float64]
 
 _SMALLEST, LARGEST = 240, 4096
+_SLOWEST, FASTEST = 0.01, 1000.0  # s of a walk in one of a film
 PIXEL: Final = 72.0  # points in an inch: at so many dots per inch, matplotlib's sizes are pixels
 GAP: Final = 12.0  # to the edges and from row to row, pixels
 APART: Final = 28.0  # from column to column: outcome and next title stand side by side
@@ -110,17 +111,17 @@ def frame_times(record: xr.Dataset, size: tuple[int, int], fps: int, speed: floa
     """
     if not 1 <= fps <= 120:
         raise ParameterError("is no frame rate", field="fps", value=fps, allowed="1 to 120 per second")
-    if not 0.01 <= speed <= 1000.0:
-        raise ParameterError("is no speed", field="speed", value=speed, allowed="0.01 to 1000")
+    if not _SLOWEST <= speed <= FASTEST:
+        raise ParameterError("is no speed", field="speed", value=speed, allowed=f"{_SLOWEST:g} to {FASTEST:g}")
     if any(side % 2 or not _SMALLEST <= side <= LARGEST for side in size):
         allowed = f"two even numbers from {_SMALLEST} to {LARGEST}"
         raise ParameterError("is no size of a film", field="size", value=size, allowed=allowed)
     if not has_encoder():
         raise OutputError(f"PyAV was built without the encoder {ENCODER}, which movies need")
     recorded = record["time"].values.astype(np.float64)
-    # The last frame is at or before the last sample; the tolerance is for round-off in the duration.
-    count = int((recorded[-1] - recorded[0]) * fps / speed + 1e-6) + 1
-    times: Array = recorded[0] + np.arange(count) * (speed / fps)
+    # The last frame is the last sample, with what it came to; the tolerance is for round-off in the duration.
+    count = math.ceil((recorded[-1] - recorded[0]) * fps / speed - 1e-6) + 1
+    times: Array = np.minimum(recorded[0] + np.arange(count) * (speed / fps), recorded[-1])
     return times
 
 

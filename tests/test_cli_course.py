@@ -1,0 +1,94 @@
+"""``chilopod course`` as it is typed."""
+
+import json
+
+import pytest
+import xarray as xr
+
+from chilopod.cli import main
+from chilopod.steering import COURSES, ON_COURSES
+
+ROBOT = "aoi2022-planar"
+# A robot that has no radius law, which takes longest.
+WIDE = [ROBOT, "--set", "legs.half_width=0.3 m", "--strategy", "leg-yaw"]
+AHEAD = ["--targets", "0 deg, 0.25 m; 0 deg, 99 m; 5 deg, 0.25 m"]
+
+
+def test_text_json_and_files_tell_the_same(capsys, tmp_path):
+    assert main(["course", *WIDE, *AHEAD, "--patience", "9 s", "--json", "--out", str(tmp_path / "new")]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["robot"], found["strategy"], found["patience_s"]) == (ROBOT, "leg-yaw", 9.0)
+    (walk,) = found["walks"]
+    assert (walk["seed"], walk["status"], walk["arrived"]) == (None, "halted", 2)
+    assert [goal["verdict"] for goal in walk["targets"]] == ["arrived", "out of reach", "arrived"]
+    assert list(walk["targets"][0]) == [
+        *("verdict", "sentence", "place_m", "begin_s", "end_s", "nearest_m", "path_m", "shortest_m"),
+        *("leg_yaw_effort_rad2_s", "spring_work_J", "drive_work_J"),
+    ]
+    files = {file.name for file in (tmp_path / "new").iterdir()}
+    assert files >= {"course.png", "course.svg", "course.nc", "course.html"}
+    with xr.open_dataset(tmp_path / "new" / "course.nc", engine="h5netcdf") as record:
+        assert record.goal_verdict.values[0].tolist() == [goal["verdict"] for goal in walk["targets"]]
+
+    assert main(["course", *WIDE, *AHEAD, "--patience", "9 s"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1:3] == [
+        "  3 targets, 9 s for each",
+        "  how tightly the robot turns is not known, so shortest paths are straight lines: the straight walk has no "
+        "pitchfork in this interval",
+    ]
+    first = walk["targets"][0]
+    assert lines[4].split()[:5] == ["1", "arrived", f"{first['end_s']:.1f}", f"{first['path_m']:.2f}", "/"]
+    assert lines[5].split() == ["2", "out", "of", "reach", *"-----"]
+    assert lines[7] == "  out of reach: farther than the robot can walk in its time"
+    assert lines[8].startswith(f"  2 of 3 targets in {walk['time_s']:.1f} s; work 0 J on springs")
+
+
+def test_of_several_walks_there_is_a_line_each(capsys):
+    assert main(["course", *WIDE, "--targets", "0 deg, 0.25 m", "--seed", "3", "--repeats", "2"]) == 0
+    *_, heads, one, other, last = capsys.readouterr().out.splitlines()
+    assert heads.split()[:2] == ["seed", "targets"]
+    assert [line.split()[:4] for line in (one, other)] == [["3", "1", "of", "1"], ["4", "1", "of", "1"]]
+    assert last == "  2 of 2 targets, 2 of 2 courses whole"
+
+
+def test_the_help_has_all_choices(capsys):
+    assert main(["course", "--help"]) == 0
+    shown = capsys.readouterr().out
+    assert f"|{'|'.join(COURSES)}|random:SEED" in shown
+    assert "|".join(ON_COURSES) in shown
+
+
+@pytest.mark.parametrize(
+    ("more", "start"),
+    [
+        (["--targets", ""], "--targets = '': there is no such course or file"),
+        (["--targets", "slalmo"], "--targets = 'slalmo': there is no such course or file; did you mean 'slalom'?"),
+        (["--targets", "random:x"], "--targets = 'random:x': has no seed"),
+        (["--targets", "1 m, 0 m; 1 m, 0 m"], "target 2 = '1 m, 0 m': lies where target 1 does"),
+        (["--targets", "1 m, 0 m; 1.1 m, 0 m"], "target 2 = '1.1 m, 0 m': lies where target 1 does"),
+        (["--targets", "0 deg, inf m"], "target 1 = 'inf m': does not start with a finite number"),
+        (["--targets", "0 deg, 1e9 m"], "target 1 = '1e+09 m': is no way to go"),
+        (["--targets", "many.txt"], "many.txt: too large for a course"),
+        (["--targets", "some.txt"], "some.txt: --targets = 'some.txt': is no number of targets; allowed: 1 to 1000"),
+        (["--strategy", "pitchfrok"], "--strategy = 'pitchfrok': there is no such strategy; did you mean 'pitchfork'?"),
+        (["--k1", "15 N*mm/deg"], "--k1 = '15 N*mm/deg': the strategy variable has no spring to choose"),
+        (["--strategy", "pitchfork"], "--k1: the strategy pitchfork walks with one spring"),
+        (["--strategy", "hopf", "--k1", "-3"], "--k1 = '-3': must be positive"),
+        (["--patience", "0 s"], "--patience = '0 s': is out of range"),
+        (["--repeats", "2"], "--repeats = 2: are all alike without a seed"),
+        (["--repeats", "99999", "--seed", "1", "--patience", "1e4 s"], "record: would take "),
+        (["--set", "springs.adjustable=false"], "springs.adjustable[0] = False: the first spring has no actuator"),
+        (["--set", "legs.half_width=0.3 m"], "the strategy variable stands on how tightly the first spring turns"),
+        (["--engine", "twin"], "twin: this robot has none"),
+    ],
+)
+def test_what_cannot_be_walked_is_one_line(capsys, monkeypatch, tmp_path, more, start):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "many.txt").write_text("10 deg, 1 m\n" * 10**6)
+    (tmp_path / "some.txt").write_text("10 deg, 1 m\n" * 1001)
+    targets = [] if "--targets" in more else ["--targets", "0 deg, 0.5 m"]
+    assert main(["course", ROBOT, *targets, *more]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.splitlines()[-1].startswith(f"error: {start}")
