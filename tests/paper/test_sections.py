@@ -37,10 +37,19 @@ def test_sections_come_in_their_own_order_and_misspelt_ones_are_refused():
 def test_what_is_left_out_unless_it_is_named():
     everything = set(names(chosen()))
     assert set(names(SECTIONS)) - everything == {"robot-structures"}
-    assert everything - set(names(chosen(quick=True))) == {"robot-spread"}
+    assert everything - set(names(chosen(quick=True))) == {"robot-spread", "robot-courses"}
     assert names(chosen(["robot-structures", "robot-spread"], quick=True)) == ["robot-spread", "robot-structures"]
     paper = names(chosen(paper=True))
-    assert everything - set(paper) == {"identification", "robot-spread", "robot-numerics", "robot-why"}
+    assert everything - set(paper) == {
+        "identification",
+        "robot-spread",
+        "robot-numerics",
+        "robot-why",
+        "courses",
+        "courses-robust",
+        "robot-courses",
+        "courses-movie",
+    }
     with pytest.raises(ParameterError, match="robot-why"):
         chosen(["robot-why"], paper=True)
 

@@ -18,7 +18,7 @@ from chilopod.tasks.identify import planar
 HERE = Path(__file__).parent
 PAGE = runpy.run_path(str(HERE / "html_page.py"))["Page"]
 BROWSER = runpy.run_path(str(HERE / "browser.py"))
-REPLAYS = ["movie-1", "movie-2", "robot-movie-1", "robot-movie-2"]
+REPLAYS = ["movie-1", "movie-2", "robot-movie-1", "robot-movie-2", "courses-movie"]
 BROKEN = """Promise.all([...document.images].map(async (image) => {
   image.loading = "eager";
   await image.decode().catch(() => {});
@@ -60,6 +60,7 @@ def test_every_section_is_computed_and_on_the_page(tiny):
         "robot-movies",
         "robot-spread",
         "robot-structures",
+        "courses-movie",
     }
 
 

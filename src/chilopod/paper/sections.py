@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from chilopod.errors import OutputError, ParameterError, nearest_name
+from chilopod.paper.courses.sections import COURSES, COURSES_FILM, ROBOT_COURSES, ROBUST
 from chilopod.paper.curved.sections import BRANCH, CURVED, UNDULATION
 from chilopod.paper.robot.sections import FILMS, NUMERICS, SPREAD, STRUCTURES, TASKS, WALKS, WHY
 from chilopod.paper.section import Context, Found, Section
@@ -35,6 +36,10 @@ SECTIONS: tuple[Section[Any], ...] = (
     NUMERICS,
     STRUCTURES,
     WHY,
+    COURSES,
+    ROBUST,
+    ROBOT_COURSES,
+    COURSES_FILM,
 )
 """All sections in the order they are computed: the paper's own experiments, then what goes beyond them."""
 

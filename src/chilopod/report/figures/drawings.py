@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
+from chilopod.paper.courses.sections import COURSES, COURSES_FILM, ROBOT_COURSES, ROBUST
 from chilopod.paper.curved.sections import BRANCH, CURVED, UNDULATION
 from chilopod.paper.robot.sections import FILMS, NUMERICS, SPREAD, STRUCTURES, TASKS, WALKS, WHY
 from chilopod.paper.straight.sections import EXPONENTS, IDENTIFICATION, MODE, MODULES, UNIFORM, VARIANTS
 from chilopod.paper.turning.sections import MOVIES, TURNING
 from chilopod.report.figures import (
     branch,
+    courses,
+    courses_robust,
     critical,
     curved_trials,
     curved_variants,
@@ -46,6 +49,12 @@ DRAWINGS: tuple[Drawing[Any], ...] = (
     Drawing(WHY, lambda data, found: [robot_why.why(data)]),
     Drawing(NUMERICS),  # in the table only
     Drawing(FILMS, films=lambda films: films),
+    Drawing(COURSES, lambda data, found: courses.panels(data)),
+    Drawing(ROBUST, lambda data, found: [courses_robust.panel(data)]),
+    Drawing(
+        ROBOT_COURSES, lambda data, found: [courses.strategies(data.compared), courses_robust.whole(data.conditions)]
+    ),
+    Drawing(COURSES_FILM, films=lambda films: films),
 )
 """In the order in which figures stand on the page within their chapter, but for those that have the letters of the
 paper's figure: these come first, in its order."""

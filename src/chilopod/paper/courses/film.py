@@ -1,0 +1,53 @@
+"""A film of one course, driven with a spring that is set on the way and with the best one for all of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from chilopod.analysis.parameters import PAPER_UNIT
+from chilopod.paper.courses.study import without_setting
+from chilopod.paper.movies import Movie
+from chilopod.progress import Progress, part, silent
+from chilopod.robot import Robot
+from chilopod.steering import COURSES, Course
+from chilopod.tasks.course import Driven, Driver, drive, patience_of
+
+NAMED = "eight"
+"""The course of :data:`chilopod.steering.COURSES` that is filmed."""
+
+_SEED = 0
+_SPEED = 10.0
+
+
+def film(
+    robot: Robot,
+    variable: Driver,
+    best: float,
+    folder: str | Path | None = None,
+    progress: Progress = silent,
+    shorter: float = 1.0,
+) -> Movie:
+    """Walk what is filmed.
+
+    Parameters
+    ----------
+    robot
+        The robot.
+    variable
+        It with the spring that is set on the way.
+    best
+        The spring for all of the course, N*mm/deg.
+    folder
+        Where records are kept.
+    progress
+        Called with the part done (0 to 1) and a few words.
+    shorter
+        Which part of the time for a target there is.
+    """
+    course = Course(COURSES[NAMED], shorter * patience_of("planar"))
+    fixed = without_setting(robot, variable, "pitchfork", best)
+    first = drive(variable, course, seed=_SEED, folder=folder, progress=part(progress, 0.0, 0.5))
+    second = drive(fixed, course, seed=_SEED, folder=folder, progress=part(progress, 0.5, 1.0))
+    both = Driven(variable, course, first.engine, first.trials + second.trials, first.records + second.records)
+    titles = "k1 set once a gait cycle", f"k1 = {best:g} {PAPER_UNIT.replace('*', '·')} all along"
+    return Movie("courses-movie", f"One target after another: {NAMED}", titles, both.record, _SPEED)

@@ -1,0 +1,168 @@
+"""What the spring that is set on the way owes to each step of its law, and how much it stands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from chilopod.paper.courses import bumps
+from chilopod.paper.courses.steps import steps
+from chilopod.paper.courses.study import Case, driven, without_setting
+from chilopod.paper.size import Size
+from chilopod.progress import Progress, silent
+from chilopod.robot import Robot
+from chilopod.steering import VARIABLE, SpringLaw
+from chilopod.tasks.course import Driver, driver
+from chilopod.trials import Disturbance
+
+USUAL = "as usual"
+"""The case that others are held against."""
+
+PLANAR_COURSES: Mapping[Size, range] = {
+    Size.FULL: range(2000, 2200),
+    Size.QUICK: range(2000, 2040),
+    Size.TINY: range(2000, 2002),
+}
+WHOLE_COURSES: Mapping[Size, range] = {
+    Size.FULL: range(2000, 2020),
+    Size.QUICK: range(2000, 2005),
+    Size.TINY: range(2000, 2001),
+}
+"""Seeds."""
+
+_FIXED = "pitchfork"
+_OTHER_FIT = ("ground.friction=256.5 N*s/m", "legs.half_width=72.8 mm", "legs.forward_offset=48 mm")
+"""Constants that meet the paper's numbers of the planar model nearly as well."""
+
+_ACTUATOR = ("springs.rate=20 N*mm/deg/s", "springs.lag=0.5 s")
+
+
+@dataclass(frozen=True)
+class Condition:
+    """Something that is not as the law takes it to be.
+
+    Attributes
+    ----------
+    name
+        In a few words.
+    changes
+        Of the robot, as ``--set`` takes them; the law does not know.
+    disturbance
+        Besides what the course's seed draws.
+    engine
+        Where it walks.
+    own_law
+        Whether the law is made for what ``changes`` say, and drives the robot as it is.
+    only_variable
+        Whether it concerns the actuator of the spring alone.
+    """
+
+    name: str
+    changes: tuple[str, ...] = ()
+    disturbance: Disturbance = field(default_factory=Disturbance)
+    engine: str = "planar"
+    own_law: bool = False
+    only_variable: bool = False
+
+
+def planar_conditions(robot: Robot) -> list[Condition]:
+    """Of the planar model."""
+    friction, middle = robot.ground.friction, robot.body.modules // 2 - 1
+    return [
+        Condition(USUAL),
+        Condition("friction × 0.7", (f"ground.friction={0.7 * friction!r} N*s/m",)),
+        Condition("friction × 1.3", (f"ground.friction={1.3 * friction!r} N*s/m",)),
+        Condition("a middle leg dead", disturbance=Disturbance(slick=(middle, 0))),
+        Condition("a front leg dead", disturbance=Disturbance(slick=(0, 0))),
+        Condition("bearings off by 3°", disturbance=Disturbance(bearing=float(np.deg2rad(3.0)))),
+        Condition("30 % of looks missed", disturbance=Disturbance(missed=0.3)),
+        Condition("the law of another fit", _OTHER_FIT, own_law=True, only_variable=True),
+        Condition("a slow actuator", _ACTUATOR, only_variable=True),
+    ]
+
+
+def whole_conditions(robot: Robot) -> list[Condition]:
+    """Of the whole robot."""
+    friction = robot.twin.sliding_friction if robot.twin else 1.0
+    return [
+        Condition(USUAL, engine="twin"),
+        Condition("friction × 0.7", (f"twin.sliding_friction={0.7 * friction!r}",), engine="twin"),
+        Condition("friction × 1.3", (f"twin.sliding_friction={1.3 * friction!r}",), engine="twin"),
+        Condition(f"bumps of {1e3 * bumps.HEIGHT:g} mm", engine=f"{bumps.__name__}:BUMPS"),
+    ]
+
+
+def ablated(
+    variable: Driver, seeds: Sequence[int], size: Size, folder: Path | None = None, progress: Progress = silent
+) -> xr.Dataset:
+    """Courses by the law as it grew, see :func:`chilopod.paper.courses.steps.steps`.
+
+    Parameters
+    ----------
+    variable
+        The robot with the spring that is set on the way.
+    seeds, size, folder, progress
+        As for :func:`chilopod.paper.courses.study.driven`, whose dataset this is: the cases are the steps.
+    """
+    assert isinstance(variable.controller, SpringLaw)
+    cases = [Case(name, replace(variable, controller=law)) for name, law in steps(variable.controller).items()]
+    return driven(cases, seeds, size, folder, progress)
+
+
+def under(
+    robot: Robot,
+    variable: Driver,
+    spring: float,
+    conditions: Sequence[Condition],
+    seeds: Sequence[int],
+    size: Size,
+    folder: Path | None = None,
+    progress: Progress = silent,
+) -> xr.Dataset:
+    """Courses under conditions that the law does not know of, by the variable spring and by one spring for all.
+
+    Parameters
+    ----------
+    robot
+        The robot.
+    variable
+        It with the spring that is set on the way.
+    spring
+        The one for all, N*mm/deg.
+    conditions
+        Whose engines have the same patience.
+    seeds, size, folder, progress
+        As for :func:`chilopod.paper.courses.study.driven`, whose dataset this is, but over (condition, strategy,
+        course, goal).
+    """
+    cases = []
+    for condition in conditions:
+        changed = robot.set_from_text(condition.changes)
+        if condition.own_law:
+            set_on_the_way = replace(variable, controller=driver(changed, VARIABLE).controller)
+        else:
+            set_on_the_way = replace(variable, robot=variable.robot.set_from_text(condition.changes))
+        fixed = without_setting(robot if condition.only_variable else changed, variable, _FIXED, spring)
+        for each in (set_on_the_way, fixed):
+            cases.append(Case(condition.name, each, condition.disturbance, condition.engine))
+    data = driven(cases, seeds, size, folder, progress)
+    both = xr.Dataset(
+        {
+            name: (("condition", "strategy", *each.dims[1:]), each.values.reshape(-1, 2, *each.shape[1:]), each.attrs)
+            if "case" in each.dims
+            else each
+            for name, each in data.data_vars.items()
+        },
+        coords={
+            "condition": [each.name for each in conditions],
+            "strategy": [VARIABLE.name, _FIXED],
+            "course": data.course.values,
+            "goal": data.goal.values,
+        },
+        attrs=data.attrs,
+    )
+    return both.assign_attrs(spring=spring)

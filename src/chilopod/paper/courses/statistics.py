@@ -1,0 +1,100 @@
+"""How sure a share of trials is, and a difference between trials that belong together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.stats import norm
+
+from chilopod.paper.scatter import Answer
+
+Array = NDArray[np.float64]
+
+LEVEL = 0.95
+"""Of all intervals."""
+
+_DRAWN = 2000
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A number and between which bounds it lies, as sure as :data:`LEVEL` says.
+
+    Attributes
+    ----------
+    value, low, high
+        NaN where nothing is known.
+    """
+
+    value: float
+    low: float
+    high: float
+
+    def above(self, other: Interval) -> Answer:
+        """Whether it lies above another, bounds and all; undecided where they overlap."""
+        if self.low > other.high:
+            return True
+        return False if self.high < other.low else None
+
+    @property
+    def sign(self) -> Answer:
+        """Whether it is positive, bounds and all; undecided where zero lies between them."""
+        return self.above(Interval(0.0, 0.0, 0.0))
+
+
+def wilson(successes: int, count: int) -> Interval:
+    """Share of successes with the interval of Wilson (1927), which holds for few trials and for shares near 0 and 1.
+
+    Parameters
+    ----------
+    successes, count
+        How many of how many independent trials.
+    """
+    if count == 0:
+        return Interval(float("nan"), float("nan"), float("nan"))
+    z = float(norm.ppf(0.5 + 0.5 * LEVEL))
+    share, spread = successes / count, z * z / count
+    middle = (share + 0.5 * spread) / (1.0 + spread)
+    half = z * np.sqrt(share * (1.0 - share) / count + 0.25 * spread / count) / (1.0 + spread)
+    return Interval(share, max(0.0, float(middle - half)), min(1.0, float(middle + half)))
+
+
+def bootstrap_mean(values: ArrayLike, seed: int = 0) -> Interval:
+    """Mean of what is not NaN, with the percentile interval of the bootstrap.
+
+    Parameters
+    ----------
+    values
+        Shape (groups,) or (groups, members). Groups are independent and are drawn anew as a whole; members of one, as
+        the targets of one course, need not be.
+    seed
+        Of what is drawn.
+    """
+    table = np.asarray(values, dtype=np.float64)
+    table = table.reshape(len(table), -1)
+    return bootstrap_ratio(np.nansum(table, axis=1), np.isfinite(table).sum(axis=1), seed)
+
+
+def bootstrap_ratio(of: ArrayLike, to: ArrayLike, seed: int = 0) -> Interval:
+    """Sum over sum, with the percentile interval of the bootstrap.
+
+    Parameters
+    ----------
+    of, to
+        Of independent groups, which are drawn anew as a whole, shape (groups,); groups in which both are 0 count for
+        nothing.
+    seed
+        Of what is drawn.
+    """
+    above, below = np.asarray(of, dtype=np.float64), np.asarray(to, dtype=np.float64)
+    groups = np.flatnonzero((above != 0.0) | (below != 0.0))
+    if not below.any():
+        return Interval(float("nan"), float("nan"), float("nan"))
+    above, below = above[groups], below[groups]
+    picked = np.random.default_rng(seed).integers(len(groups), size=(_DRAWN, len(groups)))
+    sums, counts = above[picked].sum(axis=1), below[picked].sum(axis=1)
+    drawn = sums[counts > 0.0] / counts[counts > 0.0]
+    low, high = np.quantile(drawn, [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL])
+    return Interval(float(above.sum() / below.sum()), float(low), float(high))

@@ -1,0 +1,226 @@
+"""Strategies on the same courses: a spring that is set on the way, one spring for all, none, and torques at all joints.
+
+Courses are random, five targets each, and a course's seed is that of its disturbance too, so that strategies are
+compared pair by pair. A strategy that walks with one spring is given the best there is, found on other courses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from chilopod import trials
+from chilopod.analysis.parameters import PAPER_UNIT, stiffness
+from chilopod.paper.section import Context
+from chilopod.paper.size import Size
+from chilopod.progress import Progress, part, silent
+from chilopod.robot import Robot
+from chilopod.steering import ACTUATED, ON_COURSES, VARIABLE, ActuatedAxis, Course, Goal, Verdict, steered
+from chilopod.tasks.course import Driver, driver, random_courses, steering_cost, trial_of
+from chilopod.trials import Disturbance, Trial
+
+Array = NDArray[np.float64]
+
+_SUMS = {"path": "m", "shortest": "m", "effort": "rad^2*s", "spring_work": "J", "drive_work": "J"}
+_TINY = Course((Goal(0.2, 0.03, relative=True),), patience=6.0)  # of the whole robot, whose walks take seconds
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How much is compared.
+
+    Attributes
+    ----------
+    courses
+        Seeds of the courses that strategies are compared on.
+    others
+        Of those on which the best spring of a strategy is found.
+    springs
+        That are tried, by strategy, N*mm/deg.
+    """
+
+    courses: range
+    others: range
+    springs: Mapping[str, Sequence[float]]
+
+
+_FEW = {"pitchfork": (14, 16), "hopf": (7, 9)}
+PLANAR: Mapping[Size, Plan] = {
+    Size.FULL: Plan(range(1000, 2000), range(100), {"pitchfork": range(12, 21), "hopf": range(6, 12)}),
+    Size.QUICK: Plan(range(1000, 1100), range(20), {"pitchfork": (13, 15, 17), "hopf": (7, 9)}),
+    Size.TINY: Plan(range(1000, 1002), range(1), _FEW),
+}
+WHOLE: Mapping[Size, Plan] = {
+    Size.FULL: Plan(range(1000, 1050), range(10), {"pitchfork": (20, 24, 28), "hopf": (9, 11, 13)}),
+    Size.QUICK: Plan(range(1000, 1010), range(4), {"pitchfork": (20, 24, 28), "hopf": (9, 11, 13)}),
+    Size.TINY: Plan(range(1000, 1001), range(0), {"pitchfork": (24,), "hopf": (11,)}),
+}
+
+
+@dataclass(frozen=True)
+class Case:
+    """Something that drives along courses.
+
+    Attributes
+    ----------
+    name
+        What it is called.
+    driver
+        Robot and controller.
+    disturbance
+        Besides what the course's seed draws.
+    engine
+        Where it walks.
+    """
+
+    name: str
+    driver: Driver
+    disturbance: Disturbance = field(default_factory=Disturbance)
+    engine: str = "planar"
+
+    def on(self, course: Course, seed: int) -> Trial:
+        """Its trial of a course."""
+        law = self.driver.law
+        here = course if law is None else replace(course, tightest=law.tightest)
+        walk = trial_of(self.driver, here, seed, engine=self.engine, brief=True)
+        return replace(walk, disturbance=self.disturbance)
+
+
+def driven(
+    cases: Sequence[Case], seeds: Sequence[int], size: Size, folder: Path | None = None, progress: Progress = silent
+) -> xr.Dataset:
+    """What became of every target of random courses.
+
+    Parameters
+    ----------
+    cases
+        In one engine, or in engines that have the same patience.
+    seeds
+        Of the courses.
+    size
+        Courses of the whole robot have one near target if this is tiny.
+    folder
+        Where trials are kept.
+    progress
+        Called with the part done (0 to 1) and a few words.
+
+    Returns
+    -------
+    Dataset over (case, course, goal): ``arrived``, ``seconds`` (s), and as :func:`chilopod.steering.of_course` has them
+    ``goal_path`` and ``goal_shortest`` (m), ``goal_effort`` (rad^2 s), ``goal_spring_work`` and ``goal_drive_work``
+    (J); over (course, goal): ``bearing`` (rad) and ``away`` (m) of the target when its turn comes.
+    """
+    engine = cases[0].engine
+    tiny = size is Size.TINY and engine != "planar"
+    courses = [_TINY] * len(seeds) if tiny else random_courses(seeds, engine)
+    asked = {
+        (row, column): case.on(course, seed)
+        for row, case in enumerate(cases)
+        for column, (course, seed) in enumerate(zip(courses, seeds, strict=True))
+    }
+    names = ("arrived", "seconds", *(f"goal_{name}" for name in _SUMS))
+    shape = (len(cases), len(courses), len(courses[0].goals))
+    values = {name: np.full(shape, np.nan) for name in names}
+    where: dict[str, list[tuple[int, int]]] = {}
+    for place, trial in asked.items():
+        where.setdefault(trial.file_name, []).append(place)
+    for trial, record in trials.run_each(list(asked.values()), folder, progress):
+        for place in where[trial.file_name]:
+            values["arrived"][place] = record.goal_verdict.values[0] == Verdict.ARRIVED.label
+            values["seconds"][place] = record.goal_end.values[0] - record.goal_begin.values[0]
+            for name in _SUMS:
+                values[f"goal_{name}"][place] = record[f"goal_{name}"].values[0]
+    seen = np.array([[(goal.x, goal.y) for goal in course.goals] for course in courses])
+    over, units = ("case", "course", "goal"), {"arrived": "1", "seconds": "s"}
+    units |= {f"goal_{name}": unit for name, unit in _SUMS.items()}
+    return xr.Dataset(
+        {
+            **{name: (over, each, {"units": units[name]}) for name, each in values.items()},
+            "bearing": (over[1:], np.arctan2(seen[..., 1], seen[..., 0]), {"units": "rad"}),
+            "away": (over[1:], np.hypot(seen[..., 0], seen[..., 1]), {"units": "m"}),
+        },
+        coords={"case": [each.name for each in cases], "course": list(seeds), "goal": np.arange(1, shape[2] + 1)},
+        attrs={"robot": cases[0].driver.robot.name, "engine": engine, "patience_s": courses[0].patience},
+    )
+
+
+def compared(
+    robot: Robot,
+    variable: Driver,
+    plan: Plan,
+    engine: str = "planar",
+    size: Size = Size.FULL,
+    folder: Path | None = None,
+    progress: Progress = silent,
+) -> xr.Dataset:
+    """All strategies on the same courses.
+
+    Parameters
+    ----------
+    robot
+        The robot.
+    variable
+        It with the spring that is set on the way.
+    plan
+        How much.
+    engine
+        Where they walk.
+    size, folder, progress
+        As for :func:`driven`.
+
+    Returns
+    -------
+    As of :func:`driven`, the cases being :data:`chilopod.steering.ON_COURSES`, with their ``spring`` (N*mm/deg, NaN for
+    those that have none to choose) and ``cost``, the steering cost of transport of all courses; and over (tried): which
+    ``tried_spring`` (N*mm/deg) of which ``tried_case`` reached which share of the targets of other courses
+    (``tried_arrived``).
+    """
+    tried = [(name, float(spring)) for name, springs in plan.springs.items() for spring in springs]
+    shares = np.full(len(tried), np.nan)
+    if len(plan.others) > 0:
+        asked = [Case(f"{name} {k:g}", without_setting(robot, variable, name, k), engine=engine) for name, k in tried]
+        done = driven(asked, plan.others, size, folder, part(progress, 0.0, 0.3, "springs"))
+        shares = done.arrived.mean(("course", "goal")).values
+    best = {name: _best(name, tried, shares) for name in plan.springs}
+    drivers = {
+        name: variable if name == VARIABLE.name else without_setting(robot, variable, name, best.get(name))
+        for name in ON_COURSES
+    }
+    cases = [Case(name, each, engine=engine) for name, each in drivers.items()]
+    data = driven(cases, plan.courses, size, folder, part(progress, 0.3, 1.0))
+    costs = [steering_cost(case.driver.robot, data.isel(case=row)) for row, case in enumerate(cases)]
+    data["cost"] = ("case", np.array(costs), {"units": "1"})
+    data["spring"] = ("case", np.array([best.get(name, np.nan) for name in ON_COURSES]), {"units": PAPER_UNIT})
+    data["tried_case"] = ("tried", np.array([name for name, _ in tried], dtype=object))
+    data["tried_spring"] = ("tried", np.array([spring for _, spring in tried]), {"units": PAPER_UNIT})
+    data["tried_arrived"] = ("tried", shares, {"units": "1"})
+    return data
+
+
+def prepared(context: Context, engine: str = "planar") -> Driver:
+    """The robot with the variable spring; a tiny report has the law of the planar robot for both, which takes no
+    walks."""
+    if engine == "planar":
+        return driver(context.robot, VARIABLE)
+    if context.size is Size.TINY:
+        return replace(driver(context.robot, VARIABLE), robot=context.whole.override("springs.adjustable[0]", True))
+    return driver(context.whole, VARIABLE, engine=engine, folder=context.folder)
+
+
+def without_setting(robot: Robot, variable: Driver, strategy: str, spring: float | None = None) -> Driver:
+    """A strategy that sets no spring on the way, with its spring (N*mm/deg) if it has one."""
+    law, plan = variable.law, ON_COURSES[strategy]
+    if plan is ACTUATED and law is not None:
+        return Driver(robot, plan, ActuatedAxis.of(robot, law), law)
+    walker, controller = steered(robot, plan, None if spring is None else stiffness(spring))
+    return Driver(walker, plan, controller, law)
+
+
+def _best(strategy: str, tried: Sequence[tuple[str, float]], shares: Array) -> float:
+    """Spring of the highest share, N*mm/deg."""
+    return max((share, k) for (name, k), share in zip(tried, np.nan_to_num(shares), strict=True) if name == strategy)[1]

@@ -1,0 +1,58 @@
+"""What is said of courses, on made-up ones: nothing that the intervals do not decide."""
+
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chilopod.paper.courses.rows import compared_rows, robust_rows
+from chilopod.paper.courses.summary import summaries, verdicts
+from chilopod.paper.table import NOT_PRINTED
+
+_MADE_UP = runpy.run_path(str(Path(__file__).with_name("made_up_courses.py")))
+compared, conditions = _MADE_UP["compared"], _MADE_UP["conditions"]
+OTHERS = ["pitchfork 15", "hopf 7", "leg-yaw", "actuated"]
+
+
+def test_every_number_of_a_strategy():
+    found = summaries(compared())["actuated"]
+    assert (found.targets.value, found.courses.value) == (0.6, 0.0)
+    assert found.seconds.value == pytest.approx(2.0 * np.mean(10.0 + np.arange(40) % 7))
+    assert found.spent.value == pytest.approx(found.seconds.value / 0.6)
+    assert found.later.value == pytest.approx(found.seconds.value / 2.0)
+    assert np.isnan(found.course_later.value)  # it reaches none as a whole
+    assert (found.work.value, found.more_work.value, found.drive_work) == (50.0, 45.0, 50.0)
+    assert (found.detour, found.effort, found.cost) == (1.0, 5.0, 0.1)
+
+
+def test_what_the_intervals_decide_is_said():
+    found = verdicts(summaries(compared()))
+    assert found.fewer == found.slower == found.later == OTHERS
+    assert found.costlier == ["actuated"]
+    assert not any((found.as_many, found.more, found.as_fast, found.faster, found.as_soon, found.sooner))
+    rows = compared_rows(compared())
+    assert len(rows) == 6
+    assert {row.verdict for row in rows} == {NOT_PRINTED}
+    assert "reaches more targets than pitchfork 15, hopf 7, leg-yaw and actuated" in rows[-1].computed
+
+
+def test_what_they_leave_open_is_called_open():
+    found = verdicts(summaries(compared(courses=2)))
+    assert found.as_many == OTHERS
+    same = verdicts(summaries(compared(seconds=np.ones_like, goal_drive_work=np.zeros_like)))
+    assert same.as_soon == OTHERS
+    assert same.costlier == []
+
+
+def test_who_reaches_nothing_has_no_time():
+    rows = compared_rows(compared(arrived=np.zeros_like))
+    assert "nan" not in " ".join(f"{row.computed} {row.remark}" for row in rows)
+
+
+def test_steps_and_conditions():
+    steps = compared().isel(case=slice(4))
+    rows = robust_rows(steps, conditions(worse=["one"]))
+    assert [row.quantity for row in rows][1:] == [f"40 courses, {name}" for name in ("as usual", "one", "another")]
+    assert "variable 0.0 % (0.0 to 1.9) of targets" in rows[2].computed
+    assert "pitchfork 15 80.0 %" in rows[3].computed
