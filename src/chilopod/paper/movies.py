@@ -43,6 +43,8 @@ class Movie:
         Seconds of the walks per second of the film.
     stills
         Moments of it that are pictured in three dimensions, s; none of a film from above.
+    size
+        Width and height of a film from above, pixels; that of three panels in a row.
     """
 
     name: str
@@ -51,6 +53,7 @@ class Movie:
     record: xr.Dataset
     speed: float
     stills: tuple[float, ...] = ()
+    size: tuple[int, int] = (1280, 320)
 
 
 def movies(

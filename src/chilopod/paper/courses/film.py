@@ -17,6 +17,7 @@ NAMED = "eight"
 
 _SEED = 0
 _SPEED = 10.0
+_SIZE = (960, 640)  # two panels, higher than wide
 
 
 def film(
@@ -49,5 +50,5 @@ def film(
     first = drive(variable, course, seed=_SEED, folder=folder, progress=part(progress, 0.0, 0.5))
     second = drive(fixed, course, seed=_SEED, folder=folder, progress=part(progress, 0.5, 1.0))
     both = Driven(variable, course, first.engine, first.trials + second.trials, first.records + second.records)
-    titles = "k1 set once a gait cycle", f"k1 = {best:g} {PAPER_UNIT.replace('*', '·')} all along"
-    return Movie("courses-movie", f"One target after another: {NAMED}", titles, both.record, _SPEED)
+    titles = "k1 set on the way", f"k1 = {best:g} {PAPER_UNIT.replace('*', '·')}"
+    return Movie("courses-movie", f"One target after another: {NAMED}", titles, both.record, _SPEED, size=_SIZE)

@@ -56,8 +56,8 @@ PLANAR: Mapping[Size, Plan] = {
     Size.TINY: Plan(range(1000, 1002), range(1), _FEW),
 }
 WHOLE: Mapping[Size, Plan] = {
-    Size.FULL: Plan(range(1000, 1050), range(10), {"pitchfork": (20, 24, 28), "hopf": (9, 11, 13)}),
-    Size.QUICK: Plan(range(1000, 1010), range(4), {"pitchfork": (20, 24, 28), "hopf": (9, 11, 13)}),
+    Size.FULL: Plan(range(1000, 1050), range(10), {"pitchfork": (20, 24, 28), "hopf": (11, 14, 17)}),
+    Size.QUICK: Plan(range(1000, 1010), range(4), {"pitchfork": (20, 24, 28), "hopf": (11, 14, 17)}),
     Size.TINY: Plan(range(1000, 1001), range(0), {"pitchfork": (24,), "hopf": (11,)}),
 }
 

@@ -16,8 +16,6 @@ from chilopod.report.scene.film_3d import film_3d, stills
 from chilopod.report.scene.replay import replay
 from chilopod.report.scene.replay_3d import replay_3d
 
-_FILM_SIZE = (1280, 320)  # three panels in a row
-
 
 def write_movie(shown: Movie, folder: Path) -> Film:
     """Write a movie as ``NAME.html``, ``NAME.mp4`` where films can be encoded and, of some moments of it in 3-D,
@@ -34,7 +32,7 @@ def write_movie(shown: Movie, folder: Path) -> Film:
     look: dict[str, Any] = {"titles": shown.titles, "heading": shown.heading, "speed": shown.speed}
     file, encoded = folder / f"{shown.name}.mp4", has_encoder()
     if encoded and not (solid and _rendered(lambda: film_3d(shown.record, file, **look))):
-        movie(shown.record, file, **look, size=_FILM_SIZE)
+        movie(shown.record, file, **look, size=shown.size)
     picture = folder / f"{shown.name}.png"
     pictured = bool(shown.stills) and _rendered(
         lambda: stills(shown.record, shown.stills, picture, titles=shown.titles)

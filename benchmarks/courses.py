@@ -1,0 +1,94 @@
+"""What it costs to walk courses of five targets, beside the same robots, steered as often, towards one far place.
+
+Run by `make bench`; rewrites a table in README.md. The bare loop has the same springs to set, events and records, but
+no referee who looks ten times a second, puts up targets and lets robots end, and nothing is summed up of its records.
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import time
+from dataclasses import replace
+
+import numba
+import numpy as np
+
+from chilopod.engine import engine_named, steer
+from chilopod.robot import load_robot
+from chilopod.steering import VARIABLE
+from chilopod.tasks.course import Driver, driver, random_courses, trial_of
+from chilopod.trials import Trial, batches, walked
+
+from _timing import duration, machine, table, write_section
+
+ROBOTS = {"planar": ("aoi2022-planar", 64), "twin": ("aoi2022", 8)}
+ROUNDS = 2
+
+
+def courses(ready: Driver, engine: str, count: int) -> list[Trial]:
+    assert ready.law is not None
+    seeds = range(1000, 1000 + count)
+    return [
+        trial_of(ready, replace(course, tightest=ready.law.tightest), seed, engine=engine, brief=True)
+        for seed, course in zip(seeds, random_courses(seeds, engine), strict=True)
+    ]
+
+
+def driven(batch: list[Trial]) -> tuple[float, float]:
+    """Seconds for a batch, and how long its robots walked on average, s."""
+    begin = time.perf_counter()
+    records = walked(batch)
+    taken = time.perf_counter() - begin
+    return taken, float(np.mean([np.nanmax(record.goal_end.values) for record in records]))
+
+
+def bare(batch: list[Trial], seconds: float) -> float:
+    """Seconds for the same robots towards a place that they never get to."""
+    engine, first = engine_named(batch[0].engine), batch[0]
+    bends = np.random.default_rng(0).normal(0.0, 0.02, (len(batch), first.robot.body.modules - 1))
+    begin = time.perf_counter()
+    walk = engine.start(
+        [trial.robot for trial in batch],
+        initial=engine.initial_states(first.robot, bends),
+        target=np.tile([50.0, 50.0], (len(batch), 1)),
+        record=first.recording,
+        expected=seconds,
+    )
+    steer(walk, seconds, first.controller)
+    walk.to_dataset()
+    return time.perf_counter() - begin
+
+
+def row(engine: str, threads: int) -> list[str]:
+    name, count = ROBOTS[engine]
+    ready = driver(load_robot(name), VARIABLE, engine=engine)
+    groups = batches(courses(ready, engine, count))
+    driven([replace(groups[0][0])])  # compiled
+    taken, alone = [], []
+    for _ in range(ROUNDS):
+        times = [driven(group) for group in groups]
+        taken.append(sum(each for each, _ in times))
+        alone.append(sum(bare(group, seconds) for group, (_, seconds) in zip(groups, times, strict=True)))
+    least, loop = min(taken), min(alone)
+    return [engine, str(count), str(threads), duration(least), f"{count / least:.2g}", f"{loop / least:.2f}"]
+
+
+def main() -> None:
+    load, threads = os.getloadavg()[0], numba.get_num_threads()
+    rows = []
+    for used in sorted({1, threads}):
+        numba.set_num_threads(used)
+        rows.append(row("planar", used))
+    rows.append(row("twin", threads))
+    head = ["engine", "courses", "threads", "time", "courses per second", "of the bare loop's speed"]
+    about = f"{machine()} Load average before: {load:.1f}."
+    title = "**Random courses of five targets, the first spring set once a gait cycle**"
+    write_section("courses", f"{about}\n\n{title}\n\n{table(head, rows)}")
+
+
+if __name__ == "__main__":
+    main()
