@@ -202,7 +202,7 @@ def test_what_a_record_is_made_of_belongs_to_its_version(record):
     """Change this together with RECORD_VERSION: files of the same version are taken for what would be walked now."""
     variables = sorted((name, each.dims, str(each.dtype), each.attrs) for name, each in record.variables.items())
     digest = hashlib.sha256(repr((variables, sorted(record.attrs))).encode()).hexdigest()[:12]
-    assert (RECORD_VERSION, digest) == (5, "6145ef3ab304")
+    assert (RECORD_VERSION, digest) == (6, "6145ef3ab304")
 
 
 def test_a_record_of_another_trial_is_not_written(store, record):

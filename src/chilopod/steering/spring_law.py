@@ -155,7 +155,7 @@ class SpringLaw(ReadOnlyArrays):
 
     def spring(self, seen: Observation) -> Array:
         """Stiffness of the first spring for what is seen, N*m/rad, shape (robots,)."""
-        curvature = self._curvature(seen)
+        curvature = self.curvature(seen)
         wanted, bend = self.arm * curvature, -seen.joint_angles.sum(axis=1)
         # Of what is wanted that there is; negative to the wrong side.
         share = bend * np.sign(wanted) / np.maximum(np.abs(wanted), self.straight)
@@ -167,7 +167,7 @@ class SpringLaw(ReadOnlyArrays):
         straightens |= np.abs(seen.joint_angles).max(axis=1) > self.most_bent
         return np.where(straightens, self.stiffest, spring)
 
-    def _curvature(self, seen: Observation) -> Array:
+    def curvature(self, seen: Observation) -> Array:
         """That is wanted, 1/m, left positive, shape (robots,)."""
         bearing = np.clip(seen.bearing, -0.5 * np.pi, 0.5 * np.pi)
         pursued = 2.0 * np.sin(bearing) / np.clip(seen.distance, ARRIVAL_RADIUS, self.ahead)
