@@ -28,7 +28,7 @@ from chilopod.cli.progress import progress_bar
 _SECTIONS = (
     *("mode", "exponents", "variants", "modules", "uniform", "branch", "curved", "undulation", "turning", "movies"),
     *("robot-walks", "robot-turning", "robot-movies", "identification", "robot-spread", "robot-numerics"),
-    *("robot-structures", "robot-why"),
+    *("robot-structures", "robot-why", "courses", "courses-robust", "robot-courses", "courses-movie"),
 )
 """For the help, which loads nothing heavy; a test holds them to what there is."""
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from chilopod.errors import ParameterError
+
+_DEVIATIONS = ("joint_angle", "heading", "friction", "bearing")
 
 
 @dataclass(frozen=True)
@@ -41,10 +43,14 @@ class Disturbance:
     missed: float = 0.0
     slick: tuple[int, int] | None = None
 
+    def scaled(self, factor: float) -> Disturbance:
+        """The same with all standard deviations so many times as large."""
+        return replace(self, **{name: factor * getattr(self, name) for name in _DEVIATIONS})
+
     def __post_init__(self) -> None:
         if not 0.0 <= self.missed <= 1.0:
             raise ParameterError("is no part", field="missed", value=self.missed, allowed="0 to 1")
-        for name in ("joint_angle", "heading", "friction", "bearing"):
+        for name in _DEVIATIONS:
             value = getattr(self, name)
             if not 0.0 <= value < 10.0:
                 raise ParameterError("is out of range", field=name, value=value, allowed="0 or more, less than 10")

@@ -43,9 +43,10 @@ def film(
     progress
         Called with the part done (0 to 1) and a few words.
     shorter
-        Which part of the time for a target there is.
+        Which part of the targets is shown.
     """
-    course = Course(COURSES[NAMED], shorter * patience_of("planar"))
+    goals = COURSES[NAMED]
+    course = Course(goals[: max(1, round(shorter * len(goals)))], patience_of("planar"))
     fixed = without_setting(robot, variable, "pitchfork", best)
     first = drive(variable, course, seed=_SEED, folder=folder, progress=part(progress, 0.0, 0.5))
     second = drive(fixed, course, seed=_SEED, folder=folder, progress=part(progress, 0.5, 1.0))

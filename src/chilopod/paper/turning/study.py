@@ -116,12 +116,11 @@ def turning(
         folder=folder,
         progress=part(progress, 0.5, 0.65, "uniform springs"),
     )
-    usual = Disturbance()
     rough = turning_task(
         robot,
         task.target,
         QUICK_SPRINGS if quick else ROUGH_SPRINGS,
-        disturbance=replace(usual, **{name: ROUGH * value for name, value in vars(usual).items()}),
+        disturbance=Disturbance().scaled(ROUGH),
         folder=folder,
         progress=part(progress, 0.65, 0.85, "larger disturbances"),
     )
