@@ -155,6 +155,8 @@ def started(*arguments, **environment):
         text=True,
         start_new_session=True,
         env=os.environ | environment,
+        # In the background of a script Ctrl-C is ignored, by children too.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     try:
         yield client
