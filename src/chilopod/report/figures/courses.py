@@ -78,7 +78,7 @@ def _draw(found: dict[str, Summary], narrow: bool) -> Figure:
     intervals(axes["B"], [one.seconds for one in each], rows - 0.12, style.BLUE, "o", "on it")
     intervals(axes["B"], [one.spent for one in each], rows + 0.12, style.ORANGE, "s", "on it and those missed")
     axes["B"].set(xlabel="time for a target reached (s)", title="B  Time")
-    axes["B"].legend(loc="best")
+    axes["B"].legend(loc="upper right")
     left = np.zeros(len(each))
     for values, color, name in (
         ([one.spring_work for one in each], style.BLUE, "springs"),
