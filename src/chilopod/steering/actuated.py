@@ -21,9 +21,10 @@ _A_CYCLE = 6  # the paper's scanner scans ten times a second
 class ActuatedAxis:
     """Torques bend the axis into the circle to the target, the same angle in all joints.
 
-    At each of six instants of a gait cycle the torque of every joint is what holds its spring at the wanted angle, and
-    as much again for what is missing of it. Legs yaw as in the paper; a target that is not seen is looked for to the
-    side that they were last turned to.
+    At each of six instants of a gait cycle the torque of every joint is what holds its spring at the wanted angle: the
+    joint stays as springy as it is, with another angle of rest. (Torques that also push against what is missing of the
+    angle do half as much again of work in the planar model, and throw the lightly damped joints of the twin too far.)
+    Legs yaw as in the paper; a target that is not seen is looked for to the side that they were last turned to.
 
     Attributes
     ----------
@@ -69,4 +70,4 @@ class ActuatedAxis:
         sought = np.copysign(np.inf, seen.leg_yaw[:, 0])
         wanted = -self.module_length * np.where(np.isnan(curvature), sought, curvature)
         angle = np.clip(wanted, -self.most_bent, self.most_bent)[:, None]
-        return Command(joint_torque=np.array(self.stiffness) * (2.0 * angle - seen.joint_angles))
+        return Command(joint_torque=np.array(self.stiffness) * angle)
