@@ -30,22 +30,31 @@ class Worn:
     def start(self, robots, *, friction=None, **conditions):
         """As ``planar.start``; ``friction`` is a factor on that of every foot, left and right of each module."""
         robots = as_robots(robots)
-        worn = np.tile([1.0, self.grip], (robots[0].body.modules, 1))
-        return WornWalk(planar.start(robots, friction=worn if friction is None else friction * worn, **conditions))
+        feet = self.feet(robots[0])
+        friction = feet if friction is None else friction * feet
+        return WornWalk(planar.start(robots, friction=friction, **conditions), feet)
 
     def resume(self, saved):
         """Go on with a walk that was put aside."""
-        return WornWalk(planar.resume(saved))
+        walk = planar.resume(saved)
+        return WornWalk(walk, self.feet(walk.robots[0]))
+
+    def feet(self, robot):
+        """The factor that is theirs."""
+        return np.tile([1.0, self.grip], (robot.body.modules, 1))
 
 
 class WornWalk:
-    """A walk of the planar model whose record says which engine it was."""
+    """A walk of the planar model but for what is told it of feet, and for whose its record is."""
 
-    def __init__(self, walk):
-        self.walk = walk
+    def __init__(self, walk, feet):
+        self.walk, self.feet = walk, feet
 
     def __getattr__(self, name):
         return getattr(self.walk, name)
+
+    def restart(self, which, initial, friction=None, seeds=None):
+        self.walk.restart(which, initial, None if friction is None else friction * self.feet, seeds)
 
     def to_dataset(self):
         return self.walk.to_dataset().assign_attrs(engine=Worn.traits.name)
