@@ -74,15 +74,13 @@ class StraightWalk(ReadOnlyArrays):
 
     def _repr_html_(self) -> str:
         rows = [
-            (f"{modulus:.6f}", f"{exponent:.5g}", "  ".join(_written(components)))
-            for modulus, exponent, components in zip(
-                self.moduli, self.exponents.values, self.joint_components, strict=True
-            )
+            (f"{modulus:.6f}", f"{exponent.real:.5g}", f"{abs(exponent.imag):.5g}")
+            for modulus, exponent in zip(self.moduli, self.exponents.values, strict=True)
         ]
         return block(
             f"{self.robot.name}: the straight walk is {'stable' if self.stable else 'unstable'}",
             words(f"The largest multipliers of {len(rows)}; the walk is stable if all are smaller than 1 in size."),
-            table(("size of the multiplier", "exponent (1/s)", "joint angles of the mode"), rows, most=6),
+            table(("size of the multiplier", "grows by (1/s)", "turns by (rad/s)"), rows, most=6),
         )
 
 
@@ -144,7 +142,8 @@ class WalkBifurcation(ReadOnlyArrays):
             said.append(f"Cubic coefficient of the normal form: {self.coefficient:.5g} /rad².")
         if point.frequency:
             said.append(f"The mode turns at {point.frequency:.5g} rad/s.")
-        joints = enumerate(_written(self.joint_components), start=1)
+        mode = self.joint_components
+        joints = enumerate((f"{each:.3g}" for each in (mode.real if _is_real(mode) else mode)), start=1)
         return block(
             f"{point.kind.label} at {self.parameter} = {self.value:.10g} {unit} (± {self.error_bound:.1e})",
             words(" ".join(each[0].upper() + each[1:] for each in said)),
@@ -304,10 +303,6 @@ def _numbers(values: ComplexArray) -> list[float] | list[list[float]]:
     if _is_real(values):
         return [float(value) for value in values.real]
     return _pairs(values)
-
-
-def _written(values: ComplexArray) -> list[str]:
-    return [f"{value:.3g}" for value in (values.real if _is_real(values) else values)]
 
 
 def _is_real(values: ComplexArray) -> bool:
