@@ -33,7 +33,7 @@ STEP = 0.033  # s
 ROUNDS = 3
 PLANAR = load_robot("aoi2022-planar").override("springs.adjustable", True)
 TWIN = load_robot("aoi2022")
-LOOPS = ("walk", "walk_alone", "drive", "drive_alone")
+LOOPS = ("walk", "walk_abreast", "walk_alone")
 
 
 def yawed(seen: Observation) -> Command:

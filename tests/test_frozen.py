@@ -5,6 +5,7 @@ import dataclasses
 import pickle
 from collections.abc import Iterator
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from chilopod.frozen import ReadOnlyArrays, read_only
 from chilopod.planar import PlanarModel, start
 from chilopod.planar.along import FollowedModel, walk_means
 from chilopod.planar.flow import advance
-from chilopod.planar.stretch import walk
+from chilopod.planar.stretch import walk_abreast
 from chilopod.robot import load_robot
 from chilopod.stability.branches.fold import find_fold
 from chilopod.stability.floquet import spectrum
@@ -154,10 +155,18 @@ def test_read_only_arrays_compile_no_kernel_a_second_time():
     assert all(each.mutable for each in arrays)
 
 
+def layouts(types: Any) -> Iterator[str]:
+    """Of all arrays among the types of some arguments."""
+    for each in types:
+        if hasattr(each, "layout"):
+            yield each.layout
+        elif hasattr(each, "types"):
+            yield from layouts(each.types)
+
+
 def test_arrays_of_another_order_in_memory_compile_no_kernel_a_second_time():
     FollowedModel(PRESET).flow(MODEL.orbit + 1e-3, 0.0, 0.1)
     MODEL.flow_states(np.asfortranarray([MODEL.orbit, MODEL.orbit]), 0.0, 0.1)
     start(PRESET, seeds=[3, 4]).advance(0.1)
-    for kernel in (advance, walk):
-        layouts = {each.layout for signature in kernel.signatures for each in signature if hasattr(each, "layout")}
-        assert layouts == {"C"}
+    for kernel in (advance, walk_abreast):
+        assert {layout for signature in kernel.signatures for layout in layouts(signature)} == {"C"}

@@ -1,8 +1,8 @@
-"""Functions of numbers that may carry a tangent in their imaginary part, compiled and inlined.
+"""Functions of numbers that may carry a tangent in their imaginary part, or be in lanes, compiled and inlined.
 
 A complex-step number (see :mod:`chilopod.integrate`) has an imaginary part so small that its square vanishes, so a
 function f of one is ``f(a) + i b f'(a)`` exactly: no complex function of a library is needed, and these cost little
-more than the real ones. They serve real numbers as well.
+more than the real ones. They serve real numbers as well, and numbers in lanes (:mod:`chilopod.lanes`).
 """
 
 from __future__ import annotations
@@ -14,9 +14,13 @@ import numpy as np
 from numba import types
 from numba.extending import overload
 
-from chilopod.compiled import fused_njit
+from chilopod.compiled import fused_njit, njit
+from chilopod.lanes import LanesType, absolute, any_less, choose, nearest_integer
 
 _SMALL = 0.25 * math.pi
+_NO_TURN = 0.78  # rad: below 45 degrees however that is rounded
+_RIGHT_ANGLES = 1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624879595063154e-21
+"""Their sum is a right angle to 53 + 66 bits; the first two have 33, so that a million times them is exact (fdlibm)."""
 _SIN = tuple((-1.0) ** k / math.factorial(2 * k + 1) for k in range(8))
 _COS = tuple((-1.0) ** k / math.factorial(2 * k) for k in range(9))
 
@@ -44,6 +48,36 @@ def _real_cos_sin(a: float) -> tuple[float, float]:
     return 1.0 + z * (_COS[1] + z * c), a + a * z * s
 
 
+@njit(forceinline=True)
+def _lanes_series(a: Any) -> Any:
+    z = a * a
+    s = _SIN[6] + z * _SIN[7]
+    c = _COS[7] + z * _COS[8]
+    s = _SIN[5] + z * s
+    c = _COS[6] + z * c
+    s = _SIN[4] + z * s
+    c = _COS[5] + z * c
+    s = _SIN[3] + z * s
+    c = _COS[4] + z * c
+    s = _SIN[2] + z * s
+    c = _COS[3] + z * c
+    s = _SIN[1] + z * s
+    c = _COS[2] + z * c
+    return 1.0 + z * (_COS[1] + z * c), a + a * z * s
+
+
+@njit
+def _lanes_turned(a: Any) -> Any:
+    """To the last bits for angles of up to a million; what is small has the bits that the series alone gives it."""
+    turns = nearest_integer(a * (2.0 / math.pi))
+    one, two, three = _RIGHT_ANGLES
+    c, s = _lanes_series(((a - turns * one) - turns * two) - turns * three)
+    quarter = turns - 4.0 * nearest_integer(0.25 * turns)  # -2 .. 2
+    even = absolute(absolute(quarter) - 1.0)
+    c, s = choose(0.5, even, c, s), choose(0.5, even, s, c)
+    return choose(absolute(quarter + 0.5), 1.0, c, -c), choose(absolute(quarter - 0.5), 1.0, s, -s)
+
+
 def _cos_sin(a: Any) -> Any:
     raise NotImplementedError
 
@@ -61,6 +95,15 @@ def _cos_sin_of(a: Any) -> Any:
             return complex(c, -s * a.imag), complex(s, c * a.imag)
 
         return dual
+
+    if isinstance(a, LanesType):
+
+        def in_lanes(a: Any) -> Any:
+            if any_less(_NO_TURN, absolute(a)):
+                return _lanes_turned(a)
+            return _lanes_series(a)
+
+        return in_lanes
 
     def real(a: Any) -> Any:
         return _real_cos_sin(a)
@@ -84,13 +127,13 @@ def _reciprocal_of(a: Any) -> Any:
     return real
 
 
-@fused_njit
+@fused_njit(inline="always")
 def cos_sin(a: Any) -> Any:
     """Cosine and sine of a real or complex-step angle."""
     return _cos_sin(a)
 
 
-@fused_njit
+@fused_njit(inline="always")
 def reciprocal(a: Any) -> Any:
     """One over a real or complex-step number."""
     return _reciprocal(a)

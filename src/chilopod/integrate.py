@@ -21,6 +21,7 @@ import numpy as np
 from scipy.integrate import DOP853
 
 from chilopod.compiled import fused_njit, njit
+from chilopod.lanes import absolute, choose, larger, square_root
 
 COMPLEX_STEP = 1e-40
 """Size of the imaginary perturbation; products of two of them underflow harmlessly."""
@@ -33,8 +34,22 @@ _B = np.ascontiguousarray(DOP853.B)
 _C = np.ascontiguousarray(DOP853.C)
 _E3 = np.ascontiguousarray(DOP853.E3)
 _E5 = np.ascontiguousarray(DOP853.E5)
-_STAGES = 12
-_SAFETY, _SHRINK, _GROW = 0.9, 0.2, 6.0
+STAGES = 12
+"""Slopes that a step needs."""
+SAFETY, SHRINK, GROW = 0.9, 0.2, 6.0
+"""The next step aims at this part of the tolerated one, and is that many times as long at least and at most."""
+
+
+# What is summed of the slopes, row by row without the zeros, in fours: for every stage, the new state and both errors.
+_SUMS = np.concatenate([_A[:STAGES, :STAGES], [_B, _E5[:STAGES], _E3[:STAGES]]])
+_COLUMNS = np.argsort(_SUMS == 0.0, axis=1, kind="stable")
+_WEIGHTS = np.take_along_axis(_SUMS, _COLUMNS, axis=1)
+_COLUMNS[_WEIGHTS == 0.0] = 0
+_FOURS = -(-np.count_nonzero(_SUMS, axis=1) // 4)
+_NEW, _FIFTH, _THIRD = range(STAGES, STAGES + 3)
+
+LANES_WORK = STAGES + 3
+"""Rows of scratch of :func:`lanes_step`."""
 
 
 @njit(inline="always")
@@ -91,7 +106,7 @@ def integrator(rhs: Callable[..., None], on_disk: bool = True) -> Callable[..., 
             remaining = t1 - t
             last = h >= remaining * (1.0 - 1e-12)
             step = remaining if last else h
-            for s in range(1, _STAGES):
+            for s in range(1, STAGES):
                 for i in range(n):
                     y[i] = x[i]
                 for j in range(s):
@@ -105,7 +120,7 @@ def integrator(rhs: Callable[..., None], on_disk: bool = True) -> Callable[..., 
                 y[i] = x[i]
                 fifth[i] = 0.0
                 third[i] = 0.0
-            for s in range(_STAGES):
+            for s in range(STAGES):
                 b, e5, e3 = step * _B[s], _E5[s], _E3[s]
                 if b != 0.0 or e5 != 0.0 or e3 != 0.0:
                     for i in range(n):
@@ -114,7 +129,7 @@ def integrator(rhs: Callable[..., None], on_disk: bool = True) -> Callable[..., 
                         third[i] += e3 * k[s, i]
             t_new = t1 if last else t + step
             rhs(t_new, y, args, k[12])
-            e5, e3 = _E5[_STAGES], _E3[_STAGES]
+            e5, e3 = _E5[STAGES], _E3[STAGES]
             err5 = 0.0
             err3 = 0.0
             check = 0.0  # a comparison forgets what is not a number, a sum does not
@@ -133,7 +148,7 @@ def integrator(rhs: Callable[..., None], on_disk: bool = True) -> Callable[..., 
                 for i in range(n):
                     x[i] = y[i]
                     k[0, i] = k[12, i]
-                factor = _GROW if error == 0.0 else min(_GROW, _SAFETY * error ** (-0.125))
+                factor = GROW if error == 0.0 else min(GROW, SAFETY * error ** (-0.125))
                 if rejected:
                     factor = min(1.0, factor)
                 rejected = False
@@ -142,10 +157,72 @@ def integrator(rhs: Callable[..., None], on_disk: bool = True) -> Callable[..., 
                 if last:
                     return h, True
             else:
-                h = step * max(_SHRINK, _SAFETY * error ** (-0.125))
+                h = step * max(SHRINK, SAFETY * error ** (-0.125))
                 rejected = True
                 if h < 1e-14 * max(abs(t), t1 - t0):
                     return h, False
         return h, False
 
     return integrate
+
+
+@njit(inline="always")
+def _sum_slopes(k: Any, which: int, i: int, zero: Any) -> Any:
+    total = zero
+    for four in range(_FOURS[which]):
+        j = 4 * four
+        total += _WEIGHTS[which, j] * k[_COLUMNS[which, j], i]
+        total += _WEIGHTS[which, j + 1] * k[_COLUMNS[which, j + 1], i]
+        total += _WEIGHTS[which, j + 2] * k[_COLUMNS[which, j + 2], i]
+        total += _WEIGHTS[which, j + 3] * k[_COLUMNS[which, j + 3], i]
+    return total
+
+
+@functools.cache
+def lanes_step(rhs: Callable[..., None]) -> Callable[..., Any]:
+    """A compiled step of states side by side in lanes, each at its own time and of its own length.
+
+    Parameters
+    ----------
+    rhs
+        As of :func:`integrator`, for numbers in lanes (see :mod:`chilopod.lanes`).
+
+    Returns
+    -------
+        ``attempt(args, x, t, step, tolerance, work, wide) -> error``, all in lanes but the tolerance:
+
+        - args: passed through to ``rhs``;
+        - x, t, step: state, shape (n,), time, and length of the step;
+        - tolerance: bound on the local error of each component, relative to ``max(1, |x|)``;
+        - work: scratch, shape (LANES_WORK, n or more). The slope at the beginning is given in row 0, and the new state
+          is left in row STAGES;
+        - wide: the same memory in ``LANES`` lanes, whatever their number elsewhere: sums of slopes go through it.
+        - error: of the step, as a part of what is tolerated; 1e300 where the new state is not finite.
+    """
+
+    @njit
+    def attempt(args: Any, x: Any, t: Any, step: Any, tolerance: float, work: Any, wide: Any) -> Any:
+        k, new, fifth, third = work[:STAGES], work[_NEW], work[_FIFTH], work[_THIRD]
+        zero = wide[0, 0] * 0.0
+        for s in range(1, STAGES):
+            for i in range(wide.shape[1]):
+                wide[_NEW, i] = _sum_slopes(wide, s, i, zero)
+            for i in range(x.size):
+                new[i] = x[i] + step * new[i]
+            rhs(t + _C[s] * step, new, args, k[s])
+        for i in range(wide.shape[1]):
+            for which in range(_NEW, _THIRD + 1):
+                wide[which, i] = _sum_slopes(wide, which, i, zero)
+        err5 = step * 0.0
+        err3 = err5
+        check = err5  # a comparison forgets what is not a number, a sum does not
+        for i in range(x.size):
+            new[i] = x[i] + step * new[i]
+            share = 1.0 / (tolerance * larger(1.0, larger(absolute(x[i]), absolute(new[i]))))
+            err5 = larger(err5, absolute(fifth[i]) * share)
+            err3 = larger(err3, absolute(third[i]) * share)
+            check += absolute(new[i])
+        error = step * err5 * err5 / square_root(larger(1e-300, err5 * err5 + 0.01 * err3 * err3))
+        return choose(error + check, np.inf, error, 1e300)
+
+    return attempt

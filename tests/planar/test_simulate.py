@@ -177,6 +177,26 @@ def test_neither_company_nor_threads_change_a_bit():
         assert one.equals(together)
 
 
+@pytest.mark.parametrize("modules", [2, 3, 20, 30])
+def test_robots_abreast_walk_as_each_alone_and_as_the_flow_though_one_fails(modules):
+    robot = PRESET.with_value("body.modules", modules)
+    rng = np.random.default_rng(modules)
+    count = 19  # two groups, both with more robots than lanes, of which some stay empty in the end
+    robots = [robot.with_value("springs.stiffness[0]", k) for k in rng.uniform(0.3, 30.0, count)]
+    start = initial_states(robot, 0.05 * rng.normal(size=(count, modules - 1)), rng.uniform(-3.0, 3.0, count))
+    start[4, 2] = 1e200
+    together = simulate(robots, 0.7, initial=start, rate=10.0, tolerance=1e-10)
+    assert together.status.values.tolist() == ["walked"] * 4 + ["diverged"] + ["walked"] * (count - 5)
+    for i in (0, 4, 11, count - 1):
+        alone = simulate(robots[i], 0.7, initial=start[i], rate=10.0, tolerance=1e-10)
+        for name in ("position", "heading", "joint_angle", "joint_rate"):
+            np.testing.assert_array_equal(alone[name].values[:, 0], together[name].values[:, i])
+    for i in (0, count - 1):
+        x = PlanarModel(robots[i]).flow_states(start[i : i + 1, : 2 * modules + 1], 0.0, 0.7)[0]
+        np.testing.assert_allclose(together.joint_angle.values[-1, i], x[3 : modules + 2], rtol=0, atol=1e-8)
+        np.testing.assert_allclose(together.joint_rate.values[-1, i], x[modules + 2 :], rtol=0, atol=1e-7)
+
+
 def test_a_walk_that_fails_ends_with_a_status_and_the_others_go_on():
     soft = PRESET.with_value("springs.stiffness[0]", 0.02)
     wild = initial_states(PRESET)[0]

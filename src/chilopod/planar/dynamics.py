@@ -24,6 +24,7 @@ from numba.extending import overload
 
 from chilopod.compiled import fused_njit
 from chilopod.dual import cos_sin, reciprocal
+from chilopod.lanes import LanesType, absolute, any_less, exponential
 from chilopod.planar.contact import C_EX, C_EY, C_PD, C_PP, C_PXE, C_SUM, C_X, C_Y
 
 # Rows of ``args[0]``, the scalars of a robot.
@@ -33,7 +34,8 @@ SCRATCH = 10
 """Numbers per module that the right-hand side keeps."""
 
 
-ORIGIN, LEVEL, SLOPE, BEHIND, DECAY, TORQUE = range(6)
+SPRING = 6
+ORIGIN, LEVEL, SLOPE, BEHIND, DECAY, TORQUE = range(SPRING)
 """Columns that describe a spring that changes, and what drives its joint beside it."""
 
 
@@ -54,6 +56,17 @@ def _spring_torque_of(springs: Any, joint: int, angle: Any, t: Any) -> Any:
             return -springs[joint] * angle
 
         return constant
+
+    if isinstance(springs.dtype, LanesType):
+
+        def in_lanes(springs: Any, joint: int, angle: Any, t: Any) -> Any:
+            since = t - springs[joint, ORIGIN]
+            stiffness = springs[joint, LEVEL] + springs[joint, SLOPE] * since
+            if any_less(0.0, absolute(springs[joint, BEHIND])):
+                stiffness += springs[joint, BEHIND] * exponential(-springs[joint, DECAY] * since)
+            return springs[joint, TORQUE] - stiffness * angle
+
+        return in_lanes
 
     def changing(springs: Any, joint: int, angle: Any, t: Any) -> Any:
         since = t - springs[joint, ORIGIN]
@@ -106,6 +119,8 @@ def rhs(t: float, x: Any, args: Any, out: Any) -> None:
             c, s = c * bend_c - s * bend_s, s * bend_c + c * bend_s
             vx += half * rate * s
             vy -= half * rate * c
+            # Torque of spring and damper on this module; minus that on the module in front.
+            work[i, 9] = _spring_torque(springs, i - 1, x[2 + i], t) - damping[i - 1] * x[n + 1 + i]
         work[i, 0] = c
         work[i, 1] = s
         work[i, 2] = rate
@@ -174,9 +189,7 @@ def rhs(t: float, x: Any, args: Any, out: Any) -> None:
         work[i, 6] = hy
         work[i, 8] = bt
         if i > 0:
-            # Torque of spring and damper on this module; minus that on the module in front.
-            torque = _spring_torque(springs, i - 1, x[2 + i], t) - damping[i - 1] * x[n + 1 + i]
-            work[i, 9] = torque
+            torque = work[i, 9]
             torque_behind = torque
             inverse = reciprocal(j)
             work[i, 7] = inverse

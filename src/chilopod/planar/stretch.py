@@ -1,8 +1,14 @@
-"""The compiled loop of a simulation: many robots through one stretch of time in which nobody interferes."""
+"""The compiled loop of a simulation: many robots through one stretch of time in which nobody interferes.
+
+Robots walk side by side, each in a lane (see :mod:`chilopod.lanes`) and each for itself, with its own steps and its own
+piece of time; where one has arrived, or failed, the next of those that wait goes on. A robot alone walks in numbers of
+one lane, to the same bits.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -10,44 +16,31 @@ import numpy as np
 from chilopod.compiled import copy_into, njit, parallel_njit
 from chilopod.engine.actuators import FROM, GOAL, RAMPING, SETTLING, SINCE, UNTIL
 from chilopod.engine.actuators import SLOPE as RAMP
-from chilopod.integrate import integrator
+from chilopod.integrate import GROW, LANES_WORK, MAX_STEPS, SAFETY, SHRINK, STAGES, lanes_step
+from chilopod.lanes import LANES, as_lanes, choose, room
 from chilopod.planar.contact import MOMENTS, sum_moments
-from chilopod.planar.dynamics import BEHIND, DECAY, LEVEL, ORIGIN, SCRATCH, SLOPE, TORQUE, rhs
+from chilopod.planar.dynamics import BEHIND, DECAY, LEVEL, ORIGIN, SCRATCH, SLOPE, SPRING, TORQUE, rhs
 
 WALKING, DIVERGED, OUT_OF_RANGE, HALTED = range(4)
 MOST_BENT = 0.5 * np.pi
 """Of a yaw joint, rad: beyond it modules run into each other."""
 
-_integrate = integrator(rhs)
+_TIME, _STEP, _ERROR = range(3)
+_NOBODY = -1
+
+_slope = njit(rhs.py_func)
+"""Without leave for LLVM to fuse, see :mod:`chilopod.lanes`."""
+
+_attempt = lanes_step(_slope)
 
 
-@parallel_njit
-def walk(
-    rows: Any,
-    starts: Any,
-    widths: Any,
-    interval: Any,
-    sample: Any,
-    contact: Any,
-    stroke: Any,
-    scalars: Any,
-    feet: Any,
-    stiffness: Any,
-    damping: Any,
-    friction: Any,
-    yaw: Any,
-    tolerance: float,
-    states: Any,
-    step: Any,
-    status: Any,
-    record: Any,
-) -> None:
-    """Carry robots through all pieces of time, in place, on all cores; each robot on its own, step by step.
+class Pieces(NamedTuple):
+    """Pieces of time that all robots walk through.
 
-    Parameters
+    Attributes
     ----------
-    rows
-        Which robots.
+    begins
+        When each piece begins, s, shape (pieces,).
     starts, widths
         Where in its contact interval each piece starts and how long it lasts, s, shape (pieces,).
     interval
@@ -57,155 +50,254 @@ def walk(
     contact, stroke
         By interval: whether each foot stands, and where it is at the start (m ahead of mid-stroke), shape
         (intervals, N, 2).
+    """
+
+    begins: Any
+    starts: Any
+    widths: Any
+    interval: Any
+    sample: Any
+    contact: Any
+    stroke: Any
+
+
+class Robots(NamedTuple):
+    """What robots are and what they are told.
+
+    Attributes
+    ----------
     scalars, feet
-        Of the robots: see ``dynamics.py``, shape (robots, 4); forward offset and half-width, m, shape (robots, 2).
-    stiffness, damping
-        N*m/rad and N*m*s/rad, shape (robots, N-1).
+        See ``dynamics.py``, shape (robots, 4); forward offset and half-width, m, shape (robots, 2).
+    damping
+        N*m*s/rad, shape (robots, N-1).
     friction
         Of every foot, N*s/m, shape (robots, N, 2).
-    yaw
-        Of the legs of module 1, rad, shape (robots, 2).
-    tolerance
-        Of the integrator, relative to max(1, |x|).
-    states
-        Reduced states with poses behind, shape (robots, 2N+4).
-    step
-        To start with, s; 0 for a guess; the last one is left there, shape (robots,).
-    status
-        WALKING, DIVERGED, OUT_OF_RANGE or HALTED; robots that no longer walk are left alone, shape (robots,).
-    record
-        States over (samples, robots, 2N+4); what no robot reached is left alone.
-    """
-    for row in numba.prange(rows.size):
-        walk_alone(
-            rows[row], starts, widths, interval, sample, contact, stroke, scalars, feet, stiffness, damping, friction,
-            yaw, tolerance, states, step, status, record,
-        )  # fmt: skip
-
-
-@njit
-def walk_alone(
-    r: int, starts: Any, widths: Any, interval: Any, sample: Any, contact: Any, stroke: Any, scalars: Any, feet: Any,
-    stiffness: Any, damping: Any, friction: Any, yaw: Any, tolerance: float, states: Any, step: Any, status: Any,
-    record: Any,
-) -> None:  # fmt: skip
-    """As :func:`walk`, for one robot on this thread: waking the others takes longer than a step of one robot."""
-    if status[r] != WALKING:
-        return
-    n = contact.shape[1]
-    x = states[r].copy()
-    work = np.empty((16, x.size))
-    scratch = np.empty((n, SCRATCH))
-    moments = np.empty((n, MOMENTS))
-    args = (scalars[r], stiffness[r], damping[r], moments, scratch)
-    current = -1
-    h = step[r]
-    for s in range(widths.size):
-        if interval[s] != current:
-            current = interval[s]
-            sum_moments(contact[current], stroke[current], friction[r], feet[r, 0], feet[r, 1], yaw[r], moments)
-        h, reached = _integrate(args, x, starts[s], starts[s] + widths[s], h, tolerance, work)
-        status[r] = _judged(x, n, reached)
-        if status[r] != WALKING:
-            break
-        if sample[s] >= 0:
-            copy_into(record[sample[s], r], x)
-    copy_into(states[r], x)
-    step[r] = h
-
-
-@parallel_njit
-def drive(
-    rows: Any,
-    begins: Any,
-    starts: Any,
-    widths: Any,
-    interval: Any,
-    sample: Any,
-    contact: Any,
-    stroke: Any,
-    scalars: Any,
-    feet: Any,
-    profile: Any,
-    lag: Any,
-    torque: Any,
-    damping: Any,
-    friction: Any,
-    yaw: Any,
-    tolerance: float,
-    states: Any,
-    step: Any,
-    status: Any,
-    record: Any,
-) -> None:
-    """As :func:`walk`, for robots whose springs change or whose joints are driven.
-
-    No step straddles the end of a ramp.
-
-    Parameters
-    ----------
-    begins
-        When each piece begins, s, shape (pieces,).
     profile, lag, torque
         See :class:`chilopod.engine.Actuators`, shapes (7, robots, N-1), (robots, N-1), (robots, N-1).
+    yaw
+        Of the legs of module 1, rad, shape (robots, 2).
     """
-    for row in numba.prange(rows.size):
-        drive_alone(
-            rows[row], begins, starts, widths, interval, sample, contact, stroke, scalars, feet, profile, lag, torque,
-            damping, friction, yaw, tolerance, states, step, status, record,
-        )  # fmt: skip
+
+    scalars: Any
+    feet: Any
+    damping: Any
+    friction: Any
+    profile: Any
+    lag: Any
+    torque: Any
+    yaw: Any
 
 
-@njit
-def drive_alone(
-    r: int, begins: Any, starts: Any, widths: Any, interval: Any, sample: Any, contact: Any, stroke: Any,
-    scalars: Any, feet: Any, profile: Any, lag: Any, torque: Any, damping: Any, friction: Any, yaw: Any,
-    tolerance: float, states: Any, step: Any, status: Any, record: Any,
-) -> None:  # fmt: skip
-    """As :func:`drive`, for one robot on this thread."""
-    if status[r] != WALKING:
-        return
-    n = contact.shape[1]
-    x = states[r].copy()
-    work = np.empty((16, x.size))
-    scratch = np.empty((n, SCRATCH))
-    moments = np.empty((n, MOMENTS))
-    springs = np.empty((n - 1, 6))
-    args = (scalars[r], springs, damping[r], moments, scratch)
-    current = -1
-    h = step[r]
-    for s in range(widths.size):
-        if interval[s] != current:
-            current = interval[s]
-            sum_moments(contact[current], stroke[current], friction[r], feet[r, 0], feet[r, 1], yaw[r], moments)
-        done = 0.0
-        while done < widths[s] and status[r] == WALKING:
-            end = widths[s]
-            for j in range(n - 1):
-                ramp_left = profile[UNTIL, r, j] - begins[s]
-                if done < ramp_left < end:
-                    end = ramp_left
-            middle = begins[s] + 0.5 * (done + end)
-            _describe(profile[:, r], lag[r], torque[r], middle, begins[s] - starts[s], springs)
-            h, reached = _integrate(args, x, starts[s] + done, starts[s] + end, h, tolerance, work)
-            status[r] = _judged(x, n, reached)
-            done = end
-        if status[r] != WALKING:
-            break
-        if sample[s] >= 0:
-            copy_into(record[sample[s], r], x)
-    copy_into(states[r], x)
-    step[r] = h
+class _Lanes(NamedTuple):
+    """What the right-hand side reads, in plain numbers whose last axis is the lane; see ``dynamics.py``."""
+
+    x: Any
+    scalars: Any
+    springs: Any
+    damping: Any
+    moments: Any
 
 
-@njit
-def _judged(x: Any, n: int, reached: bool) -> int:
-    if not reached:
-        return DIVERGED
+class _Places(NamedTuple):
+    """Where the robot in each lane is.
+
+    No step straddles the end of a ramp: a piece is walked in parts.
+
+    Attributes
+    ----------
+    robot, piece
+        Which, or NOBODY; in which piece.
+    begin, end
+        From where to where of the piece the present part is, s.
+    next
+        Step to try next, s; 0 for a guess.
+    tried, rejected
+        Steps in this part so far, and whether the one before was rejected.
+    last
+        Whether the present step is to be the last of the part.
+    """
+
+    robot: Any
+    piece: Any
+    begin: Any
+    end: Any
+    next: Any
+    tried: Any
+    rejected: Any
+    last: Any
+
+
+def _carrier(width: int) -> Callable[..., None]:
+    """The loop on one thread for a number of lanes.
+
+    It is called as ``carry(rows, pieces, robots, tolerance, states, step, status, record)``, see :func:`walk`.
+    """
+
+    @njit
+    def carry(
+        rows: Any, pieces: Any, robots: Any, tolerance: float, states: Any, step: Any, status: Any, record: Any
+    ) -> None:
+        n, size = pieces.contact.shape[1], states.shape[1]
+        joints = n - 1
+        lanes = _Lanes(
+            room((size, width)),
+            room((4, width)),
+            room((joints, SPRING, width)),
+            room((joints, width)),
+            room((n, MOMENTS, width)),
+        )
+        x = as_lanes(lanes.x, width)
+        args = (
+            as_lanes(lanes.scalars, width),
+            as_lanes(lanes.springs, width),
+            as_lanes(lanes.damping, width),
+            as_lanes(lanes.moments, width),
+            as_lanes(room((n, SCRATCH, width)), width),
+        )
+        # Rounded up to whole vectors, in which sums are taken whatever the number of lanes.
+        vectors = -(-size * width // LANES)
+        slope = room((LANES_WORK, vectors * LANES // width, width))
+        slopes, wide = as_lanes(slope, width), as_lanes(slope.reshape((LANES_WORK, vectors, LANES)), LANES)
+        clock = room((3, width))
+        clocks = as_lanes(clock, width)
+        at = _Places(
+            np.full(width, _NOBODY),
+            np.zeros(width, np.int64),
+            np.zeros(width),
+            np.zeros(width),
+            np.zeros(width),
+            np.zeros(width, np.int64),
+            np.zeros(width, np.bool_),
+            np.zeros(width, np.bool_),
+        )
+        walking = min(width, rows.size)
+        waiting = walking
+        for lane in range(width):
+            # Where nobody is, the first robot stands still: numbers that cost no more than others.
+            _put(lane, rows[lane if lane < walking else 0], robots, states, step, lanes, at)
+            _begin(lane, 0, 0.0, pieces, robots, lanes, clock, at)
+            if lane >= walking:
+                at.robot[lane] = _NOBODY
+
+        while walking:
+            _slope(clocks[_TIME], x, args, slopes[0])
+            for lane in range(width):
+                if at.robot[lane] != _NOBODY:
+                    _choose_step(lane, pieces, lanes, slope[0], clock, at)
+            clocks[_ERROR] = _attempt(args, x, clocks[_TIME], clocks[_STEP], tolerance, slopes, wide)
+            for i in range(size):
+                x[i] = choose(1.0, clocks[_ERROR], x[i], slopes[STAGES, i])
+            for lane in range(width):
+                r, s = at.robot[lane], at.piece[lane]
+                if r == _NOBODY:
+                    continue
+                begin = 0.0
+                if not _judge_step(lane, clock, at):
+                    status[r] = DIVERGED
+                elif at.rejected[lane] or not at.last[lane]:
+                    continue
+                elif _most_bent(lanes.x, joints, lane) > MOST_BENT:
+                    status[r] = OUT_OF_RANGE
+                elif at.end[lane] < pieces.widths[s]:
+                    begin = at.end[lane]
+                else:
+                    if pieces.sample[s] >= 0:
+                        copy_into(record[pieces.sample[s], r], lanes.x[:, lane])
+                    s += 1
+                if status[r] != WALKING or s == pieces.widths.size:
+                    copy_into(states[r], lanes.x[:, lane])
+                    step[r] = at.next[lane]
+                    if waiting == rows.size:
+                        at.robot[lane], clock[_STEP, lane] = _NOBODY, 0.0
+                        walking -= 1
+                        continue
+                    _put(lane, rows[waiting], robots, states, step, lanes, at)
+                    waiting += 1
+                    s = 0
+                _begin(lane, s, begin, pieces, robots, lanes, clock, at)
+
+    return carry
+
+
+@njit(inline="always")
+def _put(lane: int, r: int, robots: Any, states: Any, step: Any, lanes: Any, at: Any) -> None:
+    """A robot into a lane."""
+    at.robot[lane] = r
+    at.next[lane] = step[r]
+    copy_into(lanes.x[:, lane], states[r])
+    copy_into(lanes.scalars[:, lane], robots.scalars[r])
+    copy_into(lanes.damping[:, lane], robots.damping[r])
+
+
+@njit(inline="always")
+def _begin(lane: int, s: int, begin: float, pieces: Any, robots: Any, lanes: Any, clock: Any, at: Any) -> None:
+    """The part of a piece that begins somewhere in it: it ends with the piece, or where a ramp does."""
+    r = at.robot[lane]
+    end = pieces.widths[s]
+    for j in range(robots.lag.shape[1]):
+        ramp_left = robots.profile[UNTIL, r, j] - pieces.begins[s]
+        if begin < ramp_left < end:
+            end = ramp_left
+    at.piece[lane], at.begin[lane], at.end[lane] = s, begin, end
+    at.tried[lane], at.rejected[lane] = 0, False
+    clock[_TIME, lane], clock[_STEP, lane] = pieces.starts[s] + begin, 0.0
+    if s == 0 or pieces.interval[s] != pieces.interval[s - 1]:
+        which = pieces.interval[s]
+        sum_moments(
+            pieces.contact[which],
+            pieces.stroke[which],
+            robots.friction[r],
+            robots.feet[r, 0],
+            robots.feet[r, 1],
+            robots.yaw[r],
+            lanes.moments[:, :, lane],
+        )
+    middle, zero = pieces.begins[s] + 0.5 * (begin + end), pieces.begins[s] - pieces.starts[s]
+    _describe(robots.profile[:, r], robots.lag[r], robots.torque[r], middle, zero, lanes.springs[:, :, lane])
+
+
+@njit(inline="always")
+def _choose_step(lane: int, pieces: Any, lanes: Any, slope: Any, clock: Any, at: Any) -> None:
+    """As long as the one before suggests, or as is left; see :func:`chilopod.integrate.integrator` for the guess."""
+    left = pieces.starts[at.piece[lane]] + at.end[lane] - clock[_TIME, lane]
+    if at.next[lane] <= 0.0:
+        scale, steep = 0.0, 0.0
+        for i in range(slope.shape[0]):
+            scale = max(scale, abs(lanes.x[i, lane]))
+            steep = max(steep, abs(slope[i, lane]))
+        at.next[lane] = 0.01 * max(scale, 1e-3) / steep if steep > 0.0 else left
+    at.last[lane] = at.next[lane] >= left * (1.0 - 1e-12)
+    clock[_STEP, lane] = left if at.last[lane] else at.next[lane]
+
+
+@njit(inline="always")
+def _judge_step(lane: int, clock: Any, at: Any) -> bool:
+    """Go on in time if the step was good enough, and say how long the next shall be; whether that is of any use."""
+    error, step = clock[_ERROR, lane], clock[_STEP, lane]
+    factor = SAFETY / np.sqrt(np.sqrt(np.sqrt(error))) if error > 0.0 else GROW
+    at.tried[lane] += 1
+    if error > 1.0:
+        at.next[lane] = step * max(SHRINK, factor)
+        at.rejected[lane] = True
+        if at.next[lane] < 1e-14 * max(abs(clock[_TIME, lane]), at.end[lane] - at.begin[lane]):
+            return False
+    else:
+        factor = min(1.0 if at.rejected[lane] else GROW, factor)
+        at.rejected[lane] = False
+        if not at.last[lane] or factor < 1.0:
+            at.next[lane] = step * factor
+        clock[_TIME, lane] += step
+        if at.last[lane]:
+            return True
+    return at.tried[lane] < MAX_STEPS
+
+
+@njit(inline="always")
+def _most_bent(x: Any, joints: int, lane: int) -> float:
     bent = 0.0
-    for j in range(n - 1):
-        bent = max(bent, abs(x[3 + j]))
-    return OUT_OF_RANGE if bent > MOST_BENT else WALKING
+    for j in range(joints):
+        bent = max(bent, abs(x[3 + j, lane]))
+    return bent
 
 
 @njit
@@ -222,3 +314,48 @@ def _describe(profile: Any, lag: Any, torque: Any, now: float, zero: float, spri
             springs[j, BEHIND] = profile[RAMPING, j] if ramping else profile[SETTLING, j]
             springs[j, DECAY] = 1.0 / lag[j]
         springs[j, TORQUE] = torque[j]
+
+
+walk_alone = _carrier(1)
+"""As :func:`walk`, for few robots, one after the other on this thread."""
+
+walk_abreast = _carrier(LANES)
+"""As :func:`walk`, on this thread: waking the others takes longer than a step of some robots."""
+
+
+@parallel_njit
+def walk(
+    groups: int,
+    rows: Any,
+    pieces: Any,
+    robots: Any,
+    tolerance: float,
+    states: Any,
+    step: Any,
+    status: Any,
+    record: Any,
+) -> None:
+    """Carry robots through all pieces of time, in place, on all cores; each robot on its own, step by step.
+
+    Parameters
+    ----------
+    groups
+        Into how many the robots are parted; those of a group are carried on one thread.
+    rows
+        Which robots; they walk.
+    pieces, robots
+        See :class:`Pieces` and :class:`Robots`.
+    tolerance
+        Of the integrator, relative to max(1, |x|).
+    states
+        Reduced states with poses behind, shape (robots, 2N+4).
+    step
+        To start with, s; 0 for a guess; the last one is left there, shape (robots,).
+    status
+        Left at WALKING, or DIVERGED or OUT_OF_RANGE where a robot fails, shape (robots,).
+    record
+        States over (samples, robots, 2N+4); what no robot reached is left alone.
+    """
+    for group in numba.prange(groups):
+        mine = rows[group * rows.size // groups : (group + 1) * rows.size // groups]
+        walk_abreast(mine, pieces, robots, tolerance, states, step, status, record)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numba
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
@@ -35,6 +36,9 @@ Array = NDArray[np.float64]
 
 TOLERANCE = 1e-6
 """Default of :func:`start`: a minute of walking is then good to better than 1e-6 m."""
+
+_A_GROUP, _GROUPS = 8, 4
+"""Robots that a thread is given at a time at least, and how often a thread is given some at most."""
 
 traits = Traits(
     name="planar",
@@ -381,16 +385,19 @@ class PlanarWalk:
         status: NDArray[np.intp],
     ) -> None:
         """Carry all robots through pieces of time, in place."""
-        begins, starts, widths, interval, sample = pieces
-        record = self._samples.grown(int(sample.max(initial=-1)) + 1)
-        told = self._actuators
-        when = (starts, widths, interval, sample, *self._feet, *self._bodies)
-        what = (self._damping, self._friction, told.leg_yaw, self._tolerance, states, step, status, record)
-        walking = status == stretch.WALKING
-        free, driven = np.flatnonzero(walking & ~told.driven), np.flatnonzero(walking & told.driven)
-        if free.size == 1:
-            stretch.walk_alone(free[0], *when, self._stiffness, *what)
-        elif free.size:
-            stretch.walk(free, *when, self._stiffness, *what)
-        if driven.size:
-            stretch.drive(driven, begins, *when, told.profile, told.lag, told.joint_torque, *what)
+        record, told = self._samples.grown(int(pieces[-1].max(initial=-1)) + 1), self._actuators
+        rows = np.flatnonzero(status == stretch.WALKING)
+        if not rows.size:
+            return
+        scalars, feet = self._bodies
+        robots = stretch.Robots(
+            scalars, feet, self._damping, self._friction, told.profile, told.lag, told.joint_torque, told.leg_yaw
+        )
+        what = (rows, stretch.Pieces(*pieces, *self._feet), robots, self._tolerance, states, step, status, record)
+        groups = min(rows.size // _A_GROUP, _GROUPS * numba.get_num_threads())
+        if groups > 1:
+            stretch.walk(groups, *what)
+        elif rows.size > 1:
+            stretch.walk_abreast(*what)
+        else:
+            stretch.walk_alone(*what)

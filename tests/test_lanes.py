@@ -1,0 +1,60 @@
+"""Numbers in lanes: the same bits in any number of lanes and beside any others, and the functions of them."""
+
+import numpy as np
+import pytest
+
+from chilopod.compiled import njit
+from chilopod.dual import cos_sin, reciprocal
+from chilopod.lanes import LANES, any_less, as_lanes, choose, exponential, larger, square_root
+
+
+def _in_lanes(width):
+    @njit
+    def compute(a, b, out):
+        x, y, z = as_lanes(a, width), as_lanes(b, width), as_lanes(out, width)
+        for i in range(x.size):
+            c, s = cos_sin(x[i])
+            z[i, 0] = c
+            z[i, 1] = s
+            z[i, 2] = x[i] * y[i] + y[i] * c - 0.1 * x[i]
+            z[i, 3] = reciprocal(y[i]) - s / y[i]
+            z[i, 4] = larger(x[i], y[i])
+            z[i, 5] = choose(x[i], 0.5, y[i], -1.0)
+            z[i, 6] = square_root(y[i] * y[i])
+            z[i, 7] = exponential(-y[i])
+            z[i, 8] = -x[i] if any_less(0.0, y[i]) else x[i]
+
+    return compute
+
+
+ONE, MANY = _in_lanes(1), _in_lanes(LANES)
+RANDOM = np.random.default_rng(0)
+NUMBERS = np.concatenate([RANDOM.uniform(-0.8, 0.8, 40), RANDOM.uniform(-20, 20, 36), [0.0, -0.0, 1e6, np.pi / 4]])
+OTHERS = RANDOM.uniform(0.1, 3.0, NUMBERS.size)
+
+
+def _computed(compute, width, numbers):
+    out = np.empty((numbers.size // width, 9, width))
+    compute(numbers.reshape(-1, width).copy(), OTHERS.reshape(-1, width).copy(), out)
+    return out.transpose(1, 0, 2).reshape(9, -1)
+
+
+def test_the_bits_hang_neither_on_the_number_of_lanes_nor_on_what_is_in_the_others():
+    alone = _computed(ONE, 1, NUMBERS)
+    np.testing.assert_array_equal(alone.view(np.int64), _computed(MANY, LANES, NUMBERS).view(np.int64))
+    rows = np.arange(NUMBERS.size) % LANES != 3
+    np.testing.assert_array_equal(alone[:8, rows], _computed(MANY, LANES, np.where(rows, NUMBERS, np.nan))[:8, rows])
+
+
+def test_functions_are_those_of_numpy():
+    got, x, y = _computed(MANY, LANES, NUMBERS), NUMBERS, OTHERS
+    np.testing.assert_allclose(got[:2], [np.cos(x), np.sin(x)], rtol=0, atol=3e-16)
+    expected = [x * y + y * np.cos(x) - 0.1 * x, 1 / y - np.sin(x) / y, np.maximum(x, y), np.where(x < 0.5, y, -1)]
+    np.testing.assert_allclose(got[2:], [*expected, y, np.exp(-y), -x], rtol=1e-14, atol=1e-14)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_what_is_no_angle_has_no_sine(bad):
+    got = _computed(MANY, LANES, np.where(np.arange(NUMBERS.size) % LANES == 0, bad, NUMBERS))
+    assert np.isnan(got[:2, ::LANES]).all()
+    assert np.isfinite(got[:2].reshape(2, -1, LANES)[:, :, 1:]).all()
