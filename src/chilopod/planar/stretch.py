@@ -25,6 +25,9 @@ WALKING, DIVERGED, OUT_OF_RANGE, HALTED = range(4)
 MOST_BENT = 0.5 * np.pi
 """Of a yaw joint, rad: beyond it modules run into each other."""
 
+_A_GROUP, _GROUPS = LANES, 4
+"""Robots that a thread is given at a time at least, and how many times each thread is given some at most."""
+
 _TIME, _STEP, _ERROR = range(3)
 _NOBODY = -1
 
@@ -130,7 +133,7 @@ class _Places(NamedTuple):
 def _carrier(width: int) -> Callable[..., None]:
     """The loop on one thread for a number of lanes.
 
-    It is called as ``carry(rows, pieces, robots, tolerance, states, step, status, record)``, see :func:`walk`.
+    It is called as ``carry(rows, pieces, robots, tolerance, states, step, status, record)``, see :func:`carry`.
     """
 
     @njit
@@ -219,7 +222,7 @@ def _carrier(width: int) -> Callable[..., None]:
     return carry
 
 
-@njit(inline="always")
+@njit
 def _put(lane: int, r: int, robots: Any, states: Any, step: Any, lanes: Any, at: Any) -> None:
     """A robot into a lane."""
     at.robot[lane] = r
@@ -229,7 +232,7 @@ def _put(lane: int, r: int, robots: Any, states: Any, step: Any, lanes: Any, at:
     copy_into(lanes.damping[:, lane], robots.damping[r])
 
 
-@njit(inline="always")
+@njit
 def _begin(lane: int, s: int, begin: float, pieces: Any, robots: Any, lanes: Any, clock: Any, at: Any) -> None:
     """The part of a piece that begins somewhere in it: it ends with the piece, or where a ramp does."""
     r = at.robot[lane]
@@ -317,10 +320,10 @@ def _describe(profile: Any, lag: Any, torque: Any, now: float, zero: float, spri
 
 
 walk_alone = _carrier(1)
-"""As :func:`walk`, for few robots, one after the other on this thread."""
+"""As :func:`carry`, one robot after the other on this thread."""
 
 walk_abreast = _carrier(LANES)
-"""As :func:`walk`, on this thread: waking the others takes longer than a step of some robots."""
+"""As :func:`carry`, side by side on this thread: waking the others takes longer than a step of some robots."""
 
 
 @parallel_njit
@@ -335,14 +338,21 @@ def walk(
     status: Any,
     record: Any,
 ) -> None:
+    """As :func:`carry`, parted into groups, those of a group on one thread: the answer hangs on neither."""
+    for group in numba.prange(groups):
+        mine = rows[group * rows.size // groups : (group + 1) * rows.size // groups]
+        walk_abreast(mine, pieces, robots, tolerance, states, step, status, record)
+
+
+def carry(
+    rows: Any, pieces: Pieces, robots: Robots, tolerance: float, states: Any, step: Any, status: Any, record: Any
+) -> None:
     """Carry robots through all pieces of time, in place, on all cores; each robot on its own, step by step.
 
     Parameters
     ----------
-    groups
-        Into how many the robots are parted; those of a group are carried on one thread.
     rows
-        Which robots; they walk.
+        Which robots, at least one; they walk.
     pieces, robots
         See :class:`Pieces` and :class:`Robots`.
     tolerance
@@ -356,6 +366,12 @@ def walk(
     record
         States over (samples, robots, 2N+4); what no robot reached is left alone.
     """
-    for group in numba.prange(groups):
-        mine = rows[group * rows.size // groups : (group + 1) * rows.size // groups]
-        walk_abreast(mine, pieces, robots, tolerance, states, step, status, record)
+    what = (rows, pieces, robots, tolerance, states, step, status, record)
+    threads = numba.get_num_threads()
+    groups = min(rows.size // _A_GROUP, _GROUPS * threads)
+    if threads > 1 and groups > 1:
+        walk(groups, *what)
+    elif rows.size > 1:
+        walk_abreast(*what)
+    else:
+        walk_alone(*what)

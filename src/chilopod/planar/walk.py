@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import numba
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
@@ -36,9 +35,6 @@ Array = NDArray[np.float64]
 
 TOLERANCE = 1e-6
 """Default of :func:`start`: a minute of walking is then good to better than 1e-6 m."""
-
-_A_GROUP, _GROUPS = 8, 4
-"""Robots that a thread is given at a time at least, and how often a thread is given some at most."""
 
 traits = Traits(
     name="planar",
@@ -393,11 +389,5 @@ class PlanarWalk:
         robots = stretch.Robots(
             scalars, feet, self._damping, self._friction, told.profile, told.lag, told.joint_torque, told.leg_yaw
         )
-        what = (rows, stretch.Pieces(*pieces, *self._feet), robots, self._tolerance, states, step, status, record)
-        groups = min(rows.size // _A_GROUP, _GROUPS * numba.get_num_threads())
-        if groups > 1:
-            stretch.walk(groups, *what)
-        elif rows.size > 1:
-            stretch.walk_abreast(*what)
-        else:
-            stretch.walk_alone(*what)
+        when = stretch.Pieces(*pieces, *self._feet)
+        stretch.carry(rows, when, robots, self._tolerance, states, step, status, record)
