@@ -48,8 +48,8 @@ class Judged:
     ----------
     arrived
         There.
-    over
-        Out of time.
+    late, unseen
+        Out of time; and have never had it in view.
     gone
         No longer walking, and so done with all targets.
     begins
@@ -57,14 +57,15 @@ class Judged:
     """
 
     arrived: NDArray[np.bool_]
-    over: NDArray[np.bool_]
+    late: NDArray[np.bool_]
+    unseen: NDArray[np.bool_]
     gone: NDArray[np.bool_]
     begins: NDArray[np.bool_]
 
     @property
     def moved(self) -> NDArray[np.bool_]:
         """Who has got the next target, or has had the last."""
-        return self.arrived | self.over | self.begins
+        return self.arrived | self.late | self.unseen | self.begins
 
 
 class CourseReferee:
@@ -122,13 +123,14 @@ class CourseReferee:
         self._nearest[rows[busy], numbers[busy]] = np.fmin(self._nearest[rows[busy], numbers[busy]], away[busy])
         arrived = busy & (away < ARRIVAL_RADIUS)
         over = busy & ~arrived & ~gone & (now - self._begin[rows, numbers] >= self._common.patience - 1e-9)
+        late, unseen = over & self._seen_once, over & ~self._seen_once
         if gone.any() or arrived.any() or over.any():
             self._judge(gone, now, Verdict.STOPPED)
             self._judge(arrived, now, Verdict.ARRIVED)
-            self._judge(over & self._seen_once, now, Verdict.LATE)
-            self._judge(over & ~self._seen_once, now, Verdict.UNSEEN)
+            self._judge(late, now, Verdict.LATE)
+            self._judge(unseen, now, Verdict.UNSEEN)
             self._number[gone] = self._counts[gone]
-        judged = Judged(arrived, over, gone, begins)
+        judged = Judged(arrived, late, unseen, gone, begins)
         if judged.moved.any():
             self._next(walk, pose, judged.moved)
         return judged
