@@ -51,8 +51,9 @@ __all__ = [
 ]
 
 for _task in ("Turn", "Course"):
-    gymnasium.register(
-        f"chilopod/{_task}-v0",
-        entry_point=f"chilopod.gym.envs:{_task}Env",
-        vector_entry_point=f"chilopod.gym.envs:{_task}VectorEnv",
-    )
+    if f"chilopod/{_task}-v0" not in gymnasium.registry:  # this module may be loaded again
+        gymnasium.register(
+            f"chilopod/{_task}-v0",
+            entry_point=f"chilopod.gym.envs:{_task}Env",
+            vector_entry_point=f"chilopod.gym.envs:{_task}VectorEnv",
+        )

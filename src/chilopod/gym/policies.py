@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from chilopod.engine import Controller
 from chilopod.errors import ParameterError, nearest_name
 from chilopod.gym.episodes import Episodes
-from chilopod.steering import ON_COURSES, VARIABLE
+from chilopod.steering import ON_COURSES, VARIABLE, steered
 from chilopod.tasks.course import driver
 
 Row = NDArray[np.float32]
@@ -86,6 +86,10 @@ def baseline(name: str, episodes: Episodes, engine: str = "planar") -> Steered:
             allowed=", ".join(BASELINES),
             nearest=nearest_name(name, BASELINES),
         )
-    controller = driver(episodes.robot, ON_COURSES[name], engine=engine).controller
+    strategy = ON_COURSES[name]
+    if strategy is VARIABLE:
+        controller = driver(episodes.robot, strategy, engine=engine).controller
+    else:
+        _, controller = steered(episodes.robot, strategy, None)
     assert controller is not None  # both steer
     return Steered(controller, episodes)
