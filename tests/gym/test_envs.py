@@ -14,7 +14,7 @@ from gymnasium.wrappers.vector import RecordEpisodeStatistics as RecordBatchStat
 import chilopod.gym
 from chilopod import load_robot
 from chilopod.errors import ChilopodError, ParameterError
-from chilopod.gym import Episodes, Steered, baseline
+from chilopod.gym import Episodes, Steered, baseline, episodes
 from chilopod.steering import SpringLaw, random_course
 from chilopod.trials import NONE, Disturbance
 
@@ -136,6 +136,22 @@ def test_time_that_is_over_truncates():
         env.step(np.zeros(3, dtype=np.float32))
 
 
+def test_a_walk_that_is_as_long_as_walks_may_be_begins_again(monkeypatch):
+    monkeypatch.setattr(episodes, "LONGEST", 1.5)
+    batch = gymnasium.make_vec(TURN, num_envs=2)
+    batch.reset(seed=0)
+    ends = [batch.step(np.zeros((2, 3), dtype=np.float32))[3].tolist() for _ in range(5)]
+    assert ends == [[False, False], [True, True], [False, False], [False, False], [True, True]]
+
+
+def test_seeds_may_be_one_each_and_numpy_s():
+    batch = gymnasium.make_vec(TURN, num_envs=2)
+    first, _ = batch.reset(seed=np.int64(3))
+    np.testing.assert_array_equal(first, batch.reset(seed=[np.int64(3), 4])[0])
+    with pytest.raises(ParameterError, match="seed"):
+        batch.reset(seed=[3])
+
+
 def test_wrappers_of_gymnasium_go_with_both():
     batch = RecordBatchStatistics(gymnasium.make_vec(TURN, num_envs=2, **SHORT))
     alone = RecordEpisodeStatistics(gymnasium.make(TURN, **SHORT))
@@ -165,11 +181,14 @@ def test_an_action_that_is_none_is_one_line(action, words):
     env = gymnasium.make(TURN, disable_env_checker=True).unwrapped
     with pytest.raises(ParameterError, match="there is no episode yet"):
         env.step(np.zeros(3, dtype=np.float32))
-    before = env.reset(seed=0)[1]["pose"]
+    other = gymnasium.make(TURN, disable_env_checker=True).unwrapped
+    env.reset(seed=0)
+    other.reset(seed=0)
     with pytest.raises(ParameterError, match=words) as caught:
         env.step(action)
     assert "\n" not in str(caught.value)
-    np.testing.assert_array_equal(env.episodes._walk.pose()[0], before)
+    good = np.array([0.0, 1.0, 0.5], dtype=np.float32)
+    np.testing.assert_array_equal(env.step(good)[0], other.step(good)[0])
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -82,7 +83,7 @@ class CourseVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
             Not used.
         """
         seeds = _seeds(seed, self.num_envs)
-        super().reset(seed=seed if isinstance(seed, int | None) else None)
+        super().reset(seed=None if seed is None or isinstance(seed, Sequence) else operator.index(seed))
         if self._generators is None:
             drawn = self.np_random.integers(1 << 31, size=self.num_envs)
             self._generators = [np_random(int(each))[0] for each in drawn]
@@ -186,11 +187,11 @@ def _spaces(episodes: Episodes) -> tuple[Space[Row], Space[Row]]:
 
 
 def _seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:
-    if seed is None or isinstance(seed, int):
-        return [None if seed is None else seed + number for number in range(count)]
+    if seed is None or not isinstance(seed, Sequence):
+        return [None if seed is None else operator.index(seed) + number for number in range(count)]
     if len(seed) != count:
         raise ParameterError("has the wrong length", field="seed", value=len(seed), allowed=str(count))
-    return list(seed)
+    return [None if each is None else operator.index(each) for each in seed]
 
 
 def _infos(step: Step) -> dict[str, Any]:
