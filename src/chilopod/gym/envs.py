@@ -5,7 +5,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
@@ -17,8 +17,10 @@ from numpy.typing import NDArray
 
 from chilopod.errors import ParameterError
 from chilopod.gym.episodes import Episodes, Step
-from chilopod.gym.picture import Picture
 from chilopod.robot import Robot, load_robot
+
+if TYPE_CHECKING:
+    from chilopod.gym.picture import Picture
 
 Row = NDArray[np.float32]
 Pixels = NDArray[np.uint8]
@@ -105,6 +107,8 @@ class CourseVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
         if self.render_mode is None:
             return None
         if self._pictures is None:
+            from chilopod.gym.picture import Picture
+
             self._pictures = [Picture(self.episodes, robot) for robot in range(self.num_envs)]
         return tuple(picture.drawn() for picture in self._pictures)
 
@@ -155,6 +159,8 @@ class CourseEnv(gymnasium.Env[Row, Row]):
         if self.render_mode is None:
             return None
         if self._picture is None:
+            from chilopod.gym.picture import Picture
+
             self._picture = Picture(self.episodes, 0)
         return self._picture.drawn()
 
