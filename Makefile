@@ -92,6 +92,7 @@ bench: $(BENCH)  ## benchmarks beside their peers; rewrites the tables in benchm
 	$(BIN)/python benchmarks/series_term.py
 	$(BIN)/python benchmarks/twin.py
 	$(BIN)/python benchmarks/courses.py
+	$(BIN)/python benchmarks/gym.py
 	$(BIN)/python benchmarks/startup.py
 
 # One lock for all supported Pythons and systems: no addresses and no hashes, so it also serves as a constraints file.

@@ -392,5 +392,7 @@ class PlanarWalk:
             stretch.walk_alone(free[0], *when, self._stiffness, *what)
         elif free.size:
             stretch.walk(free, *when, self._stiffness, *what)
-        if driven.size:
+        if driven.size == 1:
+            stretch.drive_alone(driven[0], begins, *when, told.profile, told.lag, told.joint_torque, *what)
+        elif driven.size:
             stretch.drive(driven, begins, *when, told.profile, told.lag, told.joint_torque, *what)
