@@ -12,8 +12,10 @@ LOCK_BENCH := requirements-bench.lock
 RUNTIME := $(VENV)/.runtime-installed
 DEV := $(VENV)/.dev-installed
 BENCH := $(VENV)/.bench-installed
-# Test processes at once; each with one thread for linear algebra, as more would stand in each other's way.
+# Test processes at once; each with one thread for linear algebra, as more would stand in each other's way. Threads of
+# numba that have nothing to do sleep: by default they wait actively, and take the other processes' time.
 JOBS ?= 2
+ALONGSIDE := OPENBLAS_NUM_THREADS=1 OMP_WAIT_POLICY=passive
 
 # Makes .venv with the first suitable Python, unless a working one is there.
 define make_venv
@@ -63,7 +65,7 @@ test: lint  ## all checks and all tests
 	@$(MAKE) --no-print-directory -j 2 types run-tests
 
 run-tests: $(DEV)
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder --benchmark-disable $(ARGS)
+	$(ALONGSIDE) $(BIN)/python -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder --benchmark-disable $(ARGS)
 
 torture: $(DEV)  ## attack it for ten minutes, and count what came of it; options in ARGS="kills --seed 7 --minutes 3"
 	$(BIN)/python torture/run.py --save $(ARGS)
