@@ -50,7 +50,9 @@ $(DEV): pyproject.toml $(LOCK)
 	$(make_venv)
 	@echo "Installing chilopod, what it runs on and what its tests need"
 	@$(PIP) install -c $(LOCK) setuptools
-	@$(PIP) install -c $(LOCK) --no-build-isolation -e '.[dev]'
+	@$(PIP) install -c $(LOCK) --no-build-isolation --no-compile -e '.[dev]'
+	@# pip would compile on one core, the tests of packages too.
+	@$(BIN)/python -m compileall -qq -j 0 -x '/tests?/' $(VENV)/lib || true
 	@touch $(RUNTIME) $@
 
 $(BENCH): $(RUNTIME) $(LOCK_BENCH)
