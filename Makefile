@@ -1,7 +1,7 @@
 # Everything here needs only make and a Python from 3.11 to 3.13. Choose another with: make setup PYTHON=/path/to/python3
 # The environment lives in .venv and is reused until pyproject.toml or requirements.lock changes.
 .DEFAULT_GOAL := help
-.PHONY: help setup reproduce test run-tests torture lint types format docs bench lock clean
+.PHONY: help setup reproduce test run-tests torture lint types format docs package bench lock clean
 .DELETE_ON_ERROR:
 
 VENV := .venv
@@ -83,6 +83,11 @@ format: $(DEV)  ## rewrite files in the project's style
 docs: $(RUNTIME)  ## run what README and docs show; rewrites its output, numbers and pictures
 	$(BIN)/python docs/renew.py
 	$(BIN)/python docs/moving_picture.py
+
+package: $(DEV)  ## build what is handed out into dist, and try it in an empty environment; some minutes
+	rm -rf dist
+	$(BIN)/python packaging/build.py dist
+	$(BIN)/python packaging/try_wheel.py dist/*.whl
 
 bench: $(BENCH)  ## benchmarks beside their peers; rewrites the tables in benchmarks/README.md
 	$(BIN)/python benchmarks/straight_walk.py
