@@ -55,10 +55,10 @@ def live(
     from chilopod.live import Live
 
     def keep(name: str, record: bytes, page: str) -> None:
-        from chilopod.output import write_files
+        from chilopod.output import write_all
 
         assert out is not None
-        for path in write_files({out / f"{name}.nc": record, out / f"{name}.html": page.encode()}):
+        for path in write_all([(out / f"{name}.nc", record), (out / f"{name}.html", page)], replace=False):
             typer.echo(f"wrote {path}", err=True)
 
     page = Live(

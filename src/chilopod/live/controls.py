@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -113,7 +114,7 @@ class Controls:
             return slider
 
         first = spring("first spring", values[0], 0, "Of the joint behind module 1, the paper's k1, N·mm/deg.")
-        self._all = gui.add_slider(
+        self._all: Any = gui.add_slider(
             "all springs", round(low, 6), round(high, 6), step, float(np.mean(values)), hint="All alike, N·mm/deg."
         )
         with gui.add_folder("Each spring (N·mm/deg)", expand_by_default=False):
@@ -131,28 +132,35 @@ class Controls:
 
     def _walking(self, gui: viser.GuiApi) -> None:
         own = self._file.gait.stride * _CM
-        self._friction = gui.add_slider(
+        self._friction: Any = gui.add_slider(
             "friction", *FRICTIONS, 0.05, 1.0, hint="Of the floor, times what the robot file has."
         )
         self._friction.on_update(lambda _: self._put(wishes.Friction(self._friction.value)))
         low, high = (round(part * own, 6) for part in STRIDES)
-        self._stride = gui.add_slider("stride", low, high, round(own / 60.0, 6), own, hint="Of every step, cm.")
+        self._stride: Any = gui.add_slider("stride", low, high, round(own / 60.0, 6), own, hint="Of every step, cm.")
         self._stride.on_update(lambda _: self._put(wishes.Stride(self._stride.value / _CM)))
-        self._speed = gui.add_slider("speed", *SPEEDS, 0.5, self._settings.speed, hint="Times real time.")
+        self._speed: Any = gui.add_slider("speed", *SPEEDS, 0.5, self._settings.speed, hint="Times real time.")
         self._speed.on_update(lambda _: self._put(wishes.Speed(self._speed.value)))
         self._pause = gui.add_button("Pause (space)")
-        self._pause.on_click(lambda _: self._put(wishes.Pause(not self._settings.paused)))
+        self._pause.on_click(lambda _: self._toggle_pause())
         gui.add_button("One gait cycle (N)").on_click(lambda _: self._put(wishes.Step(1.0)))
-        self._seed = gui.add_number("seed", self._settings.seed, min=0, step=1, hint="Of the start and of the nudges.")
+        self._seed: Any = gui.add_number(
+            "seed", self._settings.seed, min=0, step=1, hint="Of the start and of the nudges."
+        )
         gui.add_button("Begin anew (R)").on_click(lambda _: self._put(wishes.Reset(self._seed.value)))
 
     def _targets(self, gui: viser.GuiApi) -> None:
         with gui.add_folder("Target", expand_by_default=False):
-            self._strategy = gui.add_dropdown(
-                "strategy", [each.name for each in STRATEGIES_HERE], self._settings.strategy, hint="How it goes there."
+            self._strategy: Any = gui.add_dropdown(
+                "strategy",
+                [each.name for each in STRATEGIES_HERE],
+                initial_value=self._settings.strategy,
+                hint="How it goes there.",
             )
             self._strategy.on_update(lambda _: self._put(wishes.Steering(self._strategy.value)))
-            self._bearing = gui.add_number("bearing", 45.0, step=5.0, hint="From where it heads, left positive, deg.")
+            self._bearing: Any = gui.add_number(
+                "bearing", 45.0, step=5.0, hint="From where it heads, left positive, deg."
+            )
             self._distance = gui.add_number("distance", 1.3, step=0.1, hint="From module 1, m.")
             gui.add_button("Go there (T)").on_click(lambda _: self._go())
             gui.add_button("Let go (L)").on_click(lambda _: self._put(wishes.Target(None)))
@@ -160,46 +168,44 @@ class Controls:
     def _joints(self, gui: viser.GuiApi) -> None:
         joints = [str(joint + 1) for joint in range(len(self._each))]
         with gui.add_folder("Pull a joint", expand_by_default=False):
-            self._joint = gui.add_dropdown("joint", joints, "1")
+            self._joint: Any = gui.add_dropdown("joint", joints, initial_value="1")
             for name, way in (("Left (J)", 1.0), ("Right (K)", -1.0)):
-                gui.add_button(name).on_click(lambda _, way=way: self._pull(way))
+                gui.add_button(name).on_click(partial(self._pull_at_button, way))
 
     def _recording(self, gui: viser.GuiApi, on_follow: Callable[[bool], None]) -> None:
         self._record = gui.add_button("Record (C)", hint="As netCDF, and as a page that plays it.")
         self._record.on_click(lambda event: self._toggle_record(event.client))
-        self._follow = gui.add_checkbox("follow the robot (M)", True)
+        self._follow: Any = gui.add_checkbox("follow the robot (M)", True)
         self._follow.on_update(lambda _: on_follow(self._follow.value))
 
     def _keys(self, gui: viser.GuiApi) -> None:
-        def key(label: str, hotkey: Any, do: Callable[[], object], modifier: Any = None) -> None:
-            gui.add_command(label, hotkey=hotkey, modifier=modifier).on_trigger(lambda _: _nothing(do()))
-
-        def scaled(slider: Any, factor: float) -> None:
-            slider.value = float(np.clip(slider.value * factor, slider.min, slider.max))
+        def key(label: str, hotkey: Any, do: Callable[..., object], *to: object, shift: bool = False) -> None:
+            command = gui.add_command(label, hotkey=hotkey, modifier="shift" if shift else None)
+            command.on_trigger(partial(_do, do, *to))
 
         for hotkey, factor, how in (("Z", 1.0 / _FACTOR, "softer"), ("X", _FACTOR, "stiffer")):
-            key(f"First spring {how}", hotkey, lambda factor=factor: scaled(self._each[0], factor))
-            key(f"All springs {how}", hotkey, lambda factor=factor: scaled(self._all, factor), "shift")
+            key(f"First spring {how}", hotkey, _scale, self._each[0], factor)
+            key(f"All springs {how}", hotkey, _scale, self._all, factor, shift=True)
         for hotkey, factor, floor, steps in (("F", 1.0 / _FACTOR, "more", "Shorter"), ("G", _FACTOR, "less", "Longer")):
-            key(f"Floor {floor} slippery", hotkey, lambda factor=factor: scaled(self._friction, factor))
-            key(f"{steps} steps", hotkey, lambda factor=factor: scaled(self._stride, factor), "shift")
-        key("Pause, or go on", "space", lambda: self._put(wishes.Pause(not self._settings.paused)))
-        key("One gait cycle", "N", lambda: self._put(wishes.Step(1.0)))
-        key("Faster", "pageup", lambda: scaled(self._speed, 2.0))
-        key("Slower", "pagedown", lambda: scaled(self._speed, 0.5))
-        key("Begin anew with the next seed", "R", lambda: self._put(wishes.Reset(self._settings.seed + 1)))
-        key("Target further left", "B", lambda: self._turn(_TURN))
-        key("Target further right", "V", lambda: self._turn(-_TURN))
+            key(f"Floor {floor} slippery", hotkey, _scale, self._friction, factor)
+            key(f"{steps} steps", hotkey, _scale, self._stride, factor, shift=True)
+        key("Pause, or go on", "space", self._toggle_pause)
+        key("One gait cycle", "N", self._put, wishes.Step(1.0))
+        key("Faster", "pageup", _scale, self._speed, 2.0)
+        key("Slower", "pagedown", _scale, self._speed, 0.5)
+        key("Begin anew with the next seed", "R", self._next_seed)
+        key("Target further left", "B", self._turn, _TURN)
+        key("Target further right", "V", self._turn, -_TURN)
         key("Go to the target", "T", self._go)
-        key("Let go of the target", "L", lambda: self._put(wishes.Target(None)))
+        key("Let go of the target", "L", self._put, wishes.Target(None))
         key("Next strategy", "Y", self._next_strategy)
         for joint in range(min(9, len(self._each))):
-            key(f"Joint {joint + 1}", str(joint + 1), lambda joint=joint: setattr(self._joint, "value", str(joint + 1)))
-        key("Pull the joint left", "J", lambda: self._pull(1.0))
-        key("Pull the joint right", "K", lambda: self._pull(-1.0))
-        key("Record", "C", lambda: self._toggle_record(None))
-        key("Follow the robot", "M", lambda: setattr(self._follow, "value", not self._follow.value))
-        key("Help", "H", self._help)
+            key(f"Joint {joint + 1}", str(joint + 1), setattr, self._joint, "value", str(joint + 1))
+        key("Pull the joint left", "J", self._pull, 1.0)
+        key("Pull the joint right", "K", self._pull, -1.0)
+        key("Follow the robot, or not", "M", self._toggle_follow)
+        gui.add_command("Record", hotkey="C").on_trigger(lambda event: self._toggle_record(event.client))
+        gui.add_command("Help", hotkey="H").on_trigger(_help)
 
     # -- what they do
     # ---------------------------------------------------------------------------------------------------------------
@@ -209,9 +215,21 @@ class Controls:
         share = 0.0 if ended else _A_LENGTH * aside / self._file.module_length
         self._put(wishes.Pull(joint, share * self._file.springs.stiffness[joint]))
 
+    def _pull_at_button(self, way: float, _: object) -> None:
+        self._pull(way)
+
     def _pull(self, way: float) -> None:
         joint = int(self._joint.value) - 1
         self._put(wishes.Pull(joint, way * _PULL * self._file.springs.stiffness[joint], self._file.gait.period))
+
+    def _toggle_pause(self) -> None:
+        self._put(wishes.Pause(not self._settings.paused))
+
+    def _toggle_follow(self) -> None:
+        self._follow.value = not self._follow.value
+
+    def _next_seed(self) -> None:
+        self._put(wishes.Reset(self._settings.seed + 1))
 
     def _turn(self, angle: float) -> None:
         self._bearing.value = (self._bearing.value + angle + 180.0) % 360.0 - 180.0
@@ -229,11 +247,20 @@ class Controls:
         self._on_record(client)
         self._put(wishes.Record(not self._settings.recording))
 
-    def _help(self) -> None:
-        with self._server.gui.add_modal("Keys") as modal:
-            self._server.gui.add_markdown(HELP)
-            self._server.gui.add_button("Close").on_click(lambda _: modal.close())
+
+def _do(do: Callable[..., object], *to: object) -> None:
+    do(*to[:-1])  # the last is the event of the key
 
 
-def _nothing(_: object) -> None:
-    """What callbacks give back."""
+def _scale(slider: Any, factor: float) -> None:
+    slider.value = float(np.clip(slider.value * factor, slider.min, slider.max))
+
+
+def _help(event: viser.CommandEvent) -> None:
+    """Show the keys to whoever asked."""
+    if event.client is None:
+        return
+    gui = event.client.gui
+    with gui.add_modal("Keys") as modal:
+        gui.add_markdown(HELP)
+        gui.add_button("Close").on_click(lambda _: modal.close())

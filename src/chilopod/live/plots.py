@@ -22,8 +22,9 @@ Array = NDArray[np.float64]
 _SPAN = 40.0  # s that are shown
 _POINTS = 160
 _WIDEST, _TIGHTEST = 10.0, 0.1  # m, of what is drawn
-_HEIGHT = 165  # px
-_NONE = np.full(2, np.nan)
+_HEIGHT = 170  # px
+_NOWHERE = 1e-9  # outside of what is drawn: uPlot takes NaN for a number
+_BETWEEN = 4  # dots from one point of the branch to the next
 
 
 class Plots:
@@ -41,37 +42,30 @@ class Plots:
         self._times: deque[float] = deque(maxlen=_POINTS)
         self._angles: deque[Array] = deque(maxlen=_POINTS)
         self._radii: deque[tuple[float, float]] = deque(maxlen=_POINTS)
-        time, short = uplot.Scale(time=False), uplot.Legend(show=joints <= 6)
-        angle_series = [_line(f"θ{joint + 1}", CURVES[joint % len(CURVES)]) for joint in range(joints)]
+        time, none = uplot.Scale(time=False), uplot.Legend(show=False)
+        radii = uplot.Scale(distr=3, range=(_TIGHTEST, _WIDEST))
+        angles = [_line(CURVES[joint % len(CURVES)]) for joint in range(joints)]
+        look: dict[str, Any] = {"legend": none, "height": _HEIGHT, "padding": (8, 12, 0, 0)}
         self._angle = gui.add_uplot(
             (np.zeros(2), *[np.zeros(2)] * joints),
-            (uplot.Series(label="s"), *angle_series),
-            title="Joint angles, mean of a gait cycle (deg) over time (s)",
+            (uplot.Series(), *angles),
+            title="Joint angles over time (deg, s)",
             scales={"x": time},
-            legend=short,
-            height=_HEIGHT,
+            **look,
         )
         self._radius = gui.add_uplot(
-            (np.zeros(2), np.ones(2), np.ones(2)),
-            (uplot.Series(label="s"), _line("walk", BLUE, 2.0), _line("settled", VERMILLION, 1.5, dash=[6, 4])),
-            title="Radius (m) over time (s)",
-            scales={"x": time, "y": uplot.Scale(distr=3, range=(_TIGHTEST, _WIDEST))},
-            height=_HEIGHT,
+            (np.zeros(2), *[np.ones(2)] * 2),
+            (uplot.Series(), _line(BLUE, 2.0), _dots(VERMILLION, 3)),
+            title="Radius; dots: where it settles (m, s)",
+            scales={"x": time, "y": radii},
+            **look,
         )
         self._branch = gui.add_uplot(
-            (np.array([0.0, 1.0]), *[_NONE] * 4),
-            (
-                uplot.Series(label="N·mm/deg"),
-                _line("stable", BLUE, 2.0),
-                _line("unstable", BLUE, 1.5, dash=[4, 4]),
-                _line("pitchfork", GREY, 1.0, dash=[2, 3]),
-                uplot.Series(
-                    label="now", stroke=VERMILLION, width=0, points=uplot.Series_Points(show=True, size=11, fill=VERMILLION)
-                ),
-            ),
-            title="Radius (m) over the first spring (N·mm/deg)",
-            scales={"x": time, "y": uplot.Scale(distr=3, range=(_TIGHTEST, _WIDEST))},
-            height=_HEIGHT,
+            (np.array([0.0, 1.0]), *[np.ones(2)] * 4),
+            (uplot.Series(), _dots(BLUE, 3), _dots(GREY, 3), _line(GREY, 1.0), _dots(VERMILLION, 12)),
+            title="Radius over first spring (m, N·mm/deg)",
+            scales={"x": time, "y": radii},
+            **look,
         )
 
     def forget(self) -> None:
@@ -86,7 +80,7 @@ class Plots:
         settled = theory.settled(float(seen.stiffness[0]))
         self._times.append(seen.time)
         self._angles.append(np.rad2deg(seen.mean_angles))
-        self._radii.append((_shown(radius_of(seen)), np.nan if settled is None else _shown(settled)))
+        self._radii.append((_shown(radius_of(seen)), _NOWHERE if settled is None else _shown(settled)))
 
     def show(self, seen: Seen, theory: Theory) -> None:
         """Draw what is remembered."""
@@ -98,23 +92,36 @@ class Plots:
 
 
 def _branch(theory: Theory, spring: float, radius: float) -> tuple[Array, ...]:
-    """Springs in rising order, and for each of them what there is of every curve."""
-    count = len(theory.springs)
-    radii = np.clip(theory.radii, _TIGHTEST, _WIDEST)
-    fork = [] if theory.pitchfork is None else [theory.pitchfork]
-    springs = np.concatenate([theory.springs, np.repeat(fork, 2), [spring]])
-    curves = np.full((4, len(springs)), np.nan)
-    curves[0, :count] = np.where(theory.stable, radii, np.nan)
-    curves[1, :count] = np.where(theory.stable, np.nan, radii)
-    curves[2, count:-1] = (_TIGHTEST, _WIDEST)[: 2 * len(fork)]
-    curves[3, -1] = radius
+    """Springs in rising order, and for each of them what there is of every series: the curved walks, stable and not,
+    the pitchfork, and what walks now."""
+    along = np.linspace(0.0, len(theory.springs) - 1.0, _BETWEEN * len(theory.springs))
+    points = np.arange(len(theory.springs))
+    springs, radii, stable = np.empty(0), np.empty(0), np.empty(0, dtype=np.bool_)
+    if len(points):
+        springs = np.interp(along, points, theory.springs)
+        radii = _shown(1.0 / np.interp(along, points, 1.0 / theory.radii))
+        stable = theory.stable[np.rint(along).astype(np.intp)]
+    fork = np.empty(0) if theory.pitchfork is None else theory.pitchfork * np.array([1.0 - 1e-6, 1.0, 1.0 + 1e-6])
+    count = len(springs)
+    springs = np.concatenate([springs, fork, [spring]])
+    series = np.full((4, len(springs)), _NOWHERE)
+    series[0, :count][stable] = radii[stable]
+    series[1, :count][~stable] = radii[~stable]
+    if len(fork):
+        series[2, count + 1] = 1.0 / _NOWHERE
+    series[3, -1] = radius
     order = np.argsort(springs, kind="stable")
-    return tuple(np.ascontiguousarray(each) for each in (units.from_si(1.0, PAPER_UNIT) * springs[order], *curves[:, order]))
+    in_unit = units.from_si(1.0, PAPER_UNIT) * springs[order]
+    return tuple(np.ascontiguousarray(each) for each in (in_unit, *series[:, order]))
 
 
-def _line(label: str, color: str, width: float = 1.5, **look: Any) -> uplot.Series:
-    return uplot.Series(label=label, stroke=color, width=width, spanGaps=True, points={"show": False}, **look)
+def _line(color: str, width: float = 1.5) -> uplot.Series:
+    return uplot.Series(stroke=color, width=width, points={"show": False})
 
 
-def _shown(radius: float) -> float:
-    return float(np.clip(radius, _TIGHTEST, _WIDEST))
+def _dots(color: str, size: int) -> uplot.Series:
+    return uplot.Series(stroke="transparent", width=0, points={"show": True, "size": size, "fill": color, "width": 0})
+
+
+def _shown(radius: Any) -> Any:
+    return np.clip(radius, _TIGHTEST, _WIDEST)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from chilopod.live.body import KINDS, Placed
 from chilopod.live.session import Seen
-from chilopod.report.kit.style import BLUE, ORANGE, SKY, VERMILLION
+from chilopod.report.kit.style import BLACK, BLUE, GREY, ORANGE, SKY, VERMILLION
 from chilopod.steering import ARRIVAL_RADIUS
 
 Array = NDArray[np.float64]
@@ -32,7 +32,13 @@ def _rgb(color: str) -> tuple[int, int, int]:
     return int(color[1:3], 16), int(color[3:5], 16), int(color[5:7], 16)
 
 
-_COLORS = {"box": _rgb(SKY), "rod": (70, 70, 70), "ball": (70, 70, 70), "pin": _rgb(ORANGE)}
+def _lit(color: str) -> NDArray[np.uint8]:
+    """A colour of a mesh in light, which is taken for the part of the light that comes back."""
+    return np.rint(255.0 * (np.array(_rgb(color)) / 255.0) ** 2.2).astype(np.uint8)
+
+
+_COLORS = {"box": _lit(SKY), "rod": _lit(GREY), "ball": _lit(BLACK), "pin": _lit(ORANGE)}
+_FRONT = _lit(VERMILLION)
 
 
 class View:
@@ -56,7 +62,7 @@ class View:
         self._step = 0.5 * length
         self._world = scene.add_frame(WORLD, show_axes=False)
         self._floor = scene.add_line_segments(
-            f"{WORLD}/floor", _lines(self._step, _FLOOR_LINES), (205, 205, 205), line_width=1.0
+            f"{WORLD}/floor", _lines(self._step, _FLOOR_LINES), (205, 205, 205), thickness=1.0
         )
         self._batches = {
             kind: scene.add_batched_meshes_simple(
@@ -73,7 +79,7 @@ class View:
             )
             for kind in KINDS
         }
-        self._way = scene.add_line_segments(f"{WORLD}/way", np.zeros((_WAY - 1, 2, 3)), _rgb(BLUE), line_width=2.0)
+        self._way = scene.add_line_segments(f"{WORLD}/way", np.zeros((_WAY - 1, 2, 3)), _rgb(BLUE), thickness=2.0)
         self._points: deque[Array] = deque(maxlen=_WAY)
         self._apart = 0.02 * length
         self._target = scene.add_batched_meshes_simple(
@@ -82,7 +88,7 @@ class View:
             np.tile(_UPRIGHT, (2, 1)),
             np.zeros((2, 3)),
             batched_scales=np.array([[ARRIVAL_RADIUS, ARRIVAL_RADIUS, 0.002], [0.01, 0.01, 0.3]]),
-            batched_colors=np.array([_rgb(VERMILLION)] * 2, dtype=np.uint8),
+            batched_colors=np.tile(_FRONT, (2, 1)),
             opacity=0.6,
             lod="off",
             cast_shadow=False,
@@ -166,14 +172,12 @@ def _mesh(kind: str) -> tuple[Any, Any]:
     elif kind == "ball":
         shape = trimesh.creation.icosphere(subdivisions=1)
     else:
-        shape = trimesh.creation.cylinder(radius=1.0, height=1.0, sections=10)
+        shape = trimesh.creation.cylinder(radius=1.0, height=1.0, sections=16)
     return shape.vertices, shape.faces
 
 
 def _colors(kind: str, count: int) -> NDArray[np.uint8]:
-    colors = np.tile(np.array(_COLORS[kind], dtype=np.uint8), (count, 1))
+    colors = np.tile(_COLORS[kind], (count, 1))
     if kind == "box":
-        colors[0] = _rgb(VERMILLION)
+        colors[0] = _FRONT
     return colors
-
-

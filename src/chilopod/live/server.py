@@ -1,4 +1,4 @@
-"""The page itself: a server for browsers, the one thread that owns the walk, and the process that computes beside it."""
+"""The page: a server for browsers, the one thread that owns the walk, and the process that computes beside it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from typing import Any
 
 import xarray as xr
 
-from chilopod.analysis.parameters import K1
 from chilopod.engine import engine_named
 from chilopod.errors import ParameterError, in_words
 from chilopod.extras import needs
@@ -85,8 +84,9 @@ class Live:
         port: int = 8080,
         kept: Callable[[str, bytes, str], None] | None = None,
     ) -> None:
+        # The first steps ever are compiled, which takes a while: better before anybody looks.
+        Session(robot, engine, seed=seed, strategy=strategy).walk_on(1.5 * robot.gait.period)
         self._session = Session(robot, engine, seed=seed, strategy=strategy)
-        self._session.walk_on(0.0)
         self._body = _body(robot, engine)
         self._kept, self._recordings = kept, 0
         self._theory = Theory()
@@ -210,9 +210,9 @@ class Live:
         if engine_named(self._session.engine).traits.exact:
             self._beside.ask_growth(robot)
         if before is None or _but_first_spring(robot) != _but_first_spring(before):
-            self._theory = Theory(remark="being computed")
+            self._theory = Theory(remark="it is being computed")
             self._session.law = None
-            self._beside.ask(_but_first_spring(robot))
+            self._beside.ask(robot)
 
     def _tell(self, rate: float) -> None:
         session, seen = self._session, self._session.seen()
@@ -254,7 +254,7 @@ class Live:
     def _follow(self, follow: bool) -> None:
         self._view.follow = follow
 
-    async def _clicked(self, event: viser.SceneClickEvent) -> None:
+    def _clicked(self, event: viser.SceneClickEvent) -> None:
         place = floor_place(self._view.origin, event.ray_origin, event.ray_direction)
         if place is not None:
             self._session.box.put(wishes.Target(place))
@@ -293,9 +293,9 @@ def _body(robot: Robot, engine: str) -> Body:
     return SolidBody(robot)
 
 
-def _but_first_spring(robot: Robot) -> Robot:
-    """The robot as the theory sees it, for which k1 is what varies."""
-    return robot.with_value(K1, max(robot.springs.stiffness[1:], default=robot.springs.stiffness[0]))
+def _but_first_spring(robot: Robot) -> tuple[object, ...]:
+    """What the theory of a robot depends on, whatever its first spring."""
+    return robot.springs.stiffness[1:], robot.gait, robot.ground, robot.twin
 
 
 def _replay(record: xr.Dataset) -> str:

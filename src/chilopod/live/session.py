@@ -43,6 +43,8 @@ _BY_NAME = {each.name: each for each in STRATEGIES_HERE}
 SPEEDS = (1.0, 20.0)
 """Slowest and fastest, times real time."""
 
+_SPEED = 2.0  # at first: fast enough to see it bend, slow enough to see it step
+
 FRICTIONS = (0.3, 3.0)
 """Of what the robot file has."""
 
@@ -169,7 +171,7 @@ class Session:
         self._file = robot.override("springs.adjustable", True)
         self._engine.common(self._file)
         self._settings = Settings(
-            self._file, 1.0, robot.gait.stride, _strategy(strategy), SPEEDS[0], False, _seed(seed), False
+            self._file, 1.0, robot.gait.stride, _strategy(strategy), _SPEED, False, _seed(seed), False
         )
         self.law: RadiusLaw | None = None
         self._records: list[xr.Dataset] = []
@@ -391,8 +393,9 @@ class Session:
             case wishes.Pause(paused):
                 self._settings = replace(self._settings, paused=bool(paused))
             case wishes.Step(cycles):
+                seconds = _within("step", cycles, (0.0, 10.0), "gait cycles") * self._period
                 self._settings = replace(self._settings, paused=True)
-                self.walk_on(_within("step", cycles, (0.0, 10.0), "gait cycles") * self._period)
+                self.walk_on(seconds)
             case wishes.Reset(seed):
                 self._keep_record()
                 self._settings = replace(self._settings, seed=_seed(seed))
@@ -435,7 +438,9 @@ class Session:
         controller: Controller | None = LegYawController()
         if strategy is not LEG_YAW:
             if self.law is None:
-                self._said.append(f"how tightly it turns is not known (yet), so leg yaw alone steers, not {strategy.name}")
+                self._said.append(
+                    f"how tightly it turns is not known (yet), so leg yaw alone steers, not {strategy.name}"
+                )
             else:
                 controller = driver(self._settings.robot, strategy, engine=self._engine_name, law=self.law).controller
         if self._target is not None:
@@ -445,7 +450,10 @@ class Session:
         self._walk.aim(self._target)
 
     def _pull_at(self, joint: int, torque: float, time: float) -> None:
-        strongest = _STRONGEST * self._file.springs.stiffness[joint]
+        own = self._file.springs.stiffness
+        if joint not in range(len(own)):
+            raise ParameterError("there is no such joint", field="joint", value=joint + 1, allowed=f"1 to {len(own)}")
+        strongest = _STRONGEST * own[joint]
         self._pull[joint] = np.clip(_number("pull", torque), -strongest, strongest)
         self._pulled_until[joint] = self._before + self._walk.time + time
         self._push()

@@ -10,6 +10,7 @@ import multiprocessing
 import os
 import signal
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
 from typing import Any
@@ -124,7 +125,8 @@ def _exact(known: Theory, told: Callable[[Theory], None]) -> None:
 
     robot = known.robot
     assert robot is not None
-    low, high = (part * max(robot.springs.stiffness) for part in _BETWEEN)
+    # As the radius law has it, but for the first spring, which is what varies.
+    low, high = (part * max(robot.springs.stiffness[1:], default=robot.springs.stiffness[0]) for part in _BETWEEN)
     told(replace(known, remark="looking for the pitchfork"))
     loss = first_loss(robot, K1, (low, high), Kind.PITCHFORK, normal_form=False)
     known = replace(known, pitchfork=loss.point.value)
@@ -153,7 +155,12 @@ def _exact(known: Theory, told: Callable[[Theory], None]) -> None:
 def _of_law(known: Theory, law: RadiusLaw) -> Theory:
     values, radii = law.values[::-1], law.radii[::-1]
     return replace(
-        known, pitchfork=law.pitchfork, springs=values, radii=radii, stable=np.ones(len(values), dtype=np.bool_), law=law
+        known,
+        pitchfork=law.pitchfork,
+        springs=values,
+        radii=radii,
+        stable=np.ones(len(values), dtype=np.bool_),
+        law=law,
     )
 
 
@@ -188,11 +195,9 @@ class Beside:
     def answers(self) -> list[Theory | Growth]:
         """What was found since this was asked last; never waits."""
         found: list[Theory | Growth] = []
-        try:
+        with suppress(EOFError, OSError):
             while self._here.poll():
                 found.append(self._here.recv())
-        except (EOFError, OSError):
-            pass
         return found
 
     def close(self) -> None:
@@ -202,10 +207,8 @@ class Beside:
         self._process.join(timeout=5.0)
 
     def _send(self, what: str, robot: Robot) -> None:
-        try:
+        with suppress(OSError):  # it may have ended, and answers nothing any more
             self._here.send((what, robot))
-        except OSError:  # it has ended, and answers nothing any more
-            pass
 
 
 class _Stale(Exception):
@@ -241,10 +244,8 @@ class _Desk:
             self.growth(self._waiting.pop("growth"))
 
     def growth(self, robot: Robot) -> None:
-        try:
+        with suppress(ChilopodError):  # where there is no straight walk to speak of
             self._pipe.send(growth_of(robot))
-        except ChilopodError:
-            pass  # there is no straight walk to speak of
 
     def _take(self) -> None:
         what, robot = self._pipe.recv()

@@ -15,7 +15,7 @@ class Wish:
     @property
     def kind(self) -> Hashable:
         """Alike are wishes of the same kind."""
-        return type(self)
+        return type(self).__name__
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Spring(Wish):
     @property
     def kind(self) -> Hashable:
         """Every spring has its own."""
-        return Spring, self.joint
+        return "Spring", self.joint
 
 
 @dataclass(frozen=True)

@@ -72,7 +72,9 @@ def _bend(seen: Seen, theory: Theory, growth: Growth | None) -> str:
         return f"Settled on {arc}; the branch of curved walks has {settled:.2f} m. {soft}."
     if not bent:
         speed = f" by {_percent(growth)} a second" if growth and growth.rate > 0.0 else ""
-        return f"{soft}: the straight walk is unstable, and the smallest bend grows{speed}, to {settled:.2f} m in the end."
+        return (
+            f"{soft}: the straight walk is unstable, and the smallest bend grows{speed}, to {settled:.2f} m in the end."
+        )
     moves = "tightens" if seen.turning > 0.0 else "widens"
     return f"{soft}. The curve, {radius:.2f} m to the {side}, {moves} towards the branch's {settled:.2f} m."
 
