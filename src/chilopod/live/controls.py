@@ -90,13 +90,15 @@ class Controls:
         self._record.label = "End the recording (C)" if settings.recording else "Record (C)"
         self._seed.value = settings.seed
 
-    def refuse(self) -> None:
-        """Put back what could not be had."""
-        now = self._settings
+    def put_back(self, now: Settings) -> None:
+        """Let everything that can be set show how it is set, where a wish was refused or came from elsewhere.
+
+        What a browser sets is not set again for it as a rule: a slider that is being dragged would jump back.
+        """
         for joint, slider in enumerate(self._each):
             slider.value = units.from_si(now.robot.springs.stiffness[joint], PAPER_UNIT)
         self._friction.value, self._stride.value = now.friction, now.stride * _CM
-        self._speed.value, self._seed.value = now.speed, now.seed
+        self._speed.value, self._seed.value, self._strategy.value = now.speed, now.seed, now.strategy
 
     # -- parts of the panel
     # ---------------------------------------------------------------------------------------------------------------

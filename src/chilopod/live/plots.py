@@ -99,7 +99,8 @@ def _branch(theory: Theory, spring: float, radius: float) -> tuple[Array, ...]:
     springs, radii, stable = np.empty(0), np.empty(0), np.empty(0, dtype=np.bool_)
     if len(points):
         springs = np.interp(along, points, theory.springs)
-        radii = _shown(1.0 / np.interp(along, points, 1.0 / theory.radii))
+        curvature = np.interp(along, points, 1.0 / theory.radii)
+        radii = 1.0 / np.clip(curvature, 1.0 / _WIDEST, 1.0 / _TIGHTEST)
         stable = theory.stable[np.rint(along).astype(np.intp)]
     fork = np.empty(0) if theory.pitchfork is None else theory.pitchfork * np.array([1.0 - 1e-6, 1.0, 1.0 + 1e-6])
     count = len(springs)

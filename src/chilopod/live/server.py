@@ -60,10 +60,14 @@ class Live:
     ----------
     address
         To open in a browser.
+    seen
+        The last frame.
     frames
         How many were shown.
     busy
         s that the thread of the walk was at work.
+    failure
+        What ended that thread, if anything did.
 
     Raises
     ------
@@ -84,30 +88,31 @@ class Live:
         port: int = 8080,
         kept: Callable[[str, bytes, str], None] | None = None,
     ) -> None:
-        # The first steps ever are compiled, which takes a while: better before anybody looks.
-        Session(robot, engine, seed=seed, strategy=strategy).walk_on(1.5 * robot.gait.period)
         self._session = Session(robot, engine, seed=seed, strategy=strategy)
+        self.seen = self._session.seen()
         self._body = _body(robot, engine)
         self._kept, self._recordings = kept, 0
         self._theory = Theory()
         self._growth: Growth | None = None
         self._wants_record: viser.ClientHandle | None = None
-        self.frames, self.busy = 0, 0.0
+        self.frames, self.busy, self._told = 0, 0.0, False
         self._server = _server(host, port)
         self._beside = Beside(engine)
         try:
+            # The first steps ever are compiled, which takes a while: better before anybody looks.
+            Session(robot, engine).walk_on(1.5 * robot.gait.period)
             self._build(described(robot, engine))
         except BaseException:
             self.close()
             raise
         self.address = f"http://{'localhost' if host in _LOCAL else host}:{self._server.get_port()}"
-        self._failure: BaseException | None = None
+        self.failure: BaseException | None = None
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run, name="chilopod walk", daemon=True)
         self._thread.start()
 
     def _build(self, title: str) -> None:
-        server, seen = self._server, self._session.seen()
+        server, seen = self._server, self.seen
         server.gui.configure_theme(show_share_button=False, show_logo=False)
         server.gui.set_panel_label("chilopod live")
         self._view = View(server, self._body.places(seen), seen.robot.body.length)
@@ -120,6 +125,11 @@ class Live:
         self._view.pins.on_drag("left")(self._dragged)
         server.scene.on_click()(self._clicked)
 
+    def wish(self, wish: wishes.Wish) -> None:
+        """Want something of the walk, from any thread, as if somebody had done it at the page."""
+        self._session.box.put(wish)
+        self._told = True
+
     def wait(self) -> None:
         """Until the thread of the walk ends, which it does not by itself unless it fails.
 
@@ -130,8 +140,8 @@ class Live:
         """
         while self._thread.is_alive():
             self._thread.join(0.5)
-        if self._failure is not None:
-            raise self._failure
+        if self.failure is not None:
+            raise self.failure
 
     def close(self) -> None:
         """End everything; a recording that is under way is kept."""
@@ -142,7 +152,8 @@ class Live:
             self._session.stop_recording()
             self._keep()
         self._beside.close()
-        self._server.stop()
+        with _quiet():
+            self._server.stop()
 
     # -- the thread of the walk
     # ---------------------------------------------------------------------------------------------------------------
@@ -151,7 +162,7 @@ class Live:
         try:
             self._walk()
         except BaseException as error:
-            self._failure = error
+            self.failure = error
             self._controls.words.content = f"**This page has failed**: {in_words(error)}"
 
     def _walk(self) -> None:
@@ -161,11 +172,12 @@ class Live:
             now = time.perf_counter()
             passed, last = min(now - last, _BEHIND), now
             watched = bool(self._server.get_clients())
-            self._obey()
+            if self._obey():
+                plotted = -math.inf
             settings = session.settings
             if watched and not settings.paused:
                 session.walk_on(passed * settings.speed)
-            seen = session.seen()
+            seen = self.seen = session.seen()
             walked.add(now, seen.time)
             self._plots.add(seen, self._theory)
             with self._server.atomic():
@@ -181,28 +193,30 @@ class Live:
             if not watched:
                 self._over.wait(_ALONE)
 
-    def _obey(self) -> None:
-        """Wishes, and what has come of questions."""
+    def _obey(self) -> bool:
+        """Wishes, and what has come of questions; whether there were any of the former."""
         session, before = self._session, self._session.settings
-        began = session.seen().time
-        if session.obey():
+        told, self._told = self._told, False
+        obeyed = session.obey()
+        if obeyed:
             if session.settings.robot != before.robot:
                 self._ask(before.robot)
-            if session.seen().time < began:
+            if session.seen().time < self.seen.time:
                 self._view.forget_way()
                 self._plots.forget()
         said = session.said()
         for sentence in said:
             for client in self._server.get_clients().values():
                 client.add_notification("chilopod", sentence, auto_close_seconds=8.0)
-        if said:
-            self._controls.refuse()
+        if said or told:
+            self._controls.put_back(session.settings)
         for answer in self._beside.answers():
             if isinstance(answer, Theory):
                 self._theory = answer
                 session.law = answer.law
             else:
                 self._growth = answer
+        return obeyed
 
     def _ask(self, before: Robot | None = None) -> None:
         """Ask what is not known of the robot as it is now."""
@@ -215,7 +229,7 @@ class Live:
             self._beside.ask(robot)
 
     def _tell(self, rate: float) -> None:
-        session, seen = self._session, self._session.seen()
+        session, seen = self._session, self.seen
         told = sentences(seen, session.settings, self._theory, self._growth)
         settings = session.settings
         slow = "" if settings.paused or rate > 0.8 * settings.speed else f", as fast as it goes: {rate:.1f} times"
@@ -309,6 +323,11 @@ def _replay(record: xr.Dataset) -> str:
     return replay(record, titles=["the robot"], heading=heading)
 
 
+def _quiet() -> contextlib.AbstractContextManager[object]:
+    """What viser prints of where it listens, and that it ends, is for us to say."""
+    return contextlib.redirect_stdout(io.StringIO())
+
+
 def _server(host: str, port: int) -> viser.ViserServer:
     """Of browsers; one that listens where it was told to, and nowhere else."""
     if not 0 <= port < 65536:
@@ -325,7 +344,7 @@ def _server(host: str, port: int) -> viser.ViserServer:
         raise ParameterError(
             f"cannot be listened at: {error.strerror}", field="port", value=port, allowed="another --port, or 0"
         ) from error
-    with contextlib.redirect_stdout(io.StringIO()):  # where it listens is for us to say
+    with _quiet():
         server = viser.ViserServer(host=host, port=free, label="chilopod live", verbose=False)
     # Of what viser can do for anybody who asks: put the page on the internet by way of somebody else's server.
     server.request_share_url = lambda verbose=True: None  # type: ignore[method-assign]
