@@ -31,9 +31,11 @@ WRITTEN = ("robot.xml", "turn/turn.html")
 EXTRAS = {
     "cluster": ('chilopod walk aoi2022-planar --duration "2 s" --seed 1 --repeats 2 --cluster 1', "2 walks"),
     "docs": ("python -m sphinx --version", "sphinx"),
+    "gym": ('python -c "import gymnasium, chilopod.gym; print(gymnasium.spec(\'chilopod/Turn-v0\').id)"', "Turn-v0"),
+    "live": ('chilopod live --port 0 --duration "1 s"', "walks at http://localhost:"),
 }
 """For each extra what takes it, and a word of what it then prints."""
-NOT_OURS = ("docs",)
+NOT_OURS = ("docs", "gym")
 """Without these extras it is not chilopod that says so."""
 
 

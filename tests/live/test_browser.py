@@ -188,7 +188,7 @@ def test_a_recording_comes_as_two_files(opened, tmp_path):
     opened.get_by_role("button", name="Record (C)").click()
     read(opened, ", recording")
     files = []
-    opened.on("download", files.append)
+    opened.on("download", lambda each: files.append(each))
     time.sleep(1.0)
     opened.get_by_role("button", name="End the recording (C)").click()
     while len(files) < 2:

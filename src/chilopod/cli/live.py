@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from chilopod.cli.options import EngineOption, SetOption, read_robot
+from chilopod.cli.options import EngineOption, SetOption, read_robot, reading
 
 
 def _strategies() -> list[str]:
@@ -39,6 +39,9 @@ def live(
         ),
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(metavar="N", help="At which port; 0 for any that is free.")] = 8080,
+    duration: Annotated[
+        str | None, typer.Option(metavar="TIME", help='End by itself after so long, such as "10 min".')
+    ] = None,
     browser: Annotated[bool, typer.Option("--open", help="Open it in a browser too.")] = False,
     overrides: SetOption = None,
     out: Annotated[
@@ -51,7 +54,11 @@ def live(
     Drag the first spring below the pitchfork and watch it bend; click on the floor, and it goes there; drag a joint.
     Ctrl-C ends it. Needs: pip install "chilopod[live]".
     """
+    from chilopod import units
+
     described = read_robot(robot, overrides)
+    with reading("duration"):
+        seconds = None if duration is None else units.parse(duration, "s")
     from chilopod.live import Live
 
     def keep(name: str, record: bytes, page: str) -> None:
@@ -68,6 +75,6 @@ def live(
         typer.echo(f"{described.name} walks at {page.address} (Ctrl-C ends it)")
         if browser and not webbrowser.open(page.address):
             typer.echo(f"no browser could be started: open {page.address} in one", err=True)
-        page.wait()
+        page.wait(seconds)
     finally:
         page.close()

@@ -8,15 +8,12 @@ one robot of it, as :class:`gymnasium.Env`.
 
 from typing import TYPE_CHECKING
 
-from chilopod.errors import ParameterError
+from chilopod.extras import needs
 from chilopod.lazy import exports
 
-try:
-    import gymnasium
-except ImportError:
-    raise ParameterError(
-        "gymnasium is not installed", field="chilopod.gym", allowed='after: pip install "chilopod[gym]"'
-    ) from None
+needs("gymnasium", extra="gym")
+
+import gymnasium  # noqa: E402  (there, as has just been seen)
 
 if TYPE_CHECKING:
     from chilopod.gym.actions import Actions

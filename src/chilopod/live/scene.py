@@ -62,7 +62,7 @@ class View:
         self._step = 0.5 * length
         self._world = scene.add_frame(WORLD, show_axes=False)
         self._floor = scene.add_line_segments(
-            f"{WORLD}/floor", _lines(self._step, _FLOOR_LINES), (205, 205, 205), thickness=1.0
+            f"{WORLD}/floor", _lines(self._step, _FLOOR_LINES), (205, 205, 205), thickness=1.0, thickness_units="screen"
         )
         self._batches = {
             kind: scene.add_batched_meshes_simple(
@@ -79,7 +79,9 @@ class View:
             )
             for kind in KINDS
         }
-        self._way = scene.add_line_segments(f"{WORLD}/way", np.zeros((_WAY - 1, 2, 3)), _rgb(BLUE), thickness=2.0)
+        self._way = scene.add_line_segments(
+            f"{WORLD}/way", np.zeros((_WAY - 1, 2, 3)), _rgb(BLUE), thickness=2.0, thickness_units="screen"
+        )
         self._points: deque[Array] = deque(maxlen=_WAY)
         self._apart = 0.02 * length
         self._target = scene.add_batched_meshes_simple(

@@ -130,16 +130,17 @@ class Live:
         self._session.box.put(wish)
         self._told = True
 
-    def wait(self) -> None:
-        """Until the thread of the walk ends, which it does not by itself unless it fails.
+    def wait(self, seconds: float | None = None) -> None:
+        """So long, or until the thread of the walk ends, which it does not by itself unless it fails.
 
         Raises
         ------
         RuntimeError
             If it failed.
         """
-        while self._thread.is_alive():
-            self._thread.join(0.5)
+        end = math.inf if seconds is None else time.monotonic() + seconds
+        while self._thread.is_alive() and time.monotonic() < end:
+            self._thread.join(min(0.5, max(0.0, end - time.monotonic())))
         if self.failure is not None:
             raise self.failure
 
