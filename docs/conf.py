@@ -74,10 +74,9 @@ html_logo = html_favicon = "static/logo.svg"
 html_title = "chilopod"
 html_copy_source = False
 html_show_sourcelink = False
-html_show_sphinx = False
+html_show_sphinx = html_show_copyright = False
 templates_path = ["templates"]
 html_additional_pages = {"index": "redirect.html"}
-pygments_style = "friendly"
 
 sphinx_gallery_conf = {
     "examples_dirs": str(ROOT / "examples"),

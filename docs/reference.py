@@ -148,9 +148,8 @@ def robot_keys_page() -> str:
         said = attributes(model)
         for key, quantity in quantities(model).items():
             path = f"{section}.{key}"
-            lines += ["", f".. robotkey:: {path}", "", f"   {_escaped(said[key])}", ""]
-            lines += [f"   :{name}: {_escaped(text)}" for name, text in _facts(quantity)]
-            lines += [f"   :{name}: {_escaped(text)}" for name, text in _of_presets(path, robots)]
+            lines += ["", f".. robotkey:: {path}", "", f"   {said[key]}", ""]
+            lines += [f"   * {text}" for text in (*_facts(quantity), *_of_presets(path, robots))]
     return "\n".join(lines) + "\n"
 
 
@@ -161,21 +160,22 @@ def attributes(model: type[Description]) -> dict[str, str]:
     return {name: " ".join(text.split()) for names, text in told for name in names.split(", ")}
 
 
-def _facts(quantity: Quantity) -> Iterator[tuple[str, str]]:
+def _facts(quantity: Quantity) -> Iterator[str]:
     if isinstance(quantity, Flag):
-        yield "Value", "true or false"
+        yield "true or false"
     elif quantity.integer:
-        yield "Value", f"a whole number, {quantity.at_least:g} to {quantity.at_most:g}"
+        yield f"a whole number, {quantity.at_least:g} to {quantity.at_most:g}"
     else:
-        unit = f"{quantity.display}, or any other unit of its kind" if quantity.display else "a plain number"
-        inside = f"; {quantity.si} inside" if quantity.si not in ("", quantity.display) else ""
-        yield "Unit", unit + inside
-        if (quantity.at_least, quantity.at_most) != _RANGE:
-            yield "Range", _range(quantity)
+        inside = f" ({_escaped(quantity.si)} inside)" if quantity.si not in ("", quantity.display) else ""
+        unit = (
+            f"in {_escaped(quantity.display)} or another unit of its kind{inside}" if quantity.display else "a number"
+        )
+        limited = (quantity.at_least, quantity.at_most) != _RANGE
+        yield unit + (f", {_escaped(_range(quantity))}" if limited else ", more than 0")
     if quantity.each:
-        yield "Shape", "one value for each joint, front to rear; a single one stands for all"
+        yield "one value for each joint, front to rear; a single one stands for all"
     if quantity.optional:
-        yield "Left out", "allowed"
+        yield "may be left out"
 
 
 _RANGE = (Quantity("", "").at_least, Quantity("", "").at_most)
@@ -188,7 +188,8 @@ def _range(quantity: Quantity) -> str:
     return f"up to {high}" if quantity.at_least == _RANGE[0] else f"{low} to {high}"
 
 
-def _of_presets(path: str, robots: dict[str, Robot]) -> Iterator[tuple[str, str]]:
+def _of_presets(path: str, robots: dict[str, Robot]) -> Iterator[str]:
+    alike: dict[str, list[str]] = {}
     for name, robot in robots.items():
         paths = [each for each in robot.parameters() if each.partition("[")[0] == path]
         values = [units.format(robot.get(each), robot.unit_of(each), digits=6) for each in paths]
@@ -196,7 +197,10 @@ def _of_presets(path: str, robots: dict[str, Robot]) -> Iterator[tuple[str, str]
         shown = ", ".join(values if len(set(values)) > 1 else values[:1])
         sources = "; ".join(dict.fromkeys(text for text in told if text))
         if shown or sources:
-            yield f"``{name}``", f"{shown or 'left out'} ({sources})" if sources else shown
+            text = f"{shown or 'left out'} ({sources})" if sources else shown
+            alike.setdefault(text, []).append(f"``{name}``")
+    for text, names in alike.items():
+        yield f"{', '.join(names)}: {_escaped(text)}"
 
 
 def _heading(text: str, underline: str) -> list[str]:
