@@ -25,7 +25,7 @@ def docs():
 
 
 def test_the_planar_model_keeps_every_promise():
-    assert len(check_engine(planar, ROBOT, seed=1)) == 15
+    assert len(check_engine(planar, ROBOT, seed=1)) == 17
 
 
 @pytest.mark.parametrize("changes", [["body.modules=3"], ["gait.side_phase=0 deg"], ["springs.damping=0.05"]])
@@ -35,11 +35,11 @@ def test_the_planar_model_keeps_them_with_other_robots(changes):
 
 def test_the_twin_keeps_every_promise():
     robot = load_robot("aoi2022").set_from_text(["twin.control_interval=4 ms", "springs.stiffness[0]=10 N*mm/deg"])
-    assert len(check_engine(twin, robot)) == 15
+    assert len(check_engine(twin, robot)) == 17
 
 
 def test_the_engine_in_the_docs_keeps_every_promise(docs):
-    assert len(check_engine(docs["Sketch"](), ROBOT)) == 15
+    assert len(check_engine(docs["Sketch"](), ROBOT)) == 17
 
 
 def _wrapped(walk_class, **changes):
@@ -58,7 +58,7 @@ def _forgets_to_record_units(original):
 def _draws_at_random(original):
     def advance(self, until):
         original.advance(self, until)
-        self.states = self.states + 1e-12 * np.random.default_rng().normal(size=self.states.shape)
+        self.here = self.here + 1e-12 * np.random.default_rng().normal(size=self.here.shape)
 
     return {"advance": advance}
 
@@ -66,14 +66,14 @@ def _draws_at_random(original):
 def _counts_advances(original):
     def advance(self, until):
         original.advance(self, until)
-        self.states = self.states * (1.0 + 1e-15)
+        self.here = self.here * (1.0 + 1e-15)
 
     return {"advance": advance}
 
 
 def _is_changed_by_looking(original):
     def observe(self):
-        self.states = self.states + 1e-14
+        self.here = self.here + 1e-14
         return original.observe(self)
 
     return {"observe": observe}
@@ -81,7 +81,7 @@ def _is_changed_by_looking(original):
 
 def _looks_at_its_neighbours(original):
     def write(self):
-        self.states = self.states + 1e-12 * (self.states - self.states.mean(axis=0))
+        self.here = self.here + 1e-12 * (self.here - self.here.mean(axis=0))
         original.write(self)
 
     return {"write": write}
@@ -116,7 +116,7 @@ def _gives_its_own_arrays(original):
 def _obeys_before_it_refuses(original):
     def command(self, command):
         if isinstance(command, Command) and command.leg_yaw is not None:
-            self.states = self.states + 1e-9
+            self.here = self.here + 1e-9
         original.command(self, command)
 
     return {"command": command}
@@ -166,7 +166,7 @@ def _has_no_halt(original):
 
 def _is_changed_by_a_look_at_its_pose(original):
     def pose(self):
-        self.states = self.states + 1e-14
+        self.here = self.here + 1e-14
         return original.pose(self)
 
     return {"pose": pose}
@@ -175,7 +175,7 @@ def _is_changed_by_a_look_at_its_pose(original):
 def _goes_where_it_is_aimed(original):
     def aim(self, target):
         original.aim(self, target)
-        self.states = self.states + 1e-12
+        self.here = self.here + 1e-12
 
     return {"aim": aim}
 
@@ -189,6 +189,23 @@ def _aims_all_alike(original):
 
 def _halts_everybody(original):
     return {"halt": lambda self, which: original.halt(self, np.ones_like(which))}
+
+
+def _counts_its_states_from_elsewhere(original):
+    return {"states": lambda self: original.states(self) + 0.01}
+
+
+def _restarts_everybody(original):
+    return {"restart": lambda self, which, *rest: original.restart(self, which | which.any(), *rest)}
+
+
+def _restarts_as_it_was_told(original):
+    def restart(self, *arguments, **named):
+        told = self.told.state()
+        original.restart(self, *arguments, **named)
+        self.told.restore(told)
+
+    return {"restart": restart}
 
 
 def _halts_for_a_moment(original):
@@ -219,6 +236,9 @@ def _halts_for_a_moment(original):
         (_aims_all_alike, "shows targets that are moved"),
         (_halts_everybody, "halts robots for good"),
         (_halts_for_a_moment, "halts robots for good"),
+        (_counts_its_states_from_elsewhere, "gives its states"),
+        (_restarts_everybody, "puts robots on the floor anew"),
+        (_restarts_as_it_was_told, "puts robots on the floor anew"),
         (_never_fails, "ends a robot that fails"),
         (_stops_everybody, "ends a robot that fails"),
         (_records_robots_that_failed, "ends a robot that fails"),

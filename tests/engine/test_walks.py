@@ -9,6 +9,7 @@ import pytest
 from chilopod import load_robot, planar, twin
 from chilopod.engine import Command, Event, Status, steer
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
+from chilopod.planar.walk import TOLERANCE
 from chilopod.record import Recording
 
 PLANAR, TWIN = load_robot("aoi2022-planar"), load_robot("aoi2022")
@@ -184,6 +185,33 @@ def test_seeds_may_be_numpy_s(engine, robot):
     walk = engine.start(robot, seeds=np.array([3, 4]), target=(1.0, 0.0))
     walk.advance(0.2)
     assert engine.resume(walk.save()).save() == walk.save()
+
+
+@BOTH
+def test_a_walk_goes_on_on_another_floor_as_one_that_never_stopped(engine, robot):
+    half, whole = (engine.start(robot, initial=engine.initial_states(robot, 0.03), record=None) for _ in range(2))
+    half.advance(2.0 * robot.gait.period)
+    whole.advance(4.0 * robot.gait.period)
+    rest = {
+        friction: engine.start(robot, initial=half.states(), friction=np.full((6, 2), friction)) for friction in (1, 2)
+    }
+    for walk in rest.values():
+        walk.advance(2.0 * robot.gait.period)
+    np.testing.assert_allclose(rest[1].states(), whole.states(), rtol=0.0, atol=TOLERANCE)
+    assert np.abs(rest[2].states() - whole.states()).max() > 1e-4
+
+
+def test_a_robot_that_is_put_on_the_floor_anew_sees_with_the_noise_of_its_new_seed():
+    first, second = (twin.start(TWIN, target=(1.0, 0.3), seeds=[seed], record=None) for seed in (3, 4))
+    first.advance(TWIN.gait.period)
+    first.restart(np.array([True]), twin.initial_states(TWIN), seeds=[4])
+    first = twin.resume(first.save())
+    for ahead in (0.0, 0.15):
+        first.advance(TWIN.gait.period + ahead)
+        second.advance(ahead)
+        np.testing.assert_allclose(first.observe().bearing, second.observe().bearing, rtol=0.0, atol=1e-9)
+    with pytest.raises(ParameterError, match="no noise"):
+        twin.start(TWIN, record=None).restart(np.array([True]), twin.initial_states(TWIN), seeds=[4])
 
 
 @BOTH

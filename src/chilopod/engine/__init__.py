@@ -5,7 +5,7 @@
 controllers by name, ``check`` tries an engine's promises.
 """
 
-from chilopod.engine.actuators import Actuators, Ramps
+from chilopod.engine.actuators import Actuators
 from chilopod.engine.check import check_engine
 from chilopod.engine.contract import (
     Array,
@@ -21,6 +21,7 @@ from chilopod.engine.contract import (
 )
 from chilopod.engine.loop import Referee, Spent, event_times, steer, watched
 from chilopod.engine.named import ENGINES, controller_named, engine_named
+from chilopod.engine.ramps import Ramps
 from chilopod.engine.targets import Targets
 
 __all__ = [

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.engine.arguments import as_array, as_number
 from chilopod.engine.contract import Command
+from chilopod.engine.ramps import Ramps
 from chilopod.errors import ParameterError
 from chilopod.record import LONGEST
 from chilopod.robot import Robot
@@ -35,77 +36,6 @@ when it ends (s) and where; and what is left of the lag at its beginning and at 
 _MOST_YAW = 0.5 * np.pi
 _SAME_INSTANT = 1e-9  # s
 _SAME = 1e-9  # relative: a spring that is told the stiffness it has
-
-
-class Ramps:
-    """Values that move to where they are told at constant rate, each on its own.
-
-    What is told the goal that it has already goes on as it was, but is there no later than it is now told to be.
-
-    Parameters
-    ----------
-    start
-        Values before any command, any shape.
-    keep
-        Whether to keep what was told, for :meth:`over`.
-    """
-
-    def __init__(self, start: Array, keep: bool = False) -> None:
-        begun = np.array(start, dtype=np.float64)
-        # Where each ramp begins and ends, and when; never written into, only replaced.
-        self._ramps = np.stack([begun, begun, 0.0 * begun, 0.0 * begun])
-        self._told: list[tuple[float, Array]] | None = [(0.0, self._ramps)] if keep else None
-
-    @property
-    def goal(self) -> Array:
-        """What was told last."""
-        return self._ramps[1]
-
-    def to(self, goal: Array, now: float, within: float) -> None:
-        """Move to ``goal`` (NaN: as before), from a time on, within a time, both of any unit."""
-        changed = ~np.isnan(goal) & ((goal != self.goal) | (now + within < self._ramps[3]))
-        if changed.any():
-            begun = np.empty_like(self._ramps)
-            begun[0], begun[1], begun[2], begun[3] = _at(self._ramps, now), goal, now, now + within
-            self._ramps = np.where(changed, begun, self._ramps)
-            if self._told is not None:
-                self._told.append((now, self._ramps))
-
-    def at(self, times: Array) -> Array:
-        """Values at times (T,) since the last command, shape (T, ...)."""
-        return _at(self._ramps, times.reshape(-1, *[1] * self.goal.ndim))
-
-    def over(self, times: Array) -> Array:
-        """Values at any times (T,), rising, shape (T, ...); at the moment of a command they are those before it."""
-        history = self._told or [(0.0, self._ramps)]
-        values = np.empty((len(times), *self.goal.shape))
-        ends = np.searchsorted(times, [when for when, _ in history[1:]] + [np.inf], side="right")
-        first = 0
-        for (_, ramps), last in zip(history, ends, strict=True):
-            if last > first:
-                values[first:last] = _at(ramps, times[first:last].reshape(-1, *[1] * self.goal.ndim))
-                first = last
-        return values
-
-    def state(self) -> dict[str, Array]:
-        """All there is to it, for :meth:`restore`."""
-        if self._told is None:
-            return {"now": self._ramps}
-        history = np.array([each for _, each in self._told])
-        return {"now": self._ramps, "times": np.array([when for when, _ in self._told]), "history": history}
-
-    def restore(self, state: dict[str, Array]) -> None:
-        """Become as another was."""
-        self._ramps = state["now"]
-        if self._told is not None:
-            self._told = list(zip(state["times"].tolist(), state["history"], strict=True))
-
-
-def _at(ramps: Array, times: Any) -> Array:
-    start, goal, since, until = ramps
-    length = until - since
-    part = np.minimum(np.maximum((times - since) / np.where(length > 0.0, length, 1.0), 0.0), 1.0)
-    return np.where(times >= until, goal, start + part * (goal - start))
 
 
 class Actuators:
@@ -205,6 +135,21 @@ class Actuators:
             when: dict[str, Any] = {"event": time, "within": within}
             what = {"command": self.leg_yaw, "command_stiffness": wanted, "command_torque": self.joint_torque}
             self._log.append(when | what)
+
+    def restart(self, which: NDArray[np.bool_]) -> None:
+        """Let some robots be as at the start, from now on; only where nothing is kept of what was commanded.
+
+        Parameters
+        ----------
+        which
+            Shape (robots,).
+        """
+        profile, driven = self.profile.copy(), self.driven & ~which
+        profile[:, which] = 0.0
+        profile[FROM, which] = profile[GOAL, which] = self._start[which]
+        self.profile, self.driven = profile, driven
+        self.joint_torque = np.where(which[:, None], 0.0, self.joint_torque)
+        self._leg_yaw.restart(which)
 
     def stiffness(self, time: float) -> Array:
         """Of every spring at a time from the last command on, N*m/rad, shape (robots, N-1)."""

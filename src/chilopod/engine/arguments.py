@@ -9,10 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import ParameterError
-from chilopod.record import LONGEST
+from chilopod.record import LONGEST, Recording
 from chilopod.robot import Robot
 
 Array = NDArray[np.float64]
+
+BEGINNING = 1e-9
+"""Part of a gait cycle by which a time may miss its beginning: rounding of whole multiples of the period."""
 
 
 def as_number(name: str, value: object) -> float:
@@ -186,6 +189,57 @@ def rows_of(
         if rows is not None:
             arrays[name] = np.array(np.broadcast_to(rows, (count, *rows.shape[1:])))
     return count, arrays
+
+
+def rows_anew(
+    which: object,
+    robots: Sequence[Robot],
+    time: float,
+    record: Recording | None,
+    arguments: Mapping[str, tuple[ArrayLike | None, tuple[int, ...]]],
+    seeds: object = None,
+) -> tuple[NDArray[np.bool_], dict[str, Array | None]]:
+    """Arguments of ``restart`` as arrays with one row for each robot that is put on the floor anew.
+
+    Parameters
+    ----------
+    which, seeds
+        As given.
+    robots, time, record
+        Of the walk.
+    arguments
+        As of :func:`rows_of`.
+
+    Returns
+    -------
+    Which robots, and the arrays; None for what was not given, or if there are no such robots.
+
+    Raises
+    ------
+    ParameterError
+        If it is not the time for it, or an argument is none.
+    """
+    marked, cycles = as_marks("which", which, len(robots)), time / robots[0].gait.period
+    if record is not None:
+        raise ParameterError(
+            "a record is of one walk", field="restart", allowed="a walk that was started with record=None"
+        )
+    if abs(cycles - round(cycles)) > BEGINNING:
+        raise ParameterError(
+            "is in the middle of a gait cycle",
+            field="restart",
+            value=f"{time:g} s",
+            allowed=f"a whole multiple of the period, {robots[0].gait.period:g} s",
+        )
+    count, own = int(marked.sum()), as_seeds(seeds)
+    if own is not None and len(own) != count:
+        raise ParameterError("has the wrong length", field="seeds", value=len(own), allowed=str(count))
+    if count == 0:
+        return marked, dict.fromkeys(arguments)
+    found, rows = rows_of(robots[:count], arguments)
+    if found != count:
+        raise ParameterError("has the wrong length", field="initial, friction", value=found, allowed=f"1 or {count}")
+    return marked, rows
 
 
 def check_time(until: float, now: float) -> float:

@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from chilopod.engine.check_referee import BREAKS, aims, halts, places, restarts, states
 from chilopod.engine.check_trial import END, TIMES, Broken, Trial, expect, expect_near, expect_refused, expect_same
 from chilopod.engine.contract import Array, Command, Engine, Observation, Status, Traits, Walk, missing_parts
 from chilopod.errors import AnalysisError
 from chilopod.robot import Robot
 
-_BREAKS = 0.6  # s
-_STOPS = 0.98  # s: on a sample, on no command
 _HUGE = 1e4  # N*m: no joint withstands it
 
 
@@ -244,7 +243,7 @@ def _failures(trial: Trial) -> None:
 
     def walked(torque: Array) -> tuple[Walk, Observation]:
         walk = trial.start()
-        walk.advance(_BREAKS)
+        walk.advance(BREAKS)
         before = walk.observe()
         walk.command(Command(joint_torque=torque))
         for time, command in zip(TIMES[1:], trial.commands()[1:], strict=True):
@@ -265,98 +264,12 @@ def _failures(trial: Trial) -> None:
     for name in [str(name) for name, values in data.data_vars.items() if values.dims[:2] == ("time", "robot")]:
         values = data[name].values[:, 1].reshape(data.sizes["time"], -1)
         known = np.isfinite(values).all(axis=1)
-        expect(known[: int(_BREAKS * 50)].all(), f"{name} is NaN before it failed")
+        expect(known[: int(BREAKS * 50)].all(), f"{name} is NaN before it failed")
         expect(np.isnan(values[~known]).all() and not known[-1], f"{name} is not NaN from where it failed on")
         expect((np.diff(known.astype(int)) <= 0).all(), f"{name} comes back after it failed")
         for i in (0, 2):
             same = np.array_equal(data[name].values[:, i], undisturbed[name].values[:, i], equal_nan=True)
             expect(same, f"{name} of robot {i} is another where robot 1 fails")
-
-
-def _places(trial: Trial) -> None:
-    walk = trial.start(target=None)
-    start = np.tile([0.2, -0.1, 0.3], (len(trial.robots), 1))
-    expect_near(walk.pose(), start, 1e-6, "pose at the start, m and rad")
-    looked, silent = trial.walked(walk), trial.walked(trial.start(target=None))
-    walk.pose()[:] = 123.0
-    last = np.column_stack([looked.position.values[-1], looked.heading.values[-1]])
-    pose = walk.pose()
-    expect_near(pose[:, :2], last[:, :2], 0.02, "pose at the end and the record, m")
-    expect_near(np.cos(pose[:, 2] - last[:, 2]), np.ones(len(pose)), 1e-3, "heading of pose at the end and the record")
-    expect_same(silent, looked, "with and without a look at the pose")
-
-
-def _aims(trial: Trial) -> None:
-    here, there, nowhere = np.array([0.9, 0.4]), np.array([0.8, -0.5]), np.full(2, np.nan)
-    where = np.stack([there, nowhere, here])
-    walk, still = trial.start(target=None), trial.walked(trial.start())
-    expect("target" not in trial.walked(trial.start(target=None)), "the record has a target where there is none")
-    told = dict(zip(TIMES, trial.commands(), strict=True))
-    for time in sorted({*TIMES, _BREAKS, END}):
-        walk.advance(time)
-        if time == _BREAKS:
-            expect(np.isnan(walk.observe().bearing).all(), "a target is seen where there is none")
-            wrong: Any = (here[:1], np.full((len(where) + 1, 2), 1.0), here * np.inf, [np.nan, 1.0], "there", None)
-            for target in wrong:
-                expect_refused(f"the target {target}", partial(walk.aim, target))
-            walk.aim(here)
-            before = walk.observe()
-            walk.aim(where)
-            walk = trial.engine.resume(walk.save())
-            seen, pose = walk.observe(), walk.pose()
-            away = where - pose[:, :2]
-            bearing = np.arctan2(away[:, 1], away[:, 0]) - pose[:, 2]
-            # A scanner's last look is from a moment ago.
-            expect_near(seen.distance, np.hypot(away[:, 0], away[:, 1]), 0.03, "distance of a target that was moved, m")
-            expect_near(seen.bearing, bearing, 0.05, "bearing of a target that was moved, rad")
-            expect_near(seen.distance[2:], before.distance[2:], 0.0, "distance of a target that stayed, m")
-        if time in told:
-            walk.command(told[time])
-    data = walk.to_dataset()
-    over = ("time", "robot", "axis")
-    expect("target" in data, "the record has no target")
-    expect(data.target.dims == over, f"target is over {data.target.dims}, not {over}")
-    count = int((data.time.values <= _BREAKS).sum())
-    moved = np.concatenate([np.full((count, *where.shape), np.nan), np.tile(where, (data.sizes["time"] - count, 1, 1))])
-    expect_near(data.target.values, moved, 0.0, "target over time, m")
-    away = moved - data.position.values
-    expect_near(data.distance.values, np.hypot(away[..., 0], away[..., 1]), 1e-9, "distance over time, m")
-    for name in ("position", "heading", "joint_angle", "stiffness"):
-        expect(data[name].equals(still[name]), f"{name} is another where the target is moved")
-
-
-def _halts(trial: Trial) -> None:
-    free, walk = trial.walked(trial.start()), trial.start()
-    told = dict(zip(TIMES, trial.commands(), strict=True))
-    for time in sorted({*TIMES, _STOPS, END}):
-        walk.advance(time)
-        if time == _STOPS:
-            wrong: Any = ([1], np.ones(len(trial.robots)), np.ones(len(trial.robots) + 1, dtype=bool), None)
-            for which in wrong:
-                expect_refused(f"halting {which}", partial(walk.halt, which))
-            walk.halt(np.array([False, True, False]))
-            before = walk.observe()
-            walk = trial.engine.resume(walk.save())
-        if time in told:
-            walk.command(told[time])
-    expect(walk.status == (Status.WALKED, Status.HALTED, Status.WALKED), f"status is {walk.status}")
-    seen = walk.observe()
-    for what, array in (("bearing", seen.bearing), ("joint_angles", seen.joint_angles), ("pose", walk.pose())):
-        expect(np.isnan(array[1]).all(), f"a robot that was halted has {what}")
-    expect(np.array_equal(seen.leg_yaw[1], before.leg_yaw[1]), "a robot that was halted obeys")
-    data = walk.to_dataset()
-    last = round(_STOPS * 50.0)
-    for name in ("position", "heading", "joint_angle", "distance"):
-        found, wanted = data[name].values, free[name].values
-        expect(np.array_equal(found[:last, 1], wanted[:last, 1]), f"{name} is another before it was halted")
-        # At the very moment, or in the step of it, it may be either.
-        expect(np.isnan(found[last + 2 :, 1]).all(), f"{name} is not NaN from where it was halted on")
-        for i in (0, 2):
-            expect(np.array_equal(found[:, i], wanted[:, i]), f"{name} of robot {i} is another where 1 is halted")
-    walk.halt(np.ones(len(trial.robots), dtype=bool))
-    walk.advance(END + 0.1)
-    expect(set(walk.status) == {Status.HALTED}, "robots walk on that were halted")
-    expect(np.isnan(walk.to_dataset().heading.values[-1]).all(), "robots that were halted are recorded")
 
 
 _PROMISES: dict[str, Callable[[Trial], None]] = {
@@ -372,7 +285,9 @@ _PROMISES: dict[str, Callable[[Trial], None]] = {
     "keeps springs within range and rate, and says so": _springs,
     "turns joints and legs the way it is told": _driving,
     "ends a robot that fails with a status and NaN, and walks on with the others": _failures,
-    "says where robots are, and looking changes nothing": _places,
-    "shows targets that are moved, and walks on to the same bits": _aims,
-    "halts robots for good, and walks on with the others to the same bits": _halts,
+    "says where robots are, and looking changes nothing": places,
+    "shows targets that are moved, and walks on to the same bits": aims,
+    "halts robots for good, and walks on with the others to the same bits": halts,
+    "gives its states, from which another walk goes on as it does": states,
+    "puts robots on the floor anew, and walks on with the others to the same bits": restarts,
 }

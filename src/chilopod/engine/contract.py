@@ -132,7 +132,7 @@ class Walk(Protocol):
 
     The same bits come out whether a minute is one :meth:`advance` or a thousand, however often is looked, alone or in a
     batch, with any number of threads, and after :meth:`save` and ``resume``. Only commands change a walk, and
-    :meth:`halt` ends it.
+    :meth:`halt` ends it; :meth:`restart` begins another in its place.
     """
 
     @property
@@ -186,6 +186,43 @@ class Walk(Protocol):
         ------
         ParameterError
             If it is something else. The walk is as before.
+        """
+
+    def states(self) -> Array:
+        """The robots as they are now, for ``initial`` of :meth:`Engine.start` or :meth:`restart`.
+
+        At the beginning of a gait cycle another walk can so begin where this one is. What actuators were told is no
+        part of it, nor what integrator or solver keep in mind: it goes on as this one to their tolerance.
+        Shape (robots, n), with n the engine's affair; NaN for robots that no longer walk.
+        """
+
+    def restart(
+        self,
+        which: NDArray[np.bool_],
+        initial: ArrayLike,
+        friction: ArrayLike | None = None,
+        seeds: Sequence[int] | None = None,
+    ) -> None:
+        """Put some robots on the floor anew, at the beginning of a gait cycle; the others walk on to the same bits.
+
+        Whatever became of them, they walk on as if freshly started, up to the rounding of times: springs of the file,
+        legs straight, no torque. Their targets stay where they are. A walk with a record has no such thing.
+
+        Parameters
+        ----------
+        which
+            Shape (robots,).
+        initial
+            As of :meth:`Engine.start`, one row for all of them or one each.
+        friction
+            Likewise; None: as it is.
+        seeds
+            Of the noise of their sensors, counted from now, one each; None: it goes on.
+
+        Raises
+        ------
+        ParameterError
+            If the walk is in the middle of a cycle or keeps a record, or an argument is none. The walk is as before.
         """
 
     def command(self, command: Command) -> None:
@@ -315,7 +352,8 @@ class Engine(Protocol):
         robots
             One, or one for every walk, with the same :meth:`common`.
         initial
-            From :meth:`initial_states`, one row for all or one a walk; by default straight from the origin along x.
+            From :meth:`initial_states` or :meth:`Walk.states`, one row for all or one a walk; by default straight from
+            the origin along x.
         friction
             Factor on the friction coefficient of every foot, positive, shape (N, 2) or (walks, N, 2).
         target

@@ -10,7 +10,17 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.engine import Actuators, Command, Observation, Status, Targets, Traits
-from chilopod.engine.arguments import as_marks, as_number, as_robots, as_seeds, check_time, rows_of, standing
+from chilopod.engine.arguments import (
+    BEGINNING,
+    as_marks,
+    as_number,
+    as_robots,
+    as_seeds,
+    check_time,
+    rows_anew,
+    rows_of,
+    standing,
+)
 from chilopod.engine.saved import pack, part, read_back, unpack
 from chilopod.errors import ParameterError
 from chilopod.planar import stretch
@@ -98,7 +108,7 @@ def start(
     robots, friction, target, record, expected
         As there. Robots share gait and number of modules and may differ in all else.
     initial
-        States with poses, shape (walks, 2N+4) or (2N+4,), such as :func:`initial_states` gives.
+        States with poses, shape (walks, 2N+4) or (2N+4,), such as :func:`initial_states` and ``states`` of a walk give.
     seeds
         Not used: what these robots see has no noise.
     tolerance
@@ -166,8 +176,8 @@ class PlanarWalk:
         self._models = [distinct.setdefault(id(robot), PlanarModel(robot)) for robot in robots]
         self._modules = self._models[0].modules
         self._record, self._tolerance, self._factors = record, tolerance, factors
-        own = np.array([robot.ground.friction for robot in robots])
-        self._friction = own[:, None, None] * factors
+        self._own_friction = np.array([robot.ground.friction for robot in robots])[:, None, None]
+        self._friction = self._own_friction * factors
         schedule = self._models[0].schedule
         self._feet = (schedule.contact, schedule.stroke)
         self._bodies = (
@@ -233,6 +243,35 @@ class PlanarWalk:
         self._status[marked] = stretch.HALTED
         if self._here is not None:
             self._here[-1][marked] = stretch.HALTED
+
+    def states(self) -> Array:
+        """See :class:`chilopod.engine.Walk`: states with poses, (robots, 2N+4)."""
+        return self._seen()
+
+    def restart(
+        self,
+        which: NDArray[np.bool_],
+        initial: ArrayLike,
+        friction: ArrayLike | None = None,
+        seeds: Sequence[int] | None = None,
+    ) -> None:
+        """See :class:`chilopod.engine.Walk`; seeds are not used."""
+        arguments = {
+            "initial": (initial, self._states.shape[1:]),
+            "friction": (friction, self._factors.shape[1:]),
+        }
+        marked, rows = rows_anew(which, self._robots, self._time, self._record, arguments, seeds)
+        # To the switch with which the cycle begins, where everybody stops for good anyhow.
+        pieces = self._timeline.whole_pieces(self._time + BEGINNING * self._robots[0].gait.period)
+        if pieces[0].size:
+            self._carry(pieces, self._states, self._step, self._status)
+        self._here = None
+        if rows["friction"] is not None:
+            self._factors[marked] = rows["friction"]
+            self._friction[marked] = self._own_friction[marked] * self._factors[marked]
+        if rows["initial"] is not None:
+            self._states[marked], self._step[marked], self._status[marked] = rows["initial"], 0.0, stretch.WALKING
+            self._actuators.restart(marked)
 
     def command(self, command: Command) -> None:
         """See :class:`chilopod.engine.Walk`."""

@@ -6,7 +6,7 @@ else is as high as the scanner. Distances are rounded to the scanner's resolutio
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from mujoco.batch import Batch
@@ -37,13 +37,14 @@ class Scanner:
     batch
         The robots, where they start.
     seeds
-        Of its noise, one a robot; None for none.
+        Of its noise, one a robot, which the walk may replace; None for none.
     """
 
-    def __init__(self, twin: Twin, batch: Batch, seeds: Sequence[int] | None) -> None:
+    def __init__(self, twin: Twin, batch: Batch, seeds: NDArray[np.object_] | None) -> None:
         self._twin, self._batch, self._seeds = twin, batch, seeds
         self._every = twin.scanner_period / twin.control_interval
         self._number, self._poses = 0, batch.bind("qpos")[:, :7].copy()
+        self._first: NDArray[np.intp] = np.zeros(len(self._poses), dtype=np.intp)
         self._looked = -1
         self._seen = np.empty((2, len(self._poses)))
 
@@ -66,6 +67,13 @@ class Scanner:
             self._poses[ids] = poses[:, max(tick - before - 1, 0)]
             self._number = number
 
+    def restart(self, ids: NDArray[np.intp], anew: bool) -> None:
+        """Some robots have been put elsewhere; with ``anew`` the noise of their scans is counted from this one."""
+        self._poses[ids] = self._batch.bind("qpos")[ids, :7]
+        if anew:
+            self._first[ids] = self._number
+        self.forget()
+
     def forget(self) -> None:
         """Make nothing of what was seen: targets are elsewhere now."""
         self._looked = -1
@@ -76,8 +84,8 @@ class Scanner:
             noise = None
             if self._seeds is not None:
                 size = len(beams(self._twin))
-                seeds = [self._seeds[i] for i in ids]
-                noise = np.stack([np.random.default_rng([s, self._number]).standard_normal(size) for s in seeds])
+                which = zip(self._seeds[ids].tolist(), (self._number - self._first[ids]).tolist(), strict=True)
+                noise = np.stack([np.random.default_rng(each).standard_normal(size) for each in which])
             scans = scan(self._twin, self._batch, self._poses, ids, noise)
             self._seen = np.full((2, len(self._poses)), np.nan)
             self._seen[:, ids] = np.transpose([detect(self._twin, each) for each in scans])
@@ -86,11 +94,12 @@ class Scanner:
 
     def state(self) -> dict[str, Array]:
         """All there is to it, for :meth:`restore`."""
-        return {"number": np.array(self._number), "poses": self._poses}
+        return {"number": np.array(self._number), "poses": self._poses, "first": self._first}
 
-    def restore(self, state: dict[str, Array]) -> None:
+    def restore(self, state: dict[str, Any]) -> None:
         """Become as another was, of the same robots."""
-        self._number, self._poses, self._looked = int(state["number"]), state["poses"], -1
+        self._number, self._poses, self._first = int(state["number"]), state["poses"], state["first"]
+        self.forget()
 
 
 def scan(twin: Twin, batch: Batch, poses: Array, ids: NDArray[np.intp], noise: Array | None = None) -> Array:

@@ -16,7 +16,7 @@ from chilopod.record import Recording, in_range
 from chilopod.robot import Robot
 from chilopod.twin.legs import twin_of
 from chilopod.twin.model import Edit, compiled, without_springs
-from chilopod.twin.walk import TOLERANCE, TwinWalk
+from chilopod.twin.walk import TOLERANCE, TwinWalk, state_size
 
 Array = NDArray[np.float64]
 
@@ -95,7 +95,7 @@ def start(
     robots, friction, record, expected
         As there. Robots may differ in the numbers of their springs and in nothing else.
     initial
-        From :func:`initial_states`, shape (walks, nq) or (nq,).
+        From :func:`initial_states`, shape (walks, nq) or (nq,), or from ``states`` of a walk, (walks, nq + nv).
     target
         Place of a pole on the floor, m, shape (2,) or (walks, 2); what is seen of it is what the scanner made of its
         last scan.
@@ -115,7 +115,7 @@ def start(
     first = common(given[0])
     if any(common(each) != first for each in given[1:]):
         raise ParameterError("may differ in their springs only", field="robots")
-    size, n = compiled(first, edit=edit).model.nq, first.body.modules
+    size, n = state_size(compiled(first, edit=edit), initial), first.body.modules
     count, rows = rows_of(
         given, {"initial": (initial, (size,)), "friction": (friction, (n, 2)), "target": (target, (2,))}, noise
     )

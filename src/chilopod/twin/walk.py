@@ -6,6 +6,7 @@ import operator
 from collections.abc import Sequence
 from typing import Any
 
+import mujoco
 import numpy as np
 import xarray as xr
 from mujoco.batch import Batch
@@ -13,14 +14,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.cores import cores
 from chilopod.engine import Actuators, Command, Observation, Ramps, Status, Targets, Traits
-from chilopod.engine.arguments import as_marks, as_number, check_time
+from chilopod.engine.arguments import as_array, as_marks, as_number, as_seeds, check_time, rows_anew
 from chilopod.engine.saved import pack, part
 from chilopod.errors import ParameterError
 from chilopod.record import Recording, Samples, add_outcome, check_size, walk_record
 from chilopod.robot import Robot
 from chilopod.twin.failures import failures
 from chilopod.twin.legs import servo_targets
-from chilopod.twin.model import AWAY, SIDES, Edit, compiled, silence, without_springs
+from chilopod.twin.model import AWAY, SIDES, Edit, TwinModel, compiled, silence, without_springs
+from chilopod.twin.samples import Sampling
 from chilopod.twin.scanner import Scanner, rotation
 
 Array = NDArray[np.float64]
@@ -59,17 +61,18 @@ class TwinWalk:
         edit: Edit | None = None,
     ) -> None:
         self._traits, self._robots, self._factors = traits, tuple(robots), factors
-        self._seeds, self._record, self._tolerance = seeds, record, tolerance
+        self._seeds = None if seeds is None else np.array(seeds, dtype=np.object_)
+        self._record, self._tolerance = record, tolerance
         self._plan = compiled(without_springs(robots[0]), bool(record and record.forces), edit)
         plan, count = self._plan, len(robots)
         self._batch = Batch(plan.model, count, threads or cores())
         self._springs = np.array([each.springs.stiffness for each in robots])
         self._batch.expand("jnt_stiffness")[:, plan.yaw_joints] = self._springs
         self._batch.expand("dof_damping")[:, plan.yaw_rates] = [each.springs.damping for each in robots]
-        self._batch.expand("geom_friction")[:, plan.feet, 0] = plan.twin.sliding_friction * factors
+        self._rub()
         self._batch.expand("opt.tolerance")[:] = tolerance
-        self._batch.bind("qpos")[:] = states
-        self._scanner = Scanner(plan.twin, self._batch, seeds)
+        self._put(np.arange(count), states)
+        self._scanner = Scanner(plan.twin, self._batch, self._seeds)
         self._targets = Targets(count, target, keep=record is not None)
         self._put_poles()
         self._actuators = Actuators(robots, keep=record is not None)
@@ -82,12 +85,13 @@ class TwinWalk:
 
         check_size(record, expected, count * (plan.model.nq + plan.model.nv))
         rows = int(expected * record.rate) + 2 if record else 0
+        self._sampling = Sampling(record.rate if record else 0.0, plan.twin.timestep)
         self._positions = Samples((count, plan.model.nq), rows)
         self._rates = Samples((count, plan.model.nv), rows)
         self._forces = Samples((count, plan.model.nsensordata), rows if plan.model.nsensordata else 0)
-        for sample in self._samples(-1, 0):  # several, if sampled more often than stepped
-            self._positions.grown(sample + 1)[sample] = states
-            self._rates.grown(sample + 1)[sample] = 0.0
+        for sample in self._sampling.between(-1, 0):  # several, if sampled more often than stepped
+            for name, store in (("qpos", self._positions), ("qvel", self._rates)):
+                store.grown(sample + 1)[sample] = self._batch.bind(name)
 
     @property
     def _longest_stretch(self) -> int:
@@ -146,6 +150,45 @@ class TwinWalk:
             self._status[robot] = Status.HALTED
         self._walking = np.flatnonzero(self._on_foot())
 
+    def states(self) -> Array:
+        """See :class:`chilopod.engine.Walk`: MuJoCo's ``qpos``, then ``qvel``, (robots, nq + nv)."""
+        states = np.hstack([self._batch.bind("qpos"), self._batch.bind("qvel")])
+        states[~self._on_foot()] = np.nan
+        return states
+
+    def restart(
+        self,
+        which: NDArray[np.bool_],
+        initial: ArrayLike,
+        friction: ArrayLike | None = None,
+        seeds: Sequence[int] | None = None,
+    ) -> None:
+        """See :class:`chilopod.engine.Walk`; the scanner goes on to scan when it would."""
+        arguments = {
+            "initial": (initial, (state_size(self._plan, initial),)),
+            "friction": (friction, self._factors.shape[1:]),
+        }
+        marked, rows = rows_anew(which, self._robots, self._time, self._record, arguments, seeds)
+        states, ids = rows["initial"], np.flatnonzero(marked)
+        if seeds is not None and self._seeds is None:
+            raise ParameterError("this walk has no noise", field="seeds", allowed="None, or seeds at the start")
+        if states is None:
+            return
+        self._batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE)
+        self._put(ids, states)
+        if rows["friction"] is not None:
+            self._factors[ids] = rows["friction"]
+            self._rub()
+        if seeds is not None and self._seeds is not None:
+            self._seeds[ids] = as_seeds(seeds)
+        self._actuators.restart(marked)
+        self._leg_yaw.restart(marked)
+        for robot in ids:
+            self._status[robot] = Status.WALKED
+        self._walking = np.flatnonzero(self._on_foot())
+        self._scanner.restart(ids, anew=seeds is not None)
+        self._put_poles()
+
     def command(self, command: Command) -> None:
         """See :class:`chilopod.engine.Walk`."""
         self._actuators.command(self._time, command, self._on_foot())
@@ -172,7 +215,7 @@ class TwinWalk:
         if not len(self._walking):
             # Nobody walks on, but the record goes on with nothing.
             for store in self._kept().values():
-                store.grown(self._samples_up_to(self._tick * self._plan.steps_per_control))
+                store.grown(self._sampling.count(self._tick * self._plan.steps_per_control))
 
     def save(self) -> bytes:
         """See :class:`chilopod.engine.Walk`."""
@@ -180,7 +223,7 @@ class TwinWalk:
         settings = {
             "record": None if record is None else {"rate": record.rate, "forces": record.forces, "poses": record.poses},
             "tolerance": self._tolerance,
-            "seeds": self._seeds,
+            "seeds": None if self._seeds is None else self._seeds.tolist(),
             "time": self._time,
             "tick": self._tick,
             "status": [each.name for each in self._status],
@@ -221,7 +264,7 @@ class TwinWalk:
         positions, rates = (each.grown(0)[:count] for each in (self._positions, self._rates))
         positions, rates = (each.copy() if copy else each for each in (positions, rates))
         turn = rotation(positions[..., 3:7])
-        times = np.asarray(self._sample_steps(np.arange(len(positions))) * plan.twin.timestep, dtype=np.float64)
+        times = np.asarray(self._sampling.steps(np.arange(len(positions))) * plan.twin.timestep, dtype=np.float64)
         data = walk_record(
             times,
             position=positions[..., :2],
@@ -256,6 +299,17 @@ class TwinWalk:
     # -- inside
     # ---------------------------------------------------------------------------------------------------------------
 
+    def _put(self, ids: NDArray[np.intp], states: Array) -> None:
+        """Robots where they are to be; at rest, if states do not say how fast they move."""
+        coordinates = self._plan.model.nq
+        self._batch.bind("qpos")[ids] = states[:, :coordinates]
+        self._batch.bind("qvel")[ids] = states[:, coordinates:] if states.shape[1] > coordinates else 0.0
+
+    def _rub(self) -> None:
+        """Let feet have their friction."""
+        plan = self._plan
+        self._batch.expand("geom_friction")[:, plan.feet, 0] = plan.twin.sliding_friction * self._factors
+
     def _on_foot(self) -> NDArray[np.bool_]:
         return np.array([each is Status.WALKED for each in self._status])
 
@@ -263,26 +317,6 @@ class TwinWalk:
         """What is recorded, by MuJoCo's name."""
         kept = {"qpos": self._positions, "qvel": self._rates}
         return {**kept, "sensordata": self._forces} if self._plan.model.nsensordata else kept
-
-    def _sample_steps(self, samples: NDArray[np.intp]) -> NDArray[np.intp]:
-        """The simulation steps that are nearest to samples."""
-        rate = self._record.rate if self._record else 1.0
-        return np.rint(samples / rate / self._plan.twin.timestep).astype(np.intp)
-
-    def _samples_up_to(self, step: int) -> int:
-        """How many samples are at steps up to one."""
-        if self._record is None or step < 0:
-            return 0
-        near = int(step * self._in_a_step) + np.arange(-2, 4 + int(self._in_a_step))
-        return int(near[self._sample_steps(near) <= step][-1]) + 1
-
-    @property
-    def _in_a_step(self) -> float:
-        return self._record.rate * self._plan.twin.timestep if self._record else 0.0
-
-    def _samples(self, after: int, up_to: int) -> NDArray[np.intp]:
-        """The samples at steps after one and up to another."""
-        return np.arange(self._samples_up_to(after), self._samples_up_to(up_to))
 
     def _look(self) -> tuple[Array, Array]:
         """Bearing and distance of the target in the last scan; NaN for robots that no longer walk."""
@@ -307,13 +341,13 @@ class TwinWalk:
         before = batch.bind("qpos")[walking], batch.bind("qvel")[walking]
         out = batch.rollout(count, self._controls(tick), record=list(kept), ids=walking)
         self._scanner.passed(self._tick, tick, out["qpos"][:, per_tick - 1 :: per_tick, :7], walking)
-        samples = self._samples(first, first + count)
-        at = self._sample_steps(samples) - first - 1
+        samples = self._sampling.between(first, first + count)
+        at = self._sampling.steps(samples) - first - 1
         for name, store in kept.items():
             if samples.size:
                 store.grown(samples[-1] + 1)[np.ix_(samples, walking)] = np.swapaxes(out[name][:, at], 0, 1)
         if self._tick == 0 and "sensordata" in kept:  # forces are of the step before, at time 0 of the step after
-            start = self._samples(-1, 0)
+            start = self._sampling.between(-1, 0)
             self._forces.grown(len(start))[np.ix_(start, walking)] = out["sensordata"][:, 0]
         warned = batch.warning[walking].any(axis=tuple(range(1, batch.warning.ndim)))
         found = failures(out["qpos"], out["qvel"], before, plan.yaw_positions, warned)
@@ -350,6 +384,12 @@ class TwinWalk:
             targets = servo_targets(self._plan.robot, ahead * self._plan.twin.control_interval)
             self._servos = targets.reshape(len(ahead), -1)
         return self._servos[ticks - self._servos_from]
+
+
+def state_size(plan: TwinModel, initial: ArrayLike | None) -> int:
+    """Numbers of a state: MuJoCo's ``qpos``, with ``qvel`` behind if that was given."""
+    both = plan.model.nq + plan.model.nv
+    return both if initial is not None and as_array("initial", initial).shape[-1:] == (both,) else plan.model.nq
 
 
 def _heading(turn: Array) -> Array:

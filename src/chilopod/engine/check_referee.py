@@ -1,0 +1,186 @@
+"""Tries what the contract promises to referees, who set tasks and steer nothing."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from chilopod.engine.check_trial import END, TIMES, Trial, expect, expect_near, expect_refused, expect_same
+from chilopod.engine.contract import Array, Command, Status, Walk
+from chilopod.record import Recording
+
+BREAKS = 0.6
+"""s: when something happens in the middle of trials."""
+
+_STOPS = 0.98  # s: on a sample, on no command
+_NEAR = 1e-4  # rad and m, of what agrees to the tolerance of an integrator or solver, after two gait cycles
+
+
+def places(trial: Trial) -> None:
+    """Where robots are, and were by their record."""
+    walk = trial.start(target=None)
+    start = np.tile([0.2, -0.1, 0.3], (len(trial.robots), 1))
+    expect_near(walk.pose(), start, 1e-6, "pose at the start, m and rad")
+    looked, silent = trial.walked(walk), trial.walked(trial.start(target=None))
+    walk.pose()[:] = 123.0
+    last = np.column_stack([looked.position.values[-1], looked.heading.values[-1]])
+    pose = walk.pose()
+    expect_near(pose[:, :2], last[:, :2], 0.02, "pose at the end and the record, m")
+    expect_near(np.cos(pose[:, 2] - last[:, 2]), np.ones(len(pose)), 1e-3, "heading of pose at the end and the record")
+    expect_same(silent, looked, "with and without a look at the pose")
+
+
+def aims(trial: Trial) -> None:
+    """Targets that are moved, taken away and put up."""
+    here, there, nowhere = np.array([0.9, 0.4]), np.array([0.8, -0.5]), np.full(2, np.nan)
+    where = np.stack([there, nowhere, here])
+    walk, still = trial.start(target=None), trial.walked(trial.start())
+    expect("target" not in trial.walked(trial.start(target=None)), "the record has a target where there is none")
+    told = dict(zip(TIMES, trial.commands(), strict=True))
+    for time in sorted({*TIMES, BREAKS, END}):
+        walk.advance(time)
+        if time == BREAKS:
+            expect(np.isnan(walk.observe().bearing).all(), "a target is seen where there is none")
+            wrong: Any = (here[:1], np.full((len(where) + 1, 2), 1.0), here * np.inf, [np.nan, 1.0], "there", None)
+            for target in wrong:
+                expect_refused(f"the target {target}", partial(walk.aim, target))
+            walk.aim(here)
+            before = walk.observe()
+            walk.aim(where)
+            walk = trial.engine.resume(walk.save())
+            seen, pose = walk.observe(), walk.pose()
+            away = where - pose[:, :2]
+            bearing = np.arctan2(away[:, 1], away[:, 0]) - pose[:, 2]
+            # A scanner's last look is from a moment ago.
+            expect_near(seen.distance, np.hypot(away[:, 0], away[:, 1]), 0.03, "distance of a target that was moved, m")
+            expect_near(seen.bearing, bearing, 0.05, "bearing of a target that was moved, rad")
+            expect_near(seen.distance[2:], before.distance[2:], 0.0, "distance of a target that stayed, m")
+        if time in told:
+            walk.command(told[time])
+    data = walk.to_dataset()
+    over = ("time", "robot", "axis")
+    expect("target" in data, "the record has no target")
+    expect(data.target.dims == over, f"target is over {data.target.dims}, not {over}")
+    count = int((data.time.values <= BREAKS).sum())
+    moved = np.concatenate([np.full((count, *where.shape), np.nan), np.tile(where, (data.sizes["time"] - count, 1, 1))])
+    expect_near(data.target.values, moved, 0.0, "target over time, m")
+    away = moved - data.position.values
+    expect_near(data.distance.values, np.hypot(away[..., 0], away[..., 1]), 1e-9, "distance over time, m")
+    for name in ("position", "heading", "joint_angle", "stiffness"):
+        expect(data[name].equals(still[name]), f"{name} is another where the target is moved")
+
+
+def halts(trial: Trial) -> None:
+    """One of three, then all."""
+    free, walk = trial.walked(trial.start()), trial.start()
+    told = dict(zip(TIMES, trial.commands(), strict=True))
+    for time in sorted({*TIMES, _STOPS, END}):
+        walk.advance(time)
+        if time == _STOPS:
+            wrong: Any = ([1], np.ones(len(trial.robots)), np.ones(len(trial.robots) + 1, dtype=bool), None)
+            for which in wrong:
+                expect_refused(f"halting {which}", partial(walk.halt, which))
+            walk.halt(np.array([False, True, False]))
+            before = walk.observe()
+            walk = trial.engine.resume(walk.save())
+        if time in told:
+            walk.command(told[time])
+    expect(walk.status == (Status.WALKED, Status.HALTED, Status.WALKED), f"status is {walk.status}")
+    seen = walk.observe()
+    for what, array in (("bearing", seen.bearing), ("joint_angles", seen.joint_angles), ("pose", walk.pose())):
+        expect(np.isnan(array[1]).all(), f"a robot that was halted has {what}")
+    expect(np.array_equal(seen.leg_yaw[1], before.leg_yaw[1]), "a robot that was halted obeys")
+    data = walk.to_dataset()
+    last = round(_STOPS * 50.0)
+    for name in ("position", "heading", "joint_angle", "distance"):
+        found, wanted = data[name].values, free[name].values
+        expect(np.array_equal(found[:last, 1], wanted[:last, 1]), f"{name} is another before it was halted")
+        # At the very moment, or in the step of it, it may be either.
+        expect(np.isnan(found[last + 2 :, 1]).all(), f"{name} is not NaN from where it was halted on")
+        for i in (0, 2):
+            expect(np.array_equal(found[:, i], wanted[:, i]), f"{name} of robot {i} is another where 1 is halted")
+    walk.halt(np.ones(len(trial.robots), dtype=bool))
+    walk.advance(END + 0.1)
+    expect(set(walk.status) == {Status.HALTED}, "robots walk on that were halted")
+    expect(np.isnan(walk.to_dataset().heading.values[-1]).all(), "robots that were halted are recorded")
+
+
+def states(trial: Trial) -> None:
+    """They are what ``start`` takes."""
+    walk, period = trial.start(seeds=None), trial.robot.gait.period
+    walk.advance(period)
+    walk.halt(np.array([False, True, False]))
+    now = walk.states()
+    expect(len(now) == len(trial.robots) and now.ndim == 2, f"states have shape {now.shape}")
+    expect(
+        np.isnan(now[1]).all() and np.isfinite(now[[0, 2]]).all(), "states of who was halted, and only theirs, are NaN"
+    )
+    again = trial.engine.start(trial.robots[2], initial=now[2], target=(0.9, 0.4), record=None)
+    expect(again.time == 0.0 and again.states().shape == (1, now.shape[1]), "states of the new walk have another shape")
+    for ahead in (0.0, 2.0 * period):
+        walk.advance(period + ahead)
+        again.advance(ahead)
+        _expect_alike(walk, 2, again, "of a walk and of another from its states")
+    now[:] = 123.0
+    expect(not (walk.states()[[0, 2]] == 123.0).any(), "writing into states changes the walk")
+
+
+def restarts(trial: Trial) -> None:
+    """One of three that are under way, after it was halted."""
+    free, walk = (trial.start(seeds=None, record=None) for _ in range(2))
+    period, one, none = trial.robot.gait.period, np.array([False, True, False]), np.zeros(3, dtype=bool)
+    begin = trial.engine.initial_states(trial.robot, -trial.bends[1], 1.0, (0.5, 0.2))
+    firm, told = np.full((trial.robot.body.modules, 2), 1.2), trial.commands()
+    for number, command in enumerate(told):
+        for each in (free, walk):
+            each.advance((number + 0.4) * period)
+            each.command(command)
+    expect_refused("putting robots on the floor in the middle of a cycle", partial(walk.restart, one, begin))
+    recorded = trial.start(record=Recording(rate=50.0))
+    expect_refused("putting robots on the floor of a walk with a record", partial(recorded.restart, one, begin))
+    for each in (free, walk):
+        each.advance(len(told) * period)
+    walk.halt(one)
+    wrong: Any = (([1], begin), (one, begin[:, :-1]), (one, np.nan * begin), (one, np.tile(begin, (2, 1))))
+    for which, initial in wrong:
+        expect_refused(f"{which}, {initial} for a restart", partial(walk.restart, which, initial))
+    expect_refused("friction 0", partial(walk.restart, one, begin, friction=0.0 * firm))
+    walk.restart(none, begin)
+    expect(walk.status[1] is Status.HALTED, "a robot walks that was not put on the floor anew")
+    walk.restart(one, begin, firm)
+    walk = trial.engine.resume(walk.save())
+    fresh = trial.engine.start(trial.robots[1], initial=begin, friction=firm, target=(0.9, 0.4), record=None)
+    later: list[Command | None] = [None, *trial.commands()[:2]]
+    for number, then in enumerate(later):
+        for each, when in ((free, len(told)), (walk, len(told)), (fresh, 0)):
+            each.advance((number + when) * period)
+            if then is not None:
+                each.command(_for_one(then) if each is fresh else then)
+        expect(set(walk.status) == {Status.WALKED}, f"status is {walk.status}")
+        _expect_alike(walk, 1, fresh, "of a robot that was put on the floor anew and of one that has just started")
+    for name in ("joint_angles", "leg_yaw", "stiffness", "bearing"):
+        here, there = (getattr(each.observe(), name)[[0, 2]] for each in (walk, free))
+        expect(np.array_equal(here, there), f"{name} of the others is another")
+    expect(np.array_equal(walk.states()[[0, 2]], free.states()[[0, 2]]), "states of the others are others")
+
+
+def _for_one(command: Command) -> Command:
+    def row(value: Any) -> Array | None:
+        return None if value is None else np.asarray(value)[1:2]
+
+    return Command(
+        leg_yaw=row(command.leg_yaw),
+        stiffness=row(command.stiffness),
+        joint_torque=row(command.joint_torque),
+        within=command.within,
+    )
+
+
+def _expect_alike(walk: Walk, robot: int, alone: Walk, whose: str) -> None:
+    """A robot of a batch that is where another is that walks alone."""
+    seen, other = walk.observe(), alone.observe()
+    for name, unit in (("joint_angles", "rad"), ("leg_yaw", "rad"), ("stiffness", "N*m/rad")):
+        expect_near(getattr(seen, name)[robot], getattr(other, name)[0], _NEAR, f"{name} {whose}, {unit}")
+    expect_near(walk.pose()[robot], alone.pose()[0], _NEAR, f"pose {whose}, m and rad")
