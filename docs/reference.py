@@ -28,6 +28,7 @@ from chilopod.units import Description, Flag, Quantity, quantities
 _COMMANDS_INTRODUCTION = """What the commands have in common stands in :doc:`the command line </docs/command-line>`.
 This page is made from the commands themselves; it says what ``--help`` says."""
 FOR_ENGINES = ("chilopod.engine.arguments", "chilopod.engine.saved", "chilopod.record")
+_SHORT = 60
 _KEYS_INTRODUCTION = """How a robot file is written stands in :doc:`the robot file </docs/robot-file>`. This page is
 made from what reads it: every key with its unit and range, and what the presets have there and where they have it from.
 A key of ``[gait]`` is ``gait.…`` in ``--set`` and in ``[provenance]``."""
@@ -103,8 +104,9 @@ def _entry(name: str, value: object) -> list[str]:
         return [f".. auto{kind}:: {name}", "   :members:"]
     if inspect.isroutine(value):
         return [f".. autofunction:: {name}"]
-    words = _words_of(name, value)
-    return [f".. data:: {name}", *([""] if words else []), *(f"   {line}" for line in words)]
+    shown = repr(value)
+    lines = [f".. data:: {name}", *([f"   :value: {shown}"] if len(shown) < _SHORT else [])]
+    return [*lines, "", *(f"   {line}" for line in _words_of(name, value))]
 
 
 def _words_of(name: str, value: object) -> Sequence[str]:
