@@ -14,6 +14,7 @@ from chilopod import stability, units
 from chilopod.analysis.parameters import K1, stiffness
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import ReadOnlyArrays, read_only
+from chilopod.notebook import block, table, words
 from chilopod.planar import PlanarModel
 from chilopod.robot import Robot
 from chilopod.stability import Kind
@@ -71,6 +72,17 @@ class StraightWalk(ReadOnlyArrays):
             ],
         }
 
+    def _repr_html_(self) -> str:
+        rows = [
+            (f"{modulus:.6f}", f"{exponent.real:.5g}", f"{abs(exponent.imag):.5g}")
+            for modulus, exponent in zip(self.moduli, self.exponents.values, strict=True)
+        ]
+        return block(
+            f"{self.robot.name}: the straight walk is {'stable' if self.stable else 'unstable'}",
+            words(f"The largest multipliers of {len(rows)}; the walk is stable if all are smaller than 1 in size."),
+            table(("size of the multiplier", "grows by (1/s)", "turns by (rad/s)"), rows, most=6),
+        )
+
 
 @dataclass(frozen=True)
 class WalkBifurcation(ReadOnlyArrays):
@@ -120,6 +132,23 @@ class WalkBifurcation(ReadOnlyArrays):
             "criticality": None if point.criticality is None else point.criticality.label,
             "coefficient": self.coefficient,
         }
+
+    def _repr_html_(self) -> str:
+        point, unit = self.point, self.unit.replace("*", "·")
+        said = [f"{point.kind.sentence}."]
+        if point.criticality is not None:
+            said.append(f"{point.criticality.label}: {point.criticality.sentence}.")
+        if self.coefficient is not None:
+            said.append(f"Cubic coefficient of the normal form: {self.coefficient:.5g} /rad².")
+        if point.frequency:
+            said.append(f"The mode turns at {point.frequency:.5g} rad/s.")
+        mode = self.joint_components
+        joints = enumerate((f"{each:.3g}" for each in (mode.real if _is_real(mode) else mode)), start=1)
+        return block(
+            f"{point.kind.label} at {self.parameter} = {self.value:.10g} {unit} (± {self.error_bound:.1e})",
+            words(" ".join(each[0].upper() + each[1:] for each in said)),
+            table(("joint, front to rear", "angle in the critical mode"), joints),
+        )
 
 
 def straight_walk(robot: Robot) -> StraightWalk:
@@ -271,6 +300,10 @@ def _pairs(values: ComplexArray) -> list[list[float]]:
 
 
 def _numbers(values: ComplexArray) -> list[float] | list[list[float]]:
-    if np.abs(values.imag).max() < 1e-9:
+    if _is_real(values):
         return [float(value) for value in values.real]
     return _pairs(values)
+
+
+def _is_real(values: ComplexArray) -> bool:
+    return bool(np.abs(values.imag).max() < 1e-9)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from chilopod import units
 from chilopod.analysis.straight_walk import bifurcations
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.notebook import Line, Mark, block, plot, table
 from chilopod.planar import PlanarModel
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
@@ -72,6 +73,25 @@ class TransitionCurve:
                 for point in self.curve.special
             ],
         }
+
+    def _repr_html_(self) -> str:
+        heading = f"{self.curve.kind.label} in two parameters: {len(self.curve.points)} points"
+        axes = [f"{path} ({unit.replace('*', '·')})" for path, unit in zip(self.parameters, self.units, strict=True)]
+        special = [
+            (point.kind.label, self.shown(point.values), self.shown(point.error_bound)) for point in self.curve.special
+        ]
+        picture = plot(
+            [Line([(float(first), float(second)) for first, second in self.values])],
+            [Mark(float(place[0]), float(place[1])) for _, place, _ in special],
+            x=axes[0],
+            y=axes[1],
+            alt=heading,
+        )
+        rows = [
+            (kind, *(f"{value:.8g} ± {abs(error):.1e}" for value, error in zip(place, off, strict=True)))
+            for kind, place, off in special
+        ]
+        return block(heading, picture, table(("on it", *axes), rows) if rows else "")
 
 
 def family2(robot: Robot, parameters: tuple[str, str]) -> Callable[[float, float], PlanarModel]:

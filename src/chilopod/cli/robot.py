@@ -106,14 +106,7 @@ def show(robot: RobotArg, overrides: SetOption = None, as_json: JsonOption = Fal
             }
         )
         return
-    rows = [
-        (
-            path,
-            units.format(described.get(path), described.unit_of(path), digits=6),
-            described.provenance_of(path) or "",
-        )
-        for path in described.parameters()
-    ]
+    rows = described.listed()
     rows += [(name, units.format(value, unit, digits=6), "derived") for name, (value, unit) in derived.items()]
     widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
     typer.echo(described.name)

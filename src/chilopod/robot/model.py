@@ -9,6 +9,7 @@ from typing import Annotated, Any, Final, Self
 
 from pydantic import PlainValidator, model_validator
 
+from chilopod import units
 from chilopod.errors import ChilopodError, ParameterError, RobotFileError
 from chilopod.gait import Gait
 from chilopod.ground import Ground
@@ -275,6 +276,31 @@ class Robot(Description):
         """Return what is said about where a parameter comes from; a spring falls back on what is said of all."""
         found: str | None = self.provenance.get(path, self.provenance.get(path.partition("[")[0]))
         return found
+
+    def listed(self) -> list[tuple[str, str, str]]:
+        """Return path, quantity with its unit, and origin (or nothing) of every number of this robot."""
+        return [
+            (path, units.format(self.get(path), self.unit_of(path), digits=6), self.provenance_of(path) or "")
+            for path in self.parameters()
+        ]
+
+    def _repr_svg_(self) -> str:
+        # Only notebooks draw: others need not load what that takes.
+        from chilopod.robot.schematic import schematic
+
+        return schematic(self.body, self.springs, self.legs, self.gait, self.name)
+
+    def _repr_html_(self) -> str:
+        from chilopod.notebook import block, folded, table, words
+
+        body, gait = self.body, self.gait
+        said = (
+            f"{body.modules} modules, {body.length:g} m, {body.mass:g} kg; walks straight at {gait.speed:.4g} m/s, "
+            f"{gait.period:g} s a step; {'planar only' if self.twin is None else 'planar and in three dimensions'}. "
+            "From above, to the right; springs in N·mm/deg, feet filled where they stand at time 0."
+        )
+        numbers = table(("number", "value", "from"), self.listed(), most=200)
+        return block(self.name, self._repr_svg_(), words(said), folded("all numbers", numbers))
 
     def to_toml(self) -> str:
         """Write this robot as the text of a robot file; reading it gives an equal robot, to the last bit."""

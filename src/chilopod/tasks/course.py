@@ -14,6 +14,7 @@ import xarray as xr
 from chilopod.engine import Controller, engine_named
 from chilopod.engine.named import check_controller, path_of
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.notebook import block, table, words
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import (
@@ -29,6 +30,7 @@ from chilopod.steering import (
     steered,
 )
 from chilopod.tasks.radius_law import radius_law
+from chilopod.tasks.shown import paths
 from chilopod.tasks.walk import check_repeats, foot_creep, repeated
 from chilopod.trials import NONE, Trial, check_fits, run
 
@@ -130,6 +132,25 @@ class Driven:
             "walks": [_walk_json(*each) for each in zip(self.trials, self.records, strict=True)],
             "foot_creep_N_s_m": self.foot_creep,
         }
+
+    def _repr_html_(self) -> str:
+        goals = self.record.sizes["goal"]
+        rows = []
+        for trial, record in zip(self.trials, self.records, strict=True):
+            ends = record.goal_end.values
+            rows.append(
+                (
+                    "-" if trial.disturbance == NONE else trial.seed,
+                    f"{int((record.goal_verdict == Verdict.ARRIVED.label).sum())} of {goals}",
+                    f"{np.nanmax(ends):.1f}" if np.isfinite(ends).any() else "-",
+                )
+            )
+        return block(
+            f"{self.robot.name}, {self.engine}: a course of {goals} targets by {self.strategy.name}",
+            paths(self.record),
+            *(words(remark) for remark in self.driver.remarks),
+            table(("seed", "targets reached", "after (s)"), rows),
+        )
 
 
 def _walk_json(trial: Trial, record: xr.Dataset) -> dict[str, Any]:

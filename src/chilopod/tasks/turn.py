@@ -11,15 +11,18 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from chilopod import units
 from chilopod.analysis.parameters import K1
 from chilopod.engine import Controller, engine_named
 from chilopod.engine.named import check_controller, path_of
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.notebook import block, table, words
 from chilopod.progress import Progress, silent
 from chilopod.record import LONGEST, in_range
 from chilopod.robot import Robot
 from chilopod.steering import Criteria, Strategy, Target, earliest_arrival, evaluate, steered
 from chilopod.tasks.radius_law import radius_law
+from chilopod.tasks.shown import paths
 from chilopod.tasks.walk import check_repeats, foot_creep, repeated
 from chilopod.trials import NONE, Trial, check_fits, run, straight, together
 
@@ -104,6 +107,23 @@ class Turn:
             ],
             "foot_creep_N_s_m": self.foot_creep,
         }
+
+    def _repr_html_(self) -> str:
+        said = f"The circle to it has a radius of {self.target.radius:.3g} m."
+        for name, spring in (("settles on it", self.by_law), ("was walked with", self.stiffness)):
+            if spring is not None:
+                said += f" The spring that {name}: {units.from_si(spring, 'N*mm/deg'):.4g} N·mm/deg."
+        found = self.criteria
+        rows = [
+            (outcome.label, f"{arrival:.2f}" if np.isfinite(arrival) else "-", f"{nearest:.3f}")
+            for outcome, arrival, nearest in zip(found.outcome, found.arrival, found.nearest, strict=True)
+        ]
+        return block(
+            f"{self.robot.name}, {self.engine}: turn to {self.target} by {self.strategy.name}",
+            paths(self.record),
+            words(said),
+            table(("outcome", "arrival (s)", "nearest (m)"), rows),
+        )
 
 
 def turn(

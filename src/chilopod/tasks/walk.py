@@ -14,9 +14,11 @@ import xarray as xr
 from chilopod.engine import Controller, HasFootCreep, engine_named
 from chilopod.engine.named import path_of
 from chilopod.errors import ParameterError
+from chilopod.notebook import block, table
 from chilopod.progress import Progress, silent
 from chilopod.record import RATE
 from chilopod.robot import Robot
+from chilopod.tasks.shown import paths
 from chilopod.trials import NONE, Disturbance, Trial, WalkSummary, run, run_each, straight, summaries, together
 
 _MOST_BENT = 1.5  # rad; at a right angle modules run into each other
@@ -70,6 +72,28 @@ class Ends:
             "foot_creep_N_s_m": self.foot_creep,
         }
 
+    def _repr_html_(self) -> str:
+        return block(self._heading, self._table)
+
+    @property
+    def _heading(self) -> str:
+        first, count = self.first, len(self.trials)
+        return f"{first.robot.name}, {first.engine}: {count} walk{'s' if count > 1 else ''} of {first.duration:g} s"
+
+    @property
+    def _table(self) -> str:
+        rows = [
+            (
+                trial.seed if self.seeded else "-",
+                end.sentence,
+                f"{end.x:.3f}",
+                f"{end.y:.3f}",
+                f"{end.axis_radius:.4g}" if np.isfinite(end.axis_radius) else "straight",
+            )
+            for trial, end in zip(self.trials, self.summaries, strict=True)
+        ]
+        return table(("seed", "", "x (m)", "y (m)", "radius (m)"), rows)
+
 
 @dataclass(frozen=True)
 class Walks(Ends):
@@ -84,6 +108,9 @@ class Walks(Ends):
     """
 
     record: xr.Dataset
+
+    def _repr_html_(self) -> str:
+        return block(self._heading, paths(self.record), self._table)
 
 
 def walk(

@@ -20,13 +20,11 @@ from chilopod.report.kit import style
 from chilopod.report.scene.encoder import has_encoder
 from chilopod.report.scene.film import FASTEST, filmed
 from chilopod.report.scene.frames import body_frames
-from chilopod.report.scene.replay import replay
-from chilopod.report.scene.replay_3d import replay_3d
+from chilopod.report.scene.played import SHOWN, replay
 from chilopod.steering import ARRIVAL_RADIUS, Verdict
 from chilopod.tasks.course import Driven
 
 _LAYOUTS = (style.Layout("AB;AC", 4.6, widths=(1.5, 1.0)), style.Layout("A;B;C", 9.0, heights=(2.0, 1.0, 1.0)))
-_SHOWN = 6  # walks in a replay or a film
 _LONGEST_FILM = 15.0  # s: it takes half as long to make
 _FILM_SIZE = (960, 640)
 _ON_WHITE = {"fc": "white", "ec": "none", "pad": 0.4}
@@ -73,11 +71,10 @@ def _files(done: Driven, folder: str | Path) -> Iterator[tuple[Path, Content]]:
         drawn = draw(done)
         files = (pixels, style.png(drawn)), (vector, style.svg(drawn, "course"))
     yield from files
-    shown = done.record.isel(robot=slice(_SHOWN))
+    shown = done.record.isel(robot=slice(SHOWN))
     count = done.record.sizes["robot"]
     labels = [f"walk {i + 1}" if count > 1 else done.strategy.name for i in range(len(shown.robot))]
-    page_of = replay_3d if "pose" in shown else replay
-    yield page, page_of(shown, titles=labels, heading=_title(done))
+    yield page, replay(shown, titles=labels, heading=_title(done)).html
     for file in film:
         # As many times faster as makes it short; from above all of a course is seen.
         seconds = float(shown.time[-1] - shown.time[0])

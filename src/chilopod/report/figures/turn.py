@@ -16,14 +16,12 @@ from chilopod.netcdf import netcdf
 from chilopod.output import Content, write_all
 from chilopod.report.kit import style
 from chilopod.report.scene.frames import body_frames
-from chilopod.report.scene.replay import replay
-from chilopod.report.scene.replay_3d import replay_3d
+from chilopod.report.scene.played import SHOWN, replay
 from chilopod.steering import ARRIVAL_RADIUS
 from chilopod.tasks import Turn
 
 _LAYOUTS = (style.Layout("AB;AC", 4.6, widths=(1.5, 1.0)), style.Layout("A;B;C", 9.0, heights=(2.0, 1.0, 1.0)))
 _STILLS = 5
-_SHOWN = 6  # walks in a replay
 
 
 def files_of_turn(folder: str | Path) -> list[Path]:
@@ -64,12 +62,11 @@ def _files(done: Turn, folder: str | Path) -> Iterator[tuple[Path, Content]]:
         drawn = draw(done)
         files = (pixels, style.png(drawn)), (vector, style.svg(drawn, "turn"))
     yield from files
-    shown = done.record.isel(robot=slice(_SHOWN))
+    shown = done.record.isel(robot=slice(SHOWN))
     labels = [
         f"walk {i + 1}" if done.record.sizes["robot"] > 1 else done.strategy.name for i in range(len(shown.robot))
     ]
-    page_of = replay_3d if "pose" in shown else replay
-    yield page, page_of(shown, titles=labels, heading=_title(done))
+    yield page, replay(shown, titles=labels, heading=_title(done)).html
 
 
 def draw(done: Turn, narrow: bool = False) -> Figure:

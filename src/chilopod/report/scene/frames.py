@@ -88,7 +88,7 @@ def body_frames(record: xr.Dataset, times: ArrayLike | None = None) -> BodyFrame
     ParameterError
         If the record does not go with its robot.
     """
-    robot = _robot(record)
+    robot = robot_of(record)
     recorded = record["time"].values.astype(np.float64)
     time = recorded if times is None else np.asarray(times, dtype=np.float64)
     position, heading, angles, leg_yaw = (
@@ -111,7 +111,14 @@ def body_frames(record: xr.Dataset, times: ArrayLike | None = None) -> BodyFrame
     return BodyFrames(robot, time, spine[rows], centres[rows], headings[rows], feet[rows], standing, walks)
 
 
-def _robot(record: xr.Dataset) -> Robot:
+def robot_of(record: xr.Dataset) -> Robot:
+    """The robot that a record says it is of.
+
+    Raises
+    ------
+    ParameterError
+        If it says nothing, or has other joints.
+    """
     if "robot" not in record.attrs:
         raise ParameterError("has no robot", field="record", allowed="the text of a robot file in attrs['robot']")
     robot = Robot.from_toml(record.attrs["robot"])

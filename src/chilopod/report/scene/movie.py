@@ -7,14 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from chilopod.errors import OutputError
-from chilopod.output import write_atomic
 from chilopod.paper.movies import Movie
 from chilopod.report.kit.page import Film
 from chilopod.report.scene.encoder import has_encoder
 from chilopod.report.scene.film import movie
 from chilopod.report.scene.film_3d import film_3d, stills
-from chilopod.report.scene.replay import replay
-from chilopod.report.scene.replay_3d import replay_3d
+from chilopod.report.scene.played import replay
 
 
 def write_movie(shown: Movie, folder: Path) -> Film:
@@ -27,8 +25,7 @@ def write_movie(shown: Movie, folder: Path) -> Film:
         If the folder cannot be written.
     """
     solid = "pose" in shown.record
-    page_of = replay_3d if solid else replay
-    write_atomic(folder / f"{shown.name}.html", page_of(shown.record, titles=shown.titles, heading=shown.heading))
+    replay(shown.record, titles=shown.titles, heading=shown.heading).write(folder / f"{shown.name}.html", replace=True)
     look: dict[str, Any] = {"titles": shown.titles, "heading": shown.heading, "speed": shown.speed}
     file, encoded = folder / f"{shown.name}.mp4", has_encoder()
     if encoded and not (solid and _rendered(lambda: film_3d(shown.record, file, **look))):
