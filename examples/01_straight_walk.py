@@ -37,7 +37,7 @@ point
 # %%
 # The whole picture: the three largest multipliers over the spring. One of them leaves the unit circle.
 
-springs = np.linspace(6.0, 30.0, 49)  # N·mm/deg
+springs = np.linspace(6.0, 30.0, 33)  # N·mm/deg
 largest = [straight_walk(robot.override("springs.stiffness[0]", f"{spring} N*mm/deg")).moduli[:3] for spring in springs]
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), width_ratios=[1.7, 1], layout="constrained")

@@ -1,5 +1,7 @@
 """Curves in the plane of two parameters on which the straight walk changes."""
 
+from xml.etree import ElementTree
+
 import numpy as np
 import pytest
 
@@ -32,6 +34,10 @@ def test_pitchfork_turns_along_its_curve():
     np.testing.assert_allclose(point.values[0], np.mean([each.point.value for each in beside]), rtol=1e-6)
     for each, walk in zip(found.curve.points, found.as_json()["points"], strict=True):
         assert walk["values"][1] == pytest.approx(found.shown(each.values)[1])
+    shown = ElementTree.fromstring(found._repr_html_())
+    cells = [cell.text for row in shown.iter("tr") for cell in row]
+    assert cells[:4] == ["on it", "springs.stiffness[0] (N·mm/deg)", "legs.forward_offset (m)", "degenerate pitchfork"]
+    assert float(cells[5].split(" ± ")[0]) == pytest.approx(point.values[1])
 
 
 def test_oscillation_of_all_springs_together():
