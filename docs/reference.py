@@ -75,11 +75,15 @@ def _is_own(name: str, value: object, module: str) -> bool:
 
 def public_name(target: str) -> str | None:
     """How a dotted name is called where it is described; itself where it is not, None if there is no such thing."""
+    described = homes()
+    if "." not in target:
+        inner = [each for name, each in sys.modules.items() if name.startswith("chilopod.") and target in vars(each)]
+        return public_name(f"{inner[0].__name__}.{target}") if inner else None
     try:
         found = pkgutil.resolve_name(target)
     except (AttributeError, ImportError, ValueError):
         return None
-    home = homes().get(id(found))
+    home = described.get(id(found))
     return f"{home}.{target.rpartition('.')[2]}" if home else target
 
 
@@ -158,8 +162,18 @@ def robot_keys_page() -> str:
 def attributes(model: type[Description]) -> dict[str, str]:
     """What the docstring of a part of the robot says of each of its fields."""
     _, _, section = inspect.cleandoc(model.__doc__ or "").partition("Attributes\n----------\n")
-    told = re.findall(r"^(\w[\w, ]*)\n((?:    .*\n?)+)", section.partition("\n\n")[0] + "\n", re.MULTILINE)
-    return {name: " ".join(text.split()) for names, text in told for name in names.split(", ")}
+    told = re.findall(r"^(\w+)\n((?:    .*\n)+)", apart(section.partition("\n\n")[0] + "\n"), re.MULTILINE)
+    return {name: " ".join(text.split()) for name, text in told}
+
+
+def apart(docstring: str) -> str:
+    """A docstring in which fields that are told of together, ``stance, swing``, are told of one after the other."""
+    return re.sub(
+        r"^(\w+(?:, \w+)+)\n((?:    .*\n)+)",
+        lambda told: "".join(f"{name}\n{told[2]}" for name in told[1].split(", ")),
+        docstring,
+        flags=re.MULTILINE,
+    )
 
 
 def _facts(quantity: Quantity) -> Iterator[str]:
