@@ -46,6 +46,7 @@ nitpick_ignore_regex = [
 ]
 
 myst_heading_anchors = 4
+smartquotes = False  # --set and "60 s" are typed as they are shown
 
 # Types stand in annotations; Napoleon, which comes with Sphinx, joins them to what the docstrings say.
 autodoc_typehints = "description"

@@ -13,7 +13,9 @@ from chilopod.robot.parameters import QUANTITIES
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT / "docs"))
-check, reference, renew = (importlib.import_module(name) for name in ("check", "reference", "renew"))
+check, conf, extension, reference, renew = map(
+    importlib.import_module, ("check", "conf", "extension", "reference", "renew")
+)
 PAGES = (*renew.PAGES, ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", ROOT / "benchmarks" / "README.md")
 
 
@@ -70,12 +72,31 @@ def test_every_number_of_a_robot_is_in_the_reference():
     assert "3 cm (paper, section Robot: distance between AEP and PEP)" in gait
 
 
-def test_the_python_reference_describes_each_export_once():
-    assert "chilopod.stability" in reference.packages()
-    some = ("chilopod", "chilopod.robot", "chilopod.stability")
+def test_the_python_reference_describes_each_export_once(monkeypatch):
+    some = ["chilopod", "chilopod.robot", "chilopod.stability"]
+    monkeypatch.setattr(reference, "packages", lambda: some)
+    monkeypatch.setattr(reference, "homes", reference.homes.__wrapped__)
     pages = "".join(map(reference.api_page, some))
     described = re.findall(r"^\.\. (?:auto(?:class|exception|function)|data):: (\w+)$", pages, re.MULTILINE)
     assert sorted(described) == sorted({name for package in some for name in reference.exports(package)})
-    assert reference.public_name("chilopod.tasks.walk.foot_creep") == "chilopod.tasks.foot_creep"
-    assert reference.public_name("chilopod.planar.dynamics") == "chilopod.planar.dynamics"
-    assert reference.public_name("chilopod.planar.nothing") is None
+    assert reference.public_name("chilopod.robot.model.load_robot") == "chilopod.robot.load_robot"
+    assert reference.public_name("chilopod.robot.inertia") == "chilopod.robot.inertia"
+    assert reference.public_name("chilopod.robot.nothing") is None
+
+
+def test_every_page_is_in_the_table_of_contents():
+    index = ROOT / f"{conf.root_doc}.md"
+    listed = re.findall(
+        r"^[\w./-]+$", "".join(re.findall(r"^```{toctree}(.*?)^```", index.read_text(), re.M | re.S)), re.M
+    )
+    found = {(index.parent / f"{name}.md").resolve() for name in listed}
+    assert {page for page in PAGES if page.name != "README.md" or page.parent.name == "benchmarks"} <= found | {index}
+
+
+def test_what_stands_in_docstrings_is_no_markup():
+    lines = ["Of ``*a`` and |theta|, (x, *args).", "", "Attributes", "----------", "stance, swing", "    Of both, s."]
+    extension.docstring(None, "class", "x", None, None, lines)
+    assert lines[0] == r"Of ``*a`` and \|theta\|, (x, \*args)."
+    assert lines[4:] == ["stance", "    Of both, s.", "swing", "    Of both, s."]
+    types = "~collections.abc.Mapping[str, ~numpy.typing.Any | chilopod.robot.Robot]"
+    assert extension.without_modules(types) == "Mapping[str, Any | chilopod.robot.Robot]"
