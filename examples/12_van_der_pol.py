@@ -28,7 +28,6 @@ def family(mu):
 
 found = multipliers(family(1.0), [2.0, 0.0])
 print(f"period {found.period:.12f}, multiplier {found.values[0].real:.12f} ± {found.error_bound:.0e}")
-found
 
 # %%
 # From a sine to a relaxation oscillation
@@ -37,7 +36,6 @@ found
 # jumps.
 
 branch = follow(family, begin(family, 0.1, [2.0, 0.0]), (0.1, 5.0))
-branch
 
 # %%
 # The multiplier soon is too small to be told from zero. Its logarithm over the period, the Floquet exponent, is not:
