@@ -16,6 +16,7 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 ROOT = Path(__file__).resolve().parent.parent
+PAGES = (*ROOT.glob("*.md"), *sorted((ROOT / "docs").rglob("*.md")), ROOT / "benchmarks" / "README.md")
 LONG = 20.0
 """What an example may take, s."""
 
@@ -104,7 +105,7 @@ def faults(site: Path) -> Iterator[str]:
 
 def main(site: Path) -> int:
     """Check a built site; 1 where something is wrong."""
-    wrong = list(faults(site.resolve()))
+    wrong = [*faults(site.resolve()), *(fault for page in PAGES for fault in broken_links(page))]
     print(*wrong, sep="\n", end="\n" if wrong else "")
     for path in sorted((ROOT / "docs" / "gallery").rglob("*.cost.json")):
         taken = json.loads(path.read_text(encoding="utf-8"))["time"]

@@ -21,6 +21,7 @@ from sphinx.environment import BuildEnvironment
 from sphinx.util.typing import stringify_annotation
 from sphinx.writers.html5 import HTML5Translator
 
+EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 _LITERAL = re.compile(r"(``.*?``|`.*?`)")
 
 
@@ -73,6 +74,13 @@ def source_of(app: Sphinx, module: str, name: str) -> str | None:
     return None if found is None or isinstance(found, type) or inspect.isroutine(found) else module
 
 
+def lead_to_gallery(app: Sphinx, page: nodes.document) -> None:
+    """A link to the folder of examples leads to what the site makes of them."""
+    for node in page.findall(pending_xref):
+        if (Path(app.srcdir, node["refdoc"]).parent / node["reftarget"]).resolve() == EXAMPLES:
+            node.attributes.update(refdomain="doc", reftarget="docs/gallery/index", reftargetid=None)
+
+
 def resolve(app: Sphinx, env: BuildEnvironment, node: pending_xref, content: nodes.TextElement) -> nodes.Element | None:
     """Lead a name from within the packages to where it is exported; what is not exported is text, no mistake."""
     public = reference.public_name(node["reftarget"]) if node.get("refdomain") == "py" else None
@@ -100,5 +108,6 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("object-description-transform", short_types, priority=900)  # behind autodoc
     next(each for each in PyObject.doc_field_types if each.name == "variable").label = "Attributes"
     app.connect("viewcode-follow-imported", source_of)
+    app.connect("doctree-read", lead_to_gallery)
     app.connect("missing-reference", resolve)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
