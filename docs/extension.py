@@ -76,8 +76,9 @@ def source_of(app: Sphinx, module: str, name: str) -> str | None:
 
 def lead_to_gallery(app: Sphinx, page: nodes.document) -> None:
     """A link to the folder of examples leads to what the site makes of them."""
+    folder = app.env.doc2path(app.env.docname).parent
     for node in page.findall(pending_xref):
-        if (Path(app.srcdir, node["refdoc"]).parent / node["reftarget"]).resolve() == EXAMPLES:
+        if node["reftype"] == "myst" and (folder / node["reftarget"]).resolve() == EXAMPLES:
             node.attributes.update(refdomain="doc", reftarget="docs/gallery/index", reftargetid=None)
 
 

@@ -105,7 +105,7 @@ def api_page(package: str) -> str:
 def _entry(name: str, value: object) -> list[str]:
     if isinstance(value, type):
         kind = "exception" if issubclass(value, BaseException) else "class"
-        return [f".. auto{kind}:: {name}", "   :members:"]
+        return [f".. auto{kind}:: {name}", "   :members:", "   :exclude-members: model_config"]  # that of pydantic
     if inspect.isroutine(value):
         return [f".. autofunction:: {name}"]
     shown = repr(value)
