@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 
 from chilopod import load_robot, units
+from chilopod.report import replay
 from chilopod.steering import ARRIVAL_RADIUS, Target, strategy_named
 from chilopod.tasks import turn
 from chilopod.twin import TwinModel
@@ -23,6 +24,11 @@ spring = units.parse("21 N*mm/deg", "N*m/rad")
 done = turn(robot, target, strategy_named("pitchfork"), spring, duration=24.0, seed=1, engine="twin")
 print(f"{done.criteria.outcome[0].label} after {done.criteria.arrival[0]:.1f} s; the paper's robot took 23 s at least")
 done
+
+# %%
+# The walk plays where it is: drag to turn it, wheel to zoom.
+
+replay(done.record)
 
 # %%
 # The record has the positions of all joints, so MuJoCo can put the bodies where they were.
