@@ -28,6 +28,7 @@ def family(force):
 
 (point,) = locate(family, between=(2.3, 2.5), orbit=[1.9, 0.6])
 print(f"{point.criticality.label} {point.kind.label} at F = {point.value:.12f} ± {point.error_bound:.0e}")
+point
 
 # %%
 # What then
@@ -39,6 +40,7 @@ symmetric = follow(family, begin(family, 2.3, [1.9, 0.6], symmetric=True), betwe
 lopsided = [follow(family, start, between) for start in switch(family, point)]
 for each in (symmetric, *lopsided):
     print(f"{len(each.points)} points to F = {each.points[-1].value:g}, stable there: {each.points[-1].stable}")
+lopsided[0]
 
 # %%
 # A motion is drawn by where x is at time 0; solid where it lasts, dotted where it does not.

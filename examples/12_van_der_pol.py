@@ -36,6 +36,7 @@ print(f"period {found.period:.12f}, multiplier {found.values[0].real:.12f} ± {f
 # jumps.
 
 branch = follow(family, begin(family, 0.1, [2.0, 0.0]), (0.1, 5.0))
+branch
 
 # %%
 # The multiplier soon is too small to be told from zero. Its logarithm over the period, the Floquet exponent, is not:

@@ -44,6 +44,7 @@ between = (3.3e-3, 4.6e-3)  # m
 q = (1.0 - KEPT) / (1.0 + KEPT)
 exact = GRAVITY / RATE**2 * np.hypot(np.pi * q, 1.0 + q**2)
 print(f"{doubling.kind.label} at {1e3 * doubling.value:.12f} mm, in closed form {1e3 * exact:.12f} mm")
+doubling
 
 # %%
 # And it doubles again. Each branch is followed through the point where it loses its stability and the next one begins.

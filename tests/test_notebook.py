@@ -9,6 +9,7 @@ import pytest
 from chilopod import load_robot
 from chilopod.analysis import pitchfork, straight_walk
 from chilopod.notebook import Line, Mark, block, folded, plot, table, words
+from chilopod.stability import PeriodicSystem, begin, follow, follow2, from_rhs, locate
 from chilopod.steering import Target, course_named, strategy_named
 from chilopod.tasks import Driver, drive, ends, planned, turn, walk
 
@@ -113,6 +114,48 @@ def test_point():
     assert "pitchfork at springs.stiffness[0] = 11.99142966 N·mm/deg" in said(html)
     assert "Supercritical: " in said(html)
     assert [float(row[1]) for row in cells(html)[1:]] == pytest.approx(point.joint_components.real, abs=1e-3)
+
+
+def duffing(force):
+    return from_rhs(
+        lambda t, x, force: [x[1], force * np.cos(t) - 0.2 * x[1] - x[0] ** 3],
+        2,
+        2.0 * np.pi,
+        args=(force,),
+        symmetry=-np.eye(2),
+    )
+
+
+def test_any_systems_points_and_branch():
+    found = locate(duffing, (2.3, 2.5), orbit=[1.9, 0.6])
+    assert cells(found._repr_html_())[1] == [
+        "pitchfork",
+        "2.40337711606",
+        f"{found[0].error_bound:.1e}",
+        "supercritical",
+    ]
+    assert "pitchfork at 2.40337711606" in said(found[0]._repr_html_())
+    branch = follow(duffing, begin(duffing, 2.35, [1.9, 0.6], symmetric=True), (2.35, 2.45), symmetric=True)
+    drawing = read(branch._repr_html_()).find(f"{SVG}svg")
+    whole, stable = ways(drawing)
+    assert len(whole) == len(branch.points)
+    assert stable == whole[: len(stable)]
+    (mark,) = drawing.iter(f"{SVG}circle")
+    assert (float(mark.get("cx")), float(mark.get("cy"))) == stable[-1]
+
+
+def henon(a, b):
+    def image(x):
+        return np.array([1 - a * x[0] ** 2 + x[1], b * x[0]]), np.array([[-2 * a * x[0], 1], [b, 0]])
+
+    return PeriodicSystem(2, 1.0, lambda x, t0, t1: image(x), flow_with_error=lambda x, t0, t1: (*image(x), 1e-15))
+
+
+def test_any_systems_curve():
+    (doubling,) = locate(lambda a: henon(a, 0.3), (0.1, 0.8), orbit=[0.8, 0.24])
+    html = follow2(henon, doubling, ((0.05, 5.0), (-1.4, 0.7)), second=0.3)._repr_html_()
+    assert cells(html)[1][0] == "1:2 resonance"
+    assert "period doubling in two parameters" in said(html)
 
 
 def test_walks():

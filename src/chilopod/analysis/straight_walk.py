@@ -135,9 +135,7 @@ class WalkBifurcation(ReadOnlyArrays):
 
     def _repr_html_(self) -> str:
         point, unit = self.point, self.unit.replace("*", "·")
-        said = [f"{point.kind.sentence}."]
-        if point.criticality is not None:
-            said.append(f"{point.criticality.label}: {point.criticality.sentence}.")
+        said = [point.sentences]
         if self.coefficient is not None:
             said.append(f"Cubic coefficient of the normal form: {self.coefficient:.5g} /rad².")
         if point.frequency:
@@ -146,7 +144,7 @@ class WalkBifurcation(ReadOnlyArrays):
         joints = enumerate((f"{each:.3g}" for each in (mode.real if _is_real(mode) else mode)), start=1)
         return block(
             f"{point.kind.label} at {self.parameter} = {self.value:.10g} {unit} (± {self.error_bound:.1e})",
-            words(" ".join(each[0].upper() + each[1:] for each in said)),
+            words(" ".join(said)),
             table(("joint, front to rear", "angle in the critical mode"), joints),
         )
 

@@ -392,5 +392,8 @@ class PlanarWalk:
             stretch.walk_alone(free[0], *when, self._stiffness, *what)
         elif free.size:
             stretch.walk(free, *when, self._stiffness, *what)
-        if driven.size:
-            stretch.drive(driven, begins, *when, told.profile, told.lag, told.joint_torque, *what)
+        pushed = (begins, *when, told.profile, told.lag, told.joint_torque)
+        if driven.size == 1:
+            stretch.drive_alone(driven[0], *pushed, *what)
+        elif driven.size:
+            stretch.drive(driven, *pushed, *what)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.notebook import block, table, words
 from chilopod.stability.asked import Asking
 from chilopod.stability.branches.fold import Fold
 from chilopod.stability.capabilities import Family
@@ -81,6 +82,22 @@ class Located(Sequence[BifurcationPoint]):
 
     def __iter__(self) -> Iterator[BifurcationPoint]:
         return iter(self.points)
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (
+                point.kind.label,
+                f"{point.value:.12g}",
+                f"{point.error_bound:.1e}",
+                point.criticality.label if point.criticality else "",
+            )
+            for point in self.points
+        ]
+        return block(
+            f"{len(self.points)} bifurcation{'' if len(self.points) == 1 else 's'}: {self.status.sentence}",
+            *(words(remark) for remark in self.remarks),
+            table(("kind", "at", "±", ""), rows),
+        )
 
 
 def locate(

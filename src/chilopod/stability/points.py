@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.frozen import ReadOnlyArrays
+from chilopod.notebook import block, table, words
 from chilopod.stability.normal_forms.amplitude import Status
 from chilopod.stability.normal_forms.normal_form import NormalForm
 from chilopod.stability.symmetry.equivariants import SymmetricCrossing
@@ -52,6 +53,7 @@ class Criticality(enum.Enum):
 
 
 _CLEAR = 3.0  # of its error, for a quadratic coefficient that makes a crossing of two orbits
+_REAL = 1e-9  # imaginary part up to which a mode is shown as a real one
 _NEGLIGIBLE = 0.3  # of the cubic term at the sampled amplitude: what the error of the quadratic one may leave open
 
 
@@ -135,6 +137,34 @@ class BifurcationPoint(ReadOnlyArrays):
     multiplicity: int = 1
     modes: NDArray[np.complex128] | None = None
     symmetry: SymmetricCrossing | None = None
+
+    @property
+    def sentences(self) -> str:
+        """What happens here and which way the new orbits go, in words."""
+        said = [f"{self.kind.sentence}."]
+        if self.criticality is not None:
+            said.append(f"{self.criticality.label}: {self.criticality.sentence}.")
+        if self.multiplicity > 1:
+            said.append(f"{self.multiplicity} multipliers are critical at once.")
+        return " ".join(each[0].upper() + each[1:] for each in said)
+
+    def _repr_html_(self) -> str:
+        rows = [("multiplier of the return map", f"{self.multiplier:.6g}"), ("period", f"{self.period:.10g}")]
+        if self.frequency:
+            rows.append(("frequency of the mode (1/s)", f"{self.frequency:.10g}"))
+        if self.coefficient is not None:
+            rows.append(("cubic coefficient", f"{self.coefficient:.6g} ± {self.coefficient_error:.1e}"))
+        real = np.abs(self.mode.imag).max() < _REAL
+        mode = (
+            (f"{x:.6g}", f"{share:.4g}")
+            for x, share in zip(self.orbit, self.mode.real if real else self.mode, strict=True)
+        )
+        return block(
+            f"{self.kind.label} at {self.value:.12g} (± {self.error_bound:.1e})",
+            words(self.sentences),
+            table(("", ""), rows),
+            table(("orbit at time 0", "critical mode"), mode),
+        )
 
 
 def with_coefficients(point: BifurcationPoint, form: NormalForm) -> BifurcationPoint:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
+from chilopod.notebook import Line, Mark, block, plot, table, words
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, Step
 from chilopod.stability.branches.branch_starts import IN_FOLD, Start, anchored, begin, branch_sizes, switch
 from chilopod.stability.branches.closure import closes
@@ -111,6 +112,40 @@ class Branch:
     def special_points(self) -> tuple[BranchPoint, ...]:
         """Folds and secondary bifurcations."""
         return tuple(point for point in self.points if point.special is not None)
+
+    def _repr_html_(self) -> str:
+        heading = f"a branch of {len(self.points)} points"
+        # The state that moves most, in its size along the curve, tells the branch from others.
+        orbits = np.array([point.orbit for point in self.points])
+        state = int((np.ptp(orbits, axis=0) / self.sizes).argmax())
+        places = [(point.value, float(point.orbit[state])) for point in self.points]
+        # A special point ends the line of what is stable beside it.
+        lasts = [point.stable or point.special is not None for point in self.points]
+        stable = [place if last else (np.nan, np.nan) for place, last in zip(places, lasts, strict=True)]
+        special = [
+            (
+                point.special.label,
+                f"{point.value:.12g}",
+                f"{point.bifurcation.error_bound:.1e}" if point.bifurcation else "",
+            )
+            for point in self.points
+            if point.special is not None
+        ]
+        picture = plot(
+            [Line(places, dotted=True), Line(stable)],
+            [Mark(point.value, float(point.orbit[state])) for point in self.special_points],
+            x="parameter",
+            y=f"state {state} at time 0",
+            alt=f"{heading}, stable ones in a solid line",
+        )
+        said = f"Orbits of {self.periods} period{'s' if self.periods > 1 else ''}. Why it ends: {self.ending.sentence}."
+        return block(
+            heading,
+            picture,
+            words(f"{said} {self.reason}".strip()),
+            *(words(remark) for remark in self.remarks),
+            table(("on it", "at", "±"), special) if special else "",
+        )
 
 
 def follow(

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.frozen import ReadOnlyArrays
+from chilopod.notebook import Line, Mark, block, plot, table
 from chilopod.stability.codimension_two.codimension2 import Codimension2
 from chilopod.stability.points import Kind
 
@@ -97,3 +98,21 @@ class Curve2:
     def values(self) -> Array:
         """Of both parameters at all points, shape (points, 2)."""
         return np.array([point.values for point in self.points])
+
+    def _repr_html_(self) -> str:
+        heading = f"{self.kind.label} in two parameters: {len(self.points)} points"
+        picture = plot(
+            [Line([(float(first), float(second)) for first, second in self.values])],
+            [Mark(float(point.values[0]), float(point.values[1])) for point in self.special],
+            x="first parameter",
+            y="second parameter",
+            alt=heading,
+        )
+        special = [
+            (
+                point.kind.label,
+                *(f"{value:.10g} ± {off:.1e}" for value, off in zip(point.values, point.error_bound, strict=True)),
+            )
+            for point in self.special
+        ]
+        return block(heading, picture, table(("on it", "first", "second"), special) if special else "")
