@@ -1,7 +1,7 @@
 # Everything here needs only make and a Python from 3.11 to 3.13. Choose another with: make setup PYTHON=/path/to/python3
 # The environment lives in .venv and is reused until pyproject.toml or requirements.lock changes.
 .DEFAULT_GOAL := help
-.PHONY: help setup reproduce test run-tests torture lint types format docs package bench lock clean
+.PHONY: help setup reproduce test run-tests torture lint types format docs renew package bench lock clean
 .DELETE_ON_ERROR:
 
 VENV := .venv
@@ -84,9 +84,13 @@ format: $(DEV)  ## rewrite files in the project's style
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-docs: $(RUNTIME)  ## run what README and docs show; rewrites its output, numbers and pictures
-	$(BIN)/python docs/renew.py
-	$(BIN)/python docs/moving_picture.py
+docs: $(DEV)  ## build the documentation with its gallery, build/site/index.html, and check its links
+	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going -j $(JOBS) -c docs -d build/doctrees . build/site
+	$(BIN)/python docs/check.py build/site
+
+renew: $(RUNTIME)  ## run what README and docs show; rewrites its output, numbers and pictures; pages in ARGS=docs/turning.md
+	$(BIN)/python docs/renew.py $(ARGS)
+	$(if $(ARGS),,$(BIN)/python docs/moving_picture.py)
 
 package: $(DEV)  ## build what is handed out into dist, and try it in an empty environment; some minutes
 	rm -rf dist
@@ -123,5 +127,5 @@ lock:  ## renew both lock files from pyproject.toml
 
 clean:  ## remove the environment, caches and generated output
 	rm -rf $(VENV) $(VENV)-lock build dist report .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks \
-	  .import_linter_cache src/*.egg-info
+	  .import_linter_cache src/*.egg-info docs/gallery docs/reference
 	find src tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true
