@@ -31,7 +31,7 @@ WRITTEN = ("robot.xml", "turn/turn.html")
 EXTRAS = {
     "cluster": ('chilopod walk aoi2022-planar --duration "2 s" --seed 1 --repeats 2 --cluster 1', "2 walks"),
     "docs": ("python -m sphinx --version", "sphinx"),
-    "gym": ('python -c "import gymnasium, chilopod.gym; print(gymnasium.spec(\'chilopod/Turn-v0\').id)"', "Turn-v0"),
+    "gym": ("python -c \"import gymnasium, chilopod.gym; print(gymnasium.spec('chilopod/Turn-v0').id)\"", "Turn-v0"),
     "live": ('chilopod live --port 0 --duration "1 s"', "walks at http://localhost:"),
 }
 """For each extra what takes it, and a word of what it then prints."""
