@@ -260,8 +260,8 @@ class Live:
         if to is not None and to.client_id in clients:
             clients = {to.client_id: to}
         for client in clients.values():
-            client.send_file_download(f"{name}.nc", content)
-            client.send_file_download(f"{name}.html", page.encode())
+            client.send_file_download(f"{name}.nc", content, save_immediately=True)
+            client.send_file_download(f"{name}.html", page.encode(), save_immediately=True)
 
     # -- what browsers do in the picture; these only leave wishes
     # ---------------------------------------------------------------------------------------------------------------
