@@ -12,7 +12,7 @@ from chilopod.cli.options import EngineOption, SetOption, read_robot, reading
 
 
 def _strategies() -> list[str]:
-    from chilopod.live.session import STRATEGIES_HERE
+    from chilopod.live.state import STRATEGIES_HERE
 
     return [each.name for each in STRATEGIES_HERE]
 
@@ -62,11 +62,16 @@ def live(
     from chilopod.live import Live
 
     def keep(name: str, record: bytes, page: str) -> None:
+        from chilopod.errors import OutputError
         from chilopod.output import write_all
 
         assert out is not None
-        for path in write_all([(out / f"{name}.nc", record), (out / f"{name}.html", page)], replace=False):
-            typer.echo(f"wrote {path}", err=True)
+        try:
+            for path in write_all([(out / f"{name}.nc", record), (out / f"{name}.html", page)], replace=False):
+                typer.echo(f"wrote {path}", err=True)
+        except OutputError as error:
+            typer.echo(f"error: {error}", err=True)  # and the walk goes on
+            raise
 
     page = Live(
         described, engine, seed=seed, strategy=strategy, host=host, port=port, kept=keep if out is not None else None

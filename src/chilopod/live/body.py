@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.kinematics import directions, foot_places, from_modules, module_centres, module_headings
-from chilopod.live.session import Seen
+from chilopod.live.state import Seen
 
 Array = NDArray[np.float64]
 KINDS = ("box", "rod", "ball", "pin")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.live.body import Placed
-from chilopod.live.session import Seen
+from chilopod.live.state import Seen
 from chilopod.robot import Robot
 from chilopod.twin.model import POLE_GROUP, compiled, without_springs
 

@@ -13,7 +13,8 @@ import viser
 from chilopod import units
 from chilopod.analysis.parameters import PAPER_UNIT, stiffness
 from chilopod.live import wishes
-from chilopod.live.session import FRICTIONS, SPEEDS, STRATEGIES_HERE, STRIDES, Seen, Session, Settings
+from chilopod.live.session import Session
+from chilopod.live.state import FRICTIONS, SPEEDS, STRATEGIES_HERE, STRIDES, Seen, Settings
 
 _SOFTEST, _STIFFEST = 0.05, 1.5  # of the stiffest spring of the file
 _FACTOR = 1.1  # of a value, at a key

@@ -12,7 +12,7 @@ from viser import uplot
 
 from chilopod import units
 from chilopod.analysis.parameters import PAPER_UNIT
-from chilopod.live.session import Seen
+from chilopod.live.state import Seen
 from chilopod.live.theory import Theory
 from chilopod.live.words import radius_of
 from chilopod.report.kit.style import BLUE, CURVES, GREY, VERMILLION

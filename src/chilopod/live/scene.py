@@ -16,7 +16,7 @@ import viser
 from numpy.typing import NDArray
 
 from chilopod.live.body import KINDS, Placed
-from chilopod.live.session import Seen
+from chilopod.live.state import Seen
 from chilopod.report.kit.style import BLACK, BLUE, GREY, ORANGE, SKY, VERMILLION
 from chilopod.steering import ARRIVAL_RADIUS
 

@@ -14,7 +14,7 @@ from typing import Any
 import xarray as xr
 
 from chilopod.engine import engine_named
-from chilopod.errors import ParameterError, in_words
+from chilopod.errors import ChilopodError, ParameterError, in_words
 from chilopod.extras import needs
 from chilopod.live import wishes
 from chilopod.live.body import Body, FlatBody
@@ -55,6 +55,7 @@ class Live:
         At which; 0 for any that is free.
     kept
         Called with the name of a recording and its two files, netCDF and HTML, besides the download in the browser.
+        What it raises of :mod:`chilopod.errors` is shown at the page.
 
     Attributes
     ----------
@@ -92,6 +93,7 @@ class Live:
         self.seen = self._session.seen()
         self._body = _body(robot, engine)
         self._kept, self._recordings = kept, 0
+        self._handing_out: list[threading.Thread] = []
         self._theory = Theory()
         self._growth: Growth | None = None
         self._wants_record: viser.ClientHandle | None = None
@@ -152,6 +154,8 @@ class Live:
             self._thread.join()
             self._session.stop_recording()
             self._keep()
+            for each in self._handing_out:
+                each.join()
         self._beside.close()
         with _quiet():
             self._server.stop()
@@ -207,8 +211,7 @@ class Live:
                 self._plots.forget()
         said = session.said()
         for sentence in said:
-            for client in self._server.get_clients().values():
-                client.add_notification("chilopod", sentence, auto_close_seconds=8.0)
+            self._notify(sentence)
         if said or told:
             self._controls.put_back(session.settings)
         for answer in self._beside.answers():
@@ -218,6 +221,10 @@ class Live:
             else:
                 self._growth = answer
         return obeyed
+
+    def _notify(self, sentence: str) -> None:
+        for client in self._server.get_clients().values():
+            client.add_notification("chilopod", sentence, auto_close_seconds=8.0)
 
     def _ask(self, before: Robot | None = None) -> None:
         """Ask what is not known of the robot as it is now."""
@@ -250,12 +257,17 @@ class Live:
             self._recordings += 1
             name, to = f"chilopod-live-{self._recordings}", self._wants_record
             # Drawing a replay of minutes takes a moment, and the walk goes on.
-            threading.Thread(target=self._hand_out, args=(name, record, to), name=f"chilopod {name}").start()
+            thread = threading.Thread(target=self._hand_out, args=(name, record, to), name=name)
+            self._handing_out = [each for each in self._handing_out if each.is_alive()] + [thread]
+            thread.start()
 
     def _hand_out(self, name: str, record: xr.Dataset, to: viser.ClientHandle | None) -> None:
         content, page = netcdf(record), _replay(record)
         if self._kept is not None:
-            self._kept(name, content, page)
+            try:
+                self._kept(name, content, page)
+            except ChilopodError as error:
+                self._notify(str(error))
         clients = self._server.get_clients()
         if to is not None and to.client_id in clients:
             clients = {to.client_id: to}

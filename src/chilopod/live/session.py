@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
@@ -15,126 +15,36 @@ from chilopod.analysis.parameters import ALL
 from chilopod.engine import Command, Controller, Status, Walk, engine_named, steer
 from chilopod.errors import ChilopodError, ParameterError
 from chilopod.live import wishes
+from chilopod.live.state import (
+    FRICTIONS,
+    LEG_YAW,
+    SPEEDS,
+    STRIDES,
+    Seen,
+    Settings,
+    as_finite,
+    as_seed,
+    as_strategy,
+    as_within,
+)
 from chilopod.record import Recording
 from chilopod.robot import Robot
-from chilopod.steering import (
-    ACTUATED,
-    ARRIVAL_RADIUS,
-    STRATEGIES,
-    VARIABLE,
-    ActuatedAxis,
-    LegYawController,
-    RadiusLaw,
-    SpringLaw,
-    strategy_named,
-)
+from chilopod.steering import ARRIVAL_RADIUS, VARIABLE, ActuatedAxis, LegYawController, RadiusLaw, SpringLaw
 from chilopod.steering.target import FARTHEST
 from chilopod.tasks.course import driver
 
 Array = NDArray[np.float64]
 
-LEG_YAW = STRATEGIES["leg-yaw"]
-
-STRATEGIES_HERE = (VARIABLE, LEG_YAW, ACTUATED)
-"""How a target is walked to. (The others are leg-yaw with a spring that is chosen before: here by hand.)"""
-
-_BY_NAME = {each.name: each for each in STRATEGIES_HERE}
-
-SPEEDS = (1.0, 20.0)
-"""Slowest and fastest, times real time."""
-
-_SPEED = 2.0  # at first: fast enough to see it bend, slow enough to see it step
-
-FRICTIONS = (0.3, 3.0)
-"""Of what the robot file has."""
-
-STRIDES = (0.2, 1.5)
-"""Of what the robot file has."""
-
 LOOKS = 6
 """In a gait cycle: means over a cycle are those of so many."""
 
+_SPEED = 2.0  # at first: fast enough to see it bend, slow enough to see it step
 _NUDGE = math.radians(0.5)  # standard deviation of what a nudge turns a joint by, held by its spring
 _START = math.radians(1.0)  # of joints and heading at the start, as in trials
 _STRONGEST = 1.0  # rad by which a pull turns a joint, held by its spring
 _RATE = 20.0  # Hz, of what is written down
 _LONGEST = 900.0  # s of it in one piece
 _MOST_WORDS = 4
-
-
-@dataclass(frozen=True)
-class Seen:
-    """What there is to see at an instant.
-
-    Attributes
-    ----------
-    time
-        Since the last reset, s.
-    clock
-        To which the gait steps, s: at 0 it was at phase 0.
-    robot
-        That walks, with its floor and steps; its springs may be others by now.
-    status
-        ``WALKED`` while it walks.
-    pose
-        x, y (m) and heading (rad) of module 1.
-    joint_angles, stiffness
-        Of the yaw joints, now: rad and N*m/rad, (N-1,).
-    leg_yaw
-        Of the legs of module 1, rad, (2,).
-    mean_angles
-        Of the joints over the last gait cycle, rad, (N-1,).
-    turning
-        By how much the sum of their sizes grows, rad/s.
-    target
-        Where to, m; None: nowhere.
-    state
-        As ``initial`` of the engine's ``start`` takes it, (n,).
-    """
-
-    time: float
-    clock: float
-    robot: Robot
-    status: Status
-    pose: Array
-    joint_angles: Array
-    stiffness: Array
-    leg_yaw: Array
-    mean_angles: Array
-    turning: float
-    target: tuple[float, float] | None
-    state: Array
-
-    @property
-    def bend(self) -> float:
-        """Sum of the sizes of the mean angles, rad: the paper's measure."""
-        return float(np.abs(self.mean_angles).sum())
-
-
-@dataclass(frozen=True)
-class Settings:
-    """How everything is set.
-
-    Attributes
-    ----------
-    robot
-        As it is to walk: with the springs, the floor and the steps that were asked for.
-    friction, stride
-        Factor on the floor of the file; m.
-    strategy, speed, paused, seed
-        As asked for.
-    recording
-        Whether the walk is being written down, or about to be.
-    """
-
-    robot: Robot
-    friction: float
-    stride: float
-    strategy: str
-    speed: float
-    paused: bool
-    seed: int
-    recording: bool
 
 
 class Session:
@@ -171,7 +81,7 @@ class Session:
         self._file = robot.override("springs.adjustable", True)
         self._engine.common(self._file)
         self._settings = Settings(
-            self._file, 1.0, robot.gait.stride, _strategy(strategy), _SPEED, False, _seed(seed), False
+            self._file, 1.0, robot.gait.stride, as_strategy(strategy).name, _SPEED, False, as_seed(seed), False
         )
         self.law: RadiusLaw | None = None
         self._records: list[xr.Dataset] = []
@@ -375,30 +285,30 @@ class Session:
             case wishes.Spring(joint, stiffness):
                 self._spring(joint, stiffness)
             case wishes.Friction(factor):
-                self._other(friction=_within("friction", factor, FRICTIONS, "times that of the file"))
+                self._other(friction=as_within("friction", factor, FRICTIONS, "times that of the file"))
             case wishes.Stride(length):
                 own = self._file.gait.stride
                 low, high = (part * own for part in STRIDES)
-                self._other(stride=_within("stride", length, (low, high), "m"))
+                self._other(stride=as_within("stride", length, (low, high), "m"))
             case wishes.Target(place):
                 self._aim(place)
             case wishes.Steering(strategy):
-                self._settings = replace(self._settings, strategy=_strategy(strategy))
+                self._settings = replace(self._settings, strategy=as_strategy(strategy).name)
                 if self._target is not None:
                     self._aim(self._target)
             case wishes.Pull(joint, torque, time):
                 self._pull_at(joint, torque, time)
             case wishes.Speed(times):
-                self._settings = replace(self._settings, speed=_within("speed", times, SPEEDS, "times real time"))
+                self._settings = replace(self._settings, speed=as_within("speed", times, SPEEDS, "times real time"))
             case wishes.Pause(paused):
                 self._settings = replace(self._settings, paused=bool(paused))
             case wishes.Step(cycles):
-                seconds = _within("step", cycles, (0.0, 10.0), "gait cycles") * self._period
+                seconds = as_within("step", cycles, (0.0, 10.0), "gait cycles") * self._period
                 self._settings = replace(self._settings, paused=True)
                 self.walk_on(seconds)
             case wishes.Reset(seed):
                 self._keep_record()
-                self._settings = replace(self._settings, seed=_seed(seed))
+                self._settings = replace(self._settings, seed=as_seed(seed))
                 self._begin()
             case wishes.Record(on):
                 if on:
@@ -409,7 +319,7 @@ class Session:
     def _spring(self, joint: int | None, stiffness: float) -> None:
         robot = self._settings.robot
         path = ALL if joint is None else f"{ALL}[{joint}]"
-        self._settings = replace(self._settings, robot=robot.with_value(path, _number("stiffness", stiffness)))
+        self._settings = replace(self._settings, robot=robot.with_value(path, as_finite("stiffness", stiffness)))
         if self._steers_springs:
             self._said.append("the springs are as you set them again when the target is reached")
         else:
@@ -432,9 +342,9 @@ class Session:
             if self._target is not None:
                 self._let_go()
             return
-        x, y = (_number("target", each) for each in place)
-        _within("target", math.hypot(x, y), (0.0, FARTHEST), "m from where the walk began")
-        strategy = strategy_named(self._settings.strategy, _BY_NAME)
+        x, y = (as_finite("target", each) for each in place)
+        as_within("target", math.hypot(x, y), (0.0, FARTHEST), "m from where the walk began")
+        strategy = as_strategy(self._settings.strategy)
         controller: Controller | None = LegYawController()
         if strategy is not LEG_YAW:
             if self.law is None:
@@ -454,7 +364,7 @@ class Session:
         if joint not in range(len(own)):
             raise ParameterError("there is no such joint", field="joint", value=joint + 1, allowed=f"1 to {len(own)}")
         strongest = _STRONGEST * own[joint]
-        self._pull[joint] = np.clip(_number("pull", torque), -strongest, strongest)
+        self._pull[joint] = np.clip(as_finite("pull", torque), -strongest, strongest)
         self._pulled_until[joint] = self._before + self._walk.time + time
         self._push()
         if isinstance(self._controller, ActuatedAxis):
@@ -465,28 +375,3 @@ def _with_springs(robot: Robot, stiffness: Sequence[float]) -> Robot:
     for joint, value in enumerate(stiffness):
         robot = robot.with_value(f"{ALL}[{joint}]", value)
     return robot
-
-
-def _strategy(name: str) -> str:
-    return strategy_named(name, _BY_NAME).name
-
-
-def _seed(seed: object) -> int:
-    if isinstance(seed, bool) or not isinstance(seed, int | float) or seed != seed or seed < 0 or seed != int(seed):
-        raise ParameterError("is no seed", field="seed", value=seed, allowed="a whole number, 0 or more")
-    return int(seed)
-
-
-def _number(field: str, value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise ParameterError("is no number", field=field, value=value, allowed="a finite number")
-    return float(value)
-
-
-def _within(field: str, value: object, limits: tuple[float, float], unit: str) -> float:
-    number = _number(field, value)
-    low, high = limits
-    # The ends of a slider are those of its range up to round-off.
-    if not low * (1.0 - 1e-9) <= number <= high * (1.0 + 1e-9):
-        raise ParameterError("is out of range", field=field, value=value, allowed=f"{low:g} to {high:g} {unit}")
-    return number

@@ -9,8 +9,9 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
-from collections.abc import Callable
-from contextlib import suppress
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
 from typing import Any
@@ -181,7 +182,8 @@ class Beside:
         context = multiprocessing.get_context("spawn")
         self._here, there = context.Pipe()
         self._process = context.Process(target=_answer, args=(there, engine), daemon=True, name="chilopod theory")
-        self._process.start()
+        with _deaf():
+            self._process.start()
         there.close()
 
     def ask(self, robot: Robot) -> None:
@@ -209,6 +211,19 @@ class Beside:
     def _send(self, what: str, robot: Robot) -> None:
         with suppress(OSError):  # it may have ended, and answers nothing any more
             self._here.send((what, robot))
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Ctrl-C is the page's: a process that is started here does not hear it, not even while it loads."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 class _Stale(Exception):
@@ -254,7 +269,7 @@ class _Desk:
 
 def _answer(pipe: Connection, engine: str) -> None:
     """The process."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the page's
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # as it is from the start, unless a thread of the page started it
     if hasattr(os, "nice"):
         os.nice(_NICE)
     desk = _Desk(pipe)

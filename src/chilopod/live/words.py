@@ -7,7 +7,7 @@ import math
 from chilopod import units
 from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.engine import Status
-from chilopod.live.session import Seen, Settings
+from chilopod.live.state import Seen, Settings
 from chilopod.live.theory import Growth, Theory
 from chilopod.robot import Robot
 
