@@ -1,7 +1,7 @@
 # Everything here needs only make and a Python from 3.11 to 3.13. Choose another with: make setup PYTHON=/path/to/python3
 # The environment lives in .venv and is reused until pyproject.toml or requirements.lock changes.
 .DEFAULT_GOAL := help
-.PHONY: help setup reproduce test run-tests torture lint types format docs bench lock clean
+.PHONY: help setup reproduce test run-tests torture lint types format docs renew package bench lock clean
 .DELETE_ON_ERROR:
 
 VENV := .venv
@@ -12,8 +12,10 @@ LOCK_BENCH := requirements-bench.lock
 RUNTIME := $(VENV)/.runtime-installed
 DEV := $(VENV)/.dev-installed
 BENCH := $(VENV)/.bench-installed
-# Test processes at once; each with one thread for linear algebra, as more would stand in each other's way.
+# Test processes at once; each with one thread for linear algebra, as more would stand in each other's way. Threads of
+# numba that have nothing to do sleep: by default they wait actively, and take the other processes' time.
 JOBS ?= 2
+ALONGSIDE := OPENBLAS_NUM_THREADS=1 OMP_WAIT_POLICY=passive
 
 # Makes .venv with the first suitable Python, unless a working one is there.
 define make_venv
@@ -48,7 +50,9 @@ $(DEV): pyproject.toml $(LOCK)
 	$(make_venv)
 	@echo "Installing chilopod, what it runs on and what its tests need"
 	@$(PIP) install -c $(LOCK) setuptools
-	@$(PIP) install -c $(LOCK) --no-build-isolation -e '.[dev]'
+	@$(PIP) install -c $(LOCK) --no-build-isolation --no-compile -e '.[dev]'
+	@# pip would compile on one core, the tests of packages too.
+	@$(BIN)/python -m compileall -qq -j 0 -x '/tests?/' $(VENV)/lib || true
 	@touch $(RUNTIME) $@
 
 $(BENCH): $(RUNTIME) $(LOCK_BENCH)
@@ -63,7 +67,7 @@ test: lint  ## all checks and all tests
 	@$(MAKE) --no-print-directory -j 2 types run-tests
 
 run-tests: $(DEV)
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder --benchmark-disable $(ARGS)
+	$(ALONGSIDE) $(BIN)/python -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder --benchmark-disable $(ARGS)
 
 torture: $(DEV)  ## attack it for ten minutes, and count what came of it; options in ARGS="kills --seed 7 --minutes 3"
 	$(BIN)/python torture/run.py --save $(ARGS)
@@ -80,9 +84,18 @@ format: $(DEV)  ## rewrite files in the project's style
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-docs: $(RUNTIME)  ## run what README and docs show; rewrites its output, numbers and pictures
-	$(BIN)/python docs/renew.py
-	$(BIN)/python docs/moving_picture.py
+docs: $(DEV)  ## build the documentation with its gallery, build/site/index.html, and check its links
+	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going -j $(JOBS) -c docs -d build/doctrees . build/site
+	$(BIN)/python docs/check.py build/site
+
+renew: $(RUNTIME)  ## run what README and docs show; rewrites its output, numbers and pictures; pages in ARGS=docs/turning.md
+	$(BIN)/python docs/renew.py $(ARGS)
+	$(if $(ARGS),,$(BIN)/python docs/moving_picture.py)
+
+package: $(DEV)  ## build what is handed out into dist, and try it in an empty environment; some minutes
+	rm -rf dist
+	$(BIN)/python packaging/build.py dist
+	$(BIN)/python packaging/try_wheel.py dist/*.whl
 
 bench: $(BENCH)  ## benchmarks beside their peers; rewrites the tables in benchmarks/README.md
 	$(BIN)/python benchmarks/straight_walk.py
@@ -92,6 +105,7 @@ bench: $(BENCH)  ## benchmarks beside their peers; rewrites the tables in benchm
 	$(BIN)/python benchmarks/series_term.py
 	$(BIN)/python benchmarks/twin.py
 	$(BIN)/python benchmarks/courses.py
+	$(BIN)/python benchmarks/gym.py
 	$(BIN)/python benchmarks/startup.py
 
 # One lock for all supported Pythons and systems: no addresses and no hashes, so it also serves as a constraints file.
@@ -113,5 +127,5 @@ lock:  ## renew both lock files from pyproject.toml
 
 clean:  ## remove the environment, caches and generated output
 	rm -rf $(VENV) $(VENV)-lock build dist report .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks \
-	  .import_linter_cache src/*.egg-info
+	  .import_linter_cache src/*.egg-info docs/gallery docs/reference
 	find src tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true

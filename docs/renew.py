@@ -1,9 +1,9 @@
-"""Runs what README and docs show, writes what it prints into the pages, and keeps it: ``make docs``.
+"""Runs what README and docs show, writes what it prints into the pages, and keeps it: ``make renew``.
 
 In a page these are results:
 
 - What a block of ``sh`` shows below a command that begins with ``$ ``. A line of dots stands for lines left out.
-- The comments at the end of a Python block behind ``<!-- run by make docs -->``: what it prints. (Python blocks
+- The comments at the end of a Python block behind ``<!-- run by make renew -->``: what it prints. (Python blocks
   without that are run by the tests.)
 - Numbers of the text, if a comment before the paragraph or table says where they come from, in their order::
 
@@ -14,6 +14,8 @@ In a page these are results:
   ``~ at (.*?) m`` takes its part of a text. A number is written with as many decimals as it had.
 
 ``make torture`` in such a comment stands for what its last run counted: ten minutes are not spent again.
+
+``make renew ARGS=docs/tutorial.md`` does so for some pages only.
 
 ``docs/results.json`` keeps the results with the version and the robots that they are of. The tests hold pages,
 results and presets together, and run the quick commands again.
@@ -39,16 +41,16 @@ import chilopod
 from chilopod.cli import main
 from chilopod.robot import load_robot, presets
 
-DOCS = Path(__file__).parent
+DOCS = Path(__file__).resolve().parent
 COUNTED = {"make torture": DOCS.parent / "torture" / "results.json"}
-PAGES = (DOCS.parent / "README.md", *sorted(DOCS.glob("*.md")))
+PAGES = (DOCS.parent / "README.md", *sorted(DOCS.rglob("*.md")))
 RESULTS = DOCS / "results.json"
 QUICK = 2.0
 """What takes no longer, in seconds of one processor, is run by the tests again."""
 
 _SHOWN = re.compile(r"^```sh\n\$ (?P<command>chilopod [^\n]*)\n(?P<output>.*?)^```$", re.M | re.S)
 _BLOCK = re.compile(
-    r"^<!-- run by make docs -->\n```python\n(?P<command>.*?)(?P<output>(?:^# [^\n]*\n)+)```$", re.M | re.S
+    r"^<!-- run by make renew -->\n```python\n(?P<command>.*?)(?P<output>(?:^# [^\n]*\n)+)```$", re.M | re.S
 )
 _NAMED = re.compile(
     r"^<!-- (?P<command>(?:chilopod|make) [^\n]*)\n(?P<names>.*?) -->\n+(?P<text>.*?)(?=\n\n|\Z)", re.M | re.S
@@ -153,8 +155,11 @@ def robots_of(command: str) -> dict[str, str]:
 
 
 def renew(pages: Sequence[Path] = PAGES) -> None:
-    """Run everything, and write pages and results."""
-    kept: dict[str, dict[str, Any]] = {}
+    """Run all that pages show, and write pages and results; what other pages show stays as it is."""
+    others = [page.read_text(encoding="utf-8") for page in PAGES if page not in pages]
+    elsewhere = {result.command for text in others for result in results_of(text)}
+    before = json.loads(RESULTS.read_text(encoding="utf-8"))["commands"]
+    kept: dict[str, dict[str, Any]] = {command: each for command, each in before.items() if command in elsewhere}
     printed: dict[str, str] = {}
     for page in pages:
         text = page.read_text(encoding="utf-8")
@@ -164,7 +169,8 @@ def renew(pages: Sequence[Path] = PAGES) -> None:
                 print(command, file=sys.stderr)
                 begun = time.process_time()
                 printed[command] = run(command)
-                kept[command] = {"robots": robots_of(command), "quick": time.process_time() - begun < QUICK}
+                used = time.process_time() - begun
+                kept.setdefault(command, {}).update(robots=robots_of(command), quick=used < QUICK)
             found = result.taken(printed[command])
             if result.numbers:
                 kept[command]["values"] = kept[command].get("values", {}) | found
@@ -201,4 +207,4 @@ def _fingerprint(numbers: object) -> str:
 
 
 if __name__ == "__main__":
-    renew()
+    renew([Path(each).resolve() for each in sys.argv[1:]] or PAGES)

@@ -52,6 +52,11 @@ def tiny(kept, tmp_path_factory) -> SimpleNamespace:
     return SimpleNamespace(folder=folder, found=found, failures=report.failures, painted=painted)
 
 
+BEGUN = {"truth": 1, "trials": 2}
+"""Folders whose tests come before others."""
+
+
 def pytest_collection_modifyitems(items) -> None:
-    """What takes longest is begun first, and beside what needs other compiled code."""
-    items.sort(key=lambda item: 0 if "tiny" in item.fixturenames else 1 if "truth" in item.path.parts else 2)
+    """What takes longest is begun first, and beside what needs other compiled code; what waits for processes of its
+    own is not left for the end, where nothing else would run meanwhile."""
+    items.sort(key=lambda item: 0 if "tiny" in item.fixturenames else BEGUN.get(item.path.parent.name, 3))

@@ -18,19 +18,19 @@ import chilopod
 from chilopod.cli import app
 from chilopod.robot import load_robot
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).resolve().parent.parent
 sys.path.append(str(ROOT / "docs"))
 renew = importlib.import_module("renew")
 
 FENCED = re.compile(
-    r"^(?:<!-- (?P<why>not run: [^\n]+|run by make docs) -->\n)?```(?P<kind>\w+)\n(?P<code>.*?)^```$", re.M | re.S
+    r"^(?:<!-- (?P<why>not run: [^\n]+|run by make renew) -->\n)?```(?P<kind>\w+)\n(?P<code>.*?)^```$", re.M | re.S
 )
 COMMAND = re.compile(r"^(?:\$ )?(chilopod [^\n]*)$", re.MULTILINE)
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
-PAGES = {page.name: page.read_text(encoding="utf-8") for page in renew.PAGES}
+PAGES = {page.relative_to(ROOT).as_posix(): page.read_text(encoding="utf-8") for page in renew.PAGES}
 SHOWN = [(name, result) for name, text in PAGES.items() for result in renew.results_of(text)]
 KEPT = json.loads(renew.RESULTS.read_text(encoding="utf-8"))
-OUT_OF_DATE = "run `make docs`, and look at what it changes"
+OUT_OF_DATE = "run `make renew`, and look at what it changes"
 
 
 def kept_of(result):
@@ -67,7 +67,7 @@ def test_nothing_is_shown_unchecked(page):
     blocks = [block for block in FENCED.finditer(PAGES[page]) if re.search(r"^\$ ", block["code"], re.MULTILINE)]
     assert [block["code"] for block in blocks] == [block[6:-3] for block in shown if block.startswith("```sh")]
     assert PAGES[page].count("<!-- ") == len([each for name, each in SHOWN if name == page and each.numbers]) + len(
-        re.findall(r"^<!-- (?:run by make docs|not (?:run|renewed): [^\n]+) -->$", PAGES[page], re.MULTILINE)
+        re.findall(r"^<!-- (?:run by make renew|not (?:run|renewed): [^\n]+) -->$", PAGES[page], re.MULTILINE)
     )
 
 
@@ -92,8 +92,8 @@ def test_another_robot_or_number_is_noticed(monkeypatch):
         next(renew.results_of(page.replace("It is 1.50", "It is 1.51"))).renewed(values)
 
 
-# new-section.md is followed by a test of its own.
-@pytest.mark.parametrize("page", [name for name in PAGES if name != "new-section.md"])
+# docs/new-section.md is followed by a test of its own.
+@pytest.mark.parametrize("page", [name for name in PAGES if name != "docs/new-section.md"])
 def test_python_blocks_print_what_they_say(page, tmp_path, monkeypatch):
     """One after the other in one namespace. A block that is not run says why in a comment before it."""
     monkeypatch.chdir(tmp_path)

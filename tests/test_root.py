@@ -39,12 +39,6 @@ def test_git_ignores_what_commands_write():
     assert set(paths) - set(checked.stdout.split()) == set()
 
 
-def test_the_robots_paper_is_cited():
-    text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
-    assert "Advanced turning maneuver of a many-legged robot using pitchfork bifurcation" in text
-    assert text.count("family-names") == 8
-
-
 def test_glossary_links_lead_somewhere():
     text = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
     links = re.findall(r"\]\(([\w-]+\.md)\)", text)

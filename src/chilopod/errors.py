@@ -83,6 +83,10 @@ class AnalysisError(ChilopodError, RuntimeError):
     """A computation cannot deliver what was asked of it."""
 
 
+class ExtraError(ChilopodError, ImportError):
+    """Something takes a package that an extra brings, and the extra is not installed."""
+
+
 class ClusterError(ChilopodError, RuntimeError):
     """A cluster is not there, is not what this machine is, or went away."""
 

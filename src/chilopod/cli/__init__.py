@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from chilopod.cli import branch, course, doctor, reproduce, robot, stability, trials, turn, walk
+from chilopod.cli import branch, course, doctor, live, reproduce, robot, stability, trials, turn, walk
 from chilopod.cli.options import new_app
 from chilopod.errors import ChilopodError, briefly, one_line
 from chilopod.process import INTERRUPTED
@@ -30,6 +30,7 @@ app.command("branch", short_help="Follow the curved walks beyond: how tightly th
 app.command("walk", short_help="Let a robot walk, and say where it gets to.")(walk.walk)
 app.command("turn", short_help="Pick the spring that leads to a target, and walk there.")(turn.turn)
 app.command("course", short_help="Walk from target to target, and say what became of each.")(course.course)
+app.command("live", short_help="Watch a robot walk in the browser, and change it meanwhile.")(live.live)
 app.add_typer(reproduce.identify_app, name="identify")
 app.add_typer(trials.app, name="trials")
 app.command("doctor", short_help="Is all here that chilopod needs, and what mends it?")(doctor.doctor)

@@ -92,6 +92,12 @@ def event_times(controller: Controller, gait: Gait, duration: float) -> Iterator
     ParameterError, AnalysisError
         If the controller's events are none.
     """
+    return ((time, event) for time, _, event in _numbered(controller, gait, 0.0, duration))
+
+
+def _numbered(controller: Controller, gait: Gait, since: float, until: float) -> Iterator[tuple[float, int, Event]]:
+    """As :func:`event_times`, with the number of each event; without those of cycles that were over at ``since`` (s):
+    who walks a moment at a time need not count from the beginning every time."""
     events = _asked(controller, "events", lambda: list(controller.events(gait)))
     for event in events:
         if not isinstance(event, Event):
@@ -101,12 +107,18 @@ def event_times(controller: Controller, gait: Gait, duration: float) -> Iterator
                 "is no phase", field=_of(controller, "events"), value=event.phase, allowed="0 to less than 1"
             )
     events.sort(key=lambda event: event.phase)
-    for cycle in range(math.ceil(duration / gait.period) if events else 0):
-        for event in events:
+    first = _whole(since, gait.period)
+    for cycle in range(first, math.ceil(until / gait.period) if events else first):
+        for number, event in enumerate(events, cycle * len(events)):
             time = (cycle + event.phase) * gait.period
-            if time >= duration:
+            if time >= until:
                 return
-            yield time, event
+            yield time, number, event
+
+
+def _whole(time: float, period: float) -> int:
+    """How many periods are over at a time; one less beside their ends, where round-off may count one too many."""
+    return max(0, math.ceil(time / period) - 1)
 
 
 def steer(
@@ -159,7 +171,7 @@ def steer(
 
     pace = _Pace()
     since, thought = clock.perf_counter(), 0.0
-    for time, index, event in _instants(controller, gait, referee, until):
+    for time, index, event in _instants(controller, gait, referee, begun, until):
         if time < begun:
             continue
         pace.advance(walk, time, tell)
@@ -193,16 +205,18 @@ def steer(
 
 
 def _instants(
-    controller: Controller | None, gait: Gait, referee: Referee | None, until: float
+    controller: Controller | None, gait: Gait, referee: Referee | None, since: float, until: float
 ) -> Iterator[tuple[float, int, Event | None]]:
-    """Instants before ``until`` (s) at which somebody looks: the number of the event and the event; no event where it
-    is the referee, who looks first."""
-    events = enumerate(event_times(controller, gait, until) if controller else ())
-    asked: Iterator[tuple[float, int, Event | None]] = ((time, index, event) for index, (time, event) in events)
+    """Instants before ``until`` (s) at which somebody looks, some of them before ``since``: the number of the event and
+    the event; no event where it is the referee, who looks first."""
+    asked: Iterator[tuple[float, int, Event | None]] = iter(())
+    if controller is not None:
+        asked = _numbered(controller, gait, since, until)
     looks: Iterator[tuple[float, int, Event | None]] = iter(())
     if referee is not None:
         every = referee.every
-        looks = ((time, -1, None) for time in takewhile(lambda time: time < until, (n * every for n in count())))
+        times = (n * every for n in count(_whole(since, every)))
+        looks = ((time, -1, None) for time in takewhile(lambda time: time < until, times))
     return merge(asked, looks, key=lambda each: each[:2])
 
 

@@ -184,7 +184,6 @@ class PlanarWalk:
             np.concatenate([model.scalars for model in self._models]),
             np.array([(robot.legs.forward_offset, robot.legs.half_width) for robot in robots]),
         )
-        self._stiffness = np.array([robot.springs.stiffness for robot in robots])
         self._damping = np.array([robot.springs.damping for robot in robots])
         self._actuators = Actuators(robots, keep=record is not None)
         self._targets = Targets(len(robots), target, keep=record is not None)

@@ -7,7 +7,7 @@ from chilopod.steering.criteria import Criteria, Outcome, arrivals, earliest_arr
 from chilopod.steering.leg_yaw import LegYawController
 from chilopod.steering.measures import of_course
 from chilopod.steering.radius_law import RadiusLaw
-from chilopod.steering.referee import CourseReferee, Verdict, decisions
+from chilopod.steering.referee import CourseReferee, Judged, Verdict, decisions
 from chilopod.steering.shortest import shortest_path
 from chilopod.steering.spring_law import SpringLaw
 from chilopod.steering.strategies import ACTUATED, ON_COURSES, STRATEGIES, VARIABLE, Strategy, steered, strategy_named
@@ -25,6 +25,7 @@ __all__ = [
     "CourseReferee",
     "Criteria",
     "Goal",
+    "Judged",
     "LegYawController",
     "Outcome",
     "RadiusLaw",

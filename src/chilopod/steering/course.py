@@ -23,12 +23,14 @@ Array = NDArray[np.float64]
 MOST_GOALS = 1000
 """More targets than this are a slip of the pen."""
 
+RANDOM_DISTANCES = (0.8, 2.0)
+"""Of the targets of a random course from where the robot is when their turn comes, least and largest, m."""
+
 _LONGEST_PATIENCE = 1e4
 _FORM = 'a direction and a distance, such as "45 deg, 1.3 m", or a place on the floor, such as "1.2 m, 0.5 m"'
 _RANDOM = "random:"
 _LONGEST_SEED = 18  # digits: a 64-bit whole number holds them
 _WIDEST_BEARING = math.radians(75.0)
-_DISTANCES = (0.8, 2.0)
 _DIGITS = 9  # of a distance: what rounding does to the 0.15 m or 10 km that somebody typed is not held against them
 
 
@@ -219,7 +221,7 @@ def random_course(seed: int, patience: float, count: int = 5) -> Course:
     """
     rng = np.random.default_rng(seed)
     bearings = rng.uniform(-_WIDEST_BEARING, _WIDEST_BEARING, count)
-    distances = rng.uniform(*_DISTANCES, count)
+    distances = rng.uniform(*RANDOM_DISTANCES, count)
     x, y = distances * np.cos(bearings), distances * np.sin(bearings)
     return Course(tuple(Goal(float(a), float(b), relative=True) for a, b in zip(x, y, strict=True)), patience)
 

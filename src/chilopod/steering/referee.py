@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -40,6 +40,34 @@ class Verdict(enum.Enum):
         self.sentence = sentence
 
 
+@dataclass(frozen=True)
+class Judged:
+    """Whom a look of :class:`CourseReferee` found to be done with a target, marks of shape (robots,).
+
+    Attributes
+    ----------
+    arrived
+        There.
+    late, unseen
+        Out of time; and have never had it in view.
+    gone
+        No longer walking, and so done with all targets.
+    begins
+        With none before.
+    """
+
+    arrived: NDArray[np.bool_]
+    late: NDArray[np.bool_]
+    unseen: NDArray[np.bool_]
+    gone: NDArray[np.bool_]
+    begins: NDArray[np.bool_]
+
+    @property
+    def moved(self) -> NDArray[np.bool_]:
+        """Who has got the next target, or has had the last."""
+        return self.arrived | self.late | self.unseen | self.begins
+
+
 class CourseReferee:
     """Referee of robots that walk one course each, see :class:`chilopod.engine.Referee`.
 
@@ -55,13 +83,18 @@ class CourseReferee:
         Of the robots.
     missed
         Whether a target is missed by the scanner, by event, shape (robots, at least as many as events); None: never.
+    keep
+        Whether to keep what controllers were shown, for :meth:`add_to`.
     """
 
     every = LOOK
 
-    def __init__(self, courses: Sequence[Course], gait: Gait, missed: NDArray[np.bool_] | None = None) -> None:
+    def __init__(
+        self, courses: Sequence[Course], gait: Gait, missed: NDArray[np.bool_] | None = None, keep: bool = True
+    ) -> None:
         robots, most = len(courses), max(len(each.goals) for each in courses)
-        self._courses, self._missed, self._speed = courses, missed, gait.speed
+        self._courses, self._missed, self._speed, self._keep = list(courses), missed, gait.speed, keep
+        self._counts = np.array([len(each.goals) for each in courses])
         self._common = courses[0]
         self._number = np.full(robots, -1)
         self._places = np.full((robots, most, 2), np.nan)
@@ -74,34 +107,73 @@ class CourseReferee:
 
     def look(self, walk: Walk) -> bool:
         """Judge, put up what comes next, halt who is done; whether anybody walks on."""
-        now, pose, busy = walk.time, walk.pose(), self._busy
-        if now == 0.0:
-            self._next(walk, pose, busy)
-            return bool(self._busy.any())
+        moved = self.judge(walk).moved
+        done = moved & ~self.busy
+        if done.any():
+            walk.halt(done)
+        return bool(self.busy.any())
+
+    def judge(self, walk: Walk) -> Judged:
+        """Judge, and put up what comes next."""
+        now, pose, begins = walk.time, walk.pose(), self._number < 0
+        busy = self.busy & ~begins
         gone = busy & np.isnan(pose[:, 0])
         rows, numbers = np.arange(len(pose)), np.minimum(self._number, self._places.shape[1] - 1)
         away = np.hypot(*(self._places[rows, numbers] - pose[:, :2]).T)
         self._nearest[rows[busy], numbers[busy]] = np.fmin(self._nearest[rows[busy], numbers[busy]], away[busy])
         arrived = busy & (away < ARRIVAL_RADIUS)
         over = busy & ~arrived & ~gone & (now - self._begin[rows, numbers] >= self._common.patience - 1e-9)
+        late, unseen = over & self._seen_once, over & ~self._seen_once
         if gone.any() or arrived.any() or over.any():
             self._judge(gone, now, Verdict.STOPPED)
             self._judge(arrived, now, Verdict.ARRIVED)
-            self._judge(over & self._seen_once, now, Verdict.LATE)
-            self._judge(over & ~self._seen_once, now, Verdict.UNSEEN)
-            self._number[gone] = [len(self._courses[robot].goals) for robot in np.flatnonzero(gone).tolist()]
-            self._next(walk, pose, arrived | over)
-        return bool(self._busy.any())
+            self._judge(late, now, Verdict.LATE)
+            self._judge(unseen, now, Verdict.UNSEEN)
+            self._number[gone] = self._counts[gone]
+        judged = Judged(arrived, late, unseen, gone, begins)
+        if judged.moved.any():
+            self._next(walk, pose, judged.moved)
+        return judged
 
-    def through(self, index: int, seen: Observation) -> Observation:
-        """What a scanner with this view sees; it is kept."""
+    def restart(self, which: NDArray[np.bool_], courses: Sequence[Course], missed: NDArray[np.bool_] | None) -> None:
+        """Begin anew with robots that have been put on the floor anew.
+
+        Parameters
+        ----------
+        which
+            Shape (robots,).
+        courses, missed
+            One for each of them, as at the start; no more targets than the longest course at the start.
+        """
+        for robot, course in zip(np.flatnonzero(which).tolist(), courses, strict=True):
+            self._courses[robot], self._counts[robot] = course, len(course.goals)
+        if self._missed is not None and missed is not None:
+            self._missed[which] = missed
+        self._number[which], self._verdicts[which], self._seen_once[which] = -1, "", False
+        for each in (self._places, self._begin, self._end, self._shortest, self._nearest, self._aims):
+            each[which] = np.nan
+
+    @property
+    def aims(self) -> Array:
+        """Where the targets are whose turn it is, m, shape (robots, 2); NaN where there is none."""
+        return self._aims.copy()
+
+    @property
+    def busy(self) -> NDArray[np.bool_]:
+        """Who has a target still, shape (robots,)."""
+        return self._number < self._counts
+
+    def through(self, index: int | NDArray[np.intp], seen: Observation) -> Observation:
+        """What a scanner with this view sees at an event, of this number, one for all robots or one each."""
         hidden = np.abs(seen.bearing) > 0.5 * self._common.view
         hidden |= seen.distance > self._common.range
         if self._missed is not None:
-            hidden |= self._missed[:, index]
+            hidden |= self._missed[np.arange(len(hidden)), index]
         bearing, distance = (np.where(hidden, np.nan, each) for each in (seen.bearing, seen.distance))
         self._seen_once |= np.isfinite(bearing)
         found = replace(seen, bearing=bearing, distance=distance)
+        if not self._keep:
+            return found
         self._log.append(found)
         return replace(found, **{name: getattr(found, name).copy() for name in _KEPT})
 
@@ -115,7 +187,7 @@ class CourseReferee:
         walk
             As it ended.
         """
-        busy = self._busy
+        busy = self.busy
         stopped = busy & np.array([each is not Status.WALKED for each in walk.status])
         self._judge(stopped, walk.time, Verdict.STOPPED)
         self._judge(busy & ~stopped & self._seen_once, walk.time, Verdict.LATE)
@@ -136,14 +208,9 @@ class CourseReferee:
             if len(shown):
                 data[f"seen_{name}"] = (("event", "robot", *dims), shown, {"units": unit})
 
-    @property
-    def _busy(self) -> NDArray[np.bool_]:
-        """Who has a target still."""
-        return self._number < np.array([len(each.goals) for each in self._courses])
-
     def _judge(self, which: NDArray[np.bool_], now: float, verdict: Verdict) -> None:
         for robot in np.flatnonzero(which).tolist():
-            number, count = self._number[robot], len(self._courses[robot].goals)
+            number, count = self._number[robot], self._counts[robot]
             self._end[robot, number], self._verdicts[robot, number] = now, verdict.label
             if verdict is Verdict.STOPPED:
                 self._verdicts[robot, number + 1 : count] = verdict.label
@@ -168,9 +235,6 @@ class CourseReferee:
                 self._number[robot] = len(self._courses[robot].goals)
         self._seen_once &= ~which
         walk.aim(self._aims)
-        done = which & ~self._busy
-        if done.any():
-            walk.halt(done)
 
 
 _KEPT = {

@@ -204,6 +204,7 @@ def driver(
     *,
     engine: str = "planar",
     controller: Controller | None = None,
+    law: RadiusLaw | None = None,
     folder: str | Path | None = None,
     progress: Progress = silent,
 ) -> Driver:
@@ -221,6 +222,8 @@ def driver(
         Whose radius law it is, see :func:`chilopod.tasks.radius_law`.
     controller
         In place of the strategy's.
+    law
+        The robot's radius law, where it is known already.
     folder
         Where trials of the radius law are kept.
     progress
@@ -240,11 +243,10 @@ def driver(
         )
     if spring is not None and not chooses:
         raise ParameterError(f"the strategy {strategy.name} has no spring to choose", field="k1", value=spring)
-    law: RadiusLaw | None = None
     remarks: list[str] = []
     walker = _with_actuator(robot, remarks) if strategy is VARIABLE else robot
     try:
-        law = radius_law(robot, engine, folder, progress)
+        law = law or radius_law(robot, engine, folder, progress)
     except AnalysisError as error:
         if strategy in (VARIABLE, ACTUATED) and controller is None:
             raise AnalysisError(

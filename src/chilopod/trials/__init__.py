@@ -12,7 +12,7 @@ from chilopod.lazy import exports
 if TYPE_CHECKING:
     from chilopod.trials.batch import batches, walked
     from chilopod.trials.cluster import Cluster
-    from chilopod.trials.disturbance import NONE, Disturbance
+    from chilopod.trials.disturbance import NONE, Disturbance, Drawn, draw
     from chilopod.trials.executors import Executor, Here, using
     from chilopod.trials.run import check_fits, run, run_each, together
     from chilopod.trials.store import Store
@@ -24,7 +24,7 @@ else:
         {
             "batch": ("batches", "walked"),
             "cluster": ("Cluster",),
-            "disturbance": ("NONE", "Disturbance"),
+            "disturbance": ("NONE", "Disturbance", "Drawn", "draw"),
             "executors": ("Executor", "Here", "using"),
             "run": ("check_fits", "run", "run_each", "together"),
             "store": ("Store",),
@@ -38,6 +38,7 @@ __all__ = [
     "NONE",
     "Cluster",
     "Disturbance",
+    "Drawn",
     "Executor",
     "Here",
     "Store",
@@ -46,6 +47,7 @@ __all__ = [
     "axis_radius",
     "batches",
     "check_fits",
+    "draw",
     "mean_joint_angles",
     "run",
     "run_each",

@@ -4,27 +4,21 @@ from __future__ import annotations
 
 import json
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from chilopod.cores import cores
 from chilopod.engine import engine_named, event_times, steer
 from chilopod.errors import AnalysisError
 from chilopod.steering import CourseReferee, Target, of_course
 from chilopod.trials.description import file_text, plain
+from chilopod.trials.disturbance import draw
 from chilopod.trials.trial import Trial
-
-Array = NDArray[np.float64]
 
 _MOST_BYTES = 256e6
 """Of the records of a batch, about."""
-
-_SLICK = 1e-3
-"""Friction that a foot without grip has left."""
 
 
 def batches(trials: Sequence[Trial], on_cores: int | None = None) -> list[list[Trial]]:
@@ -85,7 +79,7 @@ def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
     )
     courses = [each.course for each in trials if each.course]
     asked = sum(1 for _ in event_times(first.controller, first.robot.gait, first.duration)) if first.controller else 0
-    drawn = [_drawn(trial, asked) for trial in trials]
+    drawn = [draw(each.disturbance, each.seed, each.robot.body.modules, asked, each.joint_angles) for each in trials]
     own_noise, noisy = engine.traits.noisy, first.target is not None and first.disturbance.bearing > 0.0
     walk = engine.start(
         [trial.robot for trial in trials],
@@ -144,33 +138,3 @@ def _bytes_of(trial: Trial) -> float:
     # A module's joint, legs and servos at every sample, as the engine has them and as they are recorded.
     numbers = 20 * modules + (6 * modules if trial.forces else 0) + (8 * modules if trial.poses else 0)
     return 8.0 * numbers * (trial.duration * trial.rate + 1.0)
-
-
-@dataclass(frozen=True)
-class _Drawn:
-    joint_angles: Array
-    heading: float
-    friction: Array
-    bearing: Array
-    missed: NDArray[np.bool_]
-    scan_seed: int
-
-
-def _drawn(trial: Trial, events: int) -> _Drawn:
-    """What a trial's seed makes of its disturbance; each kind has its own stream of numbers."""
-    n, spread = trial.robot.body.modules, trial.disturbance
-    streams = np.random.SeedSequence(trial.seed).spawn(6)
-    joints, heading, friction, bearing = (np.random.default_rng(each) for each in streams[:4])
-    feet = np.exp(spread.friction * friction.standard_normal((n, 2)))
-    if spread.slick is not None:
-        feet[spread.slick] *= _SLICK
-    missed = np.random.default_rng(streams[5])
-    nominal = np.array(trial.joint_angles) if trial.joint_angles else np.zeros(n - 1)
-    return _Drawn(
-        nominal + spread.joint_angle * joints.standard_normal(n - 1),
-        float(spread.heading * heading.standard_normal()),
-        feet,
-        spread.bearing * bearing.standard_normal(events),
-        missed.random(events) < spread.missed,
-        int(streams[4].generate_state(1)[0]),
-    )

@@ -50,6 +50,8 @@ class Cluster:
 
     Raises
     ------
+    ExtraError
+        If dask is not installed.
     ClusterError
         If it is not there, has no workers, or has another Python, chilopod, numpy or numba.
     ParameterError

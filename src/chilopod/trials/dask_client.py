@@ -17,6 +17,7 @@ from multiprocessing.process import BaseProcess
 from typing import Any
 
 from chilopod.errors import ClusterError, ParameterError, one_line
+from chilopod.extras import needs
 from chilopod.trials.on_worker import PACKAGES, check_versions, versions
 
 MOST = 1000  # worker processes of one machine
@@ -41,20 +42,19 @@ def connected(where: str | int, threads: int | None, stack: ExitStack) -> Any:
 
     Raises
     ------
+    ExtraError
+        If dask is not installed.
     ClusterError
-        If dask is not installed, or there is no such cluster, or it is of other versions.
+        If there is no such cluster, or it is of other versions.
     ParameterError
         If ``where`` is neither an address nor a number of workers.
     """
     if isinstance(where, int) and not 1 <= where <= MOST:
         raise ParameterError("is no number of workers", field="cluster", value=where, allowed=f"1 to {MOST}")
-    try:
-        import dask
-        import distributed
-    except ImportError:
-        raise ClusterError(
-            "dask.distributed is not installed", field="cluster", allowed='after: pip install "chilopod[cluster]"'
-        ) from None
+    needs("distributed", extra="cluster")
+    import dask
+    import distributed
+
     stack.enter_context(_quiet())
     stack.enter_context(dask.config.set(_SETTINGS))
     if isinstance(where, int):

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chilopod.errors import ParameterError
+
+Array = NDArray[np.float64]
+
+_SLICK = 1e-3
+"""Friction that a foot without grip has left."""
 
 _DEVIATIONS = ("joint_angle", "heading", "friction", "bearing")
 
@@ -58,3 +65,66 @@ class Disturbance:
 
 NONE = Disturbance(0.0, 0.0, 0.0, 0.0)
 """No disturbance at all."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What a seed makes of a disturbance, for one robot.
+
+    Attributes
+    ----------
+    joint_angles
+        At the start, rad, shape (N-1,).
+    heading
+        At the start, rad.
+    friction
+        Factors on the friction coefficients of feet, shape (N, 2).
+    bearing
+        Errors of the measured bearings, rad, shape (looks,).
+    missed
+        Whether the scanner misses the target, shape (looks,).
+    scan_seed
+        Of the noise of a scanner that has its own.
+    """
+
+    joint_angles: Array
+    heading: float
+    friction: Array
+    bearing: Array
+    missed: NDArray[np.bool_]
+    scan_seed: int
+
+
+def draw(
+    disturbance: Disturbance, seed: int, modules: int, looks: int, joint_angles: Sequence[float] | None = None
+) -> Drawn:
+    """Draw what differs; each kind has its own stream of numbers.
+
+    Parameters
+    ----------
+    disturbance
+        How much.
+    seed
+        0 or more.
+    modules
+        Of the robot.
+    looks
+        How often it looks at its target, at most.
+    joint_angles
+        About which those at the start are, rad; by default straight.
+    """
+    streams = np.random.SeedSequence(seed).spawn(6)
+    joints, heading, friction, bearing = (np.random.default_rng(each) for each in streams[:4])
+    feet = np.exp(disturbance.friction * friction.standard_normal((modules, 2)))
+    if disturbance.slick is not None:
+        feet[disturbance.slick] *= _SLICK
+    missed = np.random.default_rng(streams[5])
+    nominal = np.array(joint_angles) if joint_angles else np.zeros(modules - 1)
+    return Drawn(
+        nominal + disturbance.joint_angle * joints.standard_normal(modules - 1),
+        float(disturbance.heading * heading.standard_normal()),
+        feet,
+        disturbance.bearing * bearing.standard_normal(looks),
+        missed.random(looks) < disturbance.missed,
+        int(streams[4].generate_state(1)[0]),
+    )

@@ -95,9 +95,26 @@ def body_frames(record: xr.Dataset, times: ArrayLike | None = None) -> BodyFrame
         _interpolated(record[name].transpose("time", "robot", ...).values, recorded, time)
         for name in ("position", "heading", "joint_angle", "leg_yaw")
     )
-    walks = np.isfinite(position).all(-1) & np.isfinite(heading) & np.isfinite(angles).all(-1)
+    return bodies(robot, time, position, heading, angles, leg_yaw)
+
+
+def bodies(
+    robot: Robot, time: Array, position: Array, heading: Array, joint_angles: Array, leg_yaw: Array
+) -> BodyFrames:
+    """Place modules and feet of robots under way.
+
+    Parameters
+    ----------
+    robot
+        What they have in common.
+    time
+        (T,) s.
+    position, heading, joint_angles, leg_yaw
+        As in a record, NaN after a robot stopped: (T, R, 2), (T, R), (T, R, N-1) and (T, R, 2), m and rad.
+    """
+    walks = np.isfinite(position).all(-1) & np.isfinite(heading) & np.isfinite(joint_angles).all(-1)
     walks &= np.isfinite(leg_yaw).all(-1)
-    headings = module_headings(heading, angles)
+    headings = module_headings(heading, joint_angles)
     centres = module_centres(position, headings, robot.module_length)
     half = 0.5 * robot.module_length * directions(headings)[0]
     spine = np.concatenate([centres[..., :1, :] + half[..., :1, :], centres - half], axis=-2)

@@ -1,0 +1,30 @@
+"""Packages that only an extra of the installation brings (``pip install "chilopod[live]"``)."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from chilopod.errors import ExtraError, briefly
+
+
+def needs(package: str, *, extra: str) -> None:
+    """Say in one line what to install, unless a package is there; to be called before it is imported.
+
+    Parameters
+    ----------
+    package
+        Its name where it is imported.
+    extra
+        That of chilopod which brings it.
+
+    Raises
+    ------
+    ExtraError
+        If it is not installed, or something is that it cannot be imported with.
+    """
+    try:
+        import_module(package)
+    except ImportError as error:
+        absent = isinstance(error, ModuleNotFoundError) and error.name == package
+        problem = "is not installed" if absent else f"cannot be imported: {briefly(error)}"
+        raise ExtraError(f'{package} {problem}; to mend it: pip install "chilopod[{extra}]"') from error

@@ -1,0 +1,158 @@
+"""What an action of -1 to 1 means to the actuators of a robot, and when in the gait cycle it acts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chilopod.engine import Command
+from chilopod.engine.arguments import as_array
+from chilopod.errors import ParameterError
+from chilopod.robot import Robot
+from chilopod.steering.leg_yaw import SIDES, LegYawController
+
+Array = NDArray[np.float64]
+
+SPRINGS = ("first", "all")
+"""Which springs an action sets."""
+
+_SOFTEST = (
+    1.0 / 7.0
+)  # of the stiffest spring, where the robot file says nothing: there the paper's robot turns most tightly
+_ROUNDING = 1e-6  # by which single precision may miss the end of a range
+
+
+@dataclass(frozen=True)
+class Actions:
+    """Springs, then the yaw of the left and of the right leg of module 1, each from -1 to 1.
+
+    A spring goes from its softest to its stiffest by equal factors: at 0 it is their geometric mean. The yaw of a leg
+    goes from the right to the left limit of the paper's controller. As there, a leg yaws while it swings, at 40 to 80 %
+    of its swing; the springs ramp with the leg that swings first in the cycle. What an action asks for is so under way
+    within a gait cycle of its observation, and no foot is dragged across the floor.
+
+    Attributes
+    ----------
+    robot
+        With an actuator for each of the springs.
+    joints
+        Of these springs, counted from 0.
+    softest, stiffest
+        Of these springs, N*m/rad.
+    legs
+        Whose limit and swing it is.
+    """
+
+    robot: Robot
+    joints: tuple[int, ...]
+    softest: tuple[float, ...]
+    stiffest: tuple[float, ...]
+    legs: LegYawController = field(default_factory=LegYawController)
+
+    @classmethod
+    def of(cls, robot: Robot, springs: Literal["first", "all"] = "first") -> Actions:
+        """The actions of a robot.
+
+        Parameters
+        ----------
+        robot
+            A robot without any actuator is given them.
+        springs
+            The first, or all that can be adjusted. Where the robot file gives no range, it goes from a seventh of the
+            stiffest spring of the axis to that.
+
+        Raises
+        ------
+        ParameterError
+            If a spring has no actuator, or that leaves it no range.
+        """
+        if springs not in SPRINGS:
+            raise ParameterError("are no springs", field="springs", value=springs, allowed=" or ".join(SPRINGS))
+        own = robot.springs
+        if own.adjustable is None:
+            every = springs == "all"
+            robot = robot.override("springs.adjustable" if every else "springs.adjustable[0]", True)
+        can = robot.springs.adjustable or ()
+        joints = (0,) if springs == "first" else tuple(joint for joint, each in enumerate(can) if each)
+        if not any(can) or not all(can[joint] for joint in joints):
+            raise ParameterError("has no actuator", field="springs.adjustable[0]", value=False, allowed="true")
+        most = max(own.stiffness)
+        softest = tuple(own.softest[joint] if own.softest else _SOFTEST * most for joint in joints)
+        stiffest = tuple(own.stiffest[joint] if own.stiffest else most for joint in joints)
+        for low, high in zip(softest, stiffest, strict=True):
+            if not low < high:
+                raise ParameterError(
+                    "leave a spring no range",
+                    field="springs.softest, springs.stiffest",
+                    value=f"{low:g}, {high:g} N*m/rad",
+                )
+        return cls(robot, joints, softest, stiffest)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What each number of an action sets."""
+        return (
+            *(f"spring of joint {joint + 1}" for joint in self.joints),
+            *(f"yaw of the {side} leg" for side in SIDES),
+        )
+
+    @property
+    def moments(self) -> tuple[tuple[float, float, int], ...]:
+        """When legs yaw: parts of the cycle, how long that takes (s), and which leg it is, in order."""
+        events = self.legs.events(self.robot.gait)
+        return tuple(sorted((each.phase, each.window, SIDES.index(each.name)) for each in events))
+
+    def checked(self, actions: ArrayLike, robots: int) -> Array:
+        """Actions of a batch, each its own copy, shape (robots, len(names)).
+
+        Raises
+        ------
+        ParameterError
+            If they are none: wrong shape, NaN, out of range.
+        """
+        array, shape = as_array("action", actions), (robots, len(self.names))
+        if array.shape != shape:
+            raise ParameterError("has the wrong shape", field="action", value=array.shape, allowed=str(shape))
+        inside = np.abs(array) <= 1.0 + _ROUNDING
+        if not inside.all():
+            robot, number = (int(each) for each in np.argwhere(~inside)[0])
+            raise ParameterError(
+                f"the {self.names[number]} is out of range",
+                field=f"action[{number}]" if robots == 1 else f"action[{robot}, {number}]",
+                value=float(array[robot, number]),
+                allowed="-1 to 1",
+            )
+        return np.clip(array, -1.0, 1.0)
+
+    def stiffness(self, actions: Array) -> Array:
+        """Of the springs that an action sets, N*m/rad, shape (robots, len(joints))."""
+        low, high = np.log(self.softest), np.log(self.stiffest)
+        return np.asarray(np.exp(low + 0.5 * (actions[:, : len(self.joints)] + 1.0) * (high - low)))
+
+    def set_by(self, stiffness: Array) -> Array:
+        """The actions that set springs to a stiffness, N*m/rad, as far as they go, shape (robots, len(joints))."""
+        low, high = np.log(self.softest), np.log(self.stiffest)
+        return np.clip(2.0 * (np.log(stiffness) - low) / (high - low) - 1.0, -1.0, 1.0)
+
+    def commands(self, actions: Array, leg_yaw: Array) -> list[tuple[float, Command]]:
+        """What actions make of a gait cycle: parts of the cycle and the commands that come then.
+
+        Parameters
+        ----------
+        actions
+            As :meth:`checked`.
+        leg_yaw
+            As it is, rad, shape (robots, 2).
+        """
+        stiffness = np.tile(self.robot.springs.stiffness, (len(actions), 1))
+        stiffness[:, self.joints] = self.stiffness(actions)
+        wanted, yaw = self.legs.limit * actions[:, len(self.joints) :], leg_yaw.copy()
+        told = []
+        for number, (phase, window, side) in enumerate(self.moments):
+            yaw[:, side] = wanted[:, side]
+            springs = stiffness if number == 0 else None
+            told.append((phase, Command(leg_yaw=yaw.copy(), stiffness=springs, within=window)))
+        return told

@@ -1,0 +1,210 @@
+"""The environments as Gymnasium knows them: a batch of robots, and one of them alone."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import gymnasium
+import numpy as np
+from gymnasium.spaces import Box, Space
+from gymnasium.utils.seeding import np_random
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from chilopod.errors import ParameterError
+from chilopod.gym.episodes import Episodes, Step
+from chilopod.robot import Robot, load_robot
+
+if TYPE_CHECKING:
+    from chilopod.gym.picture import Picture
+
+Row = NDArray[np.float32]
+Pixels = NDArray[np.uint8]
+
+_PRESETS = {"planar": "aoi2022-planar", "twin": "aoi2022"}
+_RENDER_MODES = ("rgb_array",)
+_FPS = 10  # pictures of a film, each a gait cycle
+
+
+class CourseVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
+    """Robots that walk random courses, all in one walk of an engine; an episode is five targets.
+
+    Parameters
+    ----------
+    num_envs
+        How many robots.
+    robot
+        A preset, a robot file, or a robot; by default the paper's.
+    engine
+        ``planar``, ``twin``, or one's own as ``package.module:object``.
+    render_mode
+        ``rgb_array`` or None.
+    named
+        As of :class:`chilopod.gym.Episodes`: springs, targets, patience, disturbance, rewards.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such robot, engine, task or render mode.
+    """
+
+    metadata = {"render_modes": [*_RENDER_MODES], "render_fps": _FPS, "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
+    targets = 5
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        *,
+        robot: str | Path | Robot | None = None,
+        engine: str = "planar",
+        render_mode: str | None = None,
+        **named: Any,
+    ) -> None:
+        self.num_envs, self.render_mode = num_envs, render_mode
+        self.episodes = _episodes(num_envs, robot, engine, render_mode, {"targets": self.targets, **named})
+        self.single_observation_space, self.single_action_space = _spaces(self.episodes)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._generators: list[np.random.Generator] | None = None
+        self._pictures: list[Picture] | None = None
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Row, dict[str, Any]]:
+        """Begin an episode with every robot.
+
+        Parameters
+        ----------
+        seed
+            That of robot i is so much more than that of robot 0, or one each; None: as the generators go on.
+        options
+            Not used.
+        """
+        seeds = _seeds(seed, self.num_envs)
+        super().reset(seed=None if seed is None or isinstance(seed, Sequence) else operator.index(seed))
+        if self._generators is None:
+            drawn = self.np_random.integers(1 << 31, size=self.num_envs)
+            self._generators = [np_random(int(each))[0] for each in drawn]
+        for number, each in enumerate(seeds):
+            if each is not None:
+                self._generators[number] = np_random(each)[0]
+        step = self.episodes.begin(self._generators, seeds)
+        return step.observation, _infos(step)
+
+    def step(
+        self, actions: Row
+    ) -> tuple[Row, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+        """Walk for a gait cycle; robots whose episode was over begin another instead."""
+        step = self.episodes.step(actions)
+        return step.observation, step.reward, step.terminated, step.truncated, _infos(step)
+
+    def render(self) -> tuple[Pixels, ...] | None:
+        """A picture of every robot, from above; None without a render mode."""
+        if self.render_mode is None:
+            return None
+        if self._pictures is None:
+            from chilopod.gym.picture import Picture
+
+            self._pictures = [Picture(self.episodes, robot) for robot in range(self.num_envs)]
+        return tuple(picture.drawn() for picture in self._pictures)
+
+
+class TurnVectorEnv(CourseVectorEnv):
+    """As :class:`CourseVectorEnv`, with one target in an episode."""
+
+    targets = 1
+
+
+class CourseEnv(gymnasium.Env[Row, Row]):
+    """One robot of :class:`CourseVectorEnv`, whose parameters these are."""
+
+    metadata = {"render_modes": [*_RENDER_MODES], "render_fps": _FPS}  # noqa: RUF012
+    targets = 5
+
+    def __init__(
+        self,
+        *,
+        robot: str | Path | Robot | None = None,
+        engine: str = "planar",
+        render_mode: str | None = None,
+        **named: Any,
+    ) -> None:
+        self.render_mode = render_mode
+        self.episodes = _episodes(1, robot, engine, render_mode, {"targets": self.targets, **named})
+        self.observation_space, self.action_space = _spaces(self.episodes)
+        self._over = False
+        self._picture: Picture | None = None
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Row, dict[str, Any]]:
+        """Begin an episode; with a seed the one that trials draw from it."""
+        super().reset(seed=seed)
+        step, self._over = self.episodes.begin([self.np_random], [seed]), False
+        return step.observation[0], _info(step)
+
+    def step(self, action: Row) -> tuple[Row, float, bool, bool, dict[str, Any]]:
+        """Walk for a gait cycle."""
+        if self._over:
+            raise ParameterError("the episode is over", field="step", allowed="reset() first")
+        step = self.episodes.step(np.asarray(action)[None])
+        terminated, truncated = bool(step.terminated[0]), bool(step.truncated[0])
+        self._over = terminated or truncated
+        return step.observation[0], float(step.reward[0]), terminated, truncated, _info(step)
+
+    def render(self) -> Pixels | None:
+        """A picture of the robot, from above; None without a render mode."""
+        if self.render_mode is None:
+            return None
+        if self._picture is None:
+            from chilopod.gym.picture import Picture
+
+            self._picture = Picture(self.episodes, 0)
+        return self._picture.drawn()
+
+
+class TurnEnv(CourseEnv):
+    """As :class:`CourseEnv`, with one target in an episode."""
+
+    targets = 1
+
+
+def _episodes(
+    count: int, robot: str | Path | Robot | None, engine: str, render_mode: str | None, named: dict[str, Any]
+) -> Episodes:
+    if render_mode not in (None, *_RENDER_MODES):
+        raise ParameterError(
+            "there is no such render mode", field="render_mode", value=render_mode, allowed=", ".join(_RENDER_MODES)
+        )
+    if robot is None:
+        robot = _PRESETS.get(engine, _PRESETS["planar"])
+    walker = robot if isinstance(robot, Robot) else load_robot(robot)
+    return Episodes(walker, count, engine=engine, remember=render_mode is not None, **named)
+
+
+def _spaces(episodes: Episodes) -> tuple[Space[Row], Space[Row]]:
+    """Of observations and actions of one robot."""
+    low, high = episodes.sight.bounds
+    observations: Any = Box(low.astype(np.float32), high.astype(np.float32), dtype=np.float32)
+    actions: Any = Box(-1.0, 1.0, (len(episodes.actions.names),), dtype=np.float32)
+    return observations, actions
+
+
+def _seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:
+    if seed is None or not isinstance(seed, Sequence):
+        return [None if seed is None else operator.index(seed) + number for number in range(count)]
+    if len(seed) != count:
+        raise ParameterError("has the wrong length", field="seed", value=len(seed), allowed=str(count))
+    return [None if each is None else operator.index(each) for each in seed]
+
+
+def _infos(step: Step) -> dict[str, Any]:
+    """As vector environments give them: every array with a mask, of who has it."""
+    here = np.ones(len(step.reward), dtype=np.bool_)
+    return {**step.info, **{f"_{name}": here.copy() for name in step.info}}
+
+
+def _info(step: Step) -> dict[str, Any]:
+    return {name: each[0].copy() if each.ndim > 1 else each[0].item() for name, each in step.info.items()}

@@ -1,0 +1,350 @@
+"""Episodes of a batch of robots, step by step: the tasks behind the environments, without Gymnasium.
+
+A step is a gait cycle. Robots whose episode is over stand still for the next step and begin another at its end, while
+the others walk on: Gymnasium's autoreset mode ``NEXT_STEP``.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chilopod.engine import Observation, Walk, engine_named
+from chilopod.errors import ParameterError
+from chilopod.gym.actions import Actions
+from chilopod.gym.sight import Sight
+from chilopod.record import LONGEST
+from chilopod.robot import Robot
+from chilopod.steering import CourseReferee, Judged, Verdict, random_course
+from chilopod.steering.course import RANDOM_DISTANCES
+from chilopod.tasks.course import patience_of
+from chilopod.trials import Disturbance, Drawn, draw
+
+Array = NDArray[np.float64]
+Marks = NDArray[np.bool_]
+
+_SEEDS = 1 << 31  # of episodes that nobody gave one, less than this
+
+
+@dataclass(frozen=True)
+class Rewards:
+    """What a step is worth.
+
+    Attributes
+    ----------
+    progress
+        For every metre that the target has come nearer.
+    arrival
+        For arriving at a target.
+    cycle
+        For every gait cycle.
+    failure
+        For a robot that falls, or bends a joint too far.
+    """
+
+    progress: float = 1.0
+    arrival: float = 1.0
+    cycle: float = -0.01
+    failure: float = -1.0
+
+
+@dataclass(frozen=True)
+class Step:
+    """What comes of a step, for every robot of a batch; the arrays are the caller's to keep.
+
+    Attributes
+    ----------
+    observation
+        See :class:`chilopod.gym.Sight`.
+    reward
+        See :class:`Rewards`; 0 for a robot whose episode has just begun.
+    terminated
+        Whether the robot has arrived at its last target, or does not walk any more.
+    truncated
+        Whether its time for the last target is over.
+    info
+        ``time`` of the episode (s), ``distance`` of the target (m), ``pose`` of module 1 (m, m, rad), ``verdict`` on
+        the target of which the robot is done with this step, or "", and ``arrived``: how many targets so far.
+    """
+
+    observation: NDArray[np.float32]
+    reward: Array
+    terminated: Marks
+    truncated: Marks
+    info: dict[str, NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class Moment:
+    """Where robots of a batch are at the end of a step: what a picture shows.
+
+    Attributes
+    ----------
+    pose
+        x, y and heading of module 1, m and rad, shape (robots, 3).
+    joint_angles, leg_yaw
+        rad, shapes (robots, N-1) and (robots, 2).
+    aims
+        Places of the targets, m, shape (robots, 2).
+    """
+
+    pose: Array
+    joint_angles: Array
+    leg_yaw: Array
+    aims: Array
+
+
+class Episodes:
+    """Robots that walk to random targets, each in an episode of its own.
+
+    Parameters
+    ----------
+    robot
+        All are alike.
+    count
+        How many.
+    engine
+        Of :data:`chilopod.engine.ENGINES`, or one's own as ``package.module:object``.
+    springs
+        Which ones actions set, see :class:`chilopod.gym.Actions`.
+    targets
+        Of an episode, one after the other, see :func:`chilopod.steering.random_course`.
+    patience
+        For each target, s; by default the engine's, see :func:`chilopod.tasks.course.patience_of`.
+    disturbance
+        What differs at the start, and the noise of bearings, as in trials.
+    rewards
+        What steps are worth.
+    remember
+        Whether to keep :attr:`moments`.
+
+    Attributes
+    ----------
+    actions, sight
+        What actions and observations mean.
+    moments
+        Of the steps so far, as many as the longest episode has.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such robot, engine or task.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        count: int = 1,
+        *,
+        engine: str = "planar",
+        springs: Literal["first", "all"] = "first",
+        targets: int = 1,
+        patience: float | None = None,
+        disturbance: Disturbance = Disturbance(),  # noqa: B008  (frozen)
+        rewards: Rewards = Rewards(),
+        remember: bool = False,
+    ) -> None:
+        if not 1 <= count <= 1 << 20:
+            raise ParameterError("is no number of robots", field="num_envs", value=count, allowed="1 to a million")
+        self._engine, self._targets, self._count = engine_named(engine), targets, count
+        self._engine.common(robot)
+        self.actions = Actions.of(robot, springs)
+        self._patience = patience_of(engine) if patience is None else patience
+        self._disturbance, self.rewards = disturbance, rewards
+        common = random_course(0, self._patience, targets)
+        self.sight = Sight(self.actions, common.range)
+        gait, least = robot.gait, RANDOM_DISTANCES[1] / robot.gait.speed
+        if self._patience < least:
+            raise ParameterError(
+                "is too short for the farthest target",
+                field="patience",
+                value=f"{self._patience:g} s",
+                allowed=f"{least:g} s or more",
+            )
+        self._period = gait.period
+        self._looks = int(np.ceil(common.duration / gait.period)) + targets + 1
+        self.moments: deque[Moment] | None = deque(maxlen=self._looks) if remember else None
+        self._walk: Walk | None = None
+        self._generators: list[np.random.Generator] = []
+
+    @property
+    def robot(self) -> Robot:
+        """That walks, with the actuators that actions need."""
+        return self.actions.robot
+
+    @property
+    def period(self) -> float:
+        """Of a step, s."""
+        return self._period
+
+    def steps(self, robot: int) -> int:
+        """That the present episode of a robot has had so far."""
+        return int(self._cycle - self._since[robot])
+
+    def begin(self, generators: Sequence[np.random.Generator], seeds: Sequence[int | None]) -> Step:
+        """Begin an episode with every robot, in a new walk.
+
+        Parameters
+        ----------
+        generators
+            One a robot, of the seeds of its episodes from now on.
+        seeds
+            Of its first one: that is the course and the disturbance that trials draw from this seed; None: drawn too.
+        """
+        self._generators = list(generators)
+        return self._begin(seeds)
+
+    def step(self, actions: ArrayLike) -> Step:
+        """Walk for a gait cycle.
+
+        Parameters
+        ----------
+        actions
+            Shape (robots, numbers of an action), see :class:`chilopod.gym.Actions`; those of robots whose episode was
+            over are not used.
+
+        Raises
+        ------
+        ParameterError
+            If there is no episode yet, or an action is none; nothing has changed then.
+        """
+        if self._walk is None:
+            raise ParameterError("there is no episode yet", field="step", allowed="reset() first")
+        told, waiting, walk = self.actions.checked(actions, self._count), self._ended, self._walk
+        if waiting.all():
+            return self._begin([None] * self._count)
+        for phase, command in self.actions.commands(told, self._leg_yaw):
+            walk.advance((self._cycle + phase) * self._period)
+            walk.command(command)
+        self._cycle += 1
+        walk.advance(self._cycle * self._period)
+        if waiting.any():
+            self._restart(walk, waiting)
+        return self._look(walk, waiting)
+
+    # -- inside
+    # ---------------------------------------------------------------------------------------------------------------
+
+    def _begin(self, seeds: Sequence[int | None]) -> Step:
+        drawn, courses = self._drawn(np.arange(self._count), seeds)
+        self._walk = self._engine.start(
+            self.robot,
+            initial=self._initial(drawn),
+            friction=np.stack([each.friction for each in drawn]),
+            seeds=self._scan_seeds(drawn),
+            record=None,
+        )
+        missed = np.stack([each.missed for each in drawn])
+        self._missing = bool(self._disturbance.missed)
+        self._referee = CourseReferee(courses, self.robot.gait, missed if self._missing else None, keep=False)
+        self._errors = np.stack([each.bearing for each in drawn])
+        self._cycle, self._since = 0, np.zeros(self._count, dtype=np.intp)
+        self._away, self._arrived = np.full(self._count, np.nan), np.zeros(self._count, dtype=np.intp)
+        if self.moments is not None:
+            self.moments.clear()
+        return self._look(self._walk, np.ones(self._count, dtype=np.bool_))
+
+    def _restart(self, walk: Walk, which: Marks) -> None:
+        ids = np.flatnonzero(which)
+        drawn, courses = self._drawn(ids, [None] * len(ids))
+        walk.restart(
+            which,
+            self._initial(drawn),
+            np.stack([each.friction for each in drawn]),
+            self._scan_seeds(drawn),
+        )
+        missed = np.stack([each.missed for each in drawn])
+        self._referee.restart(which, courses, missed if self._missing else None)
+        self._errors[ids] = np.stack([each.bearing for each in drawn])
+        self._since[ids], self._arrived[ids] = self._cycle, 0
+
+    def _drawn(self, ids: NDArray[np.intp], seeds: Sequence[int | None]) -> tuple[list[Drawn], list[Any]]:
+        """Disturbances and courses of new episodes of some robots."""
+        chosen = [
+            int(self._generators[robot].integers(_SEEDS)) if seed is None else seed
+            for robot, seed in zip(ids.tolist(), seeds, strict=True)
+        ]
+        modules = self.robot.body.modules
+        drawn = [draw(self._disturbance, seed, modules, self._looks) for seed in chosen]
+        return drawn, [random_course(seed, self._patience, self._targets) for seed in chosen]
+
+    def _initial(self, drawn: Sequence[Drawn]) -> Array:
+        angles, headings = np.stack([each.joint_angles for each in drawn]), np.array([each.heading for each in drawn])
+        return self._engine.initial_states(self.robot, angles, headings)
+
+    def _scan_seeds(self, drawn: Sequence[Drawn]) -> list[int] | None:
+        noisy = self._engine.traits.noisy and self._disturbance.bearing > 0.0
+        return [each.scan_seed for each in drawn] if noisy else None
+
+    def _look(self, walk: Walk, fresh: Marks) -> Step:
+        """Judge, put up the next targets, and see; at the end of a step."""
+        referee, seen, pose = self._referee, walk.observe(), walk.pose()
+        away = _distance(referee.aims, pose)
+        judged = referee.judge(walk)
+        busy, aims = referee.busy, referee.aims
+        others = judged.moved & busy
+        if others.any():
+            # Who is done with all targets shows the last one once more.
+            again = walk.observe()
+            seen = replace(
+                seen,
+                bearing=np.where(others, again.bearing, seen.bearing),
+                distance=np.where(others, again.distance, seen.distance),
+            )
+        reward = self._reward(judged, fresh, self._away - away)
+        self._away = np.where(others, _distance(aims, pose), away)
+        terminated = judged.gone | (judged.arrived & ~busy)
+        truncated = (judged.late | judged.unseen) & ~busy
+        if (self._cycle + 1) * self._period > LONGEST:
+            truncated |= busy  # no walk is longer; the next step begins another
+        self._arrived += judged.arrived
+        self._ended, self._leg_yaw = terminated | truncated, seen.leg_yaw
+        if self._ended.any():
+            walk.halt(self._ended)
+        if self.moments is not None:
+            self.moments.append(Moment(pose, seen.joint_angles, seen.leg_yaw, aims))
+        info = {
+            "time": (self._cycle - self._since) * self._period,
+            "distance": self._away.copy(),
+            "pose": pose,
+            "verdict": _verdicts(judged),
+            "arrived": self._arrived.copy(),
+        }
+        return Step(self.sight.row(self._through(seen)), reward, terminated, truncated, info)
+
+    def _reward(self, judged: Judged, fresh: Marks, nearer: Array) -> Array:
+        worth = self.rewards
+        reward = worth.progress * np.nan_to_num(nearer) + worth.arrival * judged.arrived
+        reward += worth.cycle + worth.failure * judged.gone
+        reward[fresh] = 0.0
+        return np.asarray(reward)
+
+    def _through(self, seen: Observation) -> Observation:
+        """What gets through to the robots, with noise and the view that scanners have."""
+        look = self._cycle - self._since
+        if not self._engine.traits.noisy:
+            bearing = seen.bearing + self._errors[np.arange(self._count), look]
+            seen = replace(seen, bearing=(bearing + np.pi) % (2.0 * np.pi) - np.pi)
+        return self._referee.through(look, seen)
+
+
+def _distance(places: Array, pose: Array) -> Array:
+    away: Array = np.hypot(places[:, 0] - pose[:, 0], places[:, 1] - pose[:, 1])
+    return away
+
+
+def _verdicts(judged: Judged) -> NDArray[np.str_]:
+    verdicts = np.full(len(judged.gone), "", dtype="U12")
+    for which, verdict in (
+        (judged.arrived, Verdict.ARRIVED),
+        (judged.late, Verdict.LATE),
+        (judged.unseen, Verdict.UNSEEN),
+        (judged.gone, Verdict.STOPPED),
+    ):
+        verdicts[which] = verdict.label
+    return verdicts

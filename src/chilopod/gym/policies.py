@@ -1,0 +1,95 @@
+"""Strategies as policies: what to do for what an environment shows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.engine import Controller
+from chilopod.errors import ParameterError, nearest_name
+from chilopod.gym.episodes import Episodes
+from chilopod.steering import ON_COURSES, VARIABLE, steered
+from chilopod.tasks.course import driver
+
+Row = NDArray[np.float32]
+
+Policy = Callable[[Row], Row]
+"""From the observation of a robot, or one a robot, to its action."""
+
+BASELINES = ("leg-yaw", VARIABLE.name)
+"""Strategies that steer with what actions set."""
+
+
+@dataclass(frozen=True)
+class Steered:
+    """A controller as a policy.
+
+    At every step it is asked at all its events at once, with what is seen at the beginning of the gait cycle. In a walk
+    it is asked at each event when it comes: it then sees what a policy saw up to a cycle before. Springs that the
+    controller does not set stay as stiff as in the robot file, as far as actions go.
+
+    Attributes
+    ----------
+    controller
+        That steers by springs and leg yaw.
+    episodes
+        What actions and observations mean.
+    """
+
+    controller: Controller
+    episodes: Episodes
+
+    def __call__(self, observation: Row) -> Row:
+        """Actions for observations, one row or one a robot."""
+        rows, actions = np.atleast_2d(observation), self.episodes.actions
+        seen = self.episodes.sight.seen(rows)
+        yaw, stiffness = seen.leg_yaw.copy(), np.tile(actions.robot.springs.stiffness, (len(rows), 1))
+        for event in self.controller.events(actions.robot.gait):
+            command = self.controller.act(event, seen)
+            if command.leg_yaw is not None:
+                wanted = np.broadcast_to(command.leg_yaw, yaw.shape)
+                yaw = np.where(wanted != seen.leg_yaw, wanted, yaw)
+            if command.stiffness is not None:
+                stiffness = np.broadcast_to(command.stiffness, stiffness.shape)
+        springs = actions.set_by(stiffness[:, actions.joints])
+        action = np.column_stack([springs, np.clip(yaw / actions.legs.limit, -1.0, 1.0)]).astype(np.float32)
+        return action.reshape(*observation.shape[:-1], action.shape[1])
+
+
+def baseline(name: str, episodes: Episodes, engine: str = "planar") -> Steered:
+    """A strategy of :data:`chilopod.steering.ON_COURSES` as a policy.
+
+    Parameters
+    ----------
+    name
+        ``leg-yaw``: the paper's controller, the springs as they are; ``variable``: the first spring is set besides.
+    episodes
+        Whose robots it is to steer.
+    engine
+        Whose radius law ``variable`` stands on, see :func:`chilopod.tasks.radius_law`.
+
+    Raises
+    ------
+    ParameterError
+        If there is none of this name.
+    AnalysisError
+        If the robot has no radius law, and the strategy stands on it.
+    """
+    if name not in BASELINES:
+        raise ParameterError(
+            "there is no such baseline",
+            field="baseline",
+            value=name,
+            allowed=", ".join(BASELINES),
+            nearest=nearest_name(name, BASELINES),
+        )
+    strategy = ON_COURSES[name]
+    if strategy is VARIABLE:
+        controller = driver(episodes.robot, strategy, engine=engine).controller
+    else:
+        _, controller = steered(episodes.robot, strategy, None)
+    assert controller is not None  # both steer
+    return Steered(controller, episodes)

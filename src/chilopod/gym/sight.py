@@ -1,0 +1,85 @@
+"""What a robot senses, as one row of bounded numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.engine import Observation
+from chilopod.gym.actions import Actions
+
+Array = NDArray[np.float64]
+
+_MOST_BENT = 0.5 * np.pi  # rad, of a joint of a robot that walks
+
+
+@dataclass(frozen=True)
+class Sight:
+    """The layout of an observation.
+
+    In order: whether the target is seen (0 or 1); sine and cosine of its bearing, left positive, and its distance in m,
+    all 0 where it is not seen; the yaw joints, rad; the yaw of the left and of the right leg of module 1 as last
+    commanded, rad; and the springs that actions set, as the action that sets them to what they are. A robot that does
+    not walk any more shows straight joints.
+
+    Attributes
+    ----------
+    actions
+        Of the same robot.
+    range
+        How far its scanner sees, m.
+    """
+
+    actions: Actions
+    range: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What each number is."""
+        joints = range(1, self.actions.robot.body.modules)
+        springs = self.actions.names
+        return (
+            "target seen", "sine of bearing", "cosine of bearing", "distance",
+            *(f"angle of joint {joint}" for joint in joints), *springs[-2:], *springs[:-2],
+        )  # fmt: skip
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Least and largest value of each number."""
+        joints, springs = self.actions.robot.body.modules - 1, len(self.actions.joints)
+        bent, yaw, whole = [_MOST_BENT] * joints, [self.actions.legs.limit] * 2, [1.0] * springs
+        high = np.array([1.0, 1.0, 1.0, self.range, *bent, *yaw, *whole])
+        low = -high
+        low[[0, 3]] = 0.0
+        return low, high
+
+    def row(self, seen: Observation) -> NDArray[np.float32]:
+        """What robots sense, shape (robots, len(names)), single precision, within the bounds."""
+        known = np.isfinite(seen.bearing)
+        bearing = np.where(known, seen.bearing, 0.0)
+        target = [known, np.where(known, np.sin(bearing), 0.0), np.where(known, np.cos(bearing), 0.0)]
+        target.append(np.where(known, seen.distance, 0.0))
+        springs = self.actions.set_by(seen.stiffness[:, self.actions.joints])
+        row = np.column_stack([*target, np.nan_to_num(seen.joint_angles), seen.leg_yaw, springs])
+        low, high = (each.astype(np.float32) for each in self.bounds)
+        return np.clip(row.astype(np.float32), low, high)
+
+    def seen(self, rows: NDArray[np.float32], time: float = 0.0) -> Observation:
+        """What a controller would be shown, of rows of shape (robots, len(names)): the other way round.
+
+        Springs that actions do not set are those of the robot file.
+        """
+        row, joints = rows.astype(np.float64), self.actions.robot.body.modules - 1
+        known, (first, legs) = row[:, 0] > 0.5, (4, 4 + joints)
+        stiffness = np.tile(self.actions.robot.springs.stiffness, (len(row), 1))
+        stiffness[:, self.actions.joints] = self.actions.stiffness(row[:, legs + 2 :])
+        return Observation(
+            time,
+            np.where(known, np.arctan2(row[:, 1], row[:, 2]), np.nan),
+            np.where(known, row[:, 3], np.nan),
+            row[:, first:legs],
+            row[:, legs : legs + 2],
+            stiffness,
+        )

@@ -1,0 +1,106 @@
+"""Where the parts of a walking robot are in space, and what they look like: boxes, rods, balls and pins."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.kinematics import directions, foot_places, from_modules, module_centres, module_headings
+from chilopod.live.state import Seen
+
+Array = NDArray[np.float64]
+KINDS = ("box", "rod", "ball", "pin")
+"""A cube with sides of 1; a cylinder along z and a ball, both of radius 1 and the cylinder of height 1; and the
+cylinders of the yaw joints, front to rear."""
+
+
+@dataclass(frozen=True)
+class Placed:
+    """All parts of a kind.
+
+    Attributes
+    ----------
+    centres
+        m, (n, 3).
+    turns
+        Quaternions, the real part first, (n, 4).
+    scales
+        Sizes along the part's own axes, m, (n, 3).
+    """
+
+    centres: Array
+    turns: Array
+    scales: Array
+
+
+class Body(Protocol):
+    """A robot that can be drawn: its first box is module 1."""
+
+    def places(self, seen: Seen) -> Mapping[str, Placed]:
+        """Where its parts are, by kind, always the same ones in the same order."""
+
+
+# In parts of the length of a module: the planar robot has no height, and no width but that of its stance.
+_WIDTH, _HEIGHT, _GAP, _CLEARANCE, _LIFT = 0.36, 0.22, 0.1, 0.24, 0.1
+_LEG, _FOOT, _PIN = 0.028, 0.045, (0.09, 0.26)
+
+
+class FlatBody:
+    """A robot of an engine that knows only where it is on the floor: the body it might have above its feet.
+
+    Feet swing forward as the gait has it, lifted by a tenth of a module's length.
+    """
+
+    def places(self, seen: Seen) -> Mapping[str, Placed]:
+        """See :class:`Body`."""
+        robot = seen.robot
+        n, length, legs, gait = robot.body.modules, robot.module_length, robot.legs, robot.gait
+        headings = module_headings(seen.pose[2], seen.joint_angles)
+        centres = module_centres(seen.pose[:2], headings, length)
+        turned = _about_z(headings)
+        pins = (centres - 0.5 * length * directions(headings)[0])[:-1]
+
+        phase = gait.phases(seen.clock, n)
+        lift = np.where(gait.stands(phase), 0.0, np.sin(gait.swing_angle(phase)))
+        yaw = np.zeros((n, 2))
+        yaw[0] = seen.leg_yaw
+        places = foot_places(legs.forward_offset, legs.half_width, gait.stroke(phase), yaw)
+        inside = np.tile([legs.forward_offset, 0.5 * _WIDTH * length], (n, 2, 1))
+        inside[:, 1, 1] *= -1.0
+        hip_height = (_CLEARANCE + 0.5 * _HEIGHT) * length
+        feet = _raised(from_modules(centres, headings, places), (_FOOT + _LIFT * lift) * length).reshape(-1, 3)
+        hips = _raised(from_modules(centres, headings, inside), hip_height).reshape(-1, 3)
+        sizes = length * np.array([(1.0 - _GAP, _WIDTH, _HEIGHT), (_FOOT,) * 3, (_PIN[0], *_PIN)])
+        return {
+            "box": Placed(_raised(centres, hip_height), turned, np.tile(sizes[0], (n, 1))),
+            "rod": _rods(hips, feet, _LEG * length),
+            "ball": Placed(feet, np.tile([1.0, 0.0, 0.0, 0.0], (2 * n, 1)), np.tile(sizes[1], (2 * n, 1))),
+            "pin": Placed(_raised(pins, hip_height), turned[:-1], np.tile(sizes[2], (n - 1, 1))),
+        }
+
+
+def _raised(flat: Array, height: float | Array) -> Array:
+    return np.concatenate([flat, np.broadcast_to(height, flat.shape[:-1])[..., None]], axis=-1)
+
+
+def _about_z(angles: Array) -> Array:
+    zero = np.zeros_like(angles)
+    return np.stack([np.cos(0.5 * angles), zero, zero, np.sin(0.5 * angles)], axis=-1)
+
+
+def _rods(tops: Array, ends: Array, radius: float) -> Placed:
+    """From end to end, turned out of z by the shortest way."""
+    way = tops - ends
+    length = np.linalg.norm(way, axis=-1)
+    x, y, z = (way / length[:, None]).T
+    turn = np.stack([1.0 + z, -y, x, np.zeros_like(x)], axis=-1)
+    thick = np.full_like(length, radius)
+    return Placed(
+        0.5 * (tops + ends),
+        turn / np.linalg.norm(turn, axis=-1, keepdims=True),
+        np.stack([thick, thick, length], axis=-1),
+    )

@@ -1,0 +1,364 @@
+"""The page: a server for browsers, the one thread that owns the walk, and the process that computes beside it."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import math
+import socket
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import xarray as xr
+
+from chilopod.engine import engine_named
+from chilopod.errors import ChilopodError, ParameterError, in_words
+from chilopod.extras import needs
+from chilopod.live import wishes
+from chilopod.live.body import Body, FlatBody
+from chilopod.live.session import Session
+from chilopod.live.theory import Beside, Growth, Theory
+from chilopod.live.words import described, sentences
+from chilopod.netcdf import netcdf
+from chilopod.robot import Robot
+
+needs("viser", extra="live")
+
+import viser  # noqa: E402  (there, as has just been seen)
+
+from chilopod.live.controls import Controls  # noqa: E402
+from chilopod.live.plots import Plots  # noqa: E402
+from chilopod.live.scene import View, floor_place  # noqa: E402
+
+_FRAME = 1.0 / 30.0  # s
+_BEHIND = 0.1  # s that may be made up for
+_PLOTS = 0.25  # s from one drawing of the plots and sentences to the next
+_ALONE = 0.1  # s from one look to the next while no browser watches
+_LOCAL = ("127.0.0.1", "localhost", "::1")
+
+
+class Live:
+    """A page with a walking robot.
+
+    One thread owns the walk; what is done at the page only leaves wishes for it. While no browser watches, the robot
+    stands still.
+
+    Parameters
+    ----------
+    robot, engine, seed, strategy
+        As for :class:`chilopod.live.Session`.
+    host
+        Address to listen at; by default this machine only.
+    port
+        At which; 0 for any that is free.
+    kept
+        Called with the name of a recording and its two files, netCDF and HTML, besides the download in the browser.
+        What it raises of :mod:`chilopod.errors` is shown at the page.
+
+    Attributes
+    ----------
+    address
+        To open in a browser.
+    seen
+        The last frame.
+    frames
+        How many were shown.
+    busy
+        s that the thread of the walk was at work.
+    failure
+        What ended that thread, if anything did.
+
+    Raises
+    ------
+    ParameterError
+        If the port is in use or there is no such address, or the engine cannot walk such a robot.
+    ExtraError
+        If viser is not installed.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        engine: str = "planar",
+        *,
+        seed: int = 1,
+        strategy: str = "variable",
+        host: str = "127.0.0.1",
+        port: int = 8080,
+        kept: Callable[[str, bytes, str], None] | None = None,
+    ) -> None:
+        self._session = Session(robot, engine, seed=seed, strategy=strategy)
+        self.seen = self._session.seen()
+        self._body = _body(robot, engine)
+        self._kept, self._recordings = kept, 0
+        self._handing_out: list[threading.Thread] = []
+        self._theory = Theory()
+        self._growth: Growth | None = None
+        self._wants_record: viser.ClientHandle | None = None
+        self.frames, self.busy, self._told = 0, 0.0, False
+        self._server = _server(host, port)
+        self._beside = Beside(engine)
+        try:
+            # The first steps ever are compiled, which takes a while: better before anybody looks.
+            Session(robot, engine).walk_on(1.5 * robot.gait.period)
+            self._build(described(robot, engine))
+        except BaseException:
+            self.close()
+            raise
+        self.address = f"http://{'localhost' if host in _LOCAL else host}:{self._server.get_port()}"
+        self.failure: BaseException | None = None
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="chilopod walk", daemon=True)
+        self._thread.start()
+
+    def _build(self, title: str) -> None:
+        server, seen = self._server, self.seen
+        server.gui.configure_theme(show_share_button=False, show_logo=False)
+        server.gui.set_panel_label("chilopod live")
+        self._view = View(server, self._body.places(seen), seen.robot.body.length)
+        self._controls = Controls(server, self._session, title, self._follow, self._recorder)
+        panel = server.gui.add_panel()
+        with panel.add_tab("Curves"):
+            self._plots = Plots(server.gui, len(seen.joint_angles))
+        panel.dock_left()
+        panel.set_width(300)
+        self._view.pins.on_drag("left")(self._dragged)
+        server.scene.on_click()(self._clicked)
+
+    def wish(self, wish: wishes.Wish) -> None:
+        """Want something of the walk, from any thread, as if somebody had done it at the page."""
+        self._session.box.put(wish)
+        self._told = True
+
+    def wait(self, seconds: float | None = None) -> None:
+        """So long, or until the thread of the walk ends, which it does not by itself unless it fails.
+
+        Raises
+        ------
+        RuntimeError
+            If it failed.
+        """
+        end = math.inf if seconds is None else time.monotonic() + seconds
+        while self._thread.is_alive() and time.monotonic() < end:
+            self._thread.join(min(0.5, max(0.0, end - time.monotonic())))
+        if self.failure is not None:
+            raise self.failure
+
+    def close(self) -> None:
+        """End everything; a recording that is under way is kept."""
+        over = getattr(self, "_over", None)
+        if over is not None:
+            over.set()
+            self._thread.join()
+            self._session.stop_recording()
+            self._keep()
+            for each in self._handing_out:
+                each.join()
+        self._beside.close()
+        with _quiet():
+            self._server.stop()
+
+    # -- the thread of the walk
+    # ---------------------------------------------------------------------------------------------------------------
+
+    def _run(self) -> None:
+        try:
+            self._walk()
+        except BaseException as error:
+            self.failure = error
+            self._controls.words.content = f"**This page has failed**: {in_words(error)}"
+
+    def _walk(self) -> None:
+        session, last, plotted, walked = self._session, time.perf_counter(), -math.inf, _Rate()
+        self._ask()
+        while not self._over.wait(max(0.0, last + _FRAME - time.perf_counter())):
+            now = time.perf_counter()
+            passed, last = min(now - last, _BEHIND), now
+            watched = bool(self._server.get_clients())
+            if self._obey():
+                plotted = -math.inf
+            settings = session.settings
+            if watched and not settings.paused:
+                session.walk_on(passed * settings.speed)
+            seen = self.seen = session.seen()
+            walked.add(now, seen.time)
+            self._plots.add(seen, self._theory)
+            with self._server.atomic():
+                self._view.show(self._body.places(seen), seen)
+                self._controls.reflect(settings, seen)
+                if now - plotted > _PLOTS:
+                    plotted = now
+                    self._tell(walked.value)
+                    self._plots.show(seen, self._theory)
+            self.frames += watched
+            self._keep()
+            self.busy += time.perf_counter() - now
+            if not watched:
+                self._over.wait(_ALONE)
+
+    def _obey(self) -> bool:
+        """Wishes, and what has come of questions; whether there were any of the former."""
+        session, before = self._session, self._session.settings
+        told, self._told = self._told, False
+        obeyed = session.obey()
+        if obeyed:
+            if session.settings.robot != before.robot:
+                self._ask(before.robot)
+            if session.seen().time < self.seen.time:
+                self._view.forget_way()
+                self._plots.forget()
+        said = session.said()
+        for sentence in said:
+            self._notify(sentence)
+        if said or told:
+            self._controls.put_back(session.settings)
+        for answer in self._beside.answers():
+            if isinstance(answer, Theory):
+                self._theory = answer
+                session.law = answer.law
+            else:
+                self._growth = answer
+        return obeyed
+
+    def _notify(self, sentence: str) -> None:
+        for client in self._server.get_clients().values():
+            client.add_notification("chilopod", sentence, auto_close_seconds=8.0)
+
+    def _ask(self, before: Robot | None = None) -> None:
+        """Ask what is not known of the robot as it is now."""
+        robot = self._session.settings.robot
+        if engine_named(self._session.engine).traits.exact:
+            self._beside.ask_growth(robot)
+        if before is None or _but_first_spring(robot) != _but_first_spring(before):
+            self._theory = Theory(remark="it is being computed")
+            self._session.law = None
+            self._beside.ask(robot)
+
+    def _tell(self, rate: float) -> None:
+        session, seen = self._session, self.seen
+        told = sentences(seen, session.settings, self._theory, self._growth)
+        settings = session.settings
+        slow = "" if settings.paused or rate > 0.8 * settings.speed else f", as fast as it goes: {rate:.1f} times"
+        recording = ", recording" if settings.recording else ""
+        text = f"{' '.join(told)}\n\n{seen.time:.0f} s, seed {settings.seed}{slow}{recording}"
+        if self._controls.words.content != text:
+            self._controls.words.content = text
+
+    # -- recordings
+    # ---------------------------------------------------------------------------------------------------------------
+
+    def _recorder(self, client: viser.ClientHandle | None) -> None:
+        self._wants_record = client
+
+    def _keep(self) -> None:
+        for record in self._session.records():
+            self._recordings += 1
+            name, to = f"chilopod-live-{self._recordings}", self._wants_record
+            # Drawing a replay of minutes takes a moment, and the walk goes on.
+            thread = threading.Thread(target=self._hand_out, args=(name, record, to), name=name)
+            self._handing_out = [each for each in self._handing_out if each.is_alive()] + [thread]
+            thread.start()
+
+    def _hand_out(self, name: str, record: xr.Dataset, to: viser.ClientHandle | None) -> None:
+        content, page = netcdf(record), _replay(record)
+        if self._kept is not None:
+            try:
+                self._kept(name, content, page)
+            except ChilopodError as error:
+                self._notify(str(error))
+        clients = self._server.get_clients()
+        if to is not None and to.client_id in clients:
+            clients = {to.client_id: to}
+        for client in clients.values():
+            client.send_file_download(f"{name}.nc", content, save_immediately=True)
+            client.send_file_download(f"{name}.html", page.encode(), save_immediately=True)
+
+    # -- what browsers do in the picture; these only leave wishes
+    # ---------------------------------------------------------------------------------------------------------------
+
+    def _follow(self, follow: bool) -> None:
+        self._view.follow = follow
+
+    def _clicked(self, event: viser.SceneClickEvent) -> None:
+        place = floor_place(self._view.origin, event.ray_origin, event.ray_direction)
+        if place is not None:
+            self._session.box.put(wishes.Target(place))
+
+    async def _dragged(self, event: Any) -> None:
+        if event.instance_index is None:
+            return
+        pin = self._view.pins.batched_wxyzs[event.instance_index]
+        angle = 2.0 * math.atan2(float(pin[3]), float(pin[0]))  # a pin stands upright
+        left = -math.sin(angle), math.cos(angle)
+        way = [end - start for start, end in zip(event.start_position, event.end_position, strict=True)]
+        aside = left[0] * way[0] + left[1] * way[1]
+        self._controls.drag(event.instance_index, aside, event.phase == "end")
+
+
+class _Rate:
+    """How many seconds were walked a second, of late."""
+
+    def __init__(self) -> None:
+        self.value = 0.0
+        self._since: tuple[float, float] | None = None
+
+    def add(self, now: float, walked: float) -> None:
+        if self._since is None or walked < self._since[1]:
+            self._since = now, walked
+        elif now - self._since[0] > 1.0:
+            self.value = (walked - self._since[1]) / (now - self._since[0])
+            self._since = now, walked
+
+
+def _body(robot: Robot, engine: str) -> Body:
+    if not engine_named(engine).traits.poses or robot.twin is None:
+        return FlatBody()
+    from chilopod.live.body_3d import SolidBody
+
+    return SolidBody(robot)
+
+
+def _but_first_spring(robot: Robot) -> tuple[object, ...]:
+    """What the theory of a robot depends on, whatever its first spring."""
+    return robot.springs.stiffness[1:], robot.gait, robot.ground, robot.twin
+
+
+def _replay(record: xr.Dataset) -> str:
+    heading = "A walk recorded at the live page"
+    if "pose" in record:
+        from chilopod.report.scene.replay_3d import replay_3d
+
+        return replay_3d(record, titles=["the robot"], heading=heading)
+    from chilopod.report.scene.replay import replay
+
+    return replay(record, titles=["the robot"], heading=heading)
+
+
+def _quiet() -> contextlib.AbstractContextManager[object]:
+    """What viser prints of where it listens, and that it ends, is for us to say."""
+    return contextlib.redirect_stdout(io.StringIO())
+
+
+def _server(host: str, port: int) -> viser.ViserServer:
+    """Of browsers; one that listens where it was told to, and nowhere else."""
+    if not 0 <= port < 65536:
+        raise ParameterError("is no port", field="port", value=port, allowed="1 to 65535, or 0 for any that is free")
+    try:
+        family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        with socket.socket(family, socket.SOCK_STREAM) as trial:
+            trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            trial.bind(address)
+            free = trial.getsockname()[1]
+    except socket.gaierror as error:
+        raise ParameterError("is no address of this machine", field="host", value=host) from error
+    except OSError as error:
+        raise ParameterError(
+            f"cannot be listened at: {error.strerror}", field="port", value=port, allowed="another --port, or 0"
+        ) from error
+    with _quiet():
+        server = viser.ViserServer(host=host, port=free, label="chilopod live", verbose=False)
+    # Of what viser can do for anybody who asks: put the page on the internet by way of somebody else's server.
+    server.request_share_url = lambda verbose=True: None  # type: ignore[method-assign]
+    return server

@@ -1,0 +1,377 @@
+"""A walk that goes on while somebody changes what it is: everything of the live page but the page."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from chilopod.analysis.parameters import ALL
+from chilopod.engine import Command, Controller, Status, Walk, engine_named, steer
+from chilopod.errors import ChilopodError, ParameterError
+from chilopod.live import wishes
+from chilopod.live.state import (
+    FRICTIONS,
+    LEG_YAW,
+    SPEEDS,
+    STRIDES,
+    Seen,
+    Settings,
+    as_finite,
+    as_seed,
+    as_strategy,
+    as_within,
+)
+from chilopod.record import Recording
+from chilopod.robot import Robot
+from chilopod.steering import ARRIVAL_RADIUS, VARIABLE, ActuatedAxis, LegYawController, RadiusLaw, SpringLaw
+from chilopod.steering.target import FARTHEST
+from chilopod.tasks.course import driver
+
+Array = NDArray[np.float64]
+
+LOOKS = 6
+"""In a gait cycle: means over a cycle are those of so many."""
+
+_SPEED = 2.0  # at first: fast enough to see it bend, slow enough to see it step
+_NUDGE = math.radians(0.5)  # standard deviation of what a nudge turns a joint by, held by its spring
+_START = math.radians(1.0)  # of joints and heading at the start, as in trials
+_STRONGEST = 1.0  # rad by which a pull turns a joint, held by its spring
+_RATE = 20.0  # Hz, of what is written down
+_LONGEST = 900.0  # s of it in one piece
+_MOST_WORDS = 4
+
+
+class Session:
+    """One robot that walks, and obeys wishes. To be used by one thread; but :attr:`box` takes wishes from any.
+
+    Without a word the walk is the same to the bit however it is cut into frames. Once a gait cycle every joint is
+    nudged at random, as a floor that is not quite even would: half a degree against its spring, about. A straight walk
+    that nothing disturbs stays straight, unstable as it may be.
+
+    Springs and pulls change at once (or as fast as the actuators of the robot file allow), the floor and the steps at
+    the beginning of the next gait cycle.
+
+    Parameters
+    ----------
+    robot
+        The robot; all of its springs may be changed here.
+    engine
+        Of :data:`chilopod.engine.ENGINES`, or one's own as ``package.module:object``.
+    seed
+        Of start and nudges.
+    strategy
+        Name of one of :data:`STRATEGIES_HERE`.
+
+    Raises
+    ------
+    ParameterError
+        If the engine cannot walk such a robot, or there is no such strategy.
+    """
+
+    def __init__(self, robot: Robot, engine: str = "planar", *, seed: int = 1, strategy: str = VARIABLE.name) -> None:
+        self.box = wishes.Box()
+        self._engine = engine_named(engine)
+        self._engine_name = engine
+        self._file = robot.override("springs.adjustable", True)
+        self._engine.common(self._file)
+        self._settings = Settings(
+            self._file, 1.0, robot.gait.stride, as_strategy(strategy).name, _SPEED, False, as_seed(seed), False
+        )
+        self.law: RadiusLaw | None = None
+        self._records: list[xr.Dataset] = []
+        self._said: deque[str] = deque(maxlen=_MOST_WORDS)
+        self._begin()
+
+    # -- what there is
+    # ---------------------------------------------------------------------------------------------------------------
+
+    @property
+    def settings(self) -> Settings:
+        """How everything is set."""
+        return self._settings
+
+    @property
+    def file(self) -> Robot:
+        """The robot as it was given, with springs that can all be changed."""
+        return self._file
+
+    @property
+    def engine(self) -> str:
+        """Name of what computes the walk."""
+        return self._engine_name
+
+    def seen(self) -> Seen:
+        """What there is to see now."""
+        looked = self._walk.observe()
+        means = np.array(self._looks).mean(axis=0)
+        return Seen(
+            self._before + self._walk.time,
+            self._walk.time,
+            self._walk.robots[0],
+            self._walk.status[0],
+            self._walk.pose()[0],
+            looked.joint_angles[0],
+            looked.stiffness[0],
+            looked.leg_yaw[0],
+            means,
+            self._turning(),
+            self._target,
+            self._walk.states()[0],
+        )
+
+    def said(self) -> list[str]:
+        """What happened since this was asked last, in sentences."""
+        sentences = list(self._said)
+        self._said.clear()
+        return sentences
+
+    def records(self) -> list[xr.Dataset]:
+        """What was written down since this was asked last, see :func:`chilopod.record.walk_record`: one record for
+        every stretch of a walk with one floor and one gait."""
+        records, self._records = self._records, []
+        return records
+
+    # -- what is done
+    # ---------------------------------------------------------------------------------------------------------------
+
+    def obey(self) -> bool:
+        """Do what is wished for; what cannot be is said. Tells whether there was anything."""
+        waiting = self.box.take()
+        for wish in waiting:
+            try:
+                self._obey(wish)
+            except ChilopodError as error:
+                self._said.append(str(error))
+        return bool(waiting)
+
+    def walk_on(self, seconds: float) -> None:
+        """Walk on; a robot that has failed stays where it is."""
+        until = self._walk.time + seconds
+        while self._walks:
+            time = self._look_next / LOOKS * self._period
+            if time > until:
+                self._go(until)
+                return
+            self._go(time)
+            self._look()
+            self._look_next += 1
+            if (self._look_next - 1) % LOOKS == 0 and self._walks:
+                left = until - self._walk.time
+                self._between_cycles()
+                until = self._walk.time + left
+
+    def stop_recording(self) -> None:
+        """End what is being written down, if anything is."""
+        self._settings = replace(self._settings, recording=False)
+        self._keep_record()
+
+    # -- inside
+    # ---------------------------------------------------------------------------------------------------------------
+
+    @property
+    def _walks(self) -> bool:
+        return self._walk.status[0] is Status.WALKED
+
+    @property
+    def _period(self) -> float:
+        return self._walk.robots[0].gait.period
+
+    def _begin(self) -> None:
+        """Put the robot on the floor anew."""
+        robot, joints = self._settings.robot, self._settings.robot.body.modules - 1
+        self._random = np.random.default_rng(self._settings.seed)
+        states = self._engine.initial_states(
+            robot, self._random.normal(0.0, _START, joints), self._random.normal(0.0, _START)
+        )
+        self._before, self._reached = 0.0, 0.0
+        self._target: tuple[float, float] | None = None
+        self._controller: Controller | None = None
+        self._nudge, self._pull, self._pulled_until = np.zeros(joints), np.zeros(joints), np.zeros(joints)
+        self._start(robot, states)
+        self._looks: deque[Array] = deque([self._walk.observe().joint_angles[0]] * LOOKS, maxlen=LOOKS)
+        self._bends: deque[float] = deque(maxlen=LOOKS + 1)
+
+    def _start(self, robot: Robot, states: Array) -> None:
+        self._written = self._has_record = self._settings.recording
+        self._walk: Walk = self._engine.start(
+            [robot],
+            initial=states,
+            seeds=[self._settings.seed] if self._engine.traits.noisy else None,
+            record=Recording(_RATE, poses=self._engine.traits.poses) if self._has_record else None,
+        )
+        self._look_next = 1
+
+    def _go(self, until: float) -> None:
+        steer(self._walk, until, self._controller)
+        if self._target is None:
+            return
+        away = float(np.hypot(*(self._walk.pose()[0, :2] - self._target)))
+        if away < ARRIVAL_RADIUS:
+            took = self._before + self._walk.time - self._reached
+            self._said.append(f"arrived after {took:.0f} s")
+            self._let_go()
+
+    def _look(self) -> None:
+        angles = self._walk.observe().joint_angles[0]
+        over = (self._pull != 0.0) & (self._pulled_until < self._before + self._walk.time)
+        if over.any():
+            self._pull[over] = 0.0
+            self._push()
+        if np.isfinite(angles).all():
+            self._looks.append(angles)
+            self._bends.append(float(np.abs(np.mean(self._looks, axis=0)).sum()))
+
+    def _turning(self) -> float:
+        return (self._bends[-1] - self._bends[0]) / self._period if len(self._bends) > LOOKS else 0.0
+
+    def _between_cycles(self) -> None:
+        """What can be done between two gait cycles only."""
+        if self._written and self._walk.time > _LONGEST:
+            self._said.append(f"the recording ended by itself, after {_LONGEST / 60.0:g} minutes")
+            self.stop_recording()
+        wanted, here = self._settings, self._walk.robots[0]
+        as_wanted = (wanted.robot.gait, wanted.robot.ground, wanted.robot.twin) == (here.gait, here.ground, here.twin)
+        if not as_wanted or {wanted.recording} != {self._written, self._has_record}:
+            self._continue(wanted.robot)
+        self._nudge = np.array(self._file.springs.stiffness) * self._random.normal(0.0, _NUDGE, len(self._nudge))
+        self._push()
+
+    def _continue(self, robot: Robot) -> None:
+        """Walk on from here with another floor, other steps, or another record."""
+        self._keep_record()
+        seen = self._walk.observe()
+        states = self._walk.states()
+        self._before += self._walk.time
+        self._start(_with_springs(robot, seen.stiffness[0].tolist()), states)
+        if self._target is not None:
+            self._walk.aim(self._target)
+        self._walk.command(Command(leg_yaw=seen.leg_yaw))
+        if not self._steers_springs:
+            self._set_springs()
+
+    def _keep_record(self) -> None:
+        if self._written and self._walk.time > 0.0:
+            self._records.append(self._walk.to_dataset())
+        self._written = False
+
+    def _push(self) -> None:
+        # Who drives the joints would take the nudges back at once.
+        if not isinstance(self._controller, ActuatedAxis):
+            self._walk.command(Command(joint_torque=[self._nudge + self._pull]))
+
+    @property
+    def _steers_springs(self) -> bool:
+        return isinstance(self._controller, SpringLaw)
+
+    def _set_springs(self) -> None:
+        self._walk.command(Command(stiffness=[self._settings.robot.springs.stiffness]))
+
+    def _let_go(self) -> None:
+        """Walk nowhere in particular, with the springs as they are set and straight legs."""
+        self._target, self._controller = None, None
+        self._walk.aim((np.nan, np.nan))
+        self._walk.command(Command(leg_yaw=[(0.0, 0.0)], within=self._period))
+        self._set_springs()
+        self._push()
+
+    def _obey(self, wish: wishes.Wish) -> None:
+        match wish:
+            case wishes.Spring(joint, stiffness):
+                self._spring(joint, stiffness)
+            case wishes.Friction(factor):
+                self._other(friction=as_within("friction", factor, FRICTIONS, "times that of the file"))
+            case wishes.Stride(length):
+                own = self._file.gait.stride
+                low, high = (part * own for part in STRIDES)
+                self._other(stride=as_within("stride", length, (low, high), "m"))
+            case wishes.Target(place):
+                self._aim(place)
+            case wishes.Steering(strategy):
+                self._settings = replace(self._settings, strategy=as_strategy(strategy).name)
+                if self._target is not None:
+                    self._aim(self._target)
+            case wishes.Pull(joint, torque, time):
+                self._pull_at(joint, torque, time)
+            case wishes.Speed(times):
+                self._settings = replace(self._settings, speed=as_within("speed", times, SPEEDS, "times real time"))
+            case wishes.Pause(paused):
+                self._settings = replace(self._settings, paused=bool(paused))
+            case wishes.Step(cycles):
+                seconds = as_within("step", cycles, (0.0, 10.0), "gait cycles") * self._period
+                self._settings = replace(self._settings, paused=True)
+                self.walk_on(seconds)
+            case wishes.Reset(seed):
+                self._keep_record()
+                self._settings = replace(self._settings, seed=as_seed(seed))
+                self._begin()
+            case wishes.Record(on):
+                if on:
+                    self._settings = replace(self._settings, recording=True)
+                else:
+                    self.stop_recording()
+
+    def _spring(self, joint: int | None, stiffness: float) -> None:
+        robot = self._settings.robot
+        path = ALL if joint is None else f"{ALL}[{joint}]"
+        self._settings = replace(self._settings, robot=robot.with_value(path, as_finite("stiffness", stiffness)))
+        if self._steers_springs:
+            self._said.append("the springs are as you set them again when the target is reached")
+        else:
+            self._set_springs()
+
+    def _other(self, friction: float | None = None, stride: float | None = None) -> None:
+        """Another floor or other steps, from the next gait cycle on."""
+        friction = self._settings.friction if friction is None else friction
+        stride = self._settings.stride if stride is None else stride
+        robot = self._file.with_value("gait.stride", stride)
+        robot = robot.with_value("ground.friction", friction * self._file.ground.friction)
+        if self._file.twin is not None:
+            robot = robot.with_value("twin.sliding_friction", friction * self._file.twin.sliding_friction)
+        self._engine.common(robot)
+        robot = _with_springs(robot, self._settings.robot.springs.stiffness)
+        self._settings = replace(self._settings, robot=robot, friction=friction, stride=stride)
+
+    def _aim(self, place: tuple[float, float] | None) -> None:
+        if place is None:
+            if self._target is not None:
+                self._let_go()
+            return
+        x, y = (as_finite("target", each) for each in place)
+        as_within("target", math.hypot(x, y), (0.0, FARTHEST), "m from where the walk began")
+        strategy = as_strategy(self._settings.strategy)
+        controller: Controller | None = LegYawController()
+        if strategy is not LEG_YAW:
+            if self.law is None:
+                self._said.append(
+                    f"how tightly it turns is not known (yet), so leg yaw alone steers, not {strategy.name}"
+                )
+            else:
+                controller = driver(self._settings.robot, strategy, engine=self._engine_name, law=self.law).controller
+        if self._target is not None:
+            self._let_go()
+        self._target, self._controller = (x, y), controller
+        self._reached = self._before + self._walk.time
+        self._walk.aim(self._target)
+
+    def _pull_at(self, joint: int, torque: float, time: float) -> None:
+        own = self._file.springs.stiffness
+        if joint not in range(len(own)):
+            raise ParameterError("there is no such joint", field="joint", value=joint + 1, allowed=f"1 to {len(own)}")
+        strongest = _STRONGEST * own[joint]
+        self._pull[joint] = np.clip(as_finite("pull", torque), -strongest, strongest)
+        self._pulled_until[joint] = self._before + self._walk.time + time
+        self._push()
+        if isinstance(self._controller, ActuatedAxis):
+            self._said.append("the strategy actuated drives the joints itself: nobody else can pull them")
+
+
+def _with_springs(robot: Robot, stiffness: Sequence[float]) -> Robot:
+    for joint, value in enumerate(stiffness):
+        robot = robot.with_value(f"{ALL}[{joint}]", value)
+    return robot

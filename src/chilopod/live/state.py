@@ -1,0 +1,159 @@
+"""What there is to see of a live walk, how everything is set, and what it may be set to."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.engine import Status
+from chilopod.errors import ParameterError
+from chilopod.robot import Robot
+from chilopod.steering import ACTUATED, STRATEGIES, VARIABLE, Strategy, strategy_named
+
+Array = NDArray[np.float64]
+
+LEG_YAW = STRATEGIES["leg-yaw"]
+
+STRATEGIES_HERE = (VARIABLE, LEG_YAW, ACTUATED)
+"""How a target is walked to. (The others are leg-yaw with a spring that is chosen before: here by hand.)"""
+
+SPEEDS = (1.0, 20.0)
+"""Slowest and fastest, times real time."""
+
+FRICTIONS = (0.3, 3.0)
+"""Of what the robot file has."""
+
+STRIDES = (0.2, 1.5)
+"""Of what the robot file has."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What there is to see at an instant.
+
+    Attributes
+    ----------
+    time
+        Since the last reset, s.
+    clock
+        To which the gait steps, s: at 0 it was at phase 0.
+    robot
+        That walks, with its floor and steps; its springs may be others by now.
+    status
+        ``WALKED`` while it walks.
+    pose
+        x, y (m) and heading (rad) of module 1.
+    joint_angles, stiffness
+        Of the yaw joints, now: rad and N*m/rad, (N-1,).
+    leg_yaw
+        Of the legs of module 1, rad, (2,).
+    mean_angles
+        Of the joints over the last gait cycle, rad, (N-1,).
+    turning
+        By how much the sum of their sizes grows, rad/s.
+    target
+        Where to, m; None: nowhere.
+    state
+        As ``initial`` of the engine's ``start`` takes it, (n,).
+    """
+
+    time: float
+    clock: float
+    robot: Robot
+    status: Status
+    pose: Array
+    joint_angles: Array
+    stiffness: Array
+    leg_yaw: Array
+    mean_angles: Array
+    turning: float
+    target: tuple[float, float] | None
+    state: Array
+
+    @property
+    def bend(self) -> float:
+        """Sum of the sizes of the mean angles, rad: the paper's measure."""
+        return float(np.abs(self.mean_angles).sum())
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How everything is set.
+
+    Attributes
+    ----------
+    robot
+        As it is to walk: with the springs, the floor and the steps that were asked for.
+    friction, stride
+        Factor on the floor of the file; m.
+    strategy, speed, paused, seed
+        As asked for.
+    recording
+        Whether the walk is being written down, or about to be.
+    """
+
+    robot: Robot
+    friction: float
+    stride: float
+    strategy: str
+    speed: float
+    paused: bool
+    seed: int
+    recording: bool
+
+
+def as_strategy(name: str) -> Strategy:
+    """One of :data:`STRATEGIES_HERE`.
+
+    Raises
+    ------
+    ParameterError
+        If there is none of this name.
+    """
+    return strategy_named(name, {each.name: each for each in STRATEGIES_HERE})
+
+
+def as_seed(seed: object) -> int:
+    """A whole number, 0 or more, typed as it may be.
+
+    Raises
+    ------
+    ParameterError
+        If it is not.
+    """
+    number = as_finite("seed", seed)
+    if number < 0.0 or number != int(number):
+        raise ParameterError("is no seed", field="seed", value=seed, allowed="a whole number, 0 or more")
+    return int(number)
+
+
+def as_finite(field: str, value: object) -> float:
+    """A finite number.
+
+    Raises
+    ------
+    ParameterError
+        If it is not, naming the field.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise ParameterError("is no number", field=field, value=value, allowed="a finite number")
+    return float(value)
+
+
+def as_within(field: str, value: object, limits: tuple[float, float], unit: str) -> float:
+    """A number between two others.
+
+    Raises
+    ------
+    ParameterError
+        If it is not, naming the field and what is allowed.
+    """
+    number = as_finite(field, value)
+    low, high = limits
+    # The ends of a slider are those of its range up to round-off.
+    if not low * (1.0 - 1e-9) <= number <= high * (1.0 + 1e-9):
+        raise ParameterError("is out of range", field=field, value=value, allowed=f"{low:g} to {high:g} {unit}")
+    return number

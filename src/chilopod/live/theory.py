@@ -1,0 +1,288 @@
+"""Where the walk gives way and how tightly it then turns, computed beside the walk by a process of its own.
+
+A question that is no longer of interest is dropped where it stands: the page asks anew whenever springs, floor or steps
+change, and only the last question is answered.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, replace
+from multiprocessing.connection import Connection
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.analysis.parameters import K1
+from chilopod.engine import engine_named
+from chilopod.errors import ChilopodError
+from chilopod.robot import Robot
+from chilopod.steering import RadiusLaw
+
+Array = NDArray[np.float64]
+
+_BETWEEN = (1.0 / 20.0, 3.0)  # of the stiffest spring: as for the radius law
+_NICE = 5
+
+
+@dataclass(frozen=True)
+class Theory:
+    """What is known of a robot with any first spring.
+
+    Attributes
+    ----------
+    robot
+        Of which it is known; None: of none.
+    pitchfork
+        First spring below which the straight walk gives way, N*m/rad; None where it is not known.
+    springs, radii, stable
+        The curved walks from there on: first spring (N*m/rad), radius (m) and whether the walk is stable, (points,).
+    law
+        How tightly which spring turns, for strategies; None where there is no such law.
+    remark
+        Why something is not known, or how far finding it is; empty once there is nothing to say.
+    """
+
+    robot: Robot | None = None
+    pitchfork: float | None = None
+    springs: Array = field(default_factory=lambda: np.empty(0))
+    radii: Array = field(default_factory=lambda: np.empty(0))
+    stable: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=np.bool_))
+    law: RadiusLaw | None = None
+    remark: str = ""
+
+    def settled(self, spring: float) -> float | None:
+        """Radius of the stable walk with a first spring (N*m/rad), m: infinite if it is the straight one; None where
+        none is known."""
+        if self.pitchfork is None:
+            return None
+        if spring >= self.pitchfork:
+            return float("inf")
+        if self.law is None or spring < self.law.values[0]:
+            return None
+        return self.law.radius(spring)
+
+
+@dataclass(frozen=True)
+class Growth:
+    """How fast a small bend of the straight walk grows.
+
+    Attributes
+    ----------
+    robot
+        With the spring it is of.
+    rate
+        Largest real part of all exponents, 1/s; negative where the straight walk is stable.
+    """
+
+    robot: Robot
+    rate: float
+
+
+def growth_of(robot: Robot) -> Growth:
+    """Of the straight walk in the planar theory."""
+    from chilopod.analysis import straight_walk
+
+    exponents = straight_walk(robot).as_json()["exponents_per_s"]
+    return Growth(robot, max(real for real, _ in exponents))
+
+
+def theory_of(robot: Robot, engine: str, told: Callable[[Theory], None]) -> None:
+    """Find out what there is to know, and tell it piece by piece.
+
+    Parameters
+    ----------
+    robot
+        Its first spring does not matter.
+    engine
+        Name of the engine that it walks in: where its walks are not those of the planar theory, some are walked.
+    told
+        Called with what is known so far; what it raises ends the work.
+    """
+    known = Theory(robot)
+    try:
+        if engine_named(engine).traits.exact:
+            _exact(known, told)
+        else:
+            from chilopod.tasks import radius_law
+
+            law = radius_law(
+                robot, engine, progress=lambda done, words: told(replace(known, remark=_share(done, "how it turns")))
+            )
+            told(_of_law(known, law))
+    except ChilopodError as error:
+        told(replace(known, remark=error.problem))
+
+
+def _exact(known: Theory, told: Callable[[Theory], None]) -> None:
+    from chilopod.analysis import curved_walks, first_loss
+    from chilopod.stability import Kind
+
+    robot = known.robot
+    assert robot is not None
+    # As the radius law has it, but for the first spring, which is what varies.
+    low, high = (part * max(robot.springs.stiffness[1:], default=robot.springs.stiffness[0]) for part in _BETWEEN)
+    told(replace(known, remark="looking for the pitchfork"))
+    loss = first_loss(robot, K1, (low, high), Kind.PITCHFORK, normal_form=False)
+    known = replace(known, pitchfork=loss.point.value)
+    told(replace(known, remark="following the curved walks"))
+    walks = curved_walks(
+        robot,
+        K1,
+        (low, high),
+        side=-1,
+        progress=lambda done, words: told(replace(known, remark=_share(done, "following the curved walks"))),
+    )
+    possible = np.abs(walks.mean_angle.values).max(axis=1) <= 0.5 * np.pi
+    known = replace(
+        known,
+        springs=walks.parameter_si.values[possible],
+        radii=walks.axis_radius.values[possible],
+        stable=walks.stable.values[possible],
+    )
+    try:
+        known = replace(known, law=RadiusLaw.of_branch(known.springs, known.radii, known.stable, robot.unit_of(K1)))
+    except ChilopodError as error:
+        known = replace(known, remark=error.problem)
+    told(known)
+
+
+def _of_law(known: Theory, law: RadiusLaw) -> Theory:
+    values, radii = law.values[::-1], law.radii[::-1]
+    return replace(
+        known,
+        pitchfork=law.pitchfork,
+        springs=values,
+        radii=radii,
+        stable=np.ones(len(values), dtype=np.bool_),
+        law=law,
+    )
+
+
+def _share(done: float, what: str) -> str:
+    return f"{what}: {100.0 * done:.0f} %"
+
+
+class Beside:
+    """A process that answers questions about robots, the last one of each kind only.
+
+    Parameters
+    ----------
+    engine
+        Name of the engine that the robots walk in.
+    """
+
+    def __init__(self, engine: str) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._here, there = context.Pipe()
+        self._process = context.Process(target=_answer, args=(there, engine), daemon=True, name="chilopod theory")
+        with _deaf():
+            self._process.start()
+        there.close()
+
+    def ask(self, robot: Robot) -> None:
+        """Want to know everything of a robot."""
+        self._send("theory", robot)
+
+    def ask_growth(self, robot: Robot) -> None:
+        """Want to know how fast small bends of its straight walk grow."""
+        self._send("growth", robot)
+
+    def answers(self) -> list[Theory | Growth]:
+        """What was found since this was asked last; never waits."""
+        found: list[Theory | Growth] = []
+        with suppress(EOFError, OSError):
+            while self._here.poll():
+                found.append(self._here.recv())
+        return found
+
+    def close(self) -> None:
+        """End it; what it was at is lost."""
+        self._here.close()
+        self._process.terminate()
+        self._process.join(timeout=5.0)
+
+    def _send(self, what: str, robot: Robot) -> None:
+        with suppress(OSError):  # it may have ended, and answers nothing any more
+            self._here.send((what, robot))
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Ctrl-C is the page's: a process that is started here does not hear it, not even while it loads."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+class _Stale(Exception):
+    """Another question has come."""
+
+
+class _Desk:
+    """The end of the pipe at which questions arrive."""
+
+    def __init__(self, pipe: Connection) -> None:
+        self._pipe = pipe
+        self._waiting: dict[str, Robot] = {}
+
+    def wait(self) -> None:
+        """Until there is a question."""
+        while not self._waiting:
+            self._take()
+
+    def next(self) -> tuple[str, Robot]:
+        """The question that is quickest to answer."""
+        what = "growth" if "growth" in self._waiting else "theory"
+        return what, self._waiting.pop(what)
+
+    def tell(self, answer: Any) -> None:
+        """Answer, unless another question of that kind has come meanwhile."""
+        while self._pipe.poll():
+            self._take()
+        if isinstance(answer, Theory) and "theory" in self._waiting:
+            raise _Stale
+        self._pipe.send(answer)
+        # While the long question is at work, a short one is answered in between.
+        if isinstance(answer, Theory) and "growth" in self._waiting:
+            self.growth(self._waiting.pop("growth"))
+
+    def growth(self, robot: Robot) -> None:
+        with suppress(ChilopodError):  # where there is no straight walk to speak of
+            self._pipe.send(growth_of(robot))
+
+    def _take(self) -> None:
+        what, robot = self._pipe.recv()
+        self._waiting[what] = robot
+
+
+def _answer(pipe: Connection, engine: str) -> None:
+    """The process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # as it is from the start, unless a thread of the page started it
+    if hasattr(os, "nice"):
+        os.nice(_NICE)
+    desk = _Desk(pipe)
+    try:
+        while True:
+            desk.wait()
+            what, robot = desk.next()
+            if what == "growth":
+                desk.growth(robot)
+                continue
+            try:
+                theory_of(robot, engine, desk.tell)
+            except _Stale:
+                continue
+    except (EOFError, OSError):
+        return  # the page is gone

@@ -1,0 +1,89 @@
+"""What am I seeing? A few sentences about a walk that change with it."""
+
+from __future__ import annotations
+
+import math
+
+from chilopod import units
+from chilopod.analysis.parameters import PAPER_UNIT
+from chilopod.engine import Status
+from chilopod.live.state import Seen, Settings
+from chilopod.live.theory import Growth, Theory
+from chilopod.robot import Robot
+
+_STRAIGHT = 0.15  # rad of bend in all that nudges alone may make
+_SETTLED = 0.1  # of the branch's radius
+_SLOW = 0.03  # of its bend a second, by which a settled walk may still move
+
+
+def spring_text(stiffness: float) -> str:
+    """A spring as the paper writes it."""
+    return f"{units.from_si(stiffness, PAPER_UNIT):.3g} N·mm/deg"
+
+
+def radius_of(seen: Seen) -> float:
+    """Radius of the arc that the body makes, m: the paper's measure."""
+    robot = seen.robot
+    return (robot.body.modules - 1) * robot.module_length / max(seen.bend, 1e-9)
+
+
+def sentences(seen: Seen, settings: Settings, theory: Theory, growth: Growth | None) -> list[str]:
+    """What is to be said of a walk now, the most important first.
+
+    Parameters
+    ----------
+    seen, settings
+        The walk and how everything is set.
+    theory, growth
+        What is known of this robot; of another robot it does not count.
+    """
+    if seen.status is not Status.WALKED:
+        return [f"It has stopped: {seen.status.sentence}. Press R to begin anew."]
+    said = []
+    if settings.paused:
+        said.append("Paused: the space bar goes on.")
+    if seen.target is not None:
+        x, y = seen.target
+        away = math.hypot(x - seen.pose[0], y - seen.pose[1])
+        said.append(f"On its way to the target, {away:.2f} m off, with the strategy {settings.strategy}.")
+    said.append(_bend(seen, theory, growth if growth is not None and growth.robot == settings.robot else None))
+    return said
+
+
+def _bend(seen: Seen, theory: Theory, growth: Growth | None) -> str:
+    k1 = float(seen.stiffness[0])
+    radius, side = radius_of(seen), "left" if seen.mean_angles.sum() < 0.0 else "right"
+    bent = seen.bend > _STRAIGHT
+    arc = f"a curve of {radius:.2f} m to the {side}" if bent else "straight on"
+    if theory.pitchfork is None:
+        return f"It walks {arc}. Where the straight walk gives way is not known: {theory.remark or 'not asked yet'}."
+    fork, settled = f"the pitchfork at {spring_text(theory.pitchfork)}", theory.settled(k1)
+    if k1 >= theory.pitchfork:
+        stiff = f"its first spring, {spring_text(k1)}, is stiffer than {fork}"
+        if bent:
+            return f"The curve of {radius:.2f} m straightens: {stiff}."
+        fades = f", and what disturbs it fades by {_percent(growth)} a second" if growth and growth.rate < 0.0 else ""
+        return f"Straight and stable: {stiff}{fades}."
+    soft = f"Past the pitchfork: its first spring, {spring_text(k1)}, is softer than {spring_text(theory.pitchfork)}"
+    if settled is None:
+        beyond = theory.remark or "no settled curve is known with this spring"
+        return f"{soft}, and it walks {arc} ({beyond})."
+    if abs(radius - settled) < _SETTLED * settled and abs(seen.turning) < _SLOW * seen.bend:
+        return f"Settled on {arc}; the branch of curved walks has {settled:.2f} m. {soft}."
+    if not bent:
+        speed = f" by {_percent(growth)} a second" if growth and growth.rate > 0.0 else ""
+        return (
+            f"{soft}: the straight walk is unstable, and the smallest bend grows{speed}, to {settled:.2f} m in the end."
+        )
+    moves = "tightens" if seen.turning > 0.0 else "widens"
+    return f"{soft}. The curve, {radius:.2f} m to the {side}, {moves} towards the branch's {settled:.2f} m."
+
+
+def _percent(growth: Growth) -> str:
+    """By how much a disturbance changes in a second."""
+    return f"{100.0 * abs(math.expm1(growth.rate)):.0f} %"
+
+
+def described(robot: Robot, engine: str) -> str:
+    """What walks here, in a line."""
+    return f"{robot.name}, {robot.body.modules} modules, {engine}"

@@ -1,0 +1,201 @@
+"""The live page in a real browser: Chromium without a window that draws without a graphics card."""
+
+import re
+import shutil
+import socket
+import time
+from contextlib import contextmanager
+
+import pytest
+import xarray as xr
+
+from chilopod.analysis.parameters import stiffness
+from chilopod.live import Live, wishes
+from chilopod.robot import load_robot
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+pytestmark = [
+    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here to open the live page in"),
+    pytest.mark.filterwarnings("ignore::DeprecationWarning"),
+]
+
+PATIENCE = 60_000  # ms, on a busy machine
+FLAGS = (
+    "--no-sandbox",
+    "--enable-unsafe-swiftshader",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+)
+READY = "Straight and stable"
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def running():
+    page = Live(load_robot("aoi2022-planar"), port=0)
+    yield page
+    page.close()
+
+
+@pytest.fixture
+def live(running):
+    """The page as it is at first."""
+    for each in (wishes.Spring(None, stiffness(41.0)), wishes.Friction(1.0), wishes.Speed(2.0), wishes.Pause(False)):
+        running.wish(each)
+    running.wish(wishes.Reset(1))
+    yield running
+    assert running.failure is None
+
+
+@pytest.fixture
+def opened(chromium, live):
+    with visit(chromium, live) as page:
+        yield page
+
+
+@contextmanager
+def visit(chromium, live):
+    page = chromium.new_page(viewport={"width": 800, "height": 500})
+    page.set_default_timeout(PATIENCE)
+    page.asked = []
+    page.on("request", lambda request: page.asked.append(request.url))
+    page.goto(live.address)
+    page.get_by_text("first spring", exact=True).first.wait_for()
+    yield page
+    page.close()
+
+
+def type_into(page, label, text):
+    field = page.locator(f"xpath=//*[normalize-space(text())='{label}']/following::input[@type='text'][1]")
+    field.fill(text)
+    field.press("Enter")
+    field.evaluate("each => each.blur()")
+    return field
+
+
+def read(page, words):
+    """Wait until the page says so, and give the whole paragraph."""
+    found = page.get_by_text(re.compile(words)).first
+    found.wait_for()
+    return found.inner_text()
+
+
+def walked(page):
+    return int(re.search(r"(\d+) s, seed", page.locator("body").inner_text())[1])
+
+
+def test_a_spring_below_the_pitchfork_bends_it_to_the_radius_of_the_branch(opened):
+    read(opened, READY)
+    type_into(opened, "speed", "10")
+    type_into(opened, "first spring", "9")
+    said = read(opened, "Settled on a curve of .* the branch of curved walks has")
+    walk, branch = (float(each) for each in re.findall(r"(\d+\.\d+) m", said)[:2])
+    assert walk == pytest.approx(branch, rel=0.1)
+    assert all(re.match(r"(http://(localhost|127\.0\.0\.1)[:/]|data:|blob:)", url) for url in opened.asked)
+
+
+def test_a_click_on_the_floor_is_walked_to(opened):
+    read(opened, READY)
+    type_into(opened, "speed", "5")
+    opened.mouse.click(420, 400)
+    read(opened, "On its way to the target")
+    read(opened, "arrived after")
+
+
+def test_keys_do_what_controls_do(opened):
+    read(opened, READY)
+    opened.locator("body").press("h")
+    read(opened, "first spring softer, stiffer")
+    opened.keyboard.press("Escape")
+    opened.locator("body").press("z")
+    read(opened, r"its first spring, 37\.3 N")
+    opened.locator("body").press("Space")
+    read(opened, "Paused")
+    opened.locator("body").press("t")
+    read(opened, r"On its way to the target, 1\.[23]\d m off")
+    opened.locator("body").press("l")
+
+
+def test_nonsense_in_a_field_is_refused_in_a_line(opened):
+    read(opened, READY)
+    field = type_into(opened, "first spring", "NaN")
+    assert field.input_value() != "NaN"
+    type_into(opened, "friction", "1e9")
+    type_into(opened, "seed", "-4")
+    time.sleep(1.0)
+    read(opened, READY)
+
+
+def test_two_browsers_a_reload_and_a_close(chromium, live):
+    with visit(chromium, live) as one, visit(chromium, live) as other:
+        read(one, READY)
+        type_into(one, "first spring", "30")
+        read(other, "its first spring, 30 N")
+        before = walked(other)
+        other.reload()
+        read(other, "its first spring, 30 N")
+        assert walked(other) >= before
+    time.sleep(1.0)
+    stood, frames = live.seen.time, live.frames
+    time.sleep(1.0)
+    assert live.seen.time == stood  # while nobody looks
+    assert live.frames == frames
+    with visit(chromium, live) as again:
+        read(again, "its first spring, 30 N")
+        assert walked(again) >= int(stood)
+
+
+def test_who_does_not_read_holds_up_nobody(opened, live):
+    """A client that has said hello and never takes anything off the line."""
+    read(opened, READY)
+    port = int(live.address.rpartition(":")[2])
+    with socket.create_connection(("127.0.0.1", port)) as slow:
+        slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1024)
+        slow.sendall(
+            b"GET / HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+            b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+            b"Sec-WebSocket-Protocol: " + protocol(opened) + b"\r\n\r\n"
+        )
+        assert b"101 Switching Protocols" in slow.recv(200)
+        before = walked(opened)
+        type_into(opened, "speed", "10")
+        opened.wait_for_function(
+            "before => +(/(\\d+) s, seed/.exec(document.body.innerText) || [0, 0])[1] > before + 20", arg=before
+        )
+
+
+def protocol(page):
+    """That this version of viser speaks."""
+    import viser
+
+    return f"viser-v{viser.__version__}".encode()
+
+
+def test_a_recording_comes_as_two_files(opened, tmp_path):
+    read(opened, READY)
+    type_into(opened, "speed", "5")
+    opened.get_by_role("button", name="Record (C)").click()
+    read(opened, ", recording")
+    files = []
+    opened.on("download", lambda each: files.append(each))
+    time.sleep(1.0)
+    opened.get_by_role("button", name="End the recording (C)").click()
+    while len(files) < 2:
+        opened.wait_for_timeout(100)
+    paths = {each.suggested_filename: tmp_path / each.suggested_filename for each in files}
+    for each in files:
+        each.save_as(paths[each.suggested_filename])
+    record = xr.load_dataset(paths["chilopod-live-1.nc"])
+    assert record.sizes["time"] > 10
+    assert "</html>" in paths["chilopod-live-1.html"].read_text(encoding="utf-8")

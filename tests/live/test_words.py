@@ -1,0 +1,66 @@
+"""The sentences that say what is seen."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from chilopod.analysis.parameters import stiffness
+from chilopod.engine import Status
+from chilopod.live import Session, wishes
+from chilopod.live.theory import Growth, Theory
+from chilopod.live.words import sentences
+from chilopod.robot import load_robot
+from chilopod.steering import RadiusLaw
+
+PLANAR = load_robot("aoi2022-planar")
+LAW = RadiusLaw(stiffness(1.0) * np.array([6.0, 8.0, 10.0, 12.0]), np.array([0.25, 0.32, 0.5, np.inf]), "N*mm/deg")
+THEORY = Theory(PLANAR, LAW.pitchfork, LAW.values[::-1], LAW.radii[::-1], np.ones(4, dtype=bool), LAW)
+
+
+@pytest.fixture
+def begun():
+    return Session(PLANAR)
+
+
+def said(session, theory=THEORY, rate=None, **seen):
+    growth = None if rate is None else Growth(session.settings.robot, rate)
+    return " ".join(sentences(replace(session.seen(), **seen), session.settings, theory, growth))
+
+
+def curve(radius, side=-1.0):
+    return {"mean_angles": side * np.full(5, PLANAR.module_length / radius)}
+
+
+def soft(spring):
+    return {"stiffness": stiffness(1.0) * np.array([spring, 41.0, 41.0, 41.0, 41.0])}
+
+
+def test_every_state_has_its_sentence(begun):
+    assert said(begun).startswith(
+        "Straight and stable: its first spring, 41 N·mm/deg, is stiffer than the pitchfork at"
+    )
+    assert "fades by 18 % a second" in said(begun, rate=-0.2)
+    assert "The curve of 0.40 m straightens" in said(begun, **curve(0.4))
+    grows = said(begun, rate=0.125, **soft(8.0))
+    assert "the smallest bend grows by 13 % a second, to 0.32 m in the end" in grows
+    assert "tightens towards the branch's 0.32 m" in said(begun, **soft(8.0), **curve(0.9), turning=0.1)
+    assert "0.20 m to the right, widens" in said(begun, **soft(8.0), **curve(0.2, 1.0), turning=-0.1)
+    assert said(begun, **soft(8.0), **curve(0.33), turning=0.001).startswith("Settled on a curve of 0.33 m to the left")
+    assert "no settled curve is known" in said(begun, **soft(3.0))
+    assert "not known: it is computed" in said(begun, Theory(remark="it is computed"))
+    assert "It has stopped: a yaw joint bent" in said(begun, status=Status.OUT_OF_RANGE)
+
+
+def test_growth_of_another_robot_does_not_count(begun):
+    other = Growth(PLANAR, -0.2)
+    assert "fades" not in " ".join(sentences(begun.seen(), begun.settings, THEORY, other))
+
+
+def test_targets_and_pauses_are_said_first(begun):
+    begun.box.put(wishes.Pause(True))
+    begun.box.put(wishes.Target((2.0, 0.0)))
+    begun.obey()
+    first, second, *_ = sentences(begun.seen(), begun.settings, THEORY, None)
+    assert first.startswith("Paused")
+    assert second.startswith("On its way to the target, 2.00 m off")
