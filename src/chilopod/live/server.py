@@ -281,7 +281,10 @@ class Live:
             thread.start()
 
     def _hand_out(self, name: str, record: xr.Dataset, to: viser.ClientHandle | None) -> None:
-        content, page = netcdf(record), _replay(record)
+        from chilopod.report import replay
+
+        content = netcdf(record)
+        page = replay(record, titles=["the robot"], heading="A walk recorded at the live page").html
         if self._kept is not None:
             try:
                 self._kept(name, content, page)
@@ -345,17 +348,6 @@ def _body(robot: Robot, engine: str) -> Body:
 def _but_first_spring(robot: Robot) -> tuple[object, ...]:
     """What the theory of a robot depends on, whatever its first spring."""
     return robot.springs.stiffness[1:], robot.gait, robot.ground, robot.twin
-
-
-def _replay(record: xr.Dataset) -> str:
-    heading = "A walk recorded at the live page"
-    if "pose" in record:
-        from chilopod.report.scene.replay_3d import replay_3d
-
-        return replay_3d(record, titles=["the robot"], heading=heading)
-    from chilopod.report.scene.replay import replay
-
-    return replay(record, titles=["the robot"], heading=heading)
 
 
 def _quiet() -> contextlib.AbstractContextManager[object]:
