@@ -13,7 +13,7 @@ from gymnasium.wrappers.vector import RecordEpisodeStatistics as RecordBatchStat
 
 import chilopod.gym
 from chilopod import load_robot
-from chilopod.errors import ChilopodError, ParameterError
+from chilopod.errors import ChilopodError, ExtraError, ParameterError
 from chilopod.gym import Episodes, Steered, baseline, episodes
 from chilopod.steering import SpringLaw, random_course
 from chilopod.trials import NONE, Disturbance
@@ -219,7 +219,7 @@ def test_springs_without_an_actuator_or_a_range_are_refused():
 
 def test_without_gymnasium_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "gymnasium", None)
-    with pytest.raises(ParameterError, match=r"chilopod\[gym\]"):
+    with pytest.raises(ExtraError, match=r"chilopod\[gym\]"):
         reload(chilopod.gym)
     monkeypatch.undo()
     reload(chilopod.gym)

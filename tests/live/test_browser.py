@@ -55,7 +55,8 @@ def live(running):
         running.wish(each)
     running.wish(wishes.Reset(1))
     yield running
-    assert running.failure is None
+    if running.failure is not None:
+        raise running.failure
 
 
 @pytest.fixture

@@ -9,8 +9,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from chilopod.kinematics import directions, foot_places, from_modules, module_centres, module_headings
+from chilopod.kinematics import from_modules
 from chilopod.live.state import Seen
+from chilopod.report.scene.frames import bodies
+from chilopod.report.scene.outline import SLIMNESS
 
 Array = NDArray[np.float64]
 KINDS = ("box", "rod", "ball", "pin")
@@ -45,7 +47,7 @@ class Body(Protocol):
 
 
 # In parts of the length of a module: the planar robot has no height, and no width but that of its stance.
-_WIDTH, _HEIGHT, _GAP, _CLEARANCE, _LIFT = 0.36, 0.22, 0.1, 0.24, 0.1
+_WIDTH, _HEIGHT, _GAP, _CLEARANCE, _LIFT = SLIMNESS, 0.22, 0.1, 0.24, 0.1
 _LEG, _FOOT, _PIN = 0.028, 0.045, (0.09, 0.26)
 
 
@@ -59,20 +61,18 @@ class FlatBody:
         """See :class:`Body`."""
         robot = seen.robot
         n, length, legs, gait = robot.body.modules, robot.module_length, robot.legs, robot.gait
-        headings = module_headings(seen.pose[2], seen.joint_angles)
-        centres = module_centres(seen.pose[:2], headings, length)
+        flat = bodies(
+            robot, np.array([seen.clock]), seen.pose[None, None, :2], seen.pose[None, None, 2],
+            seen.joint_angles[None, None], seen.leg_yaw[None, None],
+        )  # fmt: skip
+        centres, headings, pins = flat.centres[0, 0], flat.headings[0, 0], flat.spine[0, 0, 1:-1]
         turned = _about_z(headings)
-        pins = (centres - 0.5 * length * directions(headings)[0])[:-1]
 
-        phase = gait.phases(seen.clock, n)
-        lift = np.where(gait.stands(phase), 0.0, np.sin(gait.swing_angle(phase)))
-        yaw = np.zeros((n, 2))
-        yaw[0] = seen.leg_yaw
-        places = foot_places(legs.forward_offset, legs.half_width, gait.stroke(phase), yaw)
+        lift = np.where(flat.stands[0, 0], 0.0, np.sin(gait.swing_angle(gait.phases(seen.clock, n))))
         inside = np.tile([legs.forward_offset, 0.5 * _WIDTH * length], (n, 2, 1))
         inside[:, 1, 1] *= -1.0
         hip_height = (_CLEARANCE + 0.5 * _HEIGHT) * length
-        feet = _raised(from_modules(centres, headings, places), (_FOOT + _LIFT * lift) * length).reshape(-1, 3)
+        feet = _raised(flat.feet[0, 0], (_FOOT + _LIFT * lift) * length).reshape(-1, 3)
         hips = _raised(from_modules(centres, headings, inside), hip_height).reshape(-1, 3)
         sizes = length * np.array([(1.0 - _GAP, _WIDTH, _HEIGHT), (_FOOT,) * 3, (_PIN[0], *_PIN)])
         return {

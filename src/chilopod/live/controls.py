@@ -101,6 +101,10 @@ class Controls:
         self._friction.value, self._stride.value = now.friction, now.stride * _CM
         self._speed.value, self._seed.value, self._strategy.value = now.speed, now.seed, now.strategy
 
+    def fail(self, why: str) -> None:
+        """Say that nothing goes on here."""
+        self.words.content = f"**This page has failed**: {why}"
+
     # -- parts of the panel
     # ---------------------------------------------------------------------------------------------------------------
 
@@ -129,7 +133,7 @@ class Controls:
         self._each = [first, *rest]
 
         @self._all.on_update
-        def _(_: Any) -> None:
+        async def _(_: Any) -> None:
             for slider in self._each:
                 slider.value = self._all.value
 
@@ -251,7 +255,8 @@ class Controls:
         self._put(wishes.Record(not self._settings.recording))
 
 
-def _do(do: Callable[..., object], *to: object) -> None:
+async def _do(do: Callable[..., object], *to: object) -> None:
+    """What a key does; by the thread of the server, as no other may change what browsers show."""
     do(*to[:-1])  # the last is the event of the key
 
 
@@ -259,7 +264,7 @@ def _scale(slider: Any, factor: float) -> None:
     slider.value = float(np.clip(slider.value * factor, slider.min, slider.max))
 
 
-def _help(event: viser.CommandEvent) -> None:
+async def _help(event: viser.CommandEvent) -> None:
     """Show the keys to whoever asked."""
     if event.client is None:
         return

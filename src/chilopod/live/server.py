@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import io
 import math
 import socket
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import xarray as xr
@@ -17,7 +19,7 @@ from chilopod.engine import engine_named
 from chilopod.errors import ChilopodError, ParameterError, in_words
 from chilopod.extras import needs
 from chilopod.live import wishes
-from chilopod.live.body import Body, FlatBody
+from chilopod.live.body import Body, FlatBody, Placed
 from chilopod.live.session import Session
 from chilopod.live.theory import Beside, Growth, Theory
 from chilopod.live.words import described, sentences
@@ -168,7 +170,7 @@ class Live:
             self._walk()
         except BaseException as error:
             self.failure = error
-            self._controls.words.content = f"**This page has failed**: {in_words(error)}"
+            self._at_server(partial(self._controls.fail, in_words(error)))
 
     def _walk(self) -> None:
         session, last, plotted, walked = self._session, time.perf_counter(), -math.inf, _Rate()
@@ -185,18 +187,35 @@ class Live:
             seen = self.seen = session.seen()
             walked.add(now, seen.time)
             self._plots.add(seen, self._theory)
-            with self._server.atomic():
-                self._view.show(self._body.places(seen), seen)
-                self._controls.reflect(settings, seen)
-                if now - plotted > _PLOTS:
-                    plotted = now
-                    self._tell(walked.value)
-                    self._plots.show(seen, self._theory)
+            self._at_server(partial(self._show, self._body.places(seen), now - plotted > _PLOTS, walked.value))
+            if now - plotted > _PLOTS:
+                plotted = now
             self.frames += watched
             self._keep()
             self.busy += time.perf_counter() - now
             if not watched:
                 self._over.wait(_ALONE)
+
+    def _at_server(self, do: Callable[[], None]) -> None:
+        """Let the thread of the server do something, and wait for it.
+
+        viser wakes those who send to browsers by an event of asyncio, which no other thread may touch: with two
+        browsers it fails now and then.
+        """
+
+        async def done() -> None:
+            do()
+
+        asyncio.run_coroutine_threadsafe(done(), self._server.get_event_loop()).result()
+
+    def _show(self, placed: Mapping[str, Placed], all_of_it: bool, rate: float) -> None:
+        """A frame, whose parts appear at once; not in every one of them text and curves."""
+        with self._server.atomic():
+            self._view.show(placed, self.seen)
+            self._controls.reflect(self._session.settings, self.seen)
+            if all_of_it:
+                self._tell(rate)
+                self._plots.show(self.seen, self._theory)
 
     def _obey(self) -> bool:
         """Wishes, and what has come of questions; whether there were any of the former."""
@@ -211,9 +230,9 @@ class Live:
                 self._plots.forget()
         said = session.said()
         for sentence in said:
-            self._notify(sentence)
+            self._at_server(partial(self._notify, sentence))
         if said or told:
-            self._controls.put_back(session.settings)
+            self._at_server(partial(self._controls.put_back, session.settings))
         for answer in self._beside.answers():
             if isinstance(answer, Theory):
                 self._theory = answer
@@ -262,12 +281,18 @@ class Live:
             thread.start()
 
     def _hand_out(self, name: str, record: xr.Dataset, to: viser.ClientHandle | None) -> None:
-        content, page = netcdf(record), _replay(record)
+        from chilopod.report import replay
+
+        content = netcdf(record)
+        page = replay(record, titles=["the robot"], heading="A walk recorded at the live page").html
         if self._kept is not None:
             try:
                 self._kept(name, content, page)
             except ChilopodError as error:
-                self._notify(str(error))
+                self._at_server(partial(self._notify, str(error)))
+        self._at_server(partial(self._send, name, content, page, to))
+
+    def _send(self, name: str, content: bytes, page: str, to: viser.ClientHandle | None) -> None:
         clients = self._server.get_clients()
         if to is not None and to.client_id in clients:
             clients = {to.client_id: to}
@@ -323,17 +348,6 @@ def _body(robot: Robot, engine: str) -> Body:
 def _but_first_spring(robot: Robot) -> tuple[object, ...]:
     """What the theory of a robot depends on, whatever its first spring."""
     return robot.springs.stiffness[1:], robot.gait, robot.ground, robot.twin
-
-
-def _replay(record: xr.Dataset) -> str:
-    heading = "A walk recorded at the live page"
-    if "pose" in record:
-        from chilopod.report.scene.replay_3d import replay_3d
-
-        return replay_3d(record, titles=["the robot"], heading=heading)
-    from chilopod.report.scene.replay import replay
-
-    return replay(record, titles=["the robot"], heading=heading)
 
 
 def _quiet() -> contextlib.AbstractContextManager[object]:

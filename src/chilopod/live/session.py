@@ -32,6 +32,7 @@ from chilopod.robot import Robot
 from chilopod.steering import ARRIVAL_RADIUS, VARIABLE, ActuatedAxis, LegYawController, RadiusLaw, SpringLaw
 from chilopod.steering.target import FARTHEST
 from chilopod.tasks.course import driver
+from chilopod.trials import Disturbance
 
 Array = NDArray[np.float64]
 
@@ -40,7 +41,7 @@ LOOKS = 6
 
 _SPEED = 2.0  # at first: fast enough to see it bend, slow enough to see it step
 _NUDGE = math.radians(0.5)  # standard deviation of what a nudge turns a joint by, held by its spring
-_START = math.radians(1.0)  # of joints and heading at the start, as in trials
+_START = Disturbance()  # of joints and heading at the start, as in trials
 _STRONGEST = 1.0  # rad by which a pull turns a joint, held by its spring
 _RATE = 20.0  # Hz, of what is written down
 _LONGEST = 900.0  # s of it in one piece
@@ -187,7 +188,7 @@ class Session:
         robot, joints = self._settings.robot, self._settings.robot.body.modules - 1
         self._random = np.random.default_rng(self._settings.seed)
         states = self._engine.initial_states(
-            robot, self._random.normal(0.0, _START, joints), self._random.normal(0.0, _START)
+            robot, self._random.normal(0.0, _START.joint_angle, joints), self._random.normal(0.0, _START.heading)
         )
         self._before, self._reached = 0.0, 0.0
         self._target: tuple[float, float] | None = None
