@@ -265,7 +265,7 @@ def _choose_step(lane: int, pieces: Any, lanes: Any, slope: Any, clock: Any, at:
     left = pieces.starts[at.piece[lane]] + at.end[lane] - clock[_TIME, lane]
     if at.next[lane] <= 0.0:
         scale, steep = 0.0, 0.0
-        for i in range(slope.shape[0]):
+        for i in range(lanes.x.shape[0]):
             scale = max(scale, abs(lanes.x[i, lane]))
             steep = max(steep, abs(slope[i, lane]))
         at.next[lane] = 0.01 * max(scale, 1e-3) / steep if steep > 0.0 else left
