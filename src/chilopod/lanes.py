@@ -223,11 +223,8 @@ def as_lanes(typing: Any, array: Any, width: Any) -> Any:
 
 
 @njit
-def room(shape: tuple[int, ...]) -> Any:
-    """An array of zeros that begins where a line of the processor's cache does, as registers like it."""
-    numbers = 1
-    for size in shape:
-        numbers *= size
+def room(numbers: int) -> Any:
+    """So many zeros, from where a line of the processor's cache begins, as registers like it."""
     more = np.zeros(numbers + _CACHE_LINE)
     skip = -(more.ctypes.data // 8) % _CACHE_LINE
-    return more[skip : skip + numbers].reshape(shape)
+    return more[skip : skip + numbers]

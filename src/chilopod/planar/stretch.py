@@ -143,11 +143,11 @@ def _carrier(width: int) -> Callable[..., None]:
         n, size = pieces.contact.shape[1], states.shape[1]
         joints = n - 1
         lanes = _Lanes(
-            room((size, width)),
-            room((4, width)),
-            room((joints, SPRING, width)),
-            room((joints, width)),
-            room((n, MOMENTS, width)),
+            room(size * width).reshape((size, width)),
+            room(4 * width).reshape((4, width)),
+            room(joints * SPRING * width).reshape((joints, SPRING, width)),
+            room(joints * width).reshape((joints, width)),
+            room(n * MOMENTS * width).reshape((n, MOMENTS, width)),
         )
         x = as_lanes(lanes.x, width)
         args = (
@@ -155,13 +155,14 @@ def _carrier(width: int) -> Callable[..., None]:
             as_lanes(lanes.springs, width),
             as_lanes(lanes.damping, width),
             as_lanes(lanes.moments, width),
-            as_lanes(room((n, SCRATCH, width)), width),
+            as_lanes(room(n * SCRATCH * width).reshape((n, SCRATCH, width)), width),
         )
         # Rounded up to whole vectors, in which sums are taken whatever the number of lanes.
         vectors = -(-size * width // LANES)
-        slope = room((LANES_WORK, vectors * LANES // width, width))
-        slopes, wide = as_lanes(slope, width), as_lanes(slope.reshape((LANES_WORK, vectors, LANES)), LANES)
-        clock = room((3, width))
+        wider = room(LANES_WORK * vectors * LANES).reshape((LANES_WORK, vectors, LANES))
+        slope = wider.reshape((LANES_WORK, vectors * LANES // width, width))
+        slopes, wide = as_lanes(slope, width), as_lanes(wider, LANES)
+        clock = room(3 * width).reshape((3, width))
         clocks = as_lanes(clock, width)
         at = _Places(
             np.full(width, _NOBODY),
@@ -178,7 +179,7 @@ def _carrier(width: int) -> Callable[..., None]:
         for lane in range(width):
             # Where nobody is, the first robot stands still: numbers that cost no more than others.
             _put(lane, rows[lane if lane < walking else 0], robots, states, step, lanes, at)
-            _begin(lane, 0, 0.0, pieces, robots, lanes, clock, at)
+            _begin(lane, at.piece[lane], 0.0, pieces, robots, lanes, clock, at)
             if lane >= walking:
                 at.robot[lane] = _NOBODY
 
