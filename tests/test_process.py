@@ -3,6 +3,7 @@
 import errno
 import os
 import signal
+import subprocess
 import sys
 from types import SimpleNamespace
 
@@ -46,6 +47,19 @@ def test_ctrl_c_ends_the_process_while_something_is_imported(answering, tmp_path
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(LeftError):
         import interrupted_import  # noqa: F401
+
+
+def test_an_end_on_the_spot_leaves_no_semaphores(tmp_path):
+    (tmp_path / "interrupted_import.py").write_text("import signal\nsignal.raise_signal(signal.SIGINT)\n")
+    script = """
+import multiprocessing
+from chilopod.process import answer_interrupts
+answer_interrupts()
+lock = multiprocessing.get_context("spawn").Lock()
+import interrupted_import
+"""
+    ended = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (process.INTERRUPTED, "", "error: interrupted\n")
 
 
 def test_an_interrupt_that_nobody_can_raise_is_not_forgotten(answering):

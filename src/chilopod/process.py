@@ -117,6 +117,11 @@ def leave(words: str = "error: interrupted\n") -> NoReturn:
     """End this process now, as interrupted."""
     with suppress(OSError):
         os.write(2, (_SHOW_CURSOR if os.isatty(2) else b"") + words.encode())
+    # Semaphores that outlive this process are told of on its stderr, by the process that looks after them.
+    started = sys.modules.get("multiprocessing.util")
+    if started is not None:
+        with suppress(Exception):
+            started._run_finalizers(0)
     os._exit(INTERRUPTED)
 
 
