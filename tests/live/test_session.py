@@ -30,6 +30,18 @@ def wish(walking, *asked):
         walking.obey()
 
 
+def test_a_wish_wakes_who_waits_for_one():
+    box = wishes.Box()
+    assert not box.wait(0.0)
+    box.put(SOFT)
+    assert box.wait(3600.0)
+    assert box.take() == [SOFT]
+    assert not box.wait(0.0)
+    box.wake()
+    assert box.wait(3600.0)
+    assert box.take() == []
+
+
 def test_nudges_leave_a_stiff_walk_straight_and_a_soft_one_settles_on_the_branch(law):
     walking = session()
     walking.walk_on(30.0)

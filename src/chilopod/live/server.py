@@ -35,6 +35,7 @@ from chilopod.live.plots import Plots  # noqa: E402
 from chilopod.live.scene import View, floor_place  # noqa: E402
 
 _FRAME = 1.0 / 30.0  # s
+_SOONEST = 0.01  # s from one frame to the next that a wish brings on
 _BEHIND = 0.1  # s that may be made up for
 _PLOTS = 0.25  # s from one drawing of the plots and sentences to the next
 _ALONE = 0.1  # s from one look to the next while no browser watches
@@ -153,6 +154,7 @@ class Live:
         over = getattr(self, "_over", None)
         if over is not None:
             over.set()
+            self._session.box.wake()
             self._thread.join()
             self._session.stop_recording()
             self._keep()
@@ -175,7 +177,8 @@ class Live:
     def _walk(self) -> None:
         session, last, plotted, walked = self._session, time.perf_counter(), -math.inf, _Rate()
         self._ask()
-        while not self._over.wait(max(0.0, last + _FRAME - time.perf_counter())):
+        while not self._over.wait(max(0.0, last + _SOONEST - time.perf_counter())):
+            session.box.wait(max(0.0, last + _FRAME - time.perf_counter()))
             now = time.perf_counter()
             passed, last = min(now - last, _BEHIND), now
             watched = bool(self._server.get_clients())

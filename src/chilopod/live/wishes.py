@@ -110,6 +110,7 @@ class Box:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
+        self._any = threading.Event()
         self._waiting: dict[Hashable, Wish] = {}
 
     def put(self, wish: Wish) -> None:
@@ -117,10 +118,20 @@ class Box:
         with self._lock:
             self._waiting.pop(wish.kind, None)
             self._waiting[wish.kind] = wish
+        self._any.set()
+
+    def wait(self, seconds: float) -> bool:
+        """Until there is a wish, or somebody wakes, which it tells; but so long at most."""
+        return self._any.wait(seconds)
+
+    def wake(self) -> None:
+        """Let the one who waits go on, as if there were a wish."""
+        self._any.set()
 
     def take(self) -> list[Wish]:
         """All wishes in the order in which they came, and none is left."""
         with self._lock:
+            self._any.clear()
             wishes = list(self._waiting.values())
             self._waiting.clear()
         return wishes
