@@ -10,18 +10,13 @@ from numpy.typing import NDArray
 
 from chilopod.live.body import Placed
 from chilopod.live.state import Seen
+from chilopod.report.scene.outline_3d import drawn, yaw_joint
 from chilopod.robot import Robot
-from chilopod.twin.model import POLE_GROUP, compiled, without_springs
+from chilopod.twin.model import compiled, without_springs
 
 Array = NDArray[np.float64]
 
-_PIN = (0.16, 1.06)  # radius of a drawn yaw joint over the width of a module, its height over the module's
-_KINDS = {
-    int(mujoco.mjtGeom.mjGEOM_BOX): "box",
-    int(mujoco.mjtGeom.mjGEOM_CAPSULE): "rod",
-    int(mujoco.mjtGeom.mjGEOM_CYLINDER): "rod",
-    int(mujoco.mjtGeom.mjGEOM_SPHERE): "ball",
-}
+_KINDS = {"box": "box", "capsule": "rod", "cylinder": "rod", "sphere": "ball"}
 
 
 class SolidBody:
@@ -37,15 +32,13 @@ class SolidBody:
         plan = compiled(without_springs(robot))
         model = plan.model
         self._model, self._data, self._yaw_joints = model, mujoco.MjData(model), plan.yaw_joints
-        drawn = [geom for geom in range(model.ngeom) if model.geom_group[geom] != POLE_GROUP]
         self._geoms = {
-            kind: np.array([geom for geom in drawn if _KINDS.get(int(model.geom_type[geom])) == kind], dtype=np.intp)
+            kind: np.array([geom for geom, shape in drawn(model).items() if _KINDS[shape] == kind], dtype=np.intp)
             for kind in ("box", "rod", "ball")
         }
         self._scales = {kind: _scales(kind, model.geom_size[geoms]) for kind, geoms in self._geoms.items()}
-        _, half_width, half_height = model.geom("module1_box").size
-        pin = (_PIN[0] * 2.0 * half_width, _PIN[0] * 2.0 * half_width, 2.0 * _PIN[1] * half_height)
-        self._pins = np.tile(pin, (len(self._yaw_joints), 1))
+        radius, half_height = yaw_joint(model)
+        self._pins = np.tile((radius, radius, 2.0 * half_height), (len(self._yaw_joints), 1))
 
     def places(self, seen: Seen) -> Mapping[str, Placed]:
         """See :class:`chilopod.live.body.Body`."""

@@ -12,21 +12,15 @@ from numpy.typing import NDArray
 
 from chilopod.errors import ParameterError
 from chilopod.report.scene.frames import Scene, scene
+from chilopod.report.scene.outline_3d import drawn, yaw_joint
 from chilopod.report.scene.replay_page import LARGEST, encoded, packed, page, shown_times, span
-from chilopod.twin.model import POLE_GROUP, TwinModel, compiled
+from chilopod.twin.model import TwinModel, compiled
 
 Array = NDArray[np.float64]
 
 _SCRIPTS: Final = ("replay_3d_pose.js", "replay_3d_paint.js", "replay_3d.js")
-_SHAPES: Final = {
-    int(mujoco.mjtGeom.mjGEOM_BOX): "box",
-    int(mujoco.mjtGeom.mjGEOM_CAPSULE): "capsule",
-    int(mujoco.mjtGeom.mjGEOM_CYLINDER): "cylinder",
-    int(mujoco.mjtGeom.mjGEOM_SPHERE): "sphere",
-}
 _FINE: Final = 10  # thin grid lines from one to the next
 _WILDEST: Final = 10.0  # m and rad: what diverges is drawn no further than that
-_PIN: Final = (0.16, 1.06)  # radius of a drawn yaw joint over the width of a module, its height over the module's
 
 
 def replay_3d(record: xr.Dataset, *, titles: Mapping[Any, str] | Sequence[str], heading: str) -> str:
@@ -149,10 +143,8 @@ def _shapes(plan: TwinModel) -> list[dict[str, Any]]:
     model, feet = plan.model, {int(geom) for geom in plan.feet.ravel()}
     front = int(model.body("module1").id)
     shapes = []
-    for geom in range(model.ngeom):
-        kind, body = _SHAPES.get(int(model.geom_type[geom])), int(model.geom_bodyid[geom])
-        if kind is None or model.geom_group[geom] == POLE_GROUP:
-            continue
+    for geom, kind in drawn(model).items():
+        body = int(model.geom_bodyid[geom])
         role = "foot" if geom in feet else "leg"
         if kind == "box":
             role = "front" if body == front else "module"
@@ -164,8 +156,7 @@ def _shapes(plan: TwinModel) -> list[dict[str, Any]]:
 
 def _pins(plan: TwinModel) -> list[dict[str, Any]]:
     """The yaw joints, which have no geometry in the model."""
-    model, (_, half_width, half_height) = plan.model, plan.model.geom("module1_box").size
-    size = [float(_PIN[0] * 2.0 * half_width), float(_PIN[1] * half_height), 0.0]
+    model, size = plan.model, [*yaw_joint(plan.model), 0.0]
     return [
         {
             "body": int(model.jnt_bodyid[joint]),
