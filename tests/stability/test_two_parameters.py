@@ -154,6 +154,12 @@ def test_what_two_parameters_would_unfold_is_refused():
         follow2(family2, start, BOX, second=0.0)
 
 
+def test_a_krein_collision_is_named():
+    point, second = start_at(0.4, Kind.KREIN_COLLISION)
+    with pytest.raises(ParameterError, match="Krein collision, which is not followed"):
+        follow2(circle(), point, BOX, second=second)
+
+
 def test_a_coefficient_that_is_not_found_near_its_zero_is_bracketed(monkeypatch):
     """x -> -(1 + p) x + (q - 0.1) x^3 turns at q = 0.1, where here no normal form is found."""
 

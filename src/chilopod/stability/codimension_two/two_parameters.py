@@ -86,7 +86,7 @@ def follow2(
     ------
     ParameterError
         If an argument is out of range; for a pitchfork, transcritical or branch point, if nothing keeps it one as
-        both parameters change: neither a symmetry nor an orbit that the systems know.
+        both parameters change: neither a symmetry nor an orbit that the systems know; for a Krein collision.
     AnalysisError
         If no point of a curve is found at the start.
     """
@@ -134,6 +134,8 @@ def _what(family2: Family2, start: BifurcationPoint, second: float) -> tuple[int
     system = family2(start.value, second)
     if start.orbit.shape != (system.dimension,):
         raise ParameterError("is of another system", field="start", value=start.orbit.shape)
+    if start.kind is Kind.KREIN_COLLISION:
+        raise ParameterError("is a Krein collision, which is not followed", field="start", value=start.value)
     known = knows_orbit(system) and start.kind is not Kind.FOLD
     if start.kind is Kind.NEIMARK_SACKER:
         return 0, known

@@ -249,12 +249,13 @@ class _Finder:
             known = np.array(self.spectra.values)
             found = margins(self.spectra.at(known))
             gaps = np.diff((0.5 * known - 0.5 * self.a) / (0.5 * self.b - 0.5 * self.a))
-            slopes = np.diff(found, axis=0) / gaps[:, None]
             start, end, gap = found[1:-2], found[2:-1], gaps[1:-1]
-            into, out = slopes[:-2], -slopes[2:]  # both taken towards the inside of the gap
+            # Where a crossing was closed in on, a gap may round to nothing: no slope, and nobody heads anywhere.
             with np.errstate(divide="ignore", invalid="ignore"):
+                slopes = np.diff(found, axis=0) / gaps[:, None]
+                into, out = slopes[:-2], -slopes[2:]  # both taken towards the inside of the gap
                 reach = np.clip((end - start + out * gap[:, None]) / (into + out), 0.0, gap[:, None])
-            towards = np.sign(start) * (start + into * np.nan_to_num(reach))
+                towards = np.sign(start) * (start + into * np.nan_to_num(reach))
             turning = (start * end > 0.0) & (np.sign(start) * into < 0.0) & (np.sign(start) * out < 0.0)
             again = (turning & (towards < _CLOSE * np.minimum(np.abs(start), np.abs(end)))).any(axis=1)
             again &= gap > _FINEST_PROBE
