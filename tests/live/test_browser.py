@@ -1,13 +1,17 @@
 """The live page in a real browser: Chromium without a window that draws without a graphics card."""
 
+import io
 import re
 import shutil
 import socket
 import time
 from contextlib import contextmanager
 
+import numpy as np
 import pytest
 import xarray as xr
+from PIL import Image
+from scipy import ndimage
 
 from chilopod.analysis.parameters import stiffness
 from chilopod.live import Live, wishes
@@ -21,22 +25,14 @@ pytestmark = [
 ]
 
 PATIENCE = 60_000  # ms, on a busy machine
-FLAGS = (
-    "--no-sandbox",
-    "--enable-unsafe-swiftshader",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-)
+SOFTWARE_WEBGL = "--enable-unsafe-swiftshader"
 READY = "Straight and stable"
 
 
 @pytest.fixture(scope="module")
 def chromium():
     with playwright.sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        browser = started.chromium.launch(executable_path=CHROMIUM, args=[SOFTWARE_WEBGL])
         yield browser
         browser.close()
 
@@ -66,15 +62,17 @@ def opened(chromium, live):
 
 
 @contextmanager
-def visit(chromium, live):
-    page = chromium.new_page(viewport={"width": 800, "height": 500})
+def visit(chromium, live, width=800, height=500):
+    page = chromium.new_page(viewport={"width": width, "height": height})
     page.set_default_timeout(PATIENCE)
     page.asked = []
     page.on("request", lambda request: page.asked.append(request.url))
-    page.goto(live.address)
-    page.get_by_text("first spring", exact=True).first.wait_for()
-    yield page
-    page.close()
+    try:
+        page.goto(live.address)
+        page.get_by_text("first spring", exact=True).first.wait_for()
+        yield page
+    finally:
+        page.close()
 
 
 def type_into(page, label, text):
@@ -112,6 +110,40 @@ def test_a_click_on_the_floor_is_walked_to(opened):
     opened.mouse.click(420, 400)
     read(opened, "On its way to the target")
     read(opened, "arrived after")
+
+
+def joint_in(page):
+    """Where on the page a yaw joint stands still: the largest orange spot between curves, words and notifications."""
+    found = before = None
+    while found is None or found != before:
+        before = found
+        page.wait_for_timeout(500)
+        red, green, blue = np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB"), float).transpose(
+            2, 0, 1
+        )
+        orange = (red > 150.0) & (green > 0.5 * red) & (green < 0.85 * red) & (blue < 0.35 * red)
+        orange[:200] = orange[:, :310] = orange[:, 940:] = False
+        spots, count = ndimage.label(orange)
+        sizes = ndimage.sum_labels(orange, spots, np.arange(1, count + 1))
+        found = tuple(ndimage.center_of_mass(orange, spots, 1 + np.argmax(sizes))) if count else None
+    return found[::-1]
+
+
+def test_a_joint_that_is_dragged_bends_and_springs_back(chromium, live):
+    with visit(chromium, live, 1280, 800) as page:
+        read(page, READY)
+        live.wish(wishes.Pause(True))
+        read(page, "Paused")
+        x, y = joint_in(page)
+        page.mouse.move(x, y)
+        page.mouse.down()
+        page.mouse.move(x + 20.0, y + 20.0, steps=4)
+        live.wish(wishes.Pause(False))
+        read(page, r"Joint \d is pulled aside, and it walks a curve of")
+        assert np.abs(live.seen.joint_angles).max() > 0.1
+        page.mouse.up()
+        live.wish(wishes.Speed(10.0))
+        read(page, READY)
 
 
 def test_keys_do_what_controls_do(opened):

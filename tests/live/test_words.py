@@ -49,6 +49,9 @@ def test_every_state_has_its_sentence(begun):
     assert said(begun, **soft(8.0), **curve(0.33), turning=0.001).startswith("Settled on a curve of 0.33 m to the left")
     assert "no settled curve is known" in said(begun, **soft(3.0))
     assert "not known: it is computed" in said(begun, Theory(remark="it is computed"))
+    pulled = said(begun, pulled=np.array([0.0, 0.1, 0.0, 0.0, 0.0]), **curve(0.9))
+    assert pulled == "Joint 2 is pulled aside, and it walks a curve of 0.90 m to the left as long as that lasts."
+    assert said(begun, pulled=np.array([0.0, 0.1, 0.0, 0.0, -0.1])).startswith("Joints 2, 5 are pulled aside")
     assert "It has stopped: a yaw joint bent" in said(begun, status=Status.OUT_OF_RANGE)
 
 

@@ -34,7 +34,7 @@ from chilopod.live.controls import Controls  # noqa: E402
 from chilopod.live.plots import Plots  # noqa: E402
 from chilopod.live.scene import View, floor_place  # noqa: E402
 
-_FRAME = 1.0 / 30.0  # s
+_FRAME = 1.0 / 25.0  # s; with more, a browser without a graphics card falls behind, and answers later
 _SOONEST = 0.01  # s from one frame to the next that a wish brings on
 _BEHIND = 0.1  # s that may be made up for
 _PLOTS = 0.25  # s from one drawing of the plots and sentences to the next

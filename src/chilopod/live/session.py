@@ -122,6 +122,7 @@ class Session:
             looked.leg_yaw[0],
             means,
             self._turning(),
+            self._pull.copy(),
             self._target,
             self._walk.states()[0],
         )

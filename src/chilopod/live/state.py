@@ -54,6 +54,8 @@ class Seen:
         Of the joints over the last gait cycle, rad, (N-1,).
     turning
         By how much the sum of their sizes grows, rad/s.
+    pulled
+        Torques by which somebody pulls at joints, N*m, (N-1,).
     target
         Where to, m; None: nowhere.
     state
@@ -70,6 +72,7 @@ class Seen:
     leg_yaw: Array
     mean_angles: Array
     turning: float
+    pulled: Array
     target: tuple[float, float] | None
     state: Array
 

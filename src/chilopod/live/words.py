@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from chilopod import units
 from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.engine import Status
@@ -46,15 +48,17 @@ def sentences(seen: Seen, settings: Settings, theory: Theory, growth: Growth | N
         x, y = seen.target
         away = math.hypot(x - seen.pose[0], y - seen.pose[1])
         said.append(f"On its way to the target, {away:.2f} m off, with the strategy {settings.strategy}.")
+    if seen.pulled.any():
+        joints = ", ".join(str(joint + 1) for joint in np.flatnonzero(seen.pulled))
+        who = f"Joint {joints} is" if len(joints) == 1 else f"Joints {joints} are"
+        return [*said, f"{who} pulled aside, and it walks {_arc(seen)} as long as that lasts."]
     said.append(_bend(seen, theory, growth if growth is not None and growth.robot == settings.robot else None))
     return said
 
 
 def _bend(seen: Seen, theory: Theory, growth: Growth | None) -> str:
     k1 = float(seen.stiffness[0])
-    radius, side = radius_of(seen), "left" if seen.mean_angles.sum() < 0.0 else "right"
-    bent = seen.bend > _STRAIGHT
-    arc = f"a curve of {radius:.2f} m to the {side}" if bent else "straight on"
+    radius, side, bent, arc = radius_of(seen), _side(seen), seen.bend > _STRAIGHT, _arc(seen)
     if theory.pitchfork is None:
         return f"It walks {arc}. Where the straight walk gives way is not known: {theory.remark or 'not asked yet'}."
     fork, settled = f"the pitchfork at {spring_text(theory.pitchfork)}", theory.settled(k1)
@@ -77,6 +81,14 @@ def _bend(seen: Seen, theory: Theory, growth: Growth | None) -> str:
         )
     moves = "tightens" if seen.turning > 0.0 else "widens"
     return f"{soft}. The curve, {radius:.2f} m to the {side}, {moves} towards the branch's {settled:.2f} m."
+
+
+def _side(seen: Seen) -> str:
+    return "left" if seen.mean_angles.sum() < 0.0 else "right"
+
+
+def _arc(seen: Seen) -> str:
+    return f"a curve of {radius_of(seen):.2f} m to the {_side(seen)}" if seen.bend > _STRAIGHT else "straight on"
 
 
 def _percent(growth: Growth) -> str:
