@@ -22,6 +22,7 @@ PATIENCE = 120_000  # ms
 
 
 def picture(page: Page, live: Live) -> bytes:
+    """The page, settled."""
     page.goto(live.address)
     page.get_by_text("pitchfork at").first.wait_for(timeout=PATIENCE)
     for wish in (wishes.Spring(0, stiffness(8.0)), wishes.Speed(10.0)):
