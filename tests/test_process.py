@@ -52,8 +52,9 @@ def test_ctrl_c_ends_the_process_while_something_is_imported(answering, tmp_path
 def test_an_end_on_the_spot_leaves_no_semaphores(tmp_path):
     (tmp_path / "interrupted_import.py").write_text("import signal\nsignal.raise_signal(signal.SIGINT)\n")
     script = """
-import multiprocessing
+import multiprocessing, signal
 from chilopod.process import answer_interrupts
+signal.signal(signal.SIGINT, signal.default_int_handler)  # in the background of a script it is ignored
 answer_interrupts()
 lock = multiprocessing.get_context("spawn").Lock()
 import interrupted_import
