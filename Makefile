@@ -1,7 +1,7 @@
 # Everything here needs only make and a Python from 3.11 to 3.13. Choose another with: make setup PYTHON=/path/to/python3
 # The environment lives in .venv and is reused until pyproject.toml or requirements.lock changes.
 .DEFAULT_GOAL := help
-.PHONY: help setup reproduce test run-tests torture lint types format docs renew package bench lock clean
+.PHONY: help setup reproduce test run-tests test-processors torture lint types format docs renew package bench lock clean
 .DELETE_ON_ERROR:
 
 VENV := .venv
@@ -35,7 +35,7 @@ define make_venv
 endef
 
 help:  ## list the targets
-	@sed -n 's/^\([a-z]*\):[^#]*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 20
+	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1\t\2/p' Makefile | expand -t 20
 
 setup: $(DEV)  ## make .venv with everything that the tests need
 
@@ -68,6 +68,19 @@ test: lint  ## all checks and all tests
 
 run-tests: $(DEV)
 	$(ALONGSIDE) $(BIN)/python -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder --benchmark-disable $(ARGS)
+
+# OpenBLAS does not look whether the processor has what its kernels need.
+KERNELS ?= Haswell Zen Nehalem $(shell grep -qs avx512vl /proc/cpuinfo && echo SkylakeX)
+NUMERIC := tests/stability tests/truth tests/analysis tests/planar tests/test_examples.py
+
+test-processors: $(DEV)  ## the numeric tests with the arithmetic of other processors; half an hour; some in KERNELS="Zen"
+	@failed=; for kernel in $(KERNELS); do \
+	  echo "OpenBLAS kernels: $$kernel"; \
+	  OPENBLAS_CORETYPE=$$kernel $(MAKE) --no-print-directory run-tests ARGS="$(NUMERIC)" || failed="$$failed $$kernel"; \
+	done; \
+	echo "compiled for a generic processor: no FMA, no AVX"; \
+	NUMBA_CPU_NAME=generic $(MAKE) --no-print-directory run-tests ARGS="$(NUMERIC)" || failed="$$failed generic"; \
+	if [ -n "$$failed" ]; then echo "failed:$$failed" >&2; exit 1; fi
 
 torture: $(DEV)  ## attack it for ten minutes, and count what came of it; options in ARGS="kills --seed 7 --minutes 3"
 	$(BIN)/python torture/run.py --save $(ARGS)

@@ -35,7 +35,7 @@ KNOWN = {
     "07_twenty_modules": ["first spring: pitchfork", "all springs: Neimark-Sacker", "2 of 41"],
     "09_own_engine": [r"good feet: radius (\S+) m to the left, \1 m to the right"],
     "10_duffing": [r"supercritical pitchfork at F = 2\.403377116057"],
-    "11_mathieu_chart": [r"139 points, at most \de-1[3-6] beside"],
+    "11_mathieu_chart": [r"5 curves, at most \de-1[3-6] beside"],
     "12_van_der_pol": [r"period 6\.663286859323, multiplier 0\.000859695064"],
     "13_bouncing_ball": [r"period doubling at (\S+) mm, in closed form \1 mm"],
     "15_twin": ["arrived"],

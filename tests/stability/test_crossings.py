@@ -1,5 +1,7 @@
 """Crossings of the unit circle of families whose multipliers are known, or found by dense sampling."""
 
+import itertools
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -9,7 +11,7 @@ from scipy.special import mathieu_a, mathieu_b
 
 from chilopod.errors import ParameterError
 from chilopod.stability.unit_circle.crossings import Status, find_crossings
-from chilopod.stability.unit_circle.spectra import Event
+from chilopod.stability.unit_circle.spectra import Event, Spectra, symmetric
 
 MINUS, PLUS, PAIR = Event.MINUS, Event.PLUS, Event.PAIR
 
@@ -233,6 +235,22 @@ def test_multipliers_sixty_orders_apart():
     found = find_crossings(diagonal(lambda p: 70.0, lambda p: p - 70.0, lambda p: p - 0.3), 0.0, 1.0)
     assert (found.status, summary(found)) == (Status.COMPLETE, [(PLUS, 1, 1)])
     assert places(found) == pytest.approx([0.3], rel=1e-14)
+
+
+@pytest.mark.parametrize("order", list(itertools.permutations((0, 1, 2))))
+def test_a_small_multiplier_beside_a_huge_one_keeps_its_digits(order):
+    """Errors move it by parts of its own size, in whatever order the states came: on some processors rounding alone
+    moved it to anywhere."""
+    rates = np.array([70.0, -0.3, -70.0])
+    spectra = Spectra(diagonal(*(lambda p, rate=rate: rate for rate in rates[list(order)])), 10)
+    found = spectra.disturbed(np.array([0.0]))[0]
+    np.testing.assert_allclose(np.log(np.abs(found)), [rates, rates], rtol=0.0, atol=1e-12)
+
+
+def test_signs_of_subnormal_numbers():
+    signs, logs = symmetric(np.array([[1e-310j, -1e-310j, 0.5], [-1e-310, -0.5, -2e300]]), 0)
+    np.testing.assert_array_equal(signs, [1.0, -1.0])
+    np.testing.assert_allclose(logs, [np.log(0.5) + 2 * np.log(1e-310), np.log(1e-310) + np.log(1e300)], rtol=1e-13)
 
 
 @pytest.mark.parametrize(("low", "width"), [(0.0, 1e-300), (-1e300, 2e300), (1e6, 1e-3), (-1e-310, 3e-310)])

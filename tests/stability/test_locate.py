@@ -180,7 +180,7 @@ def test_an_orbit_at_rest_is_followed_from_a_guess_beside_it(unit):
 
         def flow(x, t0, t1):
             grow = np.exp(a * (t1 - t0))
-            spread = (grow * grow - 1.0) / a if a else 2.0 * (t1 - t0)
+            spread = np.expm1(2.0 * a * (t1 - t0)) / a if a else 2.0 * (t1 - t0)
             share = 1.0 + (x[0] / unit) ** 2 * spread
             return x * grow / np.sqrt(share), np.array([[grow / share**1.5]])
 

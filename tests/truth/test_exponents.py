@@ -8,6 +8,7 @@ from scipy.linalg import expm
 
 from chilopod.errors import AnalysisError
 from chilopod.stability import PeriodicSystem, exponents
+from chilopod.stability.splitting import split_leading
 
 PERIOD = 2 * pi
 SKEW = np.array([[0.0, 0.5, -0.2, 0.3], [-0.5, 0.0, 0.4, 0.1], [0.2, -0.4, 0.0, -0.6], [-0.3, -0.1, 0.6, 0.0]])
@@ -114,3 +115,17 @@ def test_a_singular_flow_is_refused():
     system = PeriodicSystem(2, 1.0, lambda x, t0, t1: (0 * x, np.diag([1.0, 0.0])), orbit=np.zeros(2))
     with pytest.raises(AnalysisError, match="contracts too strongly"):
         exponents(system)
+
+
+@pytest.mark.parametrize("last", [0.0, 1e-310])
+def test_a_singular_map_is_refused(last):
+    """A map has no parts that could be halved."""
+    system = PeriodicSystem(2, 1.0, lambda x, t0, t1: (0 * x, np.diag([0.5, last])), orbit=np.zeros(2))
+    with pytest.raises(AnalysisError, match="contracts too strongly"):
+        exponents(system)
+
+
+def test_leading_directions_of_a_factor_that_makes_nothing_of_the_others():
+    logarithms, vectors = split_leading([np.diag([2.0, 0.0])], 1)
+    np.testing.assert_allclose(logarithms, [log(2.0)], rtol=1e-15)
+    np.testing.assert_allclose(vectors, [[1.0], [0.0]], atol=1e-15)

@@ -13,6 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from chilopod.errors import AnalysisError
+
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
@@ -21,6 +23,9 @@ _GAP = 1.0
 
 _PASSES = 40
 """Passes through the product: a gap of 1 leaves exp(-40) of the neighbouring group."""
+
+_AVERAGED = 20
+"""Passes, the last ones, over which the growth is averaged."""
 
 _AT_REST = 1e-8
 """A basis that moves by less from one pass to the next has converged."""
@@ -40,14 +45,22 @@ def split_product(factors: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]
         ln|eigenvalue| + i angle, by falling modulus, shape (n,).
     vectors
         Unit eigenvectors as columns, the largest entry real and positive, shape (n, n).
+
+    Raises
+    ------
+    AnalysisError
+        If a factor has no finite inverse.
     """
     n = factors[0].shape[0]
     if n == 1:  # nothing to be split
         values = np.array([factor[0, 0] for factor in factors])
         angle = np.pi if (values < 0.0).sum() % 2 else 0.0
         return np.array([np.log(np.abs(values)).sum() + 1j * angle]), np.ones((1, 1), dtype=np.complex128)
-    slow, growth, slow_motion = _iterate(factors, n)
-    inverses: list[Array] = [np.linalg.inv(factor).astype(np.float64, copy=False) for factor in reversed(factors)]
+    slow, stretches, slow_motion = _iterate(factors, n)
+    inverses = _inverses(factors[::-1]) if stretches.all() else None
+    if inverses is None:
+        raise AnalysisError("the flow contracts too strongly to be resolved", field="flow")
+    growth = np.log(stretches).sum(axis=0) / _AVERAGED
     fast, _, fast_motion = _iterate(inverses, n)
     # Backward iteration meets the nodes in reverse: its node 0 is the same instant, its node 1 the last factor's start.
     fast = [fast[0], *reversed(fast[1:])]
@@ -86,22 +99,31 @@ def split_leading(factors: Sequence[Array], count: int) -> tuple[ComplexArray, C
     return logarithms, bases[0] @ vectors
 
 
+def _inverses(factors: Sequence[Array]) -> list[Array] | None:
+    """Inverses of square matrices; None if one has none that is finite."""
+    try:
+        inverses: list[Array] = [np.linalg.inv(factor).astype(np.float64, copy=False) for factor in factors]
+    except np.linalg.LinAlgError:
+        return None
+    return inverses if all(np.isfinite(inverse).all() for inverse in inverses) else None
+
+
 def _iterate(factors: Sequence[Array], n: int) -> tuple[list[Array], Array, Array]:
-    """Bases whose first j columns span the j directions that grow most, one before every factor; ln of the growth of
-    each in a pass, averaged over half of them; and how much the space of the first j still moves in a pass."""
+    """Bases whose first j columns span the j directions that grow most, one before every factor; the stretch of each
+    column by every factor of the last passes, shape (k, n), zero where a factor makes nothing of it; and how much the
+    space of the first j still moves in a pass."""
     basis = np.linalg.qr(np.random.default_rng(0).standard_normal((n, n)))[0]
     bases: list[Array] = []
-    growth = np.zeros(n)
-    for turn in range(_PASSES):
+    stretches: list[Array] = []
+    for _ in range(_PASSES):
         bases = []
         for factor in factors:
             bases.append(basis)
             basis, upper = np.linalg.qr(factor @ basis)
-            if turn >= _PASSES // 2:
-                growth += np.log(np.abs(np.diag(upper)))
+            stretches.append(np.abs(np.diag(upper)))
     turned = bases[0].T @ basis
     motion = np.array([np.linalg.norm(turned[j:, :j]) for j in range(1, n)])
-    return bases, growth / (_PASSES - _PASSES // 2), motion
+    return bases, np.array(stretches[-_AVERAGED * len(factors) :]), motion
 
 
 def intersection(one: Array, other: Array, dimension: int) -> Array:

@@ -308,6 +308,8 @@ class _Finder:
             if event is Event.PAIR and not self.conservative and self.spectra.without_pair(left, right):
                 continue
             if left == right and self.spectra.distances(left, event)[1][0] > _TELLING:
+                if self.spectra.clear(left):
+                    continue  # two real multipliers with product 1
                 self._leave(f"{LOST}, at {self.parameter(left):.9g}")  # zero only by rounding
                 continue
             place = left if left == right else self._root(event, idle, left, right)

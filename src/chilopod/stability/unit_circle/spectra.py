@@ -113,9 +113,9 @@ class Spectra:
             self._known[value] = np.empty(0, dtype=np.complex128)
         if not here.any():
             return
-        found = matrices[here]
-        nu = _eigenvalues(found)
-        stretch = self._stretches(found)
+        balanced = self._balanced(matrices[here])
+        nu = _eigenvalues(balanced)
+        stretch = _stretches(balanced)
         for value, row, log in zip(values[here].tolist(), nu, stretch.tolist(), strict=True):
             self._known[value] = row
             self._stretch[value] = log
@@ -147,13 +147,6 @@ class Spectra:
                 units = matrix_balance(filled, permute=False, separate=True)[1][0]
             self._units = units if (np.isfinite(units) & (units > 0.0)).all() else np.ones_like(units)
         return np.asarray(matrices * (self._units / self._units[:, None]))
-
-    def _stretches(self, matrices: Array) -> Array:
-        """Logarithms of det(1 + M^T M)^(1/2), M balanced: positive, analytic, and larger than what it divides."""
-        balanced = self._balanced(matrices)
-        one = np.broadcast_to(np.eye(matrices.shape[-1]), matrices.shape)
-        double = np.block([[one, -np.swapaxes(balanced, 1, 2)], [balanced, one]])
-        return np.asarray(0.5 * np.linalg.slogdet(double)[1])
 
     def exists(self, value: float) -> bool:
         """Whether there is a matrix at a value; asked for if that is not known."""
@@ -214,6 +207,10 @@ class Spectra:
         """Bounds on the errors of :meth:`margins`."""
         moved = margins(self.disturbed(np.array([value]))[0]) - self.margins(value)
         return np.asarray(_SAFETY * np.abs(moved).max(axis=0) + _ROUNDING)
+
+    def clear(self, value: float) -> bool:
+        """Whether all multipliers are off the circle by more than their errors."""
+        return bool((np.abs(self.margins(value)) > self.margin_errors(value)).all())
 
     def distances(self, value: float, event: Event) -> tuple[Array, Array]:
         """Sizes of the factors of the function of an event, rising, and what they may be wrong by."""
@@ -305,7 +302,10 @@ def symmetric(terms: ComplexArray, left_out: int) -> tuple[Array, Array]:
     last = small[:, left_out]
     with np.errstate(divide="ignore", invalid="ignore"):
         logs = logs + np.log(sizes).sum(axis=1) + np.log(np.abs(last.real if left_out else last))
-    signs = np.sign((np.prod(terms / np.where(sizes == 0.0, 1.0, sizes), axis=1) * last).real)
+    # Real and imaginary part apart: the quotient of a complex subnormal and its size would overflow.
+    divisors = np.where(sizes == 0.0, 1.0, sizes)
+    directions = terms.real / divisors + 1j * (terms.imag / divisors)
+    signs = np.sign((np.prod(directions, axis=1) * last).real)
     return np.asarray(signs), np.asarray(logs)
 
 
@@ -315,7 +315,20 @@ def _pairs(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return first, second
 
 
-def _eigenvalues(matrices: Array) -> ComplexArray:
-    """By falling modulus, shape (k, m)."""
-    nu = np.linalg.eigvals(matrices).astype(np.complex128)
+def _stretches(balanced: Array) -> Array:
+    """Logarithms of det(1 + M^T M)^(1/2), M balanced: positive, analytic, and larger than what it divides."""
+    one = np.broadcast_to(np.eye(balanced.shape[-1]), balanced.shape)
+    double = np.block([[one, -np.swapaxes(balanced, 1, 2)], [balanced, one]])
+    return np.asarray(0.5 * np.linalg.slogdet(double)[1])
+
+
+def _eigenvalues(balanced: Array) -> ComplexArray:
+    """Eigenvalues by falling modulus, shape (k, m).
+
+    The states with the largest rows come first: of a matrix graded downward the QR algorithm finds small eigenvalues to
+    their own size (Stewart, Numer. Math. 90, 2001), of another one rounding decides.
+    """
+    order = np.argsort(-np.abs(balanced).max(axis=-1), axis=-1)
+    graded = np.take_along_axis(np.take_along_axis(balanced, order[..., None], -2), order[..., None, :], -1)
+    nu = np.linalg.eigvals(graded).astype(np.complex128)
     return np.asarray(np.take_along_axis(nu, np.argsort(-np.abs(nu), axis=-1), axis=-1))
