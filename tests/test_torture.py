@@ -10,7 +10,8 @@ import chilopod.robot
 import chilopod.tasks
 
 sys.path.append(str(Path(__file__).parent.parent / "torture"))
-run, workers, outcomes, in_process = map(importlib.import_module, ("run", "workers", "outcomes", "in_process"))
+names = ("run", "workers", "outcomes", "in_process", "processors")
+run, workers, outcomes, in_process, processors = map(importlib.import_module, names)
 Kind = outcomes.Kind
 SEED = 13
 SHORT = {
@@ -101,3 +102,16 @@ def test_the_same_seed_makes_the_same_attacks(tmp_path):
         return place.tried.read_text()
 
     assert tried() == tried() != ""
+
+
+def test_it_finds_verdicts_and_numbers_that_hang_on_the_processor():
+    right = [["COMPLETE", [0.0, 0.0], 0.0], ["PITCHFORK", [2.4, 0.0], 1e-12]]
+    processors.compare(right, [right[0], ["PITCHFORK", [2.4 + 1.5e-12, 0.0], 1e-12]], "another")
+    for other in (
+        [["INCOMPLETE", [0.0, 0.0], 0.0], right[1]],
+        right[:1],
+        [right[0], ["PITCHFORK", [2.4 + 3e-12, 0.0], 1e-12]],
+        [right[0], ["PITCHFORK", [float("nan"), 0.0], 1e-12]],
+    ):
+        with pytest.raises(outcomes.FoundFault):
+            processors.compare(right, other, "another")

@@ -25,6 +25,7 @@ from environments import Environments
 from invariances import Invariances
 from kills import Kills
 from outcomes import FINE, SENTENCES, Kind
+from processors import Processors
 from robot_files import RobotFiles
 from same_bits import SameBits
 from saved_branches import SavedBranches
@@ -35,7 +36,7 @@ from workers import Attacks, tried
 RESULTS = Path(__file__).with_name("results.json")
 _KINDS = (
     *(RobotFiles, Arguments, SavedTrials, SavedBranches, Kills, Disks, Streams, Environments),
-    *(SameBits, Invariances),
+    *(SameBits, Invariances, Processors),
 )
 CLASSES: dict[str, Callable[[], Attacks]] = {each.name: each for each in _KINDS}
 _SHOWN = 12  # different faults of a class that are printed
