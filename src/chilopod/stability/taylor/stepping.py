@@ -40,7 +40,7 @@ from chilopod.stability.taylor.switching import (
 _ROUNDING = 2.0**-53
 _BLOCK = 64
 _AT_ONCE = 1e-13
-"""Of the time: an event so close to the border of an interval is on it."""
+"""Smallest difference of two instants, relative to the time: an event nearer to the border of an interval is on it."""
 
 
 @fused_njit(error_model="numpy")
@@ -49,14 +49,17 @@ def _first_crossing(
     switches: Any,
     order: int,
     h: float,
-    late: float,
+    remaining: float,
+    soon: float,
     values: Any,
     branches: Any,
     work: Any,
 ) -> tuple[float, int, float]:
     """When the first switch leaves its branch, which, and with which sign of the slope; number -1 if none does.
 
-    Events of guards that know only time are left to the next interval where they happen after ``late``.
+    Of those within a time ``soon`` of each other, which only rounding tells apart, it is the first of the list. Events
+    of guards that know only time are left to the next interval where they happen so shortly before the ``remaining``
+    time is over.
     """
     found, crossing, direction = h, -1, 0.0
     for s in range(switches.shape[1]):
@@ -70,9 +73,9 @@ def _first_crossing(
             if switches[0, s] == ops.FLOOR:
                 work[0] -= sign * (branches[s] + end)
             z = first_exit(work, order, found)
-            if z > late and is_timed(program, switches, s):
+            if z > remaining - soon and is_timed(program, switches, s):
                 continue
-            if z >= 0.0 and (crossing < 0 or z < found):
+            if z >= 0.0 and (crossing < 0 or z < found - soon):
                 found, crossing, direction = z, s, -sign
     return found, crossing, direction
 
@@ -228,8 +231,10 @@ def advance(
         crossing = -1
         direction = 0.0
         if count_switches > 0:
-            late = remaining - at_once / unit
-            h, crossing, direction = _first_crossing(program, switches, order, h, late, values, branches, work)
+            soon = at_once / unit
+            h, crossing, direction = _first_crossing(
+                program, switches, order, h, remaining, soon, values, branches, work
+            )
         shorter = agrees(clocks, table, period, t, h, unit, order, values)
         while shorter < h:
             h = shorter
