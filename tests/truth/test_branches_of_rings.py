@@ -13,7 +13,7 @@ from chilopod.stability.symmetry.equivariants import SymmetricKind
 BETWEEN = (-2.0, 1.0)
 
 
-def ring(cells, power, units=1.0, declared=True):
+def ring(cells, power, units=1.0, declared=True, moves=0.3):
     """Cells u -> u / 2 - c (u_left + u_right - 2 u) - u^power about an orbit that moves with c, in some units.
 
     Wave number k has the multiplier 1/2 + c l, l = 2 - 2 cos(2 pi k / cells): +1 at 1 / (2 l), -1 at -3 / (2 l).
@@ -23,7 +23,7 @@ def ring(cells, power, units=1.0, declared=True):
     symmetry = {"spatial_symmetry": [shift, np.eye(cells)[::-1]]} if declared else {}
 
     def family(c):
-        center = (0.5 + 0.3 * c) * units
+        center = (0.5 + moves * c) * units
 
         def flow(x, t0, t1):
             product = np.eye(cells)
@@ -104,9 +104,12 @@ def test_what_leaves_a_ring_keeps_a_mirror(count):
         assert np.abs(u).max() > 1e-3
 
 
-@pytest.mark.parametrize("cells", [3, 5])
-def test_the_symmetry_of_a_ring_need_not_be_declared(cells):
-    special = follow(ring(cells, 3, declared=False), np.full(cells, -0.1), BETWEEN).special_points
+@pytest.mark.parametrize(("cells", "moves"), [(3, 0.3), (5, 0.3), (7, 0.45), (3, 0.24), (5, 0.34), (7, 0.21)])
+def test_the_symmetry_of_a_ring_need_not_be_declared(cells, moves):
+    """However the last digits fall: where two multipliers cross at once, the matrix of the curve is singular but for
+    rounding."""
+    family = ring(cells, 3, declared=False, moves=moves)
+    special = follow(family, np.full(cells, 0.5 - 2.0 * moves), BETWEEN).special_points
     known = crossings(cells)
     assert [point.bifurcation.multiplicity for point in special] == [count for _, count in known]
     for point, (value, _) in zip(special, known, strict=True):

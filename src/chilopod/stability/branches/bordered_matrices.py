@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,6 +12,10 @@ from chilopod.stability.capabilities import SystemLike, spatial_symmetries
 from chilopod.stability.symmetry.mirrored import symmetric_states
 
 Array = NDArray[np.float64]
+
+_SINGULAR = 1e-9
+"""Singular value, relative to the largest, that counts as zero: the derivative by the parameter is a difference, and
+errs by about as much."""
 
 
 def symmetric_space(system: SystemLike, state: Array, sizes: Array, mode: Array | None = None) -> Array | None:
@@ -52,13 +58,29 @@ def within_space(space: Array | None, matrix: Array) -> Array:
     return result
 
 
+def inverted(matrix: Array) -> Array:
+    """Inverse of the matrix of a curve, shape (n+1, n+1); where branches meet that of shortest solutions.
+
+    There rounding decides how near to singular the matrix is, and a solution with the inverse may end on the other
+    branch.
+    """
+    with contextlib.suppress(np.linalg.LinAlgError):
+        found: Array = np.linalg.inv(matrix)
+        if np.abs(found).max() * np.abs(matrix).max() < 1.0 / _SINGULAR:
+            return found
+    try:
+        return np.linalg.pinv(matrix, rcond=_SINGULAR)
+    except np.linalg.LinAlgError:
+        raise AnalysisError("the curve has no direction here", field="step") from None
+
+
 def null_vector(bordered: Array) -> Array:
     """Unit vector that all but the last row of a matrix map to zero, on the side of the last row.
 
-    Exactly at a branch point the matrix is singular; of its solutions the shortest strays least.
+    At a branch point the matrix is singular, but for rounding; of its solutions the shortest strays least.
     """
     n = len(bordered) - 1
     if not np.isfinite(bordered).all():
         raise AnalysisError("the return map is not finite", field="flow")
-    tangent: Array = np.linalg.lstsq(bordered, np.append(np.zeros(n), 1.0))[0]
+    tangent: Array = np.linalg.lstsq(bordered, np.append(np.zeros(n), 1.0), rcond=_SINGULAR)[0]
     return tangent / np.linalg.norm(tangent)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from chilopod.errors import AnalysisError
 from chilopod.frozen import read_only
 from chilopod.stability.asked import Asking
-from chilopod.stability.branches.bordered_matrices import null_vector, symmetric_space, within_space
+from chilopod.stability.branches.bordered_matrices import inverted, null_vector, symmetric_space, within_space
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, Step
 from chilopod.stability.capabilities import (
     Family,
@@ -241,10 +241,7 @@ class Curve:
         fixed = symmetric_space(self.system(last.value), last.orbit, units[:n], mode)
         matrix = within_space(fixed, matrix)
         by_parameter = matrix[:n, n]
-        try:
-            inverse = np.linalg.inv(matrix)
-        except np.linalg.LinAlgError:
-            raise AnalysisError("the curve has no direction here", field="step") from None
+        inverse = inverted(matrix)
         largest = np.inf
         move = residual_before = np.zeros(n + 1)
         rounds = corrections = 0
