@@ -58,18 +58,18 @@ def within_space(space: Array | None, matrix: Array) -> Array:
     return result
 
 
-def inverted(matrix: Array) -> Array:
-    """Inverse of the matrix of a curve, shape (n+1, n+1); where branches meet that of shortest solutions.
+def inverted(matrix: Array) -> tuple[Array, bool]:
+    """Inverse of the matrix of a curve, shape (n+1, n+1), or that of shortest solutions, and whether it is the latter.
 
-    There rounding decides how near to singular the matrix is, and a solution with the inverse may end on the other
-    branch.
+    Where branches meet rounding decides how near to singular the matrix is, and a solution with its inverse may end on
+    the other branch. The shortest one leaves a residual as it is in a direction in which the matrix is singular.
     """
     with contextlib.suppress(np.linalg.LinAlgError):
         found: Array = np.linalg.inv(matrix)
         if np.abs(found).max() * np.abs(matrix).max() < 1.0 / _SINGULAR:
-            return found
+            return found, False
     try:
-        return np.linalg.pinv(matrix, rcond=_SINGULAR)
+        return np.linalg.pinv(matrix, rcond=_SINGULAR), True
     except np.linalg.LinAlgError:
         raise AnalysisError("the curve has no direction here", field="step") from None
 

@@ -241,7 +241,7 @@ class Curve:
         fixed = symmetric_space(self.system(last.value), last.orbit, units[:n], mode)
         matrix = within_space(fixed, matrix)
         by_parameter = matrix[:n, n]
-        inverse = inverted(matrix)
+        inverse, singular = inverted(matrix)
         largest = np.inf
         move = residual_before = np.zeros(n + 1)
         rounds = corrections = 0
@@ -262,8 +262,9 @@ class Curve:
             if not np.isfinite(now) or (now > 10.0 * largest and now > _SETTLED):
                 raise AnalysisError("corrections diverge", field="step")
             size = max(1.0, float(np.abs(x / units[:n]).max()))
-            # A residual that no longer falls is what the flow is good to.
-            if now <= self.precision * size or (now <= _SETTLED * size and now >= _FALLING * largest):
+            # A residual that no longer falls is what the flow is good to, if the matrix can make it fall.
+            settled = now <= _SETTLED * size and now >= _FALLING * largest and not singular
+            if now <= self.precision * size or settled:
                 break
             if rounds == _MOST_CORRECTIONS:
                 raise AnalysisError("corrections do not converge", field="step")
