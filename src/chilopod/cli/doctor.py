@@ -150,18 +150,17 @@ def _cores() -> list[Finding]:
 
 def _cache() -> list[Finding]:
     def cache() -> Finding:
-        mend = "set NUMBA_CACHE_DIR to a folder that can be written"
-        try:
-            from chilopod.planar.linear import propagate_batch
+        from chilopod.planar.linear import propagate_batch
 
-            folder = check_folder(propagate_batch.stats.cache_path)
-        except ParameterError as error:
-            return Finding("compile cache", error.problem, mend, essential=True)
+        folder, mend = propagate_batch.stats.cache_path, "set NUMBA_CACHE_DIR to a folder that can be written"
+        if folder is None:
+            return Finding("compile cache", "no folder can be written, so every start compiles anew", mend)
+        try:
+            return Finding("compile cache", str(check_folder(folder)))
         except OutputError as error:
             return Finding("compile cache", f"{error}, so every start compiles anew", mend)
-        return Finding("compile cache", str(folder))
 
-    from chilopod.errors import OutputError, ParameterError
+    from chilopod.errors import OutputError
     from chilopod.output import check_folder
 
     return [_guarded("compile cache", cache)]
