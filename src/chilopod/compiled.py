@@ -37,10 +37,10 @@ njit = functools.partial(_compiled, nogil=True)
 """``numba.njit`` with the compiled code kept on disk; other threads go on while it runs, to show that it does and to
 answer Ctrl-C."""
 
-fused_njit = functools.partial(_compiled, nogil=True, fastmath={"contract"})
+fused_njit = functools.partial(njit, fastmath={"contract"})
 """The same where a product and a sum may become one instruction with one rounding: not for exact error terms."""
 
-parallel_njit = functools.partial(_compiled, nogil=True, parallel=True)
+parallel_njit = functools.partial(njit, parallel=True)
 """The same for loops over ``prange``: one robot an iteration, so the answer does not depend on the number of
 threads."""
 

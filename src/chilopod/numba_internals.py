@@ -12,9 +12,18 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from llvmlite import ir
+from numba.core import cgutils
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+from numba.core.typeconv import Conversion
+from numba.core.typing import signature
 
 from chilopod import sources
+
+__all__ = ["Conversion", "cgutils", "ir", "keep", "signature"]
+
+ABOVE = ("analysis", "cli", "gym", "live", "paper", "report", "tasks", "trials", "twin")
+"""Subpackages that compile nothing, and that nothing compiled can reach: they may change without compiling anew."""
 
 _FOLDER = "chilopod-"
 FOLDERS = 3
@@ -49,7 +58,7 @@ class _Locator:
 
     def __init__(self, found: Any) -> None:
         self._found = found
-        version = hashlib.sha256(f"{sources.digest()} {numba.__version__}".encode()).hexdigest()
+        version = hashlib.sha256(f"{sources.digest(ABOVE)} {numba.__version__}".encode()).hexdigest()
         self._folder = Path(found.get_cache_path(), _FOLDER + version[:16])
 
     def __getattr__(self, name: str) -> Any:
@@ -59,7 +68,7 @@ class _Locator:
         return str(self._folder)
 
     def get_source_stamp(self) -> str:
-        return sources.digest()
+        return sources.digest(ABOVE)
 
     def ensure_cache_path(self) -> None:
         if self._folder.exists():
@@ -97,10 +106,10 @@ class _Cache(FunctionCache):  # type: ignore[misc]
 
     def __init__(self, function: Any) -> None:
         super().__init__(function)
-        self._cache_file = _File(self._cache_path, self._impl.filename_base, sources.digest())
+        self._cache_file = _File(self._cache_path, self._impl.filename_base, sources.digest(ABOVE))
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        if sources.edited():
+        if sources.edited(ABOVE):
             return None
         try:
             return super().load_overload(sig, target_context)
@@ -109,6 +118,6 @@ class _Cache(FunctionCache):  # type: ignore[misc]
 
     def save_overload(self, sig: Any, data: Any) -> None:
         # A full disk, or a folder that another process has just cleared away, costs time and nothing else.
-        if not sources.edited():
+        if not sources.edited(ABOVE):
             with suppress(OSError):
                 super().save_overload(sig, data)

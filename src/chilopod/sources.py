@@ -5,41 +5,53 @@ from __future__ import annotations
 import functools
 import hashlib
 import time
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 _PACKAGE = Path(__file__).parent
 
 
-@functools.cache
-def digest() -> str:
-    """The SHA-256 of all ``*.py`` of the package, in hexadecimal; computed once a process."""
+@functools.lru_cache
+def digest(without: Sequence[str] = ()) -> str:
+    """SHA-256 over the names and contents of all Python files of the package, in hexadecimal; computed once a process.
+
+    Parameters
+    ----------
+    without
+        Names of subpackages that do not count.
+    """
     total = hashlib.sha256()
-    for name in sorted(path.relative_to(_PACKAGE).as_posix() for path in _AT_FIRST):
-        # Checkouts with other ends of lines are the same code.
-        content = (_PACKAGE / name).read_bytes().replace(b"\r\n", b"\n")
-        total.update(f"{name} {len(content)}\n".encode() + content)
+    for name in sorted(_AT_FIRST):
+        if name.partition("/")[0] not in without:
+            # Checkouts with other ends of lines are the same code.
+            content = (_PACKAGE / name).read_bytes().replace(b"\r\n", b"\n")
+            total.update(f"{name}\0{len(content)}\0".encode() + content)
     return total.hexdigest()
 
 
-def edited() -> bool:
-    """Whether a source was changed, added or removed since the digest was computed: this process may run both.
+def edited(without: Sequence[str] = ()) -> bool:
+    """Whether a Python file that counts was changed, added or removed since this process began: it may run both.
 
-    The sources are looked at once a second at most.
+    The files are looked at once a second at most.
     """
-    return _edited(int(time.monotonic()))
+    changed = _changed(int(time.monotonic()))
+    return any(name.partition("/")[0] not in without for name in changed)
 
 
 @functools.lru_cache(maxsize=1)
-def _edited(second: int) -> bool:
-    try:
-        return _stamps() != _AT_FIRST
-    except OSError:  # being replaced
-        return True
+def _changed(second: int) -> set[str]:
+    return {name for name, _ in _stamps().items() ^ _AT_FIRST.items()}
 
 
-def _stamps() -> dict[Path, tuple[int, int, int]]:
-    states = {path: path.stat() for path in _PACKAGE.rglob("*.py")}
-    return {path: (state.st_size, state.st_mtime_ns, state.st_ctime_ns) for path, state in states.items()}
+def _stamps() -> dict[str, tuple[int, ...]]:
+    found: dict[str, tuple[int, ...]] = {}
+    for path in _PACKAGE.rglob("*.py"):
+        with suppress(OSError):  # just being replaced
+            state = path.stat()
+            name = path.relative_to(_PACKAGE).as_posix()
+            found[name] = (state.st_size, state.st_mtime_ns, state.st_ctime_ns)
+    return found
 
 
 _AT_FIRST = _stamps()
