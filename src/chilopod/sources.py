@@ -4,12 +4,38 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import os
 import time
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
 _PACKAGE = Path(__file__).parent
+
+
+@functools.cache
+def checkout() -> str:
+    """Commit of the checkout that this is, or was built of, such as ``g29a026a.dirty``; empty for a release."""
+    with suppress(OSError):
+        return (_PACKAGE / "checkout.txt").read_text(encoding="utf-8").strip()
+    root = _PACKAGE.parent.parent
+    if not (root / ".git").exists() or not (root / "src" / "chilopod").samefile(_PACKAGE):
+        return ""
+    import subprocess
+
+    command = ["git", "-C", str(root), "describe", "--always", "--tags", "--match=v*", "--dirty=.dirty", "--abbrev=7"]
+    try:
+        # To say so is not worth a lock on somebody's repository, nor waiting.
+        quiet = {**os.environ, "GIT_OPTIONAL_LOCKS": "0"}
+        done = subprocess.run(command, env=quiet, capture_output=True, text=True, check=True, timeout=5.0)
+    except (OSError, subprocess.SubprocessError):
+        return ""
+    found = done.stdout.strip()
+    return (
+        ""
+        if found.startswith("v") and not found.endswith(".dirty") and "-g" not in found
+        else "g" + found.rpartition("-g")[2]
+    )
 
 
 @functools.lru_cache
