@@ -66,7 +66,11 @@ def doctor(as_json: JsonOption = False) -> None:
     films and pictures in 3-D works.
     """
     with progress_bar("doctor"):
-        found = [finding for look in (_versions, _cores, _cache, _drawing, _encoder, _fonts) for finding in look()]
+        found = [
+            finding
+            for look in (_versions, _processor, _cores, _cache, _drawing, _encoder, _fonts)
+            for finding in look()
+        ]
     broken = any(each.mend and each.essential for each in found)
     if as_json:
         findings = [
@@ -133,6 +137,19 @@ def _fault(module: str) -> str:
     except Exception as error:  # packages with compiled parts fail in many ways
         return briefly(error)
     return ""
+
+
+def _processor() -> list[Finding]:
+    from chilopod.processor import blas_kernels, compiled_for, processor
+
+    def kernels() -> Finding:
+        return Finding("BLAS kernels", ", ".join(f"{blas_kernels(name)} ({name})" for name in ("numpy", "scipy")))
+
+    return [
+        _guarded("processor", lambda: Finding("processor", processor())),
+        _guarded("compiled for", lambda: Finding("compiled for", compiled_for())),
+        _guarded("BLAS kernels", kernels),
+    ]
 
 
 def _cores() -> list[Finding]:
