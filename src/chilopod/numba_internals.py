@@ -31,20 +31,10 @@ FOLDERS = 3
 
 
 def keep(dispatcher: Any) -> bool:
-    """Keep the machine code of a compiled function on disk.
+    """Keep the machine code of what ``numba.njit`` made on disk; returns whether there is a folder for it.
 
     Numba alone would run old code: it looks only whether the function's *own* file changed, and a function contains
     those that it calls. Here code lies in a folder of the package's digest, wherever numba has its folders.
-
-    Parameters
-    ----------
-    dispatcher
-        What ``numba.njit`` made of the function.
-
-    Returns
-    -------
-    bool
-        Whether there is a folder that can be written.
     """
     try:
         dispatcher._cache = _Cache(dispatcher.py_func)
@@ -67,14 +57,11 @@ class _Locator:
     def get_cache_path(self) -> str:
         return str(self._folder)
 
-    def get_source_stamp(self) -> str:
-        return sources.digest(ABOVE)
-
     def ensure_cache_path(self) -> None:
         if self._folder.exists():
             return
         self._folder.mkdir(parents=True, exist_ok=True)
-        # The folder of a process that still runs may be among these: it compiles without keeping then.
+        # A process that still runs may have one of these; it makes it anew.
         others = {other.stat().st_mtime: other for other in self._folder.parent.glob(f"{_FOLDER}*")}
         for when in sorted(others)[:-FOLDERS]:
             shutil.rmtree(others[when], ignore_errors=True)

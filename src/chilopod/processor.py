@@ -29,21 +29,14 @@ def compiled_for() -> str:
 
 
 def blas_kernels(package: str) -> str:
-    """The kernels that OpenBLAS has chosen for this processor, such as ``Haswell``; "unknown" with other libraries.
-
-    Parameters
-    ----------
-    package
-        Name of a package that brings its own: numpy or scipy.
-    """
+    """Kernels that the OpenBLAS of numpy or scipy has chosen, such as ``Haswell``; "unknown" with other libraries."""
     home = Path(str(import_module(package).__file__)).parent
     for folder in (home.parent / f"{package}.libs", home / ".dylibs"):  # of wheels
         for path in folder.glob("*openblas*"):
             with suppress(OSError):
                 library = ctypes.CDLL(str(path))  # is loaded already
                 for name in _CORENAME:
-                    with suppress(AttributeError):
-                        ask = getattr(library, name)
+                    if ask := getattr(library, name, None):
                         ask.restype = ctypes.c_char_p
-                        return str((ask() or b"unknown").decode())
+                        return str(ask().decode())
     return "unknown"

@@ -145,11 +145,8 @@ def _processor() -> list[Finding]:
     def kernels() -> Finding:
         return Finding("BLAS kernels", ", ".join(f"{blas_kernels(name)} ({name})" for name in ("numpy", "scipy")))
 
-    return [
-        _guarded("processor", lambda: Finding("processor", processor())),
-        _guarded("compiled for", lambda: Finding("compiled for", compiled_for())),
-        _guarded("BLAS kernels", kernels),
-    ]
+    for_what = _guarded("compiled for", lambda: Finding("compiled for", compiled_for()))
+    return [Finding("processor", processor()), for_what, _guarded("BLAS kernels", kernels)]
 
 
 def _cores() -> list[Finding]:
