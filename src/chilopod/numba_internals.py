@@ -20,7 +20,7 @@ from numba.core.typing import signature
 
 from chilopod import sources
 
-__all__ = ["Conversion", "cgutils", "ir", "keep", "signature"]
+__all__ = ["Conversion", "cgutils", "ir", "keep", "pointer_to", "signature"]
 
 ABOVE = ("analysis", "cli", "gym", "live", "paper", "report", "tasks", "trials", "twin")
 """Subpackages that compile nothing, and that nothing compiled can reach: they may change without compiling anew."""
@@ -41,6 +41,11 @@ def keep(dispatcher: Any) -> bool:
     except RuntimeError:
         return False
     return True
+
+
+def pointer_to(kind: Any, builder: Any, place: Any) -> Any:
+    """A pointer as one to values of some type of LLVM, as long as llvmlite tells pointers apart."""
+    return builder.bitcast(place, kind.as_pointer()) if hasattr(kind, "as_pointer") else place
 
 
 class _Locator:

@@ -13,7 +13,7 @@ from typing import Any
 from numba import types
 from numba.extending import intrinsic
 
-from chilopod.numba_internals import cgutils, ir
+from chilopod.numba_internals import cgutils, ir, pointer_to
 
 PANEL = 16
 """Number of columns."""
@@ -65,7 +65,7 @@ def series_term(typing_context: Any, matrix: Any, terms: Any, start: Any, scale:
 
         def panel(data: Any, row: Any) -> Any:
             start = builder.gep(data, [builder.mul(row, constant(PANEL))], source_etype=double)
-            return builder.bitcast(start, ir.PointerType())
+            return pointer_to(vector, builder, start)
 
         def loaded(place: Any, **how: Any) -> Any:
             return builder.load(place, typ=vector, **how)
