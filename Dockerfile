@@ -22,7 +22,7 @@ USER chilopod
 
 FROM base AS built
 WORKDIR /source
-COPY LICENSE README.md pyproject.toml requirements.lock ./
+COPY LICENSE README.md pyproject.toml requirements.lock setup.py ./
 COPY src src
 RUN python -m venv /opt/chilopod \
  && /opt/chilopod/bin/pip install --no-cache-dir --constraint requirements.lock ".[cluster,gym,live]"

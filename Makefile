@@ -1,12 +1,13 @@
 # Everything here needs only make and a Python from 3.11 to 3.13. Choose another with: make setup PYTHON=/path/to/python3
 # The environment lives in .venv and is reused until pyproject.toml or requirements.lock changes.
 .DEFAULT_GOAL := help
-.PHONY: help setup reproduce test run-tests test-processors torture lint types format docs renew package bench lock clean
+.PHONY: help setup reproduce test run-tests test-processors test-lowest test-newest torture lint types format docs renew package bench lock clean
 .DELETE_ON_ERROR:
 
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check --no-input
+UV := $(VENV)-lock/bin/uv
 LOCK := requirements.lock
 LOCK_BENCH := requirements-bench.lock
 RUNTIME := $(VENV)/.runtime-installed
@@ -82,6 +83,24 @@ test-processors: $(DEV)  ## the numeric tests with the arithmetic of other proce
 	NUMBA_CPU_NAME=generic $(MAKE) --no-print-directory run-tests ARGS="$(NUMERIC)" || failed="$$failed generic"; \
 	if [ -n "$$failed" ]; then echo "failed:$$failed" >&2; exit 1; fi
 
+# The core of the suite with other versions than the lock's, in an environment of its own. What has wheels counts; what
+# an old version does that is deprecated by now is its own affair.
+CORE := $(addprefix tests/,engine gym live planar report trials truth/test_duffing.py truth/test_hybrid.py twin) \
+	$(wildcard tests/test_cli_*.py) $(addprefix tests/test_,compiled.py dual.py integrate.py lanes.py notebook.py \
+	numba_internals.py output.py package.py record_file.py)
+OTHERS = $(VENV)-$(@:test-%=%)
+define test_core
+	@$(UV) venv --quiet --clear --no-python-downloads --python "$(or $(PYTHON),$(BIN)/python)" $(OTHERS)
+	@$(UV) pip install --quiet --no-config --python $(OTHERS) --only-binary :all: --no-binary chilopod $(1) -e '.[dev]'
+	$(ALONGSIDE) $(OTHERS)/bin/python -m pytest -n $(JOBS) --dist loadfile --benchmark-disable $(2) $(CORE) $(ARGS)
+endef
+
+test-lowest: $(UV)  ## the core of the tests with the lowest versions that pyproject.toml allows; PYTHON=python3.11
+	$(call test_core,--resolution lowest-direct,-W ignore::DeprecationWarning -W ignore::FutureWarning)
+
+test-newest: $(UV)  ## the same with the newest that there are
+	$(call test_core,--upgrade,)
+
 torture: $(DEV)  ## attack it for ten minutes, and count what came of it; options in ARGS="kills --seed 7 --minutes 3"
 	$(BIN)/python torture/run.py --save $(ARGS)
 
@@ -121,15 +140,15 @@ bench: $(BENCH)  ## benchmarks beside their peers; rewrites the tables in benchm
 	$(BIN)/python benchmarks/gym.py
 	$(BIN)/python benchmarks/startup.py
 
+$(UV):
+	$(make_venv)
+	@$(BIN)/python -m venv $(VENV)-lock && $(VENV)-lock/bin/python -m pip --quiet --disable-pip-version-check install uv
+
 # One lock for all supported Pythons and systems: no addresses and no hashes, so it also serves as a constraints file.
-UV := $(VENV)-lock/bin/uv
 COMPILE := $(UV) pip compile --quiet --no-config --universal --python-version 3.11 --fork-strategy fewest \
 	--upgrade --no-header --no-emit-index-url --no-emit-find-links
 
-lock:  ## renew both lock files from pyproject.toml
-	$(make_venv)
-	@test -x $(UV) || { $(BIN)/python -m venv $(VENV)-lock && \
-	  $(VENV)-lock/bin/python -m pip --quiet --disable-pip-version-check install uv; }
+lock: $(UV)  ## renew both lock files from pyproject.toml
 	@$(COMPILE) --extra dev pyproject.toml >$(LOCK).new
 	@{ echo '# Python 3.11 to 3.13, all systems: what chilopod runs on and what its tests need. Written by `make lock`.'; \
 	  cat $(LOCK).new; } >$(LOCK)
@@ -139,6 +158,6 @@ lock:  ## renew both lock files from pyproject.toml
 	@rm -f $(LOCK).new $(LOCK_BENCH).new
 
 clean:  ## remove the environment, caches and generated output
-	rm -rf $(VENV) $(VENV)-lock build dist report .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks \
+	rm -rf $(VENV) $(VENV)-lock $(VENV)-lowest $(VENV)-newest build dist report .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks \
 	  .import_linter_cache src/*.egg-info docs/gallery docs/reference
 	find src tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true

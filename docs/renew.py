@@ -179,7 +179,7 @@ def renew(pages: Sequence[Path] = PAGES) -> None:
             start, end = result.place.span()
             text = text[:start] + result.renewed(found) + text[end:]
         page.write_text(text, encoding="utf-8")
-    said = {"chilopod": chilopod.__version__, "commands": dict(sorted(kept.items()))}
+    said = {"chilopod": chilopod.__version__.partition("+")[0], "commands": dict(sorted(kept.items()))}
     RESULTS.write_text(json.dumps(said, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 

@@ -1,11 +1,17 @@
 """``chilopod doctor``: all is found here, and what is missing comes with the line that mends it."""
 
 import json
+import os
+import platform
+import subprocess
+import sys
+from types import SimpleNamespace
 
 import matplotlib.font_manager
 import pytest
 
 import chilopod
+from chilopod import processor
 from chilopod.cli import doctor, main
 from chilopod.errors import OutputError
 from chilopod.twin import gl
@@ -14,7 +20,7 @@ from chilopod.twin import gl
 def examined(capsys, *arguments):
     code = main(["doctor", *arguments])
     captured = capsys.readouterr()
-    assert captured.err == ""
+    assert all(line.startswith("doctor: ") for line in captured.err.splitlines())  # how long it takes, if it does
     return code, captured.out
 
 
@@ -37,6 +43,27 @@ def test_all_is_here(capsys):
     assert {name for name, each in found.items() if each["mend"]} <= {"OpenGL"}
     if gl.backend():
         assert gl.backend() in found["OpenGL"]["found"]
+
+
+def test_processor_and_kernels(capsys, monkeypatch):
+    found = findings(capsys)
+    assert found["processor"]["found"] == processor.processor()
+    assert found["compiled for"]["found"] == os.environ.get("NUMBA_CPU_NAME", processor.compiled_for())
+    assert found["BLAS kernels"]["found"].count(")") == 2
+    monkeypatch.setattr(processor, "_CORENAME", ["no_such_function"])
+    assert findings(capsys)["BLAS kernels"]["found"] == "unknown (numpy), unknown (scipy)"
+    monkeypatch.setattr(processor, "import_module", lambda name: SimpleNamespace(__file__="nowhere/at/all.py"))
+    assert processor.blas_kernels("numpy") == "unknown"
+
+
+@pytest.mark.parametrize("kernels", ["Haswell", "Nehalem"])
+def test_the_kernels_that_are_asked_for_are_named(kernels):
+    code = "from chilopod.processor import blas_kernels; print(blas_kernels('numpy'), blas_kernels('scipy'))"
+    environment = {**os.environ, "OPENBLAS_CORETYPE": kernels}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    if platform.machine() not in ("x86_64", "AMD64") or "unknown" in done.stdout:
+        pytest.skip("another architecture, or another library")
+    assert done.stdout.split() == [kernels, kernels]
 
 
 def test_prints_a_line_each(capsys, monkeypatch):

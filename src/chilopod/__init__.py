@@ -39,7 +39,9 @@ else:
         # numpy, pydantic and importlib.metadata are loaded on first use: --help imports this package but none of them.
         if name != "__version__":
             return _load(name)
-        value = globals()[name] = import_module("importlib.metadata").version("chilopod")
+        release = import_module("importlib.metadata").version("chilopod")
+        checkout = import_module("chilopod.sources").checkout()
+        value = globals()[name] = f"{release}+{checkout}" if checkout else release
         return value
 
 

@@ -23,6 +23,7 @@ def _run() -> int:
     os.environ["MPLBACKEND"] = "agg"
     # Numba would go on without a variable that it cannot read, after many lines about it.
     warnings.filterwarnings("error", "Environment variable 'NUMBA_", RuntimeWarning)
+    warnings.showwarning = lambda message, *_: print(f"warning: {message}", file=sys.stderr)
     from chilopod.cli import USAGE_ERROR
     from chilopod.cli import main as run
 

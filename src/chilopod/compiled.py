@@ -1,61 +1,46 @@
-"""The decorators for compiled code, with the one cache rule numba does not have.
-
-Numba keeps compiled functions on disk and recompiles a function when *its own file* changes; a function that calls one
-from another file keeps running the old callee. So on import, compiled functions older than the newest of this
-package's sources are dropped.
-"""
+"""The decorators for compiled code, with the one cache rule numba does not have: changed sources never run old code."""
 
 from __future__ import annotations
 
-import contextlib
 import functools
-import os
-from pathlib import Path
+import warnings
 from typing import Any
 
 import numba
 
-from chilopod.errors import ParameterError
+from chilopod.numba_internals import keep
 
 # Somebody else's wish to debug: as plain Python, what is compiled here would take hours, and its overloads do not run.
 numba.config.DISABLE_JIT = False
 
 
-def _drop_stale() -> None:
-    package = Path(__file__).parent
-    folders = ("", "planar/", "stability/taylor/", "stability/implicit/")
-    sources = [source for folder in folders for source in package.glob(f"{folder}*.py")]
-    newest = max(source.stat().st_mtime for source in sources)
-    for index in package.rglob("*.nbi"):
-        with contextlib.suppress(OSError):  # another process may have been quicker, or the folder is read-only
-            if index.stat().st_mtime < newest:
-                index.unlink()
+def _compiled(function: Any = None, **options: Any) -> Any:
+    """``numba.njit`` with the compiled code kept on disk where it can be."""
+    if function is None:
+        return functools.partial(_compiled, **options)
+    dispatcher = numba.njit(**options)(function)
+    if not keep(dispatcher):
+        _warn()
+    return dispatcher
 
 
-def _check_cache() -> None:
-    # Numba looks for a folder where a function is to be kept: beside its source, and in the user's own.
-    try:
-        numba.njit(cache=True)(_drop_stale)
-    except RuntimeError:
-        raise ParameterError(
-            "there is no folder in which compiled code can be kept",
-            field="NUMBA_CACHE_DIR",
-            value=os.environ.get("NUMBA_CACHE_DIR"),
-            allowed="one that can be written, in the environment",
-        ) from None
+@functools.cache
+def _warn() -> None:
+    warnings.warn(
+        "compiled code cannot be kept, every start compiles anew: set NUMBA_CACHE_DIR to a folder that can be written",
+        RuntimeWarning,
+        stacklevel=4,
+    )
 
 
-_drop_stale()
-_check_cache()
-
-njit = functools.partial(numba.njit, cache=True, nogil=True)
+njit = functools.partial(_compiled, nogil=True)
 """``numba.njit`` with the compiled code kept on disk; other threads go on while it runs, to show that it does and to
 answer Ctrl-C."""
 
-fused_njit = functools.partial(numba.njit, cache=True, nogil=True, fastmath={"contract"})
+fused_njit = functools.partial(njit, fastmath={"contract"})
 """The same where a product and a sum may become one instruction with one rounding: not for exact error terms."""
 
-parallel_njit = functools.partial(numba.njit, cache=True, nogil=True, parallel=True)
+parallel_njit = functools.partial(njit, parallel=True)
 """The same for loops over ``prange``: one robot an iteration, so the answer does not depend on the number of
 threads."""
 

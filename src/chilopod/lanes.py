@@ -17,15 +17,11 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
 from numba import types
-from numba.core import cgutils
-from numba.core.imputils import lower_builtin, lower_cast
-from numba.core.typeconv import Conversion
-from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
-from numba.extending import intrinsic, models, register_model
+from numba.extending import intrinsic, lower_builtin, lower_cast, models, register_model, type_callable
 
 from chilopod.compiled import njit
+from chilopod.numba_internals import Conversion, cgutils, ir, signature
 
 LANES = 8
 """Of double precision that fill the widest registers there are; narrower ones are used two or four at a time."""
@@ -100,11 +96,17 @@ def _subtract(builder: Any, kind: Any, a: Any, b: Any) -> Any:
     return builder.fsub(a, b)
 
 
-def _add_operator(function: Callable[..., Any], make: Callable[..., Any], operands: int) -> None:
-    class Template(ConcreteTemplate):  # type: ignore[misc]
-        cases = tuple(signature(*(kind,) * (operands + 1)) for kind in _TYPES.values())
+def _same(*given: Any) -> Any:
+    """The signature of a function whose arguments, plain ones too, and result are all in lanes; None if none is."""
+    kinds = [kind for kind in given if isinstance(kind, LanesType)]
+    return signature(*kinds[:1] * (len(given) + 1)) if kinds else None
 
-    infer_global(function)(Template)
+
+def _add_operator(function: Callable[..., Any], make: Callable[..., Any], operands: int) -> None:
+    if operands == 1:
+        type_callable(function)(lambda context: lambda a: _same(a))
+    else:
+        type_callable(function)(lambda context: lambda a, b: _same(a, b))
 
     @lower_builtin(function, *(LanesType,) * operands)
     def lower(context: Any, builder: Any, sig: Any, values: Any) -> Any:

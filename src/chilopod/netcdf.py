@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-import io
 import os
 import stat
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from chilopod.errors import ParameterError
 
@@ -31,30 +30,17 @@ def storable(data: xr.Dataset) -> xr.Dataset:
     return renamed
 
 
-def netcdf(data: xr.Dataset) -> bytes:
-    """The bytes of a netCDF-4 file."""
-    stream = io.BytesIO()
-    dump(data, stream)
-    return stream.getvalue()
-
-
-def dump(data: xr.Dataset, stream: Any, unlimited: Iterable[str] = ()) -> None:
-    """Write a dataset as netCDF-4 into what is like a binary file.
+def netcdf(data: xr.Dataset, unlimited: Iterable[str] = ()) -> bytes:
+    """The bytes of a netCDF-4 file.
 
     Parameters
     ----------
     data
         The dataset.
-    stream
-        In memory: if it raises, the process may die.
     unlimited
         Dimensions that may grow.
     """
-    import h5netcdf
-    from xarray.backends import H5NetCDFStore
-
-    with h5netcdf.File(stream, "w") as file:
-        storable(data).dump_to_store(H5NetCDFStore(file), unlimited_dims=unlimited)
+    return bytes(storable(data).to_netcdf(engine="h5netcdf", unlimited_dims=unlimited))
 
 
 def sealed(content: bytes) -> bytes:

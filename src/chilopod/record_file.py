@@ -11,7 +11,7 @@ from typing import IO, TYPE_CHECKING, Any, Self
 import numpy as np
 
 from chilopod.errors import OutputError
-from chilopod.netcdf import dump
+from chilopod.netcdf import netcdf
 from chilopod.output import check_room, spool, write_all
 
 if TYPE_CHECKING:
@@ -116,7 +116,7 @@ class RecordFile:
                 longest = {"robot": 1, "time": min(variable.sizes.get("time", 1), _LONGEST)}
                 sizes = tuple(longest.get(str(dim), size) for dim, size in variable.sizes.items())
                 variable.encoding = {"chunksizes": sizes}
-        dump(shaped, self._medium, unlimited=["robot"])
+        self._medium.write(netcdf(shaped, unlimited=["robot"]))
         self._failure = self._medium.failure(self._path)
         if self._failure is not None:
             return

@@ -2,10 +2,15 @@
 
 import math
 
+import numba
 import numpy as np
 import pytest
+from numba.core import ir
+from numba.core.analysis import dead_branch_prune
+from numba.core.compiler import run_frontend
 
 from chilopod.errors import AnalysisError
+from chilopod.stability.taylor import stepping
 from chilopod.stability.taylor.taylor import TaylorFlow
 from chilopod.stability.taylor.trace import trace
 
@@ -243,3 +248,19 @@ def test_many_states_each_with_its_parameters():
     k = np.linspace(0.5, 4.0, 70)
     states = flow.states(np.tile([1.0, 0.0], (70, 1)), 0.0, 2.0, k[:, None])
     np.testing.assert_allclose(states[:, 0], np.cos(2.0 * np.sqrt(k)), atol=1e-14)
+
+
+def test_what_goes_through_switches_is_compiled_only_where_there_are_any():
+    """It takes as long to compile as the rest. Numba leaves out what it knows not to run for the types it is given."""
+
+    def left(flow):
+        function = run_frontend(stepping.advance.py_func)
+        directions = numba.typeof(flow._arrays[1])
+        dead_branch_prune(function, [directions if name == "directions" else None for name in function.arg_names])
+        values = (line.value for block in function.blocks.values() for line in block.find_insts(ir.Assign))
+        return {value.name for value in values if isinstance(value, ir.Global)}
+
+    smooth, _ = flow_of(lambda t, x: [-x[0]], 1)
+    switching = {"settle", "await_events", "_first_crossing", "cross"}
+    assert left(ball(0.8)[0]) >= switching
+    assert not left(smooth) & switching

@@ -66,7 +66,11 @@ def doctor(as_json: JsonOption = False) -> None:
     films and pictures in 3-D works.
     """
     with progress_bar("doctor"):
-        found = [finding for look in (_versions, _cores, _cache, _drawing, _encoder, _fonts) for finding in look()]
+        found = [
+            finding
+            for look in (_versions, _processor, _cores, _cache, _drawing, _encoder, _fonts)
+            for finding in look()
+        ]
     broken = any(each.mend and each.essential for each in found)
     if as_json:
         findings = [
@@ -135,6 +139,16 @@ def _fault(module: str) -> str:
     return ""
 
 
+def _processor() -> list[Finding]:
+    from chilopod.processor import blas_kernels, compiled_for, processor
+
+    def kernels() -> Finding:
+        return Finding("BLAS kernels", ", ".join(f"{blas_kernels(name)} ({name})" for name in ("numpy", "scipy")))
+
+    for_what = _guarded("compiled for", lambda: Finding("compiled for", compiled_for()))
+    return [Finding("processor", processor()), for_what, _guarded("BLAS kernels", kernels)]
+
+
 def _cores() -> list[Finding]:
     from chilopod.cores import cores
 
@@ -150,18 +164,17 @@ def _cores() -> list[Finding]:
 
 def _cache() -> list[Finding]:
     def cache() -> Finding:
-        mend = "set NUMBA_CACHE_DIR to a folder that can be written"
-        try:
-            from chilopod.planar.linear import propagate_batch
+        from chilopod.planar.linear import propagate_batch
 
-            folder = check_folder(propagate_batch.stats.cache_path)
-        except ParameterError as error:
-            return Finding("compile cache", error.problem, mend, essential=True)
+        folder, mend = propagate_batch.stats.cache_path, "set NUMBA_CACHE_DIR to a folder that can be written"
+        if folder is None:
+            return Finding("compile cache", "no folder can be written, so every start compiles anew", mend)
+        try:
+            return Finding("compile cache", str(check_folder(folder)))
         except OutputError as error:
             return Finding("compile cache", f"{error}, so every start compiles anew", mend)
-        return Finding("compile cache", str(folder))
 
-    from chilopod.errors import OutputError, ParameterError
+    from chilopod.errors import OutputError
     from chilopod.output import check_folder
 
     return [_guarded("compile cache", cache)]

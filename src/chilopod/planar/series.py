@@ -10,9 +10,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from llvmlite import ir
-from numba.core import cgutils, types
+from numba import types
 from numba.extending import intrinsic
+
+from chilopod.numba_internals import cgutils, ir, pointer_to
 
 PANEL = 16
 """Number of columns."""
@@ -39,7 +40,8 @@ def series_term(typing_context: Any, matrix: Any, terms: Any, start: Any, scale:
             cgutils.create_struct_proxy(kind)(context, builder, value)
             for kind, value in zip((matrix, terms, total), (args[0], args[1], args[4]), strict=True)
         )
-        integer, vector = ir.IntType(64), ir.VectorType(ir.DoubleType(), _LANES)
+        integer, double = ir.IntType(64), ir.DoubleType()
+        vector = ir.VectorType(double, _LANES)
         vectors = PANEL // _LANES
         rows, inner = cgutils.unpack_tuple(builder, a.shape, 2)
         # fmuladd: one instruction where the processor has it, a product and a sum where it has not.
@@ -58,10 +60,15 @@ def series_term(typing_context: Any, matrix: Any, terms: Any, start: Any, scale:
             )
 
         def element(base: Any, row: Any, column: int) -> Any:
-            return builder.gep(base, [builder.add(builder.mul(row, constant(vectors)), constant(column))])
+            at = builder.add(builder.mul(row, constant(vectors)), constant(column))
+            return builder.gep(base, [at], source_etype=vector)
 
         def panel(data: Any, row: Any) -> Any:
-            return builder.bitcast(builder.gep(data, [builder.mul(row, constant(PANEL))]), vector.as_pointer())
+            start = builder.gep(data, [builder.mul(row, constant(PANEL))], source_etype=double)
+            return pointer_to(vector, builder, start)
+
+        def loaded(place: Any, **how: Any) -> Any:
+            return builder.load(place, typ=vector, **how)
 
         source = panel(b.data, args[2])
         target = panel(b.data, builder.sub(args[2], rows))
@@ -72,19 +79,19 @@ def series_term(typing_context: Any, matrix: Any, terms: Any, start: Any, scale:
             for slot in (slot for row in sums for slot in row):
                 builder.store(ir.Constant(vector, [0.0] * _LANES), slot)
             with cgutils.for_range(builder, inner) as loop:
-                columns = [builder.load(element(source, loop.index, h), align=8) for h in range(vectors)]
+                columns = [loaded(element(source, loop.index, h), align=8) for h in range(vectors)]
                 for r in range(ROWS):
                     at = builder.add(builder.mul(builder.add(i, constant(r)), inner), loop.index)
-                    entry = spread(builder.load(builder.gep(a.data, [at])))
+                    entry = spread(builder.load(builder.gep(a.data, [at], source_etype=double), typ=double))
                     for h in range(vectors):
-                        builder.store(builder.call(fma, [entry, columns[h], builder.load(sums[r][h])]), sums[r][h])
+                        builder.store(builder.call(fma, [entry, columns[h], loaded(sums[r][h])]), sums[r][h])
             for r in range(ROWS):
                 for h in range(vectors):
                     row = builder.add(i, constant(r))
-                    new = builder.fmul(factor, builder.load(sums[r][h]))
+                    new = builder.fmul(factor, loaded(sums[r][h]))
                     builder.store(new, element(target, row, h), align=8)
                     place = element(summed, row, h)
-                    builder.store(builder.fadd(builder.load(place, align=8), new), place, align=8)
+                    builder.store(builder.fadd(loaded(place, align=8), new), place, align=8)
         return context.get_dummy_value()
 
     return signature, generate

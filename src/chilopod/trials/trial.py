@@ -213,7 +213,8 @@ def versions_of(engine: str) -> dict[str, Any]:
     """Of what makes a record, as they stand in a trial's text."""
     return {
         "version": RECORD_VERSION,
-        "chilopod": chilopod.__version__,
+        # What else a version says of a checkout, the sources say better.
+        "chilopod": chilopod.__version__.partition("+")[0],
         "engine_version": engine_named(engine).traits.version,
     }
 

@@ -113,6 +113,7 @@ def _absorb(factors: Any, errors: Any, count: int, total: Any, bound: Any) -> No
 @fused_njit(error_model="numpy", nogil=True)
 def advance(
     tape: Any,
+    directions: Any,
     clock: Any,
     params: Any,
     x: Any,
@@ -133,7 +134,9 @@ def advance(
     Parameters
     ----------
     tape
-        program, terms, numbers, layout, slopes, switches, resets, clocks of the tape, and the directions of its events.
+        program, terms, numbers, layout, slopes, switches, resets, clocks of the tape.
+    directions
+        Directions of its events; None where the tape has no switches, and what goes through them is not compiled.
     clock
         Values of the functions of time on a grid over the period, the last of each the largest modulus, and the period.
     shake
@@ -149,7 +152,7 @@ def advance(
     report
         Shape (4,): filled with the number of steps, of crossings, of events, and the time reached.
     """
-    program, terms, numbers, layout, slopes, switches, resets, clocks, directions = tape
+    program, terms, numbers, layout, slopes, switches, resets, clocks = tape
     table, period = clock
     n = layout[0]
     columns = derivative.shape[1]
@@ -178,7 +181,7 @@ def advance(
     last = t0 - (t1 - t0)
     noise = 1
     at_once = _AT_ONCE * max(abs(t0), abs(t1))
-    if count_switches > 0:
+    if directions is not None:
         start(layout, x, t, seeds, values, tangents)
         status = settle(program, terms, layout, slopes, switches, unit, values, tangents, branches, scales)
         await_events(
@@ -230,7 +233,7 @@ def advance(
             h = 0.5 * remaining
         crossing = -1
         direction = 0.0
-        if count_switches > 0:
+        if directions is not None:
             soon = at_once / unit
             h, crossing, direction = _first_crossing(
                 program, switches, order, h, remaining, soon, values, branches, work
@@ -290,7 +293,7 @@ def advance(
             _assign(derivative, factor @ derivative if stepwise else factor)
         t = reached
         unit *= min(max(h, 1e-3), 1e3) if h > 0.0 else 1.0
-        if crossing >= 0:
+        if directions is not None and crossing >= 0:
             crossings += 1
             status, event = cross(
                 program,

@@ -131,9 +131,9 @@ class TaylorFlow(ReadOnlyArrays):
     def __post_init__(self) -> None:
         super().__post_init__()
         t = self.tape
-        directions = np.array(self.directions, dtype=np.float64)
-        arrays = (t.program, t.terms, t.numbers, t.layout, t.slopes, t.switches, t.resets, t.clocks, directions)
-        object.__setattr__(self, "_arrays", arrays)
+        arrays = (t.program, t.terms, t.numbers, t.layout, t.slopes, t.switches, t.resets, t.clocks)
+        directions = np.array(self.directions, dtype=np.float64) if t.switches.size else None
+        object.__setattr__(self, "_arrays", (arrays, directions))
 
     @functools.cached_property
     def order(self) -> int:
@@ -237,7 +237,7 @@ class TaylorFlow(ReadOnlyArrays):
         clock = self._clock(params)
         for a, b in self._pieces(t0, t1):
             status = _compiled().advance(
-                self._arrays,
+                *self._arrays,
                 clock,
                 params,
                 x,

@@ -1,0 +1,115 @@
+"""All of numba and llvmlite that chilopod uses beyond what they document: what a new version of theirs may change.
+
+So ``pyproject.toml`` caps numba, and ``tests/test_numba_internals.py`` names what broke.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numba
+from llvmlite import ir
+from numba.core import cgutils
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+from numba.core.typeconv import Conversion
+from numba.core.typing import signature
+
+from chilopod import sources
+
+__all__ = ["Conversion", "cgutils", "ir", "keep", "pointer_to", "signature"]
+
+ABOVE = ("analysis", "cli", "gym", "live", "paper", "report", "tasks", "trials", "twin")
+"""Subpackages that compile nothing, and that nothing compiled can reach: they may change without compiling anew."""
+
+_FOLDER = "chilopod-"
+FOLDERS = 3
+"""Versions whose code is kept: as many as one goes back and forth between."""
+
+
+def keep(dispatcher: Any) -> bool:
+    """Keep the machine code of what ``numba.njit`` made on disk; returns whether there is a folder for it.
+
+    Numba alone would run old code: it looks only whether the function's *own* file changed, and a function contains
+    those that it calls. Here code lies in a folder of the package's digest, wherever numba has its folders.
+    """
+    try:
+        dispatcher._cache = _Cache(dispatcher.py_func)
+    except RuntimeError:
+        return False
+    return True
+
+
+def pointer_to(kind: Any, builder: Any, place: Any) -> Any:
+    """A pointer as one to values of some type of LLVM, as long as llvmlite tells pointers apart."""
+    return builder.bitcast(place, kind.as_pointer()) if hasattr(kind, "as_pointer") else place
+
+
+class _Locator:
+    """A folder that numba found, and in it that of this version."""
+
+    def __init__(self, found: Any) -> None:
+        self._found = found
+        version = hashlib.sha256(f"{sources.digest(ABOVE)} {numba.__version__}".encode()).hexdigest()
+        self._folder = Path(found.get_cache_path(), _FOLDER + version[:16])
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._found, name)
+
+    def get_cache_path(self) -> str:
+        return str(self._folder)
+
+    def ensure_cache_path(self) -> None:
+        if self._folder.exists():
+            return
+        self._folder.mkdir(parents=True, exist_ok=True)
+        # A process that still runs may have one of these; it makes it anew.
+        others = {other.stat().st_mtime: other for other in self._folder.parent.glob(f"{_FOLDER}*")}
+        for when in sorted(others)[:-FOLDERS]:
+            shutil.rmtree(others[when], ignore_errors=True)
+
+
+class _Impl(CompileResultCacheImpl):  # type: ignore[misc]
+    def __init__(self, function: Any) -> None:
+        super().__init__(function)
+        self._locator: Any = _Locator(self._locator)
+
+
+class _File(IndexDataCacheFile):  # type: ignore[misc]
+    def save(self, key: Any, data: Any) -> None:
+        # Numba counts its files. Of two processes that compile at the same time, for other arguments or another
+        # processor, one would overwrite what the other's entry in the index stands for.
+        name = f"{self._index_name.removesuffix('.nbi')}.{hashlib.sha256(repr(key).encode()).hexdigest()[:16]}.nbc"
+        self._save_data(name, data)
+        self._save_index({**self._load_index(), key: name})
+
+    def _load_index(self) -> Any:
+        try:
+            return super()._load_index()
+        except Exception:  # damaged: as good as none
+            return {}
+
+
+class _Cache(FunctionCache):  # type: ignore[misc]
+    _impl_class = _Impl
+
+    def __init__(self, function: Any) -> None:
+        super().__init__(function)
+        self._cache_file = _File(self._cache_path, self._impl.filename_base, sources.digest(ABOVE))
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        if sources.edited(ABOVE):
+            return None
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:  # damaged: as good as none
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        # A full disk, or a folder that another process has just cleared away, costs time and nothing else.
+        if not sources.edited(ABOVE):
+            with suppress(OSError):
+                super().save_overload(sig, data)
