@@ -9,9 +9,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.engine import Actuators, Command, Observation, Status, Targets, Traits
+from chilopod.engine import Actuators, Command, Observation, Status, Targets, Traits, one_thread
 from chilopod.engine.arguments import (
-    BEGINNING,
     as_marks,
     as_number,
     as_robots,
@@ -155,6 +154,7 @@ def resume(saved: bytes) -> PlanarWalk:
     return walk
 
 
+@one_thread
 class PlanarWalk:
     """Robots under way on the plane, see :class:`chilopod.engine.Walk`; :func:`start` makes one.
 
@@ -260,10 +260,7 @@ class PlanarWalk:
             "friction": (friction, self._factors.shape[1:]),
         }
         marked, rows = rows_anew(which, self._robots, self._time, self._record, arguments, seeds)
-        # To the switch with which the cycle begins, where everybody stops for good anyhow.
-        pieces = self._timeline.whole_pieces(self._time + BEGINNING * self._robots[0].gait.period)
-        if pieces[0].size:
-            self._carry(pieces, self._states, self._step, self._status)
+        # All are at the switch with which the cycle begins, however time was rounded: there they stop for good anyhow.
         self._here = None
         if rows["friction"] is not None:
             self._factors[marked] = rows["friction"]
@@ -286,8 +283,7 @@ class PlanarWalk:
         check_size(self._record, until, self._states.size)
         pieces = self._timeline.whole_pieces(until)
         self._time, self._here = until, None
-        if pieces[0].size:
-            self._carry(pieces, self._states, self._step, self._status)
+        self._carry(pieces, self._states, self._step, self._status)
 
     def save(self) -> bytes:
         """See :class:`chilopod.engine.Walk`."""
@@ -322,8 +318,8 @@ class PlanarWalk:
     def to_dataset(self, copy: bool = True) -> xr.Dataset:
         """The record so far, see :func:`chilopod.planar.simulate`; without a copy if the walk ends here."""
         rate = self._record.rate if self._record else 1.0
-        # Who was halted beside a switch may have a sample more than the others of the batch.
-        count = self._timeline.samples
+        # A sample that comes a moment of rounding after the present is taken already, but does not count yet.
+        count = min(self._timeline.samples, len(self._record.samples(self._time)) if self._record else 0)
         states = self._samples.rows[:count].copy() if copy else self._samples.grown(0)[:count]
         times = np.arange(len(states)) / rate
         leg_yaw = self._actuators.leg_yaw_over(times)
@@ -350,8 +346,7 @@ class PlanarWalk:
             return self._states, self._step, self._status
         if self._here is None:
             self._here = self._states.copy(), self._step.copy(), self._status.copy()
-            begins, starts, widths, interval, _ = self._timeline.rest(self._time)
-            self._carry((begins, starts, widths, interval, np.full(len(begins), -1)), *self._here)
+            self._carry(self._timeline.rest(self._time), *self._here)
         return self._here
 
     def _seen(self) -> Array:
@@ -362,15 +357,11 @@ class PlanarWalk:
         return np.where(gone[:, None], np.nan, states)
 
     def _arrive(self, which: NDArray[np.bool_]) -> None:
-        """Let some robots be for good where they are at the present time, with the sample that is taken there."""
+        """Let some robots be for good where they are at the present time."""
         if self._time <= self._timeline.cut:
             return
         for mine, here in zip((self._states, self._step, self._status), self._now(), strict=True):
             mine[which] = here[which]
-        for sample in self._timeline.rest(self._time)[-1]:
-            if sample >= 0:
-                walking = which & (self._status == stretch.WALKING)
-                self._samples.grown(sample + 1)[sample, walking] = self._states[walking]
 
     def _carry(
         self,
@@ -382,7 +373,7 @@ class PlanarWalk:
         """Carry all robots through pieces of time, in place."""
         record, told = self._samples.grown(int(pieces[-1].max(initial=-1)) + 1), self._actuators
         rows = np.flatnonzero(status == stretch.WALKING)
-        if not rows.size:
+        if not rows.size or not len(pieces[0]):
             return
         scalars, feet = self._bodies
         robots = stretch.Robots(
