@@ -58,3 +58,17 @@ def test_what_is_no_angle_has_no_sine(bad):
     got = _computed(MANY, LANES, np.where(np.arange(NUMBERS.size) % LANES == 0, bad, NUMBERS))
     assert np.isnan(got[:2, ::LANES]).all()
     assert np.isfinite(got[:2].reshape(2, -1, LANES)[:, :, 1:]).all()
+
+
+def test_debug_information_does_not_change_which_sums_are_fused(monkeypatch):
+    def product_and_sum(numbers):
+        lanes = as_lanes(numbers, LANES)
+        product = lanes[0] * lanes[1]
+        lanes[2] = product + lanes[2]
+
+    monkeypatch.setattr("numba.config.DEBUGINFO_DEFAULT", 1)
+    compiled = njit(cache=False)(product_and_sum)
+    numbers = np.full((3, LANES), 1.0 + 2.0**-30)
+    numbers[2] = -1.0 - 2.0**-29
+    compiled(numbers)
+    np.testing.assert_array_equal(numbers[2], 2.0**-60)

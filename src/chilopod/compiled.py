@@ -13,12 +13,19 @@ import os
 from pathlib import Path
 from typing import Any
 
-import numba
-
 from chilopod.errors import ParameterError
 
-# Somebody else's wish to debug: as plain Python, what is compiled here would take hours, and its overloads do not run.
-numba.config.DISABLE_JIT = False
+# Read once, when the first loop goes parallel: threads that wait for others sleep. By default GNU's spin, and where
+# another process has the cores, each of thousands of short loops waits for a spinning thread to be taken off.
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+
+import numba
+
+if numba.config.DISABLE_JIT:
+    # As plain Python, what is compiled here would take hours, and its overloads do not run.
+    raise ParameterError(
+        "chilopod does not run without compiling", field="NUMBA_DISABLE_JIT", value=1, allowed="0, or unset"
+    )
 
 
 def _drop_stale() -> None:
@@ -48,14 +55,15 @@ def _check_cache() -> None:
 _drop_stale()
 _check_cache()
 
-njit = functools.partial(numba.njit, cache=True, nogil=True)
+# With debug information numba keeps every value in memory, where no product is seen beside its sum: other bits.
+njit = functools.partial(numba.njit, cache=True, nogil=True, debug=False)
 """``numba.njit`` with the compiled code kept on disk; other threads go on while it runs, to show that it does and to
 answer Ctrl-C."""
 
-fused_njit = functools.partial(numba.njit, cache=True, nogil=True, fastmath={"contract"})
+fused_njit = functools.partial(njit, fastmath={"contract"})
 """The same where a product and a sum may become one instruction with one rounding: not for exact error terms."""
 
-parallel_njit = functools.partial(numba.njit, cache=True, nogil=True, parallel=True)
+parallel_njit = functools.partial(njit, parallel=True)
 """The same for loops over ``prange``: one robot an iteration, so the answer does not depend on the number of
 threads."""
 

@@ -222,7 +222,7 @@ class PlanarModel(ReadOnlyArrays):
         -------
         Derivatives, shape (robots, 2N+1, 2N+1), and the bounds on the error of their largest entries, shape (robots,).
         """
-        if not all(models[0].can_flow_with(model) for model in models[1:]):
+        if not models or not all(models[0].can_flow_with(model) for model in models[1:]):
             raise ParameterError("must have the same gait and number of modules", field="models")
         parts = [model._linear_pieces(t0, t1) for model in models]
         widths = parts[0][0]

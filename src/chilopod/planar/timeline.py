@@ -5,8 +5,8 @@ the walk is asked to advance, it stops for good only at cuts that are there anyh
 was asked to go it is carried on a copy, which becomes the walk only if a command comes there.
 
 No time is a sum of others: a switch is so many periods and its place in the period, a sample its number over the rate,
-a command comes at the time that was given. So a cut lies before another, or not, whoever asks. A cut that comes no more
-than ``BEGINNING`` of a period after the time asked for is reached there: that much rounding may take from it.
+a command comes at the time that was given. So a cut lies before another, or not, whoever asks. Who asks for a time that
+lies beside a cut by no more than rounding of whole multiples of the period (``BEGINNING``) is at that cut.
 """
 
 from __future__ import annotations
@@ -45,12 +45,12 @@ class Timeline:
     def __init__(self, schedule: Schedule, rate: float) -> None:
         self._times = schedule.times
         self._rate = rate
-        self._early = max(BEGINNING * float(schedule.times[-1]), 10.0 * _SAME_INSTANT)
+        self._moment = max(BEGINNING * float(schedule.times[-1]), 10.0 * _SAME_INSTANT)
         self.position: Array = np.array([0.0, 0.0, 1.0])
 
     @property
     def cut(self) -> float:
-        """The last one, s; at most a moment of rounding later than the time that was asked for."""
+        """The last one, s."""
         return float(self.position[0])
 
     @property
@@ -72,20 +72,25 @@ class Timeline:
         most = int((span / self._times[-1] + 2.0) * intervals + span * self._rate) + 3
         pieces = np.empty((3, most))
         numbers = np.empty((2, most), dtype=np.intp)
-        count = _whole_pieces(self._times, self._rate, until + self._early, self.position, pieces, numbers)
+        count = _whole_pieces(self._times, self._rate, until + self._moment, self.position, pieces, numbers)
         begins, starts, widths = pieces[:, :count]
         return begins, starts, widths, numbers[0, :count], numbers[1, :count]
 
     def rest(self, until: float) -> tuple[Array, Array, Array, NDArray[np.intp], NDArray[np.intp]]:
-        """The piece from the last cut to a later time, up to which :meth:`whole_pieces` went; nothing is sampled."""
+        """The piece from the last cut to a later time, to which :meth:`whole_pieces` went; nothing is sampled there."""
         number, switch, _ = _interval_after(self._times, self.cut, int(self.position[1]))
         cut = self.position[:1].copy()
         which = np.array([number % (len(self._times) - 1)])
         return cut, cut - switch, until - cut, which, np.array([-1])
 
+    def is_at_cut(self, time: float) -> bool:
+        """Whether a time to which :meth:`whole_pieces` went is that of the last cut."""
+        return time <= self.cut + self._moment
+
     def cut_at(self, time: float) -> None:
-        """Cut where a command comes, at a time up to which :meth:`whole_pieces` went."""
-        self.position[0] = max(time, self.cut)
+        """Cut where a command comes, at a time to which :meth:`whole_pieces` went, unless there is a cut."""
+        if not self.is_at_cut(time):
+            self.position[0] = time
 
 
 @njit

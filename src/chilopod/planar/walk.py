@@ -342,7 +342,7 @@ class PlanarWalk:
 
     def _now(self) -> tuple[Array, Array, NDArray[np.intp]]:
         """States, steps and statuses at the present time; a copy unless there is a cut."""
-        if self._time <= self._timeline.cut:
+        if self._timeline.is_at_cut(self._time):
             return self._states, self._step, self._status
         if self._here is None:
             self._here = self._states.copy(), self._step.copy(), self._status.copy()
@@ -358,7 +358,7 @@ class PlanarWalk:
 
     def _arrive(self, which: NDArray[np.bool_]) -> None:
         """Let some robots be for good where they are at the present time."""
-        if self._time <= self._timeline.cut:
+        if self._timeline.is_at_cut(self._time):
             return
         for mine, here in zip((self._states, self._step, self._status), self._now(), strict=True):
             mine[which] = here[which]
