@@ -171,6 +171,17 @@ def test_nonsense_is_one_line_and_changes_nothing(engine, robot):
         {"tolerance": float("nan")},
         {"initial": np.full((2, 3), 1.0)},
         {"friction": np.full((6, 2), -1.0)},
+        {"friction": np.full((6, 2), True)},
+        {"initial": np.full(16, 1.0, dtype=object)},
+        {"target": [[np.inf, 0.0]]},
+        {"tolerance": True},
+        {"record": 5},
+        {"record": "all"},
+        {"record": True},
+        {"expected": "long"},
+        {"expected": float("nan")},
+        {"expected": -1.0},
+        {"expected": True},
     ],
     ids=str,
 )
@@ -179,6 +190,45 @@ def test_a_start_that_is_none_is_named(engine, robot, arguments):
         engine.start(**{"robots": robot, **arguments})
     assert caught.value.field == next(iter(arguments))
     assert "\n" not in str(caught.value)
+
+
+@BOTH
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"duration": "1 s"},
+        {"duration": None},
+        {"duration": float("nan")},
+        {"duration": True},
+        {"rate": 10**400},
+        {"rate": "often"},
+        {"forces": np.array([True, False])},
+        {"forces": 1},
+        {"progress": 5},
+    ],
+    ids=str,
+)
+def test_a_simulation_that_is_none_is_named(engine, robot, arguments):
+    with pytest.raises(ParameterError) as caught:
+        engine.simulate(robot, **{"duration": 0.01, **arguments})
+    assert caught.value.field == next(iter(arguments))
+    assert "\n" not in str(caught.value)
+
+
+@BOTH
+def test_what_is_no_robot_is_named(engine, robot):
+    for wrong in ("aoi2022", None, 5, [robot]):
+        for call in (engine.common, engine.initial_states):
+            with pytest.raises(ParameterError, match="robot"):
+                call(wrong)
+
+
+@BOTH
+def test_numbers_may_be_numpy_s(engine, robot):
+    record = Recording(rate=np.float32(100.0), forces=np.True_)
+    walk = engine.start(robot, record=record, tolerance=np.float32(1e-6), expected=np.int64(1))
+    walk.advance(np.float64(0.02))
+    assert engine.resume(walk.save()).save() == walk.save()
 
 
 @BOTH

@@ -13,9 +13,11 @@ from chilopod.engine import Actuators, Command, Observation, Status, Targets, Tr
 from chilopod.engine.arguments import (
     as_marks,
     as_number,
+    as_robot,
     as_robots,
     as_seeds,
     check_time,
+    check_wishes,
     rows_anew,
     rows_of,
     standing,
@@ -54,7 +56,7 @@ _STATUS = {
 
 def common(robot: Robot) -> tuple[Any, ...]:
     """What robots of a batch share, see :class:`chilopod.engine.Engine`: gait and number of modules."""
-    return robot.gait, robot.body.modules
+    return as_robot(robot).gait, robot.body.modules
 
 
 def initial_states(
@@ -80,7 +82,8 @@ def initial_states(
     -------
     Shape (robots, 2N+4): reduced state (see :mod:`chilopod.planar.dynamics`), then x, y and heading.
     """
-    n, (angles, headings, places) = robot.body.modules, standing(robot, joint_angles, heading, position)
+    angles, headings, places = standing(robot, joint_angles, heading, position)
+    n = robot.body.modules
     states = np.zeros((len(angles), 2 * n + 4))
     states[:, 0] = robot.gait.speed
     states[:, 3 : n + 2] = angles
@@ -113,7 +116,7 @@ def start(
     tolerance
         Of every step, relative to max(1, |state|).
     """
-    in_range("tolerance", as_number("tolerance", tolerance), 1e-2)
+    tolerance, expected = in_range("tolerance", tolerance, 1e-2), check_wishes(record, expected)
     given = as_robots(robots)
     n = given[0].body.modules
     if record is not None and record.poses:
