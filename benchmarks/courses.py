@@ -2,6 +2,8 @@
 
 Run by `make bench`; rewrites a table in README.md. The bare loop has the same springs to set, events and records, but
 no referee who looks ten times a second, puts up targets and lets robots end, and nothing is summed up of its records.
+
+Two threads are also timed while other processes keep all cores but one busy, beside one thread on its own.
 """
 
 from __future__ import annotations
@@ -11,12 +13,17 @@ import os
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+import subprocess
+import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numba
 import numpy as np
 
+from chilopod.cores import cores
 from chilopod.engine import engine_named, steer
 from chilopod.robot import load_robot
 from chilopod.steering import VARIABLE
@@ -63,18 +70,32 @@ def bare(batch: list[Trial], seconds: float) -> float:
     return time.perf_counter() - begin
 
 
-def row(engine: str, threads: int) -> list[str]:
+@contextmanager
+def busy(count: int) -> Iterator[None]:
+    """So many other processes that compute all the time."""
+    others = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(count)]
+    try:
+        yield
+    finally:
+        for other in others:
+            other.kill()
+            other.wait()
+
+
+def row(engine: str, threads: int, others: int = 0) -> list[str]:
     name, count = ROBOTS[engine]
     ready = driver(load_robot(name), VARIABLE, engine=engine)
     groups = batches(courses(ready, engine, count))
     driven([replace(groups[0][0])])  # compiled
     taken, alone = [], []
-    for _ in range(ROUNDS):
-        times = [driven(group) for group in groups]
-        taken.append(sum(each for each, _ in times))
-        alone.append(sum(bare(group, seconds) for group, (_, seconds) in zip(groups, times, strict=True)))
+    with busy(others):
+        for _ in range(ROUNDS):
+            times = [driven(group) for group in groups]
+            taken.append(sum(each for each, _ in times))
+            alone.append(sum(bare(group, seconds) for group, (_, seconds) in zip(groups, times, strict=True)))
     least, loop = min(taken), min(alone)
-    return [engine, str(count), str(threads), duration(least), f"{count / least:.2g}", f"{loop / least:.2f}"]
+    about = [engine, str(count), str(threads), str(others)]
+    return [*about, duration(least), f"{count / least:.2g}", f"{loop / least:.2f}"]
 
 
 def main() -> None:
@@ -83,8 +104,18 @@ def main() -> None:
     for used in sorted({1, threads}):
         numba.set_num_threads(used)
         rows.append(row("planar", used))
+    if threads > 1:
+        rows.append(row("planar", threads, others=cores() - 1))
     rows.append(row("twin", threads))
-    head = ["engine", "courses", "threads", "time", "courses per second", "of the bare loop's speed"]
+    head = [
+        "engine",
+        "courses",
+        "threads",
+        "busy processes beside",
+        "time",
+        "courses per second",
+        "of the bare loop's speed",
+    ]
     about = f"{machine()} Load average before: {load:.1f}."
     title = "**Random courses of five targets, the first spring set once a gait cycle**"
     write_section("courses", f"{about}\n\n{title}\n\n{table(head, rows)}")

@@ -1,5 +1,9 @@
 """Numbers in lanes: the same bits in any number of lanes and beside any others, and the functions of them."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -58,3 +62,38 @@ def test_what_is_no_angle_has_no_sine(bad):
     got = _computed(MANY, LANES, np.where(np.arange(NUMBERS.size) % LANES == 0, bad, NUMBERS))
     assert np.isnan(got[:2, ::LANES]).all()
     assert np.isfinite(got[:2].reshape(2, -1, LANES)[:, :, 1:]).all()
+
+
+def test_debug_information_does_not_change_which_sums_are_fused(monkeypatch):
+    def product_and_sum(numbers):
+        lanes = as_lanes(numbers, LANES)
+        product = lanes[0] * lanes[1]
+        lanes[2] = product + lanes[2]
+
+    monkeypatch.setattr("numba.config.DEBUGINFO_DEFAULT", 1)
+    compiled = njit(cache=False)(product_and_sum)
+    numbers = np.full((3, LANES), 1.0 + 2.0**-30)
+    numbers[2] = -1.0 - 2.0**-29
+    compiled(numbers)
+    np.testing.assert_array_equal(numbers[2], 2.0**-60)
+
+
+def _python(code, **variables):
+    kept = {name: value for name, value in os.environ.items() if name != "OMP_WAIT_POLICY"}
+    command = [sys.executable, "-c", code]
+    return subprocess.run(command, env={**kept, **variables}, capture_output=True, text=True, timeout=60, check=False)
+
+
+def test_a_wish_not_to_compile_is_refused_in_one_line():
+    done = _python(
+        "from chilopod.cli import main; raise SystemExit(main(['stability', 'aoi2022-planar']))", NUMBA_DISABLE_JIT="1"
+    )
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: NUMBA_DISABLE_JIT = 1: ")
+    assert done.stderr.count("\n") == 1
+
+
+def test_threads_that_wait_sleep_unless_the_user_says_otherwise():
+    code = "import chilopod.compiled, os; print(os.environ['OMP_WAIT_POLICY'])"
+    assert _python(code).stdout == "passive\n"
+    assert _python(code, OMP_WAIT_POLICY="active").stdout == "active\n"

@@ -8,6 +8,7 @@ import pytest
 
 import chilopod.robot
 import chilopod.tasks
+from chilopod.planar.walk import PlanarWalk
 
 sys.path.append(str(Path(__file__).parent.parent / "torture"))
 names = ("run", "workers", "outcomes", "in_process", "processors")
@@ -19,6 +20,7 @@ SHORT = {
     "arguments": (run.Arguments(quick=True), 20),
     "trials": (run.SavedTrials(quick=True), 15),
     "same-bits": (run.SameBits(), 6),
+    "verbs": (run.Verbs(quick=True), 5),
     "invariances": (run.Invariances(), 8),
 }
 
@@ -72,6 +74,17 @@ def test_it_finds_records_that_depend_on_the_batch(tmp_path, monkeypatch):
 
     monkeypatch.setattr(chilopod.tasks, "walk", depending)
     assert Kind.WRONG in {kind for kind, _, _ in attacked("same-bits", tmp_path, 3)}
+
+
+def test_it_finds_a_walk_that_is_changed_by_a_look(tmp_path, monkeypatch):
+    pose = PlanarWalk.pose
+
+    def cutting(walk):
+        walk._timeline.cut_at(walk.time)
+        return pose(walk)
+
+    monkeypatch.setattr(PlanarWalk, "pose", cutting)
+    assert Kind.WRONG in {kind for kind, _, _ in attacked("verbs", tmp_path, 1)}
 
 
 @pytest.mark.parametrize(

@@ -31,12 +31,13 @@ from same_bits import SameBits
 from saved_branches import SavedBranches
 from saved_trials import SavedTrials
 from streams import Streams
+from verbs import Verbs
 from workers import Attacks, tried
 
 RESULTS = Path(__file__).with_name("results.json")
 _KINDS = (
     *(RobotFiles, Arguments, SavedTrials, SavedBranches, Kills, Disks, Streams, Environments),
-    *(SameBits, Invariances, Processors),
+    *(SameBits, Verbs, Invariances, Processors),
 )
 CLASSES: dict[str, Callable[[], Attacks]] = {each.name: each for each in _KINDS}
 _SHOWN = 12  # different faults of a class that are printed

@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 import functools
+import os
 import warnings
 from typing import Any
+
+from chilopod.errors import ParameterError
+
+# Read once, when the first loop goes parallel: threads that wait for others sleep. By default GNU's spin, and where
+# another process has the cores, each of thousands of short loops waits for a spinning thread to be taken off.
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 import numba
 
 from chilopod.numba_internals import keep
 
-# Somebody else's wish to debug: as plain Python, what is compiled here would take hours, and its overloads do not run.
-numba.config.DISABLE_JIT = False
+if numba.config.DISABLE_JIT:
+    # As plain Python, what is compiled here would take hours, and its overloads do not run.
+    raise ParameterError(
+        "chilopod does not run without compiling", field="NUMBA_DISABLE_JIT", value=1, allowed="0, or unset"
+    )
 
 
 def _compiled(function: Any = None, **options: Any) -> Any:
@@ -33,7 +43,8 @@ def _warn() -> None:
     )
 
 
-njit = functools.partial(_compiled, nogil=True)
+# With debug information numba keeps every value in memory, where no product is seen beside its sum: other bits.
+njit = functools.partial(_compiled, nogil=True, debug=False)
 """``numba.njit`` with the compiled code kept on disk; other threads go on while it runs, to show that it does and to
 answer Ctrl-C."""
 

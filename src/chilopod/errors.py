@@ -87,6 +87,10 @@ class ExtraError(ChilopodError, ImportError):
     """Something takes a package that an extra brings, and the extra is not installed."""
 
 
+class ThreadError(ChilopodError, RuntimeError):
+    """Two threads are within a thing at the same time that belongs to one."""
+
+
 class ClusterError(ChilopodError, RuntimeError):
     """A cluster is not there, is not what this machine is, or went away."""
 

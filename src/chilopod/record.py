@@ -46,9 +46,13 @@ class Recording:
     poses: bool = False
 
     def __post_init__(self) -> None:
+        rate = in_range("rate", self.rate, 1e6, "Hz")
         if not isinstance(self.rate, int | float):
-            raise ParameterError("is no number", field="rate", value=self.rate, allowed="samples per second")
-        in_range("rate", self.rate, 1e6, "Hz")
+            object.__setattr__(self, "rate", rate)
+        for name in ("forces", "poses"):
+            if not isinstance(getattr(self, name), bool | np.bool_):
+                raise ParameterError("is neither", field=name, value=getattr(self, name), allowed="True or False")
+            object.__setattr__(self, name, bool(getattr(self, name)))
 
     def samples(self, until: float) -> Array:
         """Times of all samples up to a time, s."""
@@ -61,14 +65,31 @@ class Recording:
         return 8.0 * numbers * (until * self.rate + 1.0)
 
 
-def in_range(name: str, value: float, most: float, unit: str = "") -> None:
-    """Refuse what is not positive or beyond all reason, both in this unit.
+def as_number(name: str, value: object) -> float:
+    """One plain number.
 
     Raises
     ------
     ParameterError
-        Naming the field.
+        If it is none.
     """
+    try:
+        if np.ndim(value) != 0 or np.asarray(value).dtype.kind not in "fiuO":  # type: ignore[arg-type]
+            raise TypeError
+        return float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        raise ParameterError("is no number", field=name, value=value) from None
+
+
+def in_range(name: str, value: object, most: float, unit: str = "") -> float:
+    """A plain number that is positive and within reason, both in this unit.
+
+    Raises
+    ------
+    ParameterError
+        If it is none, naming the field.
+    """
+    value = as_number(name, value)
     if not 0.0 < value <= most:
         high = f"{most:g} {unit}".strip()
         raise ParameterError(
@@ -77,6 +98,7 @@ def in_range(name: str, value: float, most: float, unit: str = "") -> None:
             value=f"{value:g} {unit}" if unit else value,
             allowed=f"more than 0, at most {high}",
         )
+    return value
 
 
 def check_size(record: Recording | None, until: float, numbers: int) -> None:

@@ -2,13 +2,14 @@
 
 import io
 import json
+import threading
 
 import numpy as np
 import pytest
 
 from chilopod import load_robot, planar, twin
-from chilopod.engine import Command, Event, Status, steer
-from chilopod.errors import AnalysisError, ChilopodError, ParameterError
+from chilopod.engine import Command, Event, Status, Targets, steer
+from chilopod.errors import AnalysisError, ChilopodError, ParameterError, ThreadError
 from chilopod.planar.walk import TOLERANCE
 from chilopod.record import Recording
 
@@ -170,6 +171,17 @@ def test_nonsense_is_one_line_and_changes_nothing(engine, robot):
         {"tolerance": float("nan")},
         {"initial": np.full((2, 3), 1.0)},
         {"friction": np.full((6, 2), -1.0)},
+        {"friction": np.full((6, 2), True)},
+        {"initial": np.full(16, 1.0, dtype=object)},
+        {"target": [[np.inf, 0.0]]},
+        {"tolerance": True},
+        {"record": 5},
+        {"record": "all"},
+        {"record": True},
+        {"expected": "long"},
+        {"expected": float("nan")},
+        {"expected": -1.0},
+        {"expected": True},
     ],
     ids=str,
 )
@@ -178,6 +190,45 @@ def test_a_start_that_is_none_is_named(engine, robot, arguments):
         engine.start(**{"robots": robot, **arguments})
     assert caught.value.field == next(iter(arguments))
     assert "\n" not in str(caught.value)
+
+
+@BOTH
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"duration": "1 s"},
+        {"duration": None},
+        {"duration": float("nan")},
+        {"duration": True},
+        {"rate": 10**400},
+        {"rate": "often"},
+        {"forces": np.array([True, False])},
+        {"forces": 1},
+        {"progress": 5},
+    ],
+    ids=str,
+)
+def test_a_simulation_that_is_none_is_named(engine, robot, arguments):
+    with pytest.raises(ParameterError) as caught:
+        engine.simulate(robot, **{"duration": 0.01, **arguments})
+    assert caught.value.field == next(iter(arguments))
+    assert "\n" not in str(caught.value)
+
+
+@BOTH
+def test_what_is_no_robot_is_named(engine, robot):
+    for wrong in ("aoi2022", None, 5, [robot]):
+        for call in (engine.common, engine.initial_states):
+            with pytest.raises(ParameterError, match="robot"):
+                call(wrong)
+
+
+@BOTH
+def test_numbers_may_be_numpy_s(engine, robot):
+    record = Recording(rate=np.float32(100.0), forces=np.True_)
+    walk = engine.start(robot, record=record, tolerance=np.float32(1e-6), expected=np.int64(1))
+    walk.advance(np.float64(0.02))
+    assert engine.resume(walk.save()).save() == walk.save()
 
 
 @BOTH
@@ -294,3 +345,93 @@ def test_controllers_that_are_none_are_named(engine, robot):
         steer(engine.start(robot), 1.0, Asked(answer=Command()), bearing_noise=np.zeros((2, 9)))
     with pytest.raises(ParameterError, match="bearing_noise"):
         steer(engine.start(robot), 9.0, Asked(answer=Command()), bearing_noise=np.zeros((1, 2)))
+
+
+@BOTH
+@pytest.mark.parametrize(
+    "verb", ["advance", "observe", "pose", "states", "save", "to_dataset", "command", "aim", "halt"]
+)
+def test_a_thread_is_refused_while_another_is_within_a_verb(engine, robot, verb, monkeypatch):
+    arguments = {
+        "advance": (0.2,),
+        "command": (Command(leg_yaw=(0.1, 0.1)),),
+        "aim": ((1.0, 0.0),),
+        "halt": (np.array([True]),),
+    }
+    walk = engine.start(robot)
+    walk.advance(0.05)
+    within, on = threading.Event(), threading.Event()
+
+    def waiting(self):
+        within.set()
+        on.wait(10.0)
+        return np.zeros(1, dtype=bool)
+
+    # Any verb of the other thread that takes a while.
+    monkeypatch.setattr(Targets, "there", property(waiting))
+    monkeypatch.setattr(Targets, "move", lambda self, time, target: waiting(self))
+    other = threading.Thread(target=walk.aim, args=((1.0, 1.0),))
+    other.start()
+    assert within.wait(10.0)
+    with pytest.raises(ThreadError, match=f"walk.{verb}: another thread") as caught:
+        getattr(walk, verb)(*arguments.get(verb, ()))
+    assert "\n" not in str(caught.value)
+    assert walk.time == 0.05
+    on.set()
+    other.join()
+    # Then it is free, for whoever comes.
+    done = threading.Thread(target=walk.advance, args=(0.1,))
+    done.start()
+    done.join()
+    assert walk.time == 0.1
+    monkeypatch.undo()
+    walk.observe()
+
+
+@BOTH
+def test_a_verb_that_is_refused_leaves_the_walk_to_the_next_thread(engine, robot):
+    walk = engine.start(robot)
+    with pytest.raises(ParameterError):
+        walk.advance(-1.0)
+    thread = threading.Thread(target=walk.advance, args=(0.02,))
+    thread.start()
+    thread.join()
+    assert walk.time == 0.02
+
+
+def test_a_command_between_two_cuts_whose_times_were_added_up():
+    walk = planar.start(PLANAR, initial=planar.initial_states(PLANAR, joint_angles=0.01))
+    walk.advance(0.77)
+    walk.command(Command(leg_yaw=[0.02, 0.02]))
+    walk.advance(5.3)
+    assert np.isfinite(walk.observe().joint_angles).all()
+
+
+@pytest.mark.parametrize("rate", [None, 100.0])
+@pytest.mark.parametrize("beside", [0.0, 1e-16, -1e-16, 1e-12, -1e-12, 9e-11, -9e-11, 1.1e-10, -1.1e-10, 1e-9, -2e-9])
+def test_times_beside_cuts_are_like_any_other(rate, beside):
+    record = None if rate is None else Recording(rate=rate)
+    switches = [*PLANAR.gait.schedule(6).times[1:], 0.05, 0.1]
+    for time in (float(switch) + PLANAR.gait.period for switch in switches):
+        walk, once = (planar.start(PLANAR, initial=planar.initial_states(PLANAR, 0.02), record=record) for _ in "ab")
+        for ahead in (0.3, time - 1e-6, time - 1e-11, time):
+            walk.advance(min(ahead, time + beside))
+            walk.observe()
+        for each in (walk, once):
+            each.advance(time + beside)
+            each.command(Command(leg_yaw=(0.1, 0.1)))
+            each.advance(time + beside + 0.2)
+        assert walk.save() == once.save()
+        assert len(walk.to_dataset().time) == (0 if record is None else len(record.samples(walk.time)))
+
+
+@pytest.mark.parametrize("beside", [0.0, 1e-12, -1e-12, 5e-10, -5e-10])
+def test_a_robot_put_on_the_floor_anew_beside_the_beginning_of_a_cycle_leaves_the_others_alone(beside):
+    walk, once = (planar.start([PLANAR] * 2, initial=planar.initial_states(PLANAR, 0.02), record=None) for _ in "ab")
+    for each in (walk, once):
+        each.advance(3 * PLANAR.gait.period + beside * PLANAR.gait.period)
+    walk.restart(np.array([True, False]), planar.initial_states(PLANAR))
+    for each in (walk, once):
+        each.command(Command(leg_yaw=(0.1, 0.1)))
+        each.advance(4.2 * PLANAR.gait.period)
+    np.testing.assert_array_equal(walk.states()[1], once.states()[1])

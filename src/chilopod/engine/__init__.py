@@ -2,7 +2,7 @@
 
 ``contract`` says what everybody may rely on, ``actuators`` does what a command asks for within the robot's limits,
 ``targets`` knows where targets are and were, ``loop`` lets a controller steer a walk, ``named`` finds engines and
-controllers by name, ``check`` tries an engine's promises.
+controllers by name, ``one_thread`` keeps a walk to one thread at a time, ``check`` tries an engine's promises.
 """
 
 from chilopod.engine.actuators import Actuators
@@ -21,6 +21,7 @@ from chilopod.engine.contract import (
 )
 from chilopod.engine.loop import Referee, Spent, event_times, steer, watched
 from chilopod.engine.named import ENGINES, controller_named, engine_named
+from chilopod.engine.one_thread import one_thread
 from chilopod.engine.ramps import Ramps
 from chilopod.engine.targets import Targets
 
@@ -45,6 +46,7 @@ __all__ = [
     "controller_named",
     "engine_named",
     "event_times",
+    "one_thread",
     "steer",
     "watched",
 ]

@@ -10,28 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import ParameterError
 from chilopod.record import LONGEST, Recording
+from chilopod.record import as_number as as_number  # for all engines
 from chilopod.robot import Robot
 
 Array = NDArray[np.float64]
 
 BEGINNING = 1e-9
 """Part of a gait cycle by which a time may miss its beginning: rounding of whole multiples of the period."""
-
-
-def as_number(name: str, value: object) -> float:
-    """One plain number.
-
-    Raises
-    ------
-    ParameterError
-        If it is none.
-    """
-    try:
-        if isinstance(value, str | bytes) or np.ndim(value) != 0:  # type: ignore[arg-type]
-            raise TypeError
-        return float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError, OverflowError):
-        raise ParameterError("is no number", field=name, value=value) from None
 
 
 def as_array(name: str, value: object) -> Array:
@@ -103,6 +88,35 @@ def as_robots(robots: object) -> list[Robot]:
     return list(given)
 
 
+def as_robot(robot: object) -> Robot:
+    """One robot.
+
+    Raises
+    ------
+    ParameterError
+        If it is none.
+    """
+    if not isinstance(robot, Robot):
+        raise ParameterError("is no robot", field="robot", value=type(robot).__name__, allowed="a chilopod Robot")
+    return robot
+
+
+def check_wishes(record: object, expected: object) -> float:
+    """What is to be recorded, and for how long, s, as engines are asked at the start; that time is returned.
+
+    Raises
+    ------
+    ParameterError
+        If it is no :class:`chilopod.record.Recording`, or no such time.
+    """
+    if not isinstance(record, Recording | None):
+        raise ParameterError("is none", field="record", value=record, allowed="a chilopod.record.Recording, or None")
+    seconds = as_number("expected", expected)
+    if not 0.0 <= seconds <= LONGEST:
+        raise ParameterError("is no time", field="expected", value=expected, allowed=f"0 to {LONGEST:g} s")
+    return seconds
+
+
 def standing(
     robot: Robot, joint_angles: ArrayLike, heading: ArrayLike, position: ArrayLike
 ) -> tuple[Array, Array, Array]:
@@ -113,7 +127,7 @@ def standing(
     ParameterError
         If one has the wrong shape or is not finite, or their numbers do not agree.
     """
-    joints = robot.body.modules - 1
+    joints = as_robot(robot).body.modules - 1
     angles, headings = as_array("joint_angles", joint_angles), as_array("heading", heading)
     places = as_array("position", position)
     for name, array, fits, allowed in (

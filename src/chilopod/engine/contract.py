@@ -133,6 +133,9 @@ class Walk(Protocol):
     The same bits come out whether a minute is one :meth:`advance` or a thousand, however often is looked, alone or in a
     batch, with any number of threads, and after :meth:`save` and ``resume``. Only commands change a walk, and
     :meth:`halt` ends it; :meth:`restart` begins another in its place.
+
+    A walk belongs to one thread at a time. Threads may take turns; while one is within a verb (a method, not a
+    property), every verb of the same walk raises :class:`chilopod.errors.ThreadError` in another, and changes nothing.
     """
 
     @property

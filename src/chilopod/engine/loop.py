@@ -155,6 +155,8 @@ def steer(
     """
     gait, begun = walk.robots[0].gait, walk.time
     until = check_time(until, begun)
+    if not callable(progress):
+        raise ParameterError("cannot be called", field="progress", value=progress, allowed="a function of two")
     if bearing_noise is not None and (bearing_noise.ndim != 2 or len(bearing_noise) != len(walk.robots)):
         raise ParameterError(
             "has the wrong shape",

@@ -8,6 +8,7 @@ import json
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import cache
 from importlib.metadata import version
 from typing import Any
 
@@ -35,7 +36,8 @@ def pack(traits: Traits, robots: Sequence[Robot], settings: Mapping[str, Any], a
     arrays
         By name.
     """
-    texts = [robot.to_toml() for robot in robots]
+    written = {id(robot): robot.to_toml() for robot in {id(robot): robot for robot in robots}.values()}
+    texts = [written[id(robot)] for robot in robots]
     distinct = list(dict.fromkeys(texts))
     header = {**_made_by(traits), "robots": distinct, "settings": settings}
     body = io.BytesIO()
@@ -100,5 +102,6 @@ def read_back() -> Iterator[None]:
         raise ParameterError(f"does not fit together ({error})", field="saved", allowed="what save() gave") from None
 
 
+@cache
 def _made_by(traits: Traits) -> dict[str, str]:
     return {"engine": traits.name, "chilopod": version("chilopod"), "version": traits.version}

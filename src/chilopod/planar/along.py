@@ -94,8 +94,7 @@ class FollowedModel(PlanarModel):
             If a motion diverges.
         """
         batch = np.array(states, dtype=np.float64, order="C")
-        if len(batch) != len(models):
-            raise ParameterError("must be one for each model", field="states", value=len(batch))
+        _check_one_each(models, batch, "states")
         if not _alike(models):
             return np.concatenate(
                 [
@@ -153,6 +152,10 @@ def walk_means(models: Sequence[PlanarModel], orbits: ArrayLike) -> WalkMeans:
         If a motion diverges.
     """
     orbits = np.asarray(orbits, dtype=np.float64)
+    _check_one_each(models, orbits, "orbits")
+    if any(orbits.shape[1:] != (model.dimension,) for model in models):
+        allowed = f"(walks, {models[0].dimension})"
+        raise ParameterError("has the wrong shape", field="orbits", value=orbits.shape, allowed=allowed)
     at_once = _AT_ONCE if _alike(models) else 1
     if len(orbits) > at_once:
         starts = range(0, len(orbits), at_once)
@@ -177,6 +180,11 @@ def walk_means(models: Sequence[PlanarModel], orbits: ArrayLike) -> WalkMeans:
     legs, floor = _powers(models, recorded, widths[:, None] * fractions)
     drifts = tuple(Drift(ahead, left, turn, first.period) for ahead, left, turn in states[:, -3:].tolist())
     return WalkMeans(mean_angle, np.einsum("sn,wsn->w", share, legs), np.einsum("sn,wsn->w", share, floor), drifts)
+
+
+def _check_one_each(models: Sequence[PlanarModel], states: Array, name: str) -> None:
+    if states.ndim != 2 or not 0 < len(models) == len(states):
+        raise ParameterError("must be one for each model", field=name, value=states.shape, allowed="at least one")
 
 
 def _alike(models: Sequence[PlanarModel]) -> bool:

@@ -13,13 +13,14 @@ import numba
 import numpy as np
 
 from chilopod.compiled import copy_into, parallel_njit
+from chilopod.errors import ParameterError
 from chilopod.integrate import integrator
+from chilopod.planar.contact import MOMENTS
 from chilopod.planar.dynamics import SCRATCH, rhs
 
 _integrate = integrator(rhs)
 
 
-@parallel_njit
 def advance(
     starts: Any,
     widths: Any,
@@ -50,7 +51,42 @@ def advance(
         Of the integrator, relative to max(1, |x|).
     ok
         Set to False where a state could not be carried to the end, shape (states,).
+
+    Raises
+    ------
+    ParameterError
+        If their shapes do not go together: compiled code would read beyond them.
     """
+    count, (robots, joints) = len(states), stiffness.shape
+    fits = (
+        starts.shape == widths.shape
+        and scalars.shape == (robots, 4)
+        and damping.shape == (robots, joints)
+        and moments.shape == (robots, widths.size, joints + 1, MOMENTS)
+        and states.shape[1:] in ((2 * joints + 3,), (2 * joints + 6,))
+        and owner.shape == ok.shape == (count,)
+        and (count == 0 or 0 <= owner.min() <= owner.max() < robots)
+    )
+    if not fits:
+        allowed = f"(any number, {2 * joints + 3} or {2 * joints + 6})"
+        raise ParameterError("has the wrong shape", field="states", value=states.shape, allowed=allowed)
+    if count:
+        _advance(starts, widths, scalars, stiffness, damping, moments, owner, states, tolerance, ok)
+
+
+@parallel_njit
+def _advance(
+    starts: Any,
+    widths: Any,
+    scalars: Any,
+    stiffness: Any,
+    damping: Any,
+    moments: Any,
+    owner: Any,
+    states: Any,
+    tolerance: float,
+    ok: Any,
+) -> None:
     for r in numba.prange(states.shape[0]):
         p = owner[r]
         x = states[r].copy()

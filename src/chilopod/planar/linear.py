@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from scipy.linalg import lu_factor, lu_solve
 
 from chilopod.compiled import copy_into, njit, parallel_njit
+from chilopod.errors import ParameterError
 from chilopod.planar.contact import C_PP
 from chilopod.planar.series import PANEL, ROWS, series_term
 
@@ -335,5 +336,8 @@ def propagate(
     -------
     The bound on the error of the largest entry, and the number of Taylor orders computed.
     """
+    n, intervals = len(matrix), widths.size
+    if (matrix.shape, upper.shape, decay.size) != ((n, n), (intervals, (n + 3) // 2, 3, n), intervals):
+        raise ParameterError("has the wrong shape", field="upper", value=upper.shape, allowed="see propagate()")
     error, orders = _propagate_all(widths, upper, decay, frequency, clock, matrix)
     return float(error), int(orders)

@@ -41,10 +41,11 @@ _MOST_NUMBERS = 1e8  # of the matrices of a period
 class PlanarModel(ReadOnlyArrays):
     """The paper's planar model (eq. 1) of one robot, period by period.
 
-    The state is ``[vx, vy, w0, theta_1 .., theta_1' ..]``, length 2N+1 (see :mod:`chilopod.planar.dynamics`). The
-    object has every capability that :mod:`chilopod.stability.capabilities` names but that of flowing each, which
-    :class:`chilopod.planar.along.FollowedModel` adds. It does not change once it is made, and its arrays cannot be
-    written into: another robot is another model.
+    The state is ``[vx, vy, w0, theta_1 .., theta_1' ..]``, length 2N+1 (see :mod:`chilopod.planar.dynamics`). Of what
+    :mod:`chilopod.stability.capabilities` names it knows its orbit, scale, symmetries and switch times, bounds its
+    error, and carries many states or many robots at once; :class:`chilopod.planar.along.FollowedModel` also carries
+    each state by its own robot. It has no tangents or frames, for its full derivative is small. It does not change once
+    it is made, and its arrays cannot be written into: another robot is another model.
 
     Parameters
     ----------
@@ -222,7 +223,7 @@ class PlanarModel(ReadOnlyArrays):
         -------
         Derivatives, shape (robots, 2N+1, 2N+1), and the bounds on the error of their largest entries, shape (robots,).
         """
-        if not all(models[0].can_flow_with(model) for model in models[1:]):
+        if not models or not all(models[0].can_flow_with(model) for model in models[1:]):
             raise ParameterError("must have the same gait and number of modules", field="models")
         parts = [model._linear_pieces(t0, t1) for model in models]
         widths = parts[0][0]

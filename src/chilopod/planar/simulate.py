@@ -9,6 +9,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from chilopod.engine import Controller, event_times, steer
+from chilopod.engine.arguments import as_array
 from chilopod.errors import ParameterError
 from chilopod.planar.walk import TOLERANCE, start
 from chilopod.record import LONGEST, RATE, Recording, in_range
@@ -88,7 +89,7 @@ def simulate(
     noise = None
     if controller is not None and bearing_noise is not None:
         count, asked = len(walk.robots), sum(1 for _ in event_times(controller, walk.robots[0].gait, duration))
-        noise = np.atleast_2d(np.asarray(bearing_noise, dtype=np.float64))
+        noise = np.atleast_2d(as_array("bearing_noise", bearing_noise))
         if noise.ndim != 2 or len(noise) != count or noise.shape[1] < asked:
             raise ParameterError(
                 "has the wrong shape", field="bearing_noise", value=noise.shape, allowed=f"({count}, {asked} or more)"

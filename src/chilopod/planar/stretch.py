@@ -16,6 +16,7 @@ import numpy as np
 from chilopod.compiled import copy_into, njit, parallel_njit
 from chilopod.engine.actuators import FROM, GOAL, RAMPING, SETTLING, SINCE, UNTIL
 from chilopod.engine.actuators import SLOPE as RAMP
+from chilopod.errors import ParameterError
 from chilopod.integrate import GROW, LANES_WORK, MAX_STEPS, SAFETY, SHRINK, STAGES, lanes_step
 from chilopod.lanes import LANES, as_lanes, choose, room
 from chilopod.planar.contact import MOMENTS, sum_moments
@@ -27,6 +28,9 @@ MOST_BENT = 0.5 * np.pi
 
 _A_GROUP, _GROUPS = LANES, 4
 """Robots that a thread is given at a time at least, and how many times each thread is given some at most."""
+
+_WORTH_WAKING, _A_STEP = 2e-4, 2.5e-7
+"""Work that is worth waking other threads for, and that of a step for one module, in lanes, about, s."""
 
 _TIME, _STEP, _ERROR = range(3)
 _NOBODY = -1
@@ -367,12 +371,46 @@ def carry(
     record
         States over (samples, robots, 2N+4); what no robot reached is left alone.
     """
+    _check_shapes(rows, pieces, robots, states, step, status, record)
     what = (rows, pieces, robots, tolerance, states, step, status, record)
     threads = numba.get_num_threads()
     groups = min(rows.size // _A_GROUP, _GROUPS * threads)
-    if threads > 1 and groups > 1:
+    if threads > 1 and groups > 1 and _work(rows, pieces, step) > _WORTH_WAKING:
         walk(groups, *what)
     elif rows.size > 1:
         walk_abreast(*what)
     else:
         walk_alone(*what)
+
+
+def _work(rows: Any, pieces: Pieces, step: Any) -> float:
+    """How long it will take on one thread, about, s: at least a step a piece, and each as long as the last one."""
+    steps = pieces.widths.size * rows.size + (pieces.widths.sum() / np.maximum(step[rows], 1e-6)).sum()
+    return float(_A_STEP * pieces.contact.shape[1] * steps)
+
+
+def _check_shapes(rows: Any, pieces: Pieces, robots: Robots, states: Any, step: Any, status: Any, record: Any) -> None:
+    """Refuse what does not fit together, or is nothing: compiled loops would read beyond it.
+
+    Raises
+    ------
+    ParameterError
+        If anything does not.
+    """
+    count, joints, size = len(states), robots.lag.shape[-1], pieces.widths.size
+    intervals = len(pieces.contact)
+    fits = (
+        0 < rows.size <= count
+        and size > 0
+        and pieces.begins.size == pieces.starts.size == pieces.interval.size == pieces.sample.size == size
+        and pieces.contact.shape == pieces.stroke.shape == (intervals, joints + 1, 2)
+        and states.shape[1:] == record.shape[2:] == (2 * joints + 6,)
+        and record.shape[1] == step.size == status.size == count
+        and robots.scalars.shape == (count, 4)
+        and robots.feet.shape == robots.yaw.shape == (count, 2)
+        and robots.damping.shape == robots.lag.shape == robots.torque.shape == (count, joints)
+        and robots.friction.shape == (count, joints + 1, 2)
+        and robots.profile.shape == (7, count, joints)
+    )
+    if not fits:
+        raise ParameterError("do not fit together", field="states", value=states.shape, allowed="see carry()")

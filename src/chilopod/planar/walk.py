@@ -9,14 +9,15 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.engine import Actuators, Command, Observation, Status, Targets, Traits
+from chilopod.engine import Actuators, Command, Observation, Status, Targets, Traits, one_thread
 from chilopod.engine.arguments import (
-    BEGINNING,
     as_marks,
     as_number,
+    as_robot,
     as_robots,
     as_seeds,
     check_time,
+    check_wishes,
     rows_anew,
     rows_of,
     standing,
@@ -55,7 +56,7 @@ _STATUS = {
 
 def common(robot: Robot) -> tuple[Any, ...]:
     """What robots of a batch share, see :class:`chilopod.engine.Engine`: gait and number of modules."""
-    return robot.gait, robot.body.modules
+    return as_robot(robot).gait, robot.body.modules
 
 
 def initial_states(
@@ -81,7 +82,8 @@ def initial_states(
     -------
     Shape (robots, 2N+4): reduced state (see :mod:`chilopod.planar.dynamics`), then x, y and heading.
     """
-    n, (angles, headings, places) = robot.body.modules, standing(robot, joint_angles, heading, position)
+    angles, headings, places = standing(robot, joint_angles, heading, position)
+    n = robot.body.modules
     states = np.zeros((len(angles), 2 * n + 4))
     states[:, 0] = robot.gait.speed
     states[:, 3 : n + 2] = angles
@@ -114,7 +116,7 @@ def start(
     tolerance
         Of every step, relative to max(1, |state|).
     """
-    in_range("tolerance", as_number("tolerance", tolerance), 1e-2)
+    tolerance, expected = in_range("tolerance", tolerance, 1e-2), check_wishes(record, expected)
     given = as_robots(robots)
     n = given[0].body.modules
     if record is not None and record.poses:
@@ -155,6 +157,7 @@ def resume(saved: bytes) -> PlanarWalk:
     return walk
 
 
+@one_thread
 class PlanarWalk:
     """Robots under way on the plane, see :class:`chilopod.engine.Walk`; :func:`start` makes one.
 
@@ -260,10 +263,7 @@ class PlanarWalk:
             "friction": (friction, self._factors.shape[1:]),
         }
         marked, rows = rows_anew(which, self._robots, self._time, self._record, arguments, seeds)
-        # To the switch with which the cycle begins, where everybody stops for good anyhow.
-        pieces = self._timeline.whole_pieces(self._time + BEGINNING * self._robots[0].gait.period)
-        if pieces[0].size:
-            self._carry(pieces, self._states, self._step, self._status)
+        # All are at the switch with which the cycle begins, however time was rounded: there they stop for good anyhow.
         self._here = None
         if rows["friction"] is not None:
             self._factors[marked] = rows["friction"]
@@ -286,8 +286,7 @@ class PlanarWalk:
         check_size(self._record, until, self._states.size)
         pieces = self._timeline.whole_pieces(until)
         self._time, self._here = until, None
-        if pieces[0].size:
-            self._carry(pieces, self._states, self._step, self._status)
+        self._carry(pieces, self._states, self._step, self._status)
 
     def save(self) -> bytes:
         """See :class:`chilopod.engine.Walk`."""
@@ -322,8 +321,8 @@ class PlanarWalk:
     def to_dataset(self, copy: bool = True) -> xr.Dataset:
         """The record so far, see :func:`chilopod.planar.simulate`; without a copy if the walk ends here."""
         rate = self._record.rate if self._record else 1.0
-        # Who was halted beside a switch may have a sample more than the others of the batch.
-        count = self._timeline.samples
+        # A sample that comes a moment of rounding after the present is taken already, but does not count yet.
+        count = min(self._timeline.samples, len(self._record.samples(self._time)) if self._record else 0)
         states = self._samples.rows[:count].copy() if copy else self._samples.grown(0)[:count]
         times = np.arange(len(states)) / rate
         leg_yaw = self._actuators.leg_yaw_over(times)
@@ -346,12 +345,11 @@ class PlanarWalk:
 
     def _now(self) -> tuple[Array, Array, NDArray[np.intp]]:
         """States, steps and statuses at the present time; a copy unless there is a cut."""
-        if self._time <= self._timeline.cut:
+        if self._timeline.is_at_cut(self._time):
             return self._states, self._step, self._status
         if self._here is None:
             self._here = self._states.copy(), self._step.copy(), self._status.copy()
-            begins, starts, widths, interval, _ = self._timeline.rest(self._time)
-            self._carry((begins, starts, widths, interval, np.full(len(begins), -1)), *self._here)
+            self._carry(self._timeline.rest(self._time), *self._here)
         return self._here
 
     def _seen(self) -> Array:
@@ -362,15 +360,11 @@ class PlanarWalk:
         return np.where(gone[:, None], np.nan, states)
 
     def _arrive(self, which: NDArray[np.bool_]) -> None:
-        """Let some robots be for good where they are at the present time, with the sample that is taken there."""
-        if self._time <= self._timeline.cut:
+        """Let some robots be for good where they are at the present time."""
+        if self._timeline.is_at_cut(self._time):
             return
         for mine, here in zip((self._states, self._step, self._status), self._now(), strict=True):
             mine[which] = here[which]
-        for sample in self._timeline.rest(self._time)[-1]:
-            if sample >= 0:
-                walking = which & (self._status == stretch.WALKING)
-                self._samples.grown(sample + 1)[sample, walking] = self._states[walking]
 
     def _carry(
         self,
@@ -382,7 +376,7 @@ class PlanarWalk:
         """Carry all robots through pieces of time, in place."""
         record, told = self._samples.grown(int(pieces[-1].max(initial=-1)) + 1), self._actuators
         rows = np.flatnonzero(status == stretch.WALKING)
-        if not rows.size:
+        if not rows.size or not len(pieces[0]):
             return
         scalars, feet = self._bodies
         robots = stretch.Robots(

@@ -1,9 +1,10 @@
 """What the analyses need to know of a periodic system, and what more they use where a system has it.
 
-Every capability is a protocol: a system has it by having its methods, and the analyses ask ``isinstance(system,
-FlowsStates)``. A method that is None counts as missing, so a class may leave to its instances whether they have it
-(:class:`chilopod.stability.PeriodicSystem` does), and so does an orbit or a symmetry that is None. Methods and
-properties have to be the system's own, not made up by ``__getattr__``.
+Every capability is a protocol: a system has it by having its methods. The analyses ask ``isinstance``, or, of
+protocols with one member, the functions at the end of this module. A member that is None counts as missing, so a class
+may leave to its instances whether they have it (:class:`chilopod.stability.PeriodicSystem` does). Methods and
+properties have to be found on the system or its class: from Python 3.12 on, ``isinstance`` does not see what a
+``__getattr__`` makes up.
 
 Throughout, n is the number of states; times are in the unit of the system's period, states in its own units; a
 derivative has the derivative of state i with respect to state j at the start in row i, column j.

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.engine import Traits
-from chilopod.engine.arguments import as_number, as_robots, as_seeds, rows_of, standing
+from chilopod.engine.arguments import as_number, as_robot, as_robots, as_seeds, check_wishes, rows_of, standing
 from chilopod.engine.saved import read_back, unpack
 from chilopod.errors import ParameterError
 from chilopod.record import Recording, in_range
@@ -34,7 +34,7 @@ traits = Traits(
 
 def common(robot: Robot) -> Robot:
     """What robots of a batch share, see :class:`chilopod.engine.Engine`: all but the numbers of their springs."""
-    twin_of(robot)
+    twin_of(as_robot(robot))
     return without_springs(robot)
 
 
@@ -108,9 +108,11 @@ def start(
     edit, traits
         See :class:`Edited`.
     """
-    in_range("tolerance", as_number("tolerance", tolerance), 1.0)
+    tolerance, expected = in_range("tolerance", tolerance, 1.0), check_wishes(record, expected)
     if as_number("threads", threads) not in range(1 << 16):
         raise ParameterError("is no number of threads", field="threads", value=threads, allowed="0 (all cores) or more")
+    if not (edit is None or callable(edit)) or not isinstance(traits, Traits):
+        raise ParameterError("are none", field="edit, traits", allowed="a function or None; a chilopod.engine.Traits")
     given, noise = as_robots(robots), as_seeds(seeds)
     first = common(given[0])
     if any(common(each) != first for each in given[1:]):
@@ -129,7 +131,7 @@ def start(
         None if noise is None else noise * (count if len(noise) == 1 else 1),
         record,
         tolerance=tolerance,
-        threads=threads,
+        threads=int(threads),
         expected=expected,
         edit=edit,
     )

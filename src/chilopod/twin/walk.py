@@ -13,7 +13,7 @@ from mujoco.batch import Batch
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.cores import cores
-from chilopod.engine import Actuators, Command, Observation, Ramps, Status, Targets, Traits
+from chilopod.engine import Actuators, Command, Observation, Ramps, Status, Targets, Traits, one_thread
 from chilopod.engine.arguments import as_array, as_marks, as_number, as_seeds, check_time, rows_anew
 from chilopod.engine.saved import pack, part
 from chilopod.errors import ParameterError
@@ -38,6 +38,7 @@ _STATE = ("time", "qpos", "qvel", "qacc_warmstart", "qfrc_applied")
 """Of MuJoCo's state what is not the same in every walk or set before every step."""
 
 
+@one_thread
 class TwinWalk:
     """Robots under way on the floor, see :class:`chilopod.engine.Walk`; :func:`chilopod.twin.start` makes one.
 

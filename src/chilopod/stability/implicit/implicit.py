@@ -146,6 +146,9 @@ class ImplicitFlow(ReadOnlyArrays):
         n, t = self.tape.dimension, self.tape
         # Copies, because compiled code is compiled anew for arrays that are read-only.
         x, params = np.array(x, dtype=np.float64), self.params.copy()
+        if not (x.shape == (n,) and carried[0].shape[0] in (0, n) and (units is None or np.shape(units) == (n,))):
+            # Compiled code would read beyond them.
+            raise ParameterError("has the wrong shape", field="x", value=x.shape, allowed=f"({n},)")
         if not np.isfinite(x).all():
             raise AnalysisError("the state is not finite", field="rhs")
         balanced, near = self._coupling(x, 0.5 * (t0 + t1))

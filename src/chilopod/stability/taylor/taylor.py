@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.cores import cores
-from chilopod.errors import AnalysisError
+from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import ReadOnlyArrays, read_only
 from chilopod.stability.taylor.evaluation import evaluate
 from chilopod.stability.taylor.tape import Tape
@@ -177,10 +177,10 @@ class TaylorFlow(ReadOnlyArrays):
             derivative = np.eye(n) if derived else np.empty((n, 0))
             events, steps = self._run(x, t0, t1, params, derivative, _NOTHING, self.order, 0.0)
             return Passage(x, derivative, _NOTHING, events, steps)
-        other_x = x * self._shaken
+        other_x = x.copy()
         derivative, bound, other = np.eye(n), np.zeros((n, n)), np.eye(n)
         events, steps = self._run(x, t0, t1, params, derivative, bound, self.order, 0.0)
-        self._run(other_x, t0, t1, params, other, _NOTHING, self.order - _OTHER_ORDER, _SHAKE)
+        self._run(other_x * self._shaken, t0, t1, params, other, _NOTHING, self.order - _OTHER_ORDER, _SHAKE)
         difference = np.abs(other - derivative)
         known = bound > _UNDERFLOW
         ratios = np.sort(difference[known] / bound[known])
@@ -230,6 +230,10 @@ class TaylorFlow(ReadOnlyArrays):
         shake: float,
         stepwise: bool = True,
     ) -> tuple[Array, int]:
+        n, parameters = int(self.tape.layout[0]), int(self.tape.layout[1])
+        if not (x.shape == derivative.shape[:1] == (n,) and params.shape == (parameters,)):
+            # Compiled code would read beyond them.
+            raise ParameterError("has the wrong shape", field="x", value=x.shape, allowed=f"({n},)")
         events = np.empty((_MOST_EVENTS if self.directions else 0, 2))
         report = np.zeros(4)
         seen = []

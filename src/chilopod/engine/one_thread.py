@@ -1,0 +1,49 @@
+"""A walk belongs to one thread at a time: held here, once for every engine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from threading import get_ident
+from typing import Any, Final, TypeVar
+
+from chilopod.engine.contract import Walk
+from chilopod.errors import ThreadError
+
+_Kind = TypeVar("_Kind", bound=type)
+
+_VERBS: Final = tuple(
+    name for name, each in vars(Walk).items() if callable(each) and not isinstance(each, type) and name[0] != "_"
+)
+_INSIDE: Final = "_thread_inside"
+
+
+def one_thread(kind: _Kind) -> _Kind:
+    """Make a class of walks refuse a thread while another is within one of the verbs of :class:`Walk`.
+
+    Threads may take turns: nobody owns a walk between two verbs. A verb may call others.
+    """
+    for name in _VERBS:
+        setattr(kind, name, _alone(name, getattr(kind, name)))
+    return kind
+
+
+def _alone(name: str, verb: Callable[..., Any]) -> Callable[..., Any]:
+    @wraps(verb)
+    def alone(self: Any, *arguments: Any, **named: Any) -> Any:
+        state, me = self.__dict__, get_ident()
+        if state.get(_INSIDE) == me:
+            return verb(self, *arguments, **named)
+        # One step for the interpreter, so that of two threads one is first.
+        if state.setdefault(_INSIDE, me) != me:
+            raise ThreadError(
+                "another thread is within a verb of this walk",
+                field=f"walk.{name}",
+                allowed="one thread at a time: a walk each, or a lock",
+            )
+        try:
+            return verb(self, *arguments, **named)
+        finally:
+            del state[_INSIDE]
+
+    return alone
