@@ -59,6 +59,8 @@ class Seen:
         Torques by which somebody pulls at joints, N*m, (N-1,).
     target
         Where to, m; None: nowhere.
+    steering
+        Name of the strategy that steers there, which is leg yaw while those of springs are not known; else empty.
     state
         As ``initial`` of the engine's ``start`` takes it, (n,).
     """
@@ -75,6 +77,7 @@ class Seen:
     turning: float
     pulled: Array
     target: tuple[float, float] | None
+    steering: str
     state: Array
 
     @property
