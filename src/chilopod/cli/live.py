@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import signal
-import threading
 import webbrowser
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated, Any
@@ -94,30 +93,21 @@ def live(
             typer.echo(f"error: {error}", err=True)  # and the walk goes on
             raise
 
-    page = Live(
-        described,
-        engine,
-        seed=seed,
-        strategy=strategy,
-        host=host,
-        port=port,
-        token=token,
-        kept=keep if out is not None else None,
-    )
-    with _ended_by_signals() as ignore:
-        try:
+    listening: dict[str, Any] = {"host": host, "port": port, "token": token}
+    page = Live(described, engine, seed=seed, strategy=strategy, **listening, kept=keep if out is not None else None)
+    try:
+        with _ended_by_signals():
             typer.echo(f"{described.name} walks at {page.address} (Ctrl-C ends it)")
             if browser and not webbrowser.open(page.address):
                 typer.echo(f"no browser could be started: open {page.address} in one", err=True)
             page.wait(seconds)
-        finally:
-            ignore()
-            page.close()
-            for recording in page.undelivered:  # better here than nowhere
-                with suppress(OutputError):
-                    keep(*recording, folder=Path())
-            if page.gate.refused:
-                typer.echo(f"requests and messages that the page refused: {page.gate.refused}", err=True)
+    finally:
+        page.close()
+        for recording in page.undelivered:  # better here than nowhere
+            with suppress(OutputError):
+                keep(*recording, folder=Path())
+        if page.gate.refused:
+            typer.echo(f"requests and messages that the page refused: {page.gate.refused}", err=True)
 
 
 def _files(folder: Path, name: str) -> list[Path]:
@@ -125,24 +115,18 @@ def _files(folder: Path, name: str) -> list[Path]:
 
 
 @contextmanager
-def _ended_by_signals() -> Iterator[Callable[[], None]]:
-    """What ends a process politely is as good as Ctrl-C here; gives what makes it deaf to that while it ends."""
-    here = threading.current_thread() is threading.main_thread()
-    all_of_them = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if here and hasattr(signal, name)]
-    default = [each for each in all_of_them if signal.getsignal(each) is signal.SIG_DFL]  # not nohup's
-
-    def ignore() -> None:
-        for each in default:
-            signal.signal(each, signal.SIG_IGN)
+def _ended_by_signals() -> Iterator[None]:
+    """What ends a process politely is as good as Ctrl-C here, and once is enough."""
 
     def end(number: int, frame: Any) -> None:
-        ignore()
         raise KeyboardInterrupt
 
-    for each in default:
+    everywhere = [each for each in signal.Signals if each.name in ("SIGTERM", "SIGHUP")]
+    heard = [each for each in everywhere if signal.getsignal(each) is signal.SIG_DFL]  # nohup's is not
+    for each in heard:
         signal.signal(each, end)
     try:
-        yield ignore
+        yield
     finally:
-        for each in default:
-            signal.signal(each, signal.SIG_DFL)
+        for each in heard:
+            signal.signal(each, signal.SIG_IGN)
