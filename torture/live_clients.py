@@ -120,6 +120,11 @@ class LiveClients:
         self._before = after[0]
         return Outcome(Kind.REFUSED)
 
+    def close(self) -> None:
+        """Hang up."""
+        if self._socket is not None:
+            self._socket.close()
+
     # -- the page
     # ---------------------------------------------------------------------------------------------------------------
 

@@ -292,9 +292,9 @@ def _only(values: list[str]) -> str | None:
 def _policy(host: str) -> str:
     """What a page may load and who may frame it: its own two scripts, and nothing from elsewhere."""
     return (
-        f"default-src 'none'; script-src {_scripts()} 'wasm-unsafe-eval' blob:; worker-src blob:; "
+        f"default-src 'none'; script-src {_scripts()} 'wasm-unsafe-eval'; worker-src blob:; "
         "style-src 'unsafe-inline'; img-src data: blob:; font-src data:; "
-        f"connect-src 'self' data: blob: {f'ws://{host}' if host else ''}; "
+        f"connect-src 'self' {f'ws://{host}' if host else ''}; "
         "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
     )
 
