@@ -202,7 +202,10 @@ class LiveClients:
             case 2:
                 return _text(chance)
             case 3:
-                return chance.choice((b"\x91", b"\x81\xa1a", b"\xdd\xff\xff\xff\xff")) * chance.choice((1, 900, 3000))
+                deep = chance.choice((b"\x91", b"\x81\xa1a", b"\xdd\xff\xff\xff\xff")) * chance.choice(
+                    (1, 300, 900, 3000)
+                )
+                return deep + chance.choice((b"", b"\xc0"))
             case 4:
                 return b"\xc4" + chance.randbytes(chance.choice((20_000, 300_000)))
             case 5 | 6:

@@ -235,7 +235,7 @@ def test_an_answer_is_for_no_frame_and_for_no_other_page(page):
         headers = answer.headers
     policy = headers["Content-Security-Policy"]
     assert "frame-ancestors 'none'" in policy
-    assert f"connect-src 'self' ws://localhost:{port_of(page)};" in policy
+    assert f"connect-src 'self' data: blob: ws://localhost:{port_of(page)};" in policy
     assert "unsafe" not in policy.partition("style-src")[0].replace("'wasm-unsafe-eval'", "")
     assert headers["X-Content-Type-Options"] == "nosniff"
     assert headers["Referrer-Policy"] == "no-referrer"

@@ -79,8 +79,7 @@ def live(
     if not 0 <= port < 65536:
         raise ParameterError("is no port", field="port", value=port, allowed="1 to 65535, or 0 for any that is free")
     if out is not None:
-        there = out.glob("chilopod-live-*") if out.is_dir() else []
-        free([*_files(out, "chilopod-live-1"), *there], force)
+        free([*_files(out, "chilopod-live-1"), *(out.glob("chilopod-live-*") if out.is_dir() else ())], force)
     described = read_robot(robot, overrides)
     from chilopod.live import Live
 
@@ -93,8 +92,8 @@ def live(
             typer.echo(f"error: {error}", err=True)  # and the walk goes on
             raise
 
-    listening: dict[str, Any] = {"host": host, "port": port, "token": token}
-    page = Live(described, engine, seed=seed, strategy=strategy, **listening, kept=keep if out is not None else None)
+    there: dict[str, Any] = {"host": host, "port": port, "token": token}
+    page = Live(described, engine, seed=seed, strategy=strategy, **there, kept=keep if out is not None else None)
     try:
         with _ended_by_signals():
             typer.echo(f"{described.name} walks at {page.address} (Ctrl-C ends it)")
@@ -118,15 +117,18 @@ def _files(folder: Path, name: str) -> list[Path]:
 def _ended_by_signals() -> Iterator[None]:
     """What ends a process politely is as good as Ctrl-C here, and once is enough."""
 
+    def listen(how: Any) -> None:
+        for each in heard:
+            signal.signal(each, how)
+
     def end(number: int, frame: Any) -> None:
+        listen(signal.SIG_IGN)  # a terminal that is closed says so twice
         raise KeyboardInterrupt
 
     everywhere = [each for each in signal.Signals if each.name in ("SIGTERM", "SIGHUP")]
     heard = [each for each in everywhere if signal.getsignal(each) is signal.SIG_DFL]  # nohup's is not
-    for each in heard:
-        signal.signal(each, end)
+    listen(end)
     try:
         yield
     finally:
-        for each in heard:
-            signal.signal(each, signal.SIG_IGN)
+        listen(signal.SIG_IGN)

@@ -14,6 +14,7 @@ import hmac
 import ipaddress
 import logging
 import re
+import reprlib
 import secrets
 import socket
 import threading
@@ -32,9 +33,7 @@ from viser.infra import _infra
 from websockets.asyncio.server import ServerConnection, serve
 from websockets.http11 import Request, Response
 
-LARGEST = 16_384
-"""Bytes of a message; those of viser's client have a few hundred."""
-
+_LARGEST = 16_384  # bytes of a message; those of viser's client have a few hundred
 _RATE = 200.0  # messages a second from one browser; one that drags sends 60
 _AT_ONCE = 1.0  # s of messages that may come at once
 _MOST = 250  # browsers
@@ -52,7 +51,6 @@ _KINDS: dict[str, Any] = {
 }
 _HEADERS = {
     "X-Content-Type-Options": "nosniff",
-    "X-Frame-Options": "DENY",
     "Referrer-Policy": "no-referrer",
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cross-Origin-Opener-Policy": "same-origin",
@@ -61,24 +59,12 @@ _HEADERS = {
 
 
 class Gate:
-    """What is asked of everybody who comes.
+    """Checks of every request and message at an address (`host`); ``refused`` counts those that failed.
 
     A browser says by Host which name it looked up, and by Origin which page sends it. On this machine's own addresses
     Host is one of their names, so that a name that leads here later is refused (DNS rebinding), and Origin is the page
     itself; a handshake without Origin comes from no browser, and is refused. Programs can say what they like: at other
-    addresses, or where asked for, they need a token. It comes with the link, and stays in a cookie.
-
-    Parameters
-    ----------
-    host
-        Address to listen at.
-    token
-        Whether a token is wanted at this machine's own addresses too.
-
-    Attributes
-    ----------
-    refused
-        Number of requests and messages that were refused.
+    addresses, or where wanted (`token`), they need a token. It comes with the link, and stays in a cookie.
     """
 
     def __init__(self, host: str, token: bool = False) -> None:
@@ -96,13 +82,7 @@ class Gate:
         return address if self._token is None else f"{address}/?token={self._token}"
 
     def open(self, port: int) -> viser.ViserServer:
-        """Listen at a free port.
-
-        Raises
-        ------
-        RuntimeError
-            If this version of viser listens in another way, and nothing would be asked of anybody.
-        """
+        """Listen at a free port; not at all with a viser that listens in another way, and would ask nobody."""
         ours = SimpleNamespace(asyncio=SimpleNamespace(server=SimpleNamespace(serve=self._serve)))
         ours.exceptions, ours.datastructures = websockets.exceptions, websockets.datastructures
         with _PATCHING:
@@ -120,7 +100,7 @@ class Gate:
 
     def _serve(self, handler: Any, *where: Any, process_request: Any, **how: Any) -> Any:
         self._serves = True
-        how |= {"max_size": LARGEST, "create_connection": partial(_Guarded, self)}
+        how |= {"max_size": _LARGEST, "create_connection": partial(_Guarded, self)}
         return serve(handler, *where, process_request=partial(self._answer, process_request), **how)
 
     # -- requests
@@ -172,12 +152,12 @@ class Gate:
     def _has_token(self, connection: ServerConnection, request: Request) -> bool:
         try:
             shown = parse_qs(urlsplit(request.path).query, max_num_fields=20).get("token", [])
-        except ValueError:
+            for cookie in ";".join(request.headers.get_all("Cookie")).split(";"):
+                name, _, value = cookie.strip().partition("=")
+                shown += [value] if name == _cookie(connection) else []
+            return any(hmac.compare_digest(each.encode(), str(self._token).encode()) for each in shown)
+        except ValueError:  # a path or a text that is none
             return False
-        for cookie in ";".join(request.headers.get_all("Cookie")).split(";"):
-            name, _, value = cookie.strip().partition("=")
-            shown += [value] if name == _cookie(connection) else []
-        return any(hmac.compare_digest(each.encode(), str(self._token).encode()) for each in shown)
 
     def _refuse(self, what: str) -> None:
         self.refused += 1
@@ -201,7 +181,7 @@ class Gate:
         except (ValueError, TypeError, LookupError, RecursionError):
             offered = False
         if not offered:
-            self._refuse(f"a message, {ascii(read)[:120]}")
+            self._refuse(f"a message, {ascii(reprlib.repr(read))}")
         return msgspec.msgpack.encode(read) if offered else None
 
     def _offers(self, connection: ServerConnection, message: Any) -> bool:
@@ -294,7 +274,7 @@ def _policy(host: str) -> str:
     return (
         f"default-src 'none'; script-src {_scripts()} 'wasm-unsafe-eval'; worker-src blob:; "
         "style-src 'unsafe-inline'; img-src data: blob:; font-src data:; "
-        f"connect-src 'self' {f'ws://{host}' if host else ''}; "
+        f"connect-src 'self' data: blob: {f'ws://{host}' if host else ''}; "
         "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
     )
 
