@@ -181,7 +181,7 @@ class Gate:
         except (ValueError, TypeError, LookupError, RecursionError):
             offered = False
         if not offered:
-            self._refuse(f"a message, {ascii(reprlib.repr(read))}")
+            self._refuse(f"a message, {reprlib.repr(read)!a}")
         return msgspec.msgpack.encode(read) if offered else None
 
     def _offers(self, connection: ServerConnection, message: Any) -> bool:
