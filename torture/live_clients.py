@@ -148,7 +148,7 @@ class LiveClients:
                 return self._socket
         port = self._port
         where: dict[str, Any] = {"origin": f"http://127.0.0.1:{port}", "subprotocols": [f"viser-v{viser.__version__}"]}
-        self._socket = connect(f"ws://127.0.0.1:{port}", **where, compression=None, max_size=None)
+        self._socket = connect(f"ws://127.0.0.1:{port}", **where, compression=None, max_size=None, close_timeout=0.1)
         self._socket.send(msgspec.msgpack.encode(_CAMERA))
         return self._socket
 
