@@ -144,7 +144,7 @@ class LiveClients:
             with suppress(TimeoutError, ConnectionClosed):
                 while True:
                     self._socket.recv(timeout=0)
-            if self._socket.close_code is None:
+            if self._socket.protocol.close_code is None:
                 return self._socket
         port = self._port
         where: dict[str, Any] = {"origin": f"http://127.0.0.1:{port}", "subprotocols": [f"viser-v{viser.__version__}"]}
@@ -174,7 +174,7 @@ class LiveClients:
         before = gate.refused
         with suppress(ConnectionClosed):
             client.send(raw)
-        _until(lambda: gate.refused > before or client.close_code is not None, "let through")
+        _until(lambda: gate.refused > before or client.protocol.close_code is not None, "let through")
 
     def _move(self, chance: Random) -> None:
         client, gate = self._client(), self._live().gate
