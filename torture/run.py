@@ -24,6 +24,7 @@ from disks import Disks
 from environments import Environments
 from invariances import Invariances
 from kills import Kills
+from live_clients import LiveClients
 from outcomes import FINE, SENTENCES, Kind
 from processors import Processors
 from robot_files import RobotFiles
@@ -37,7 +38,7 @@ from workers import Attacks, tried
 RESULTS = Path(__file__).with_name("results.json")
 _KINDS = (
     *(RobotFiles, Arguments, SavedTrials, SavedBranches, Kills, Disks, Streams, Environments),
-    *(SameBits, Verbs, Invariances, Processors),
+    *(SameBits, Verbs, Invariances, Processors, LiveClients),
 )
 CLASSES: dict[str, Callable[[], Attacks]] = {each.name: each for each in _KINDS}
 _SHOWN = 12  # different faults of a class that are printed

@@ -41,7 +41,8 @@ def test_every_state_has_its_sentence(begun):
         "Straight and stable: its first spring, 41 N·mm/deg, is stiffer than the pitchfork at"
     )
     assert "fades by 18 % a second" in said(begun, rate=-0.2)
-    assert "The curve of 0.40 m straightens" in said(begun, **curve(0.4))
+    assert "The curve of 0.40 m straightens" in said(begun, **curve(0.4), turning=-0.1)
+    assert "The curve of 0.40 m will straighten" in said(begun, **curve(0.4), turning=0.1)
     grows = said(begun, rate=0.125, **soft(8.0))
     assert "the smallest bend grows by 13 % a second, to 0.32 m in the end" in grows
     assert "tightens towards the branch's 0.32 m" in said(begun, **soft(8.0), **curve(0.9), turning=0.1)
@@ -53,6 +54,39 @@ def test_every_state_has_its_sentence(begun):
     assert pulled == "Joint 2 is pulled aside, and it walks a curve of 0.90 m to the left as long as that lasts."
     assert said(begun, pulled=np.array([0.0, 0.1, 0.0, 0.0, -0.1])).startswith("Joints 2, 5 are pulled aside")
     assert "It has stopped: a yaw joint bent" in said(begun, status=Status.OUT_OF_RANGE)
+
+
+@pytest.mark.parametrize(
+    ("radius", "turning", "sentence"),
+    [
+        (1.78, 0.1, "1.78 m to the left, tightens towards the branch's 0.32 m."),
+        (1.78, -0.1, "1.78 m to the left, is wider than the branch's 0.32 m, and widens just now."),
+        (1.78, 0.0, "1.78 m to the left, is wider than the branch's 0.32 m."),
+        (0.2, -0.1, "0.20 m to the left, widens towards the branch's 0.32 m."),
+        (0.2, 0.1, "0.20 m to the left, is tighter than the branch's 0.32 m, and tightens just now."),
+    ],
+)
+def test_a_curve_goes_towards_the_branch_only_if_it_does(begun, radius, turning, sentence):
+    assert said(begun, **soft(8.0), **curve(radius), turning=turning).endswith(sentence)
+
+
+def test_a_spring_that_the_strategy_holds_is_told_from_the_one_of_the_slider(begun):
+    begun.box.put(wishes.Spring(0, stiffness(8.0)))
+    begun.box.put(wishes.Target((2.0, 0.0)))
+    begun.obey()
+    steered = said(begun, **soft(41.0), **curve(0.9), target=(2.0, 0.0), steering="variable")
+    assert "with the strategy variable. The strategy has the first spring at 41 N·mm/deg now; yours, 8 N" in steered
+    assert steered.endswith("Steered, it walks a curve of 0.90 m to the left.")
+    assert "stable" not in steered
+    assert "yours" not in said(begun, **soft(8.0))
+
+
+def test_the_strategy_that_is_named_is_the_one_that_steers(begun):
+    """As long as nobody knows how tightly which spring turns, leg yaw alone steers."""
+    begun.box.put(wishes.Target((2.0, 0.0)))
+    begun.obey()
+    assert begun.settings.strategy == "variable"
+    assert "with the strategy leg-yaw" in said(begun)
 
 
 def test_growth_of_another_robot_does_not_count(begun):

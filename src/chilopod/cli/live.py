@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
+import signal
 import webbrowser
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from chilopod.cli.options import EngineOption, SetOption, read_robot, reading
+from chilopod.cli.options import EngineOption, ForceOption, SetOption, free, read_robot, reading
+from chilopod.live.wishes import LARGEST_SEED
 
 
 def _strategies() -> list[str]:
@@ -30,15 +35,22 @@ def live(
             autocompletion=_strategies,
         ),
     ] = "variable",
-    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Of the start, and of the nudges of the floor.")] = 1,
+    seed: Annotated[
+        int,
+        typer.Option(metavar="N", min=0, max=LARGEST_SEED, help="Seed of the start and of the nudges of the floor."),
+    ] = 1,
     host: Annotated[
         str,
         typer.Option(
             metavar="ADDRESS",
-            help="Where to listen: by default for this machine only; 0.0.0.0 lets in everybody who can reach it.",
+            help="Where to listen: by default for this machine only. At any other address, such as 0.0.0.0 (all), a "
+            "browser needs the token in the link that is printed.",
         ),
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(metavar="N", help="At which port; 0 for any that is free.")] = 8080,
+    token: Annotated[
+        bool, typer.Option("--token", help="Want the token on this machine too, for one that others use as well.")
+    ] = False,
     duration: Annotated[
         str | None, typer.Option(metavar="TIME", help='End by itself after so long, such as "10 min".')
     ] = None,
@@ -46,40 +58,77 @@ def live(
     overrides: SetOption = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="FOLDER", help="Keep recordings here too, besides the browser's downloads."),
+        typer.Option("--out", metavar="FOLDER", help="Keep recordings here too, besides the downloads of the browser."),
     ] = None,
+    force: ForceOption = False,
 ) -> None:
     """A robot that walks in the browser, while you change it.
 
     Drag the first spring below the pitchfork and watch it bend; click on the floor, and it goes there; drag a joint.
-    Ctrl-C ends it. Needs: pip install "chilopod[live]".
+    Only the page itself can do so: what comes from other web sites is refused. Ctrl-C ends it, and keeps what is being
+    recorded. Needs: pip install "chilopod[live]".
     """
     from chilopod import units
+    from chilopod.errors import OutputError, ParameterError
+    from chilopod.output import write_all
 
-    described = read_robot(robot, overrides)
     with reading("duration"):
-        seconds = None if duration is None else units.parse(duration, "s")
+        seconds = math.inf if duration is None else units.parse(duration, "s")
+        if not seconds > 0.0:
+            raise ParameterError("is no time to walk", value=seconds, allowed="more than 0 s")
+    if not 0 <= port < 65536:
+        raise ParameterError("is no port", field="port", value=port, allowed="1 to 65535, or 0 for any that is free")
+    if out is not None:
+        free([*_files(out, "chilopod-live-1"), *(out.glob("chilopod-live-*") if out.is_dir() else ())], force)
+    described = read_robot(robot, overrides)
     from chilopod.live import Live
 
-    def keep(name: str, record: bytes, page: str) -> None:
-        from chilopod.errors import OutputError
-        from chilopod.output import write_all
-
-        assert out is not None
+    def keep(name: str, record: bytes, page: str, folder: Path | None = out) -> None:
+        assert folder is not None
         try:
-            for path in write_all([(out / f"{name}.nc", record), (out / f"{name}.html", page)], replace=False):
+            for path in write_all(zip(_files(folder, name), (record, page), strict=True), replace=force):
                 typer.echo(f"wrote {path}", err=True)
         except OutputError as error:
             typer.echo(f"error: {error}", err=True)  # and the walk goes on
             raise
 
-    page = Live(
-        described, engine, seed=seed, strategy=strategy, host=host, port=port, kept=keep if out is not None else None
-    )
+    there: dict[str, Any] = {"host": host, "port": port, "token": token}
+    page = Live(described, engine, seed=seed, strategy=strategy, **there, kept=keep if out is not None else None)
     try:
-        typer.echo(f"{described.name} walks at {page.address} (Ctrl-C ends it)")
-        if browser and not webbrowser.open(page.address):
-            typer.echo(f"no browser could be started: open {page.address} in one", err=True)
-        page.wait(seconds)
+        with _ended_by_signals():
+            typer.echo(f"{described.name} walks at {page.address} (Ctrl-C ends it)")
+            if browser and not webbrowser.open(page.address):
+                typer.echo(f"no browser could be started: open {page.address} in one", err=True)
+            page.wait(seconds)
     finally:
         page.close()
+        for recording in page.undelivered:  # better here than nowhere
+            with suppress(OutputError):
+                keep(*recording, folder=Path())
+        if page.gate.refused:
+            typer.echo(f"requests and messages that the page refused: {page.gate.refused}", err=True)
+
+
+def _files(folder: Path, name: str) -> list[Path]:
+    return [folder / f"{name}.nc", folder / f"{name}.html"]
+
+
+@contextmanager
+def _ended_by_signals() -> Iterator[None]:
+    """What ends a process politely is as good as Ctrl-C here, and once is enough."""
+
+    def listen(how: Any) -> None:
+        for each in heard:
+            signal.signal(each, how)
+
+    def end(number: int, frame: Any) -> None:
+        listen(signal.SIG_IGN)  # a terminal that is closed says so twice
+        raise KeyboardInterrupt
+
+    everywhere = [each for each in signal.Signals if each.name in ("SIGTERM", "SIGHUP")]
+    heard = [each for each in everywhere if signal.getsignal(each) is signal.SIG_DFL]  # nohup's is not
+    listen(end)
+    try:
+        yield
+    finally:
+        listen(signal.SIG_IGN)

@@ -2,8 +2,8 @@
 
 ``wishes`` are what somebody wants, ``session`` owns the walk and does it, ``state`` is what there is to see of it,
 ``theory`` computes beside it where the walk gives way, ``words`` says what is seen, ``body`` is where the robot's parts
-are; nothing of that knows of a browser. ``server`` shows it in one with viser, ``controls``, ``scene`` and ``plots``
-are parts of the page.
+are; nothing of that knows of a browser. ``server`` shows it in one with viser, ``gate`` lets in nobody but the page,
+``controls``, ``scene`` and ``plots`` are parts of it.
 """
 
 from typing import TYPE_CHECKING

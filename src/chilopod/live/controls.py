@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any, Final
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import viser
@@ -15,6 +16,7 @@ from chilopod.analysis.parameters import PAPER_UNIT, stiffness
 from chilopod.live import wishes
 from chilopod.live.session import Session
 from chilopod.live.state import FRICTIONS, SPEEDS, STRATEGIES_HERE, STRIDES, Seen, Settings
+from chilopod.steering.target import FARTHEST
 
 _SOFTEST, _STIFFEST = 0.05, 1.5  # of the stiffest spring of the file
 _FACTOR = 1.1  # of a value, at a key
@@ -69,6 +71,7 @@ class Controls:
         self._server, self._put, self._settings = server, session.box.put, session.settings
         self._file, self._on_record = session.file, on_record
         self._seen: Seen = session.seen()
+        self._helped: WeakKeyDictionary[viser.ClientHandle, Any] = WeakKeyDictionary()
         gui = server.gui
         gui.add_markdown(
             f"**{title}**\n\nDrag the **first spring** below the pitchfork and watch it bend. **Click the floor**: it "
@@ -152,7 +155,7 @@ class Controls:
         self._pause.on_click(lambda _: self._toggle_pause())
         gui.add_button("One gait cycle (N)").on_click(lambda _: self._put(wishes.Step(1.0)))
         self._seed: Any = gui.add_number(
-            "seed", self._settings.seed, min=0, step=1, hint="Of the start and of the nudges."
+            "seed", self._settings.seed, min=0, max=wishes.LARGEST_SEED, step=1, hint="Of the start and of the nudges."
         )
         gui.add_button("Begin anew (R)").on_click(lambda _: self._put(wishes.Reset(self._seed.value)))
 
@@ -166,9 +169,9 @@ class Controls:
             )
             self._strategy.on_update(lambda _: self._put(wishes.Steering(self._strategy.value)))
             self._bearing: Any = gui.add_number(
-                "bearing", 45.0, step=5.0, hint="From where it heads, left positive, deg."
+                "bearing", 45.0, min=-360.0, max=360.0, step=5.0, hint="From where it heads, left positive, deg."
             )
-            self._distance = gui.add_number("distance", 1.3, step=0.1, hint="From module 1, m.")
+            self._distance = gui.add_number("distance", 1.3, min=0.0, max=FARTHEST, step=0.1, hint="From module 1, m.")
             gui.add_button("Go there (T)").on_click(lambda _: self._go())
             gui.add_button("Let go (L)").on_click(lambda _: self._put(wishes.Target(None)))
 
@@ -212,7 +215,7 @@ class Controls:
         key("Pull the joint right", "K", self._pull, -1.0)
         key("Follow the robot, or not", "M", self._toggle_follow)
         gui.add_command("Record", hotkey="C").on_trigger(lambda event: self._toggle_record(event.client))
-        gui.add_command("Help", hotkey="H").on_trigger(_help)
+        gui.add_command("Help", hotkey="H").on_trigger(self._help)
 
     # -- what they do
     # ---------------------------------------------------------------------------------------------------------------
@@ -236,7 +239,7 @@ class Controls:
         self._follow.value = not self._follow.value
 
     def _next_seed(self) -> None:
-        self._put(wishes.Reset(self._settings.seed + 1))
+        self._put(wishes.Reset((self._settings.seed + 1) % (wishes.LARGEST_SEED + 1)))
 
     def _turn(self, angle: float) -> None:
         self._bearing.value = (self._bearing.value + angle + 180.0) % 360.0 - 180.0
@@ -250,6 +253,19 @@ class Controls:
         names = list(self._strategy.options)
         self._strategy.value = names[(names.index(self._strategy.value) + 1) % len(names)]
 
+    async def _help(self, event: viser.CommandEvent) -> None:
+        """Show the keys to whoever asked; nobody says that an earlier window was closed by Escape."""
+        if event.client is None:
+            return
+        before = self._helped.pop(event.client, None)
+        if before is not None and not before.closed:
+            before.close()
+        gui = event.client.gui
+        with gui.add_modal("Keys") as modal:
+            gui.add_markdown(HELP)
+            gui.add_button("Close").on_click(lambda _: None if modal.closed else modal.close())
+        self._helped[event.client] = modal
+
     def _toggle_record(self, client: viser.ClientHandle | None) -> None:
         self._on_record(client)
         self._put(wishes.Record(not self._settings.recording))
@@ -262,13 +278,3 @@ async def _do(do: Callable[..., object], *to: object) -> None:
 
 def _scale(slider: Any, factor: float) -> None:
     slider.value = float(np.clip(slider.value * factor, slider.min, slider.max))
-
-
-async def _help(event: viser.CommandEvent) -> None:
-    """Show the keys to whoever asked."""
-    if event.client is None:
-        return
-    gui = event.client.gui
-    with gui.add_modal("Keys") as modal:
-        gui.add_markdown(HELP)
-        gui.add_button("Close").on_click(lambda _: modal.close())

@@ -10,6 +10,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Mapping
+from concurrent import futures
 from functools import partial
 from typing import Any
 
@@ -31,6 +32,7 @@ needs("viser", extra="live")
 import viser  # noqa: E402  (there, as has just been seen)
 
 from chilopod.live.controls import Controls  # noqa: E402
+from chilopod.live.gate import Gate  # noqa: E402
 from chilopod.live.plots import Plots  # noqa: E402
 from chilopod.live.scene import View, floor_place  # noqa: E402
 
@@ -39,7 +41,6 @@ _SOONEST = 0.01  # s from one frame to the next that a wish brings on
 _BEHIND = 0.1  # s that may be made up for
 _PLOTS = 0.25  # s from one drawing of the plots and sentences to the next
 _ALONE = 0.1  # s from one look to the next while no browser watches
-_LOCAL = ("127.0.0.1", "localhost", "::1")
 
 
 class Live:
@@ -53,9 +54,11 @@ class Live:
     robot, engine, seed, strategy
         As for :class:`chilopod.live.Session`.
     host
-        Address to listen at; by default this machine only.
+        Address to listen at; by default this machine only. At others a browser needs the token in :attr:`address`.
     port
-        At which; 0 for any that is free.
+        Port to listen at; 0 for any that is free.
+    token
+        Whether a browser needs a token on this machine too, where others use it.
     kept
         Called with the name of a recording and its two files, netCDF and HTML, besides the download in the browser.
         What it raises of :mod:`chilopod.errors` is shown at the page.
@@ -63,7 +66,11 @@ class Live:
     Attributes
     ----------
     address
-        To open in a browser.
+        Link to open in a browser, with the token if one is needed.
+    gate
+        Look at every request and message; counts what it refused.
+    undelivered
+        Names and files of recordings that nobody took: neither ``kept`` nor a browser, or while the page ended.
     seen
         The last frame.
     frames
@@ -90,18 +97,26 @@ class Live:
         strategy: str = "variable",
         host: str = "127.0.0.1",
         port: int = 8080,
+        token: bool = False,
         kept: Callable[[str, bytes, str], None] | None = None,
     ) -> None:
         self._session = Session(robot, engine, seed=seed, strategy=strategy)
         self.seen = self._session.seen()
         self._body = _body(robot, engine)
         self._kept, self._recordings = kept, 0
-        self._handing_out: list[threading.Thread] = []
+        self.undelivered: list[tuple[str, bytes, str]] = []
+        # Drawing a replay of minutes takes a moment, and the walk goes on.
+        self._drawing = futures.ThreadPoolExecutor(1, thread_name_prefix="chilopod recordings")
+        self._handing_out: list[futures.Future[None]] = []
+        self._over, self._ended = threading.Event(), threading.Event()
         self._theory = Theory()
         self._growth: Growth | None = None
         self._wants_record: viser.ClientHandle | None = None
         self.frames, self.busy, self._told = 0, 0.0, False
-        self._server = _server(host, port)
+        self.gate = Gate(host, token)
+        free = _free_port(host, port)
+        with _quiet():
+            self._server = self.gate.open(free)
         self._beside = Beside(engine)
         try:
             # The first steps ever are compiled, which takes a while: better before anybody looks.
@@ -110,9 +125,8 @@ class Live:
         except BaseException:
             self.close()
             raise
-        self.address = f"http://{'localhost' if host in _LOCAL else host}:{self._server.get_port()}"
+        self.address = self.gate.link(self._server.get_port())
         self.failure: BaseException | None = None
-        self._over = threading.Event()
         self._thread = threading.Thread(target=self._run, name="chilopod walk", daemon=True)
         self._thread.start()
 
@@ -129,6 +143,7 @@ class Live:
         panel.set_width(300)
         self._view.pins.on_drag("left")(self._dragged)
         server.scene.on_click()(self._clicked)
+        server.on_client_connect(self._send_undelivered)
 
     def wish(self, wish: wishes.Wish) -> None:
         """Want something of the walk, from any thread, as if somebody had done it at the page."""
@@ -144,25 +159,27 @@ class Live:
             If it failed.
         """
         end = math.inf if seconds is None else time.monotonic() + seconds
-        while self._thread.is_alive() and time.monotonic() < end:
-            self._thread.join(min(0.5, max(0.0, end - time.monotonic())))
+        # Not by joining the thread: Ctrl-C within a join that has a limit leaves a thread that counts as ended.
+        while not self._ended.wait(min(0.5, max(0.0, end - time.monotonic()))) and time.monotonic() < end:
+            pass
         if self.failure is not None:
             raise self.failure
 
     def close(self) -> None:
         """End everything; a recording that is under way is kept."""
-        over = getattr(self, "_over", None)
-        if over is not None:
-            over.set()
-            self._session.box.wake()
-            self._thread.join()
-            self._session.stop_recording()
-            self._keep()
-            for each in self._handing_out:
-                each.join()
-        self._beside.close()
-        with _quiet():
-            self._server.stop()
+        self._over.set()
+        try:
+            if hasattr(self, "_thread"):
+                self._session.box.wake()
+                self._ended.wait()
+                self._session.stop_recording()
+                self._keep()
+                futures.wait(self._handing_out)
+        finally:
+            self._drawing.shutdown()
+            self._beside.close()
+            with _quiet():
+                self._server.stop()
 
     # -- the thread of the walk
     # ---------------------------------------------------------------------------------------------------------------
@@ -173,6 +190,8 @@ class Live:
         except BaseException as error:
             self.failure = error
             self._at_server(partial(self._controls.fail, in_words(error)))
+        finally:
+            self._ended.set()
 
     def _walk(self) -> None:
         session, last, plotted, walked = self._session, time.perf_counter(), -math.inf, _Rate()
@@ -277,11 +296,9 @@ class Live:
     def _keep(self) -> None:
         for record in self._session.records():
             self._recordings += 1
-            name, to = f"chilopod-live-{self._recordings}", self._wants_record
-            # Drawing a replay of minutes takes a moment, and the walk goes on.
-            thread = threading.Thread(target=self._hand_out, args=(name, record, to), name=name)
-            self._handing_out = [each for each in self._handing_out if each.is_alive()] + [thread]
-            thread.start()
+            name = f"chilopod-live-{self._recordings}"
+            self._handing_out = [each for each in self._handing_out if not each.done()]
+            self._handing_out.append(self._drawing.submit(self._hand_out, name, record, self._wants_record))
 
     def _hand_out(self, name: str, record: xr.Dataset, to: viser.ClientHandle | None) -> None:
         from chilopod.report import replay
@@ -293,6 +310,8 @@ class Live:
                 self._kept(name, content, page)
             except ChilopodError as error:
                 self._at_server(partial(self._notify, str(error)))
+        elif self._over.is_set() or not self._server.get_clients():
+            self.undelivered.append((name, content, page))
         self._at_server(partial(self._send, name, content, page, to))
 
     def _send(self, name: str, content: bytes, page: str, to: viser.ClientHandle | None) -> None:
@@ -302,6 +321,11 @@ class Live:
         for client in clients.values():
             client.send_file_download(f"{name}.nc", content, save_immediately=True)
             client.send_file_download(f"{name}.html", page.encode(), save_immediately=True)
+
+    async def _send_undelivered(self, client: viser.ClientHandle) -> None:
+        """Give a browser what was recorded while there was none."""
+        while self.undelivered and not self._over.is_set():
+            self._send(*self.undelivered.pop(0), client)
 
     # -- what browsers do in the picture; these only leave wishes
     # ---------------------------------------------------------------------------------------------------------------
@@ -358,8 +382,8 @@ def _quiet() -> contextlib.AbstractContextManager[object]:
     return contextlib.redirect_stdout(io.StringIO())
 
 
-def _server(host: str, port: int) -> viser.ViserServer:
-    """Of browsers; one that listens where it was told to, and nowhere else."""
+def _free_port(host: str, port: int) -> int:
+    """Make sure that the page can listen at a port, and nowhere else."""
     if not 0 <= port < 65536:
         raise ParameterError("is no port", field="port", value=port, allowed="1 to 65535, or 0 for any that is free")
     try:
@@ -367,15 +391,11 @@ def _server(host: str, port: int) -> viser.ViserServer:
         with socket.socket(family, socket.SOCK_STREAM) as trial:
             trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             trial.bind(address)
-            free = trial.getsockname()[1]
-    except socket.gaierror as error:
+            free: int = trial.getsockname()[1]
+            return free
+    except (socket.gaierror, UnicodeError) as error:
         raise ParameterError("is no address of this machine", field="host", value=host) from error
     except OSError as error:
         raise ParameterError(
             f"cannot be listened at: {error.strerror}", field="port", value=port, allowed="another --port, or 0"
         ) from error
-    with _quiet():
-        server = viser.ViserServer(host=host, port=free, label="chilopod live", verbose=False)
-    # Of what viser can do for anybody who asks: put the page on the internet by way of somebody else's server.
-    server.request_share_url = lambda verbose=True: None  # type: ignore[method-assign]
-    return server

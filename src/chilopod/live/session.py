@@ -45,6 +45,8 @@ _START = Disturbance()  # of joints and heading at the start, as in trials
 _STRONGEST = 1.0  # rad by which a pull turns a joint, held by its spring
 _RATE = 20.0  # Hz, of what is written down
 _LONGEST = 900.0  # s of it in one piece
+_MOST_RECORDS = 100  # of a session
+_MOST_BYTES = 1 << 29  # of all of them, before they are packed
 _MOST_WORDS = 4
 
 
@@ -86,6 +88,7 @@ class Session:
         )
         self.law: RadiusLaw | None = None
         self._records: list[xr.Dataset] = []
+        self._recorded, self._bytes = 0, 0
         self._said: deque[str] = deque(maxlen=_MOST_WORDS)
         self._begin()
 
@@ -124,6 +127,7 @@ class Session:
             self._turning(),
             self._pull.copy(),
             self._target,
+            self._steering,
             self._walk.states()[0],
         )
 
@@ -193,6 +197,7 @@ class Session:
         )
         self._before, self._reached = 0.0, 0.0
         self._target: tuple[float, float] | None = None
+        self._steering = ""
         self._controller: Controller | None = None
         self._nudge, self._pull, self._pulled_until = np.zeros(joints), np.zeros(joints), np.zeros(joints)
         self._start(robot, states)
@@ -200,6 +205,9 @@ class Session:
         self._bends: deque[float] = deque(maxlen=LOOKS + 1)
 
     def _start(self, robot: Robot, states: Array) -> None:
+        if self._settings.recording and not self._may_record:
+            self._settings = replace(self._settings, recording=False)
+            self._said.append(f"recording has ended: there is room for no more than the {self._recorded} so far")
         self._written = self._has_record = self._settings.recording
         self._walk: Walk = self._engine.start(
             [robot],
@@ -259,8 +267,14 @@ class Session:
 
     def _keep_record(self) -> None:
         if self._written and self._walk.time > 0.0:
-            self._records.append(self._walk.to_dataset())
+            record = self._walk.to_dataset()
+            self._recorded, self._bytes = self._recorded + 1, self._bytes + record.nbytes
+            self._records.append(record)
         self._written = False
+
+    @property
+    def _may_record(self) -> bool:
+        return self._recorded < _MOST_RECORDS and self._bytes < _MOST_BYTES
 
     def _push(self) -> None:
         # Who drives the joints would take the nudges back at once.
@@ -276,7 +290,7 @@ class Session:
 
     def _let_go(self) -> None:
         """Walk nowhere in particular, with the springs as they are set and straight legs."""
-        self._target, self._controller = None, None
+        self._target, self._controller, self._steering = None, None, ""
         self._walk.aim((np.nan, np.nan))
         self._walk.command(Command(leg_yaw=[(0.0, 0.0)], within=self._period))
         self._set_springs()
@@ -348,6 +362,7 @@ class Session:
         as_within("target", math.hypot(x, y), (0.0, FARTHEST), "m from where the walk began")
         strategy = as_strategy(self._settings.strategy)
         controller: Controller | None = LegYawController()
+        steering = LEG_YAW.name
         if strategy is not LEG_YAW:
             if self.law is None:
                 self._said.append(
@@ -355,9 +370,10 @@ class Session:
                 )
             else:
                 controller = driver(self._settings.robot, strategy, engine=self._engine_name, law=self.law).controller
+                steering = strategy.name
         if self._target is not None:
             self._let_go()
-        self._target, self._controller = (x, y), controller
+        self._target, self._controller, self._steering = (x, y), controller, steering
         self._reached = self._before + self._walk.time
         self._walk.aim(self._target)
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from chilopod.engine import Status
 from chilopod.errors import ParameterError
+from chilopod.live.wishes import LARGEST_SEED
 from chilopod.robot import Robot
 from chilopod.steering import ACTUATED, STRATEGIES, VARIABLE, Strategy, strategy_named
 
@@ -58,6 +59,8 @@ class Seen:
         Torques by which somebody pulls at joints, N*m, (N-1,).
     target
         Where to, m; None: nowhere.
+    steering
+        Name of the strategy that steers there, which is leg yaw while those of springs are not known; else empty.
     state
         As ``initial`` of the engine's ``start`` takes it, (n,).
     """
@@ -74,6 +77,7 @@ class Seen:
     turning: float
     pulled: Array
     target: tuple[float, float] | None
+    steering: str
     state: Array
 
     @property
@@ -120,7 +124,7 @@ def as_strategy(name: str) -> Strategy:
 
 
 def as_seed(seed: object) -> int:
-    """A whole number, 0 or more, typed as it may be.
+    """A whole number, 0 to :data:`chilopod.live.wishes.LARGEST_SEED`, typed as it may be.
 
     Raises
     ------
@@ -128,8 +132,9 @@ def as_seed(seed: object) -> int:
         If it is not.
     """
     number = as_finite("seed", seed)
-    if number < 0.0 or number != int(number):
-        raise ParameterError("is no seed", field="seed", value=seed, allowed="a whole number, 0 or more")
+    if number != int(number) or not 0 <= number <= LARGEST_SEED:
+        allowed = f"a whole number, 0 to {LARGEST_SEED}"
+        raise ParameterError("is no seed", field="seed", value=seed, allowed=allowed)
     return int(number)
 
 
@@ -141,9 +146,13 @@ def as_finite(field: str, value: object) -> float:
     ParameterError
         If it is not, naming the field.
     """
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    try:
+        number = math.nan if isinstance(value, bool) or not isinstance(value, int | float) else float(value)
+    except OverflowError:  # an int may have any number of digits
+        number = math.inf
+    if not math.isfinite(number):
         raise ParameterError("is no number", field=field, value=value, allowed="a finite number")
-    return float(value)
+    return number
 
 
 def as_within(field: str, value: object, limits: tuple[float, float], unit: str) -> float:

@@ -7,6 +7,9 @@ import threading
 from collections.abc import Hashable
 from dataclasses import dataclass
 
+LARGEST_SEED = 2**53 - 1
+"""Largest whole number that a browser holds exactly."""
+
 
 @dataclass(frozen=True)
 class Wish:

@@ -47,13 +47,25 @@ def sentences(seen: Seen, settings: Settings, theory: Theory, growth: Growth | N
     if seen.target is not None:
         x, y = seen.target
         away = math.hypot(x - seen.pose[0], y - seen.pose[1])
-        said.append(f"On its way to the target, {away:.2f} m off, with the strategy {settings.strategy}.")
+        said.append(f"On its way to the target, {away:.2f} m off, with the strategy {seen.steering}.")
+        said += _held(seen, settings)
     if seen.pulled.any():
         joints = ", ".join(str(joint + 1) for joint in np.flatnonzero(seen.pulled))
         who = f"Joint {joints} is" if len(joints) == 1 else f"Joints {joints} are"
         return [*said, f"{who} pulled aside, and it walks {_arc(seen)} as long as that lasts."]
+    if seen.target is not None:
+        # Who steers makes the curve, not the spring: what the straight or the curved walk would do is not to be seen.
+        return [*said, f"Steered, it walks {_arc(seen)}."]
     said.append(_bend(seen, theory, growth if growth is not None and growth.robot == settings.robot else None))
     return said
+
+
+def _held(seen: Seen, settings: Settings) -> list[str]:
+    """The first spring as the strategy has it, where the slider shows another one."""
+    here, set_to = (spring_text(float(each)) for each in (seen.stiffness[0], settings.robot.springs.stiffness[0]))
+    if here == set_to:
+        return []
+    return [f"The strategy has the first spring at {here} now; yours, {set_to}, is back when the target is let go."]
 
 
 def _bend(seen: Seen, theory: Theory, growth: Growth | None) -> str:
@@ -65,7 +77,8 @@ def _bend(seen: Seen, theory: Theory, growth: Growth | None) -> str:
     if k1 >= theory.pitchfork:
         stiff = f"its first spring, {spring_text(k1)}, is stiffer than {fork}"
         if bent:
-            return f"The curve of {radius:.2f} m straightens: {stiff}."
+            now = "straightens" if seen.turning < 0.0 else "will straighten"
+            return f"The curve of {radius:.2f} m {now}: {stiff}."
         fades = f", and what disturbs it fades by {_percent(growth)} a second" if growth and growth.rate < 0.0 else ""
         return f"Straight and stable: {stiff}{fades}."
     soft = f"Past the pitchfork: its first spring, {spring_text(k1)}, is softer than {spring_text(theory.pitchfork)}"
@@ -79,8 +92,16 @@ def _bend(seen: Seen, theory: Theory, growth: Growth | None) -> str:
         return (
             f"{soft}: the straight walk is unstable, and the smallest bend grows{speed}, to {settled:.2f} m in the end."
         )
-    moves = "tightens" if seen.turning > 0.0 else "widens"
-    return f"{soft}. The curve, {radius:.2f} m to the {side}, {moves} towards the branch's {settled:.2f} m."
+    return f"{soft}. The curve, {radius:.2f} m to the {side}, {_moving(radius, settled, seen)}."
+
+
+def _moving(radius: float, settled: float, seen: Seen) -> str:
+    """Where a curve is and where it goes, which need not be the same way: a bend overshoots, and sways."""
+    moves, towards = "tightens" if seen.turning > 0.0 else "widens", "tightens" if radius > settled else "widens"
+    if seen.turning and moves == towards:
+        return f"{moves} towards the branch's {settled:.2f} m"
+    than = f"is {'wider' if radius > settled else 'tighter'} than the branch's {settled:.2f} m"
+    return f"{than}, and {moves} just now" if seen.turning else than
 
 
 def _side(seen: Seen) -> str:

@@ -1,0 +1,301 @@
+"""Who may open the page, and what a browser may say: viser's server, behind a look at every request and message.
+
+viser answers whoever asks, and sets any attribute that a message names. It listens by ``websockets``; here it does so
+by ours, which asks a :class:`Gate` first. All that is used of viser beside its documented interface is in this module.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import dataclasses
+import hashlib
+import hmac
+import ipaddress
+import logging
+import re
+import reprlib
+import secrets
+import socket
+import threading
+from functools import cache, partial
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+import msgspec
+import viser
+import websockets
+import zstandard
+from viser import _messages
+from viser.infra import _infra
+from websockets.asyncio.server import ServerConnection, serve
+from websockets.http11 import Request, Response
+
+_LARGEST = 16_384  # bytes of a message; those of viser's client have a few hundred
+_RATE = 200.0  # messages a second from one browser; one that drags sends 60
+_AT_ONCE = 1.0  # s of messages that may come at once
+_MOST = 250  # browsers
+_FARTHEST = 1e16  # in any unit, of any number; seeds go up to 9e15
+_LONGEST = 200  # characters of any text
+_LOG = logging.getLogger("chilopod.live")
+_PATCHING = threading.Lock()
+_HOST = re.compile(r"([a-z0-9._-]+|\[[0-9a-f:.]+\])(:\d+)?", re.IGNORECASE)
+_KINDS: dict[str, Any] = {
+    each.__name__: each
+    for each in (
+        *(_messages.ViewerCameraMessage, _messages.ScenePointerMessage, _messages.SceneNodeDragMessage),
+        *(_messages.GuiUpdateMessage, _messages.CommandTriggerMessage),
+    )
+}
+_HEADERS = {
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cache-Control": "no-store",
+}
+
+
+class Gate:
+    """Checks of every request and message at an address (`host`); ``refused`` counts those that failed.
+
+    A browser says by Host which name it looked up, and by Origin which page sends it. On this machine's own addresses
+    Host is one of their names, so that a name that leads here later is refused (DNS rebinding), and Origin is the page
+    itself; a handshake without Origin comes from no browser, and is refused. Programs can say what they like: at other
+    addresses, or where wanted (`token`), they need a token. It comes with the link, and stays in a cookie.
+    """
+
+    def __init__(self, host: str, token: bool = False) -> None:
+        self._host, self._local = host, _is_local(host)
+        self._token = None if self._local and not token else secrets.token_urlsafe(24)
+        self.refused = 0
+        self._serves = False
+        self._viser: viser.ViserServer | None = None
+
+    def link(self, port: int) -> str:
+        """Link to the page, with the token if one is wanted."""
+        everywhere = self._host in ("0.0.0.0", "::")
+        host = "localhost" if self._local else socket.gethostname() if everywhere else self._host
+        address = f"http://{f'[{host}]' if ':' in host else host}:{port}"
+        return address if self._token is None else f"{address}/?token={self._token}"
+
+    def open(self, port: int) -> viser.ViserServer:
+        """Listen at a free port; not at all with a viser that listens in another way, and would ask nobody."""
+        ours = SimpleNamespace(asyncio=SimpleNamespace(server=SimpleNamespace(serve=self._serve)))
+        ours.exceptions, ours.datastructures = websockets.exceptions, websockets.datastructures
+        with _PATCHING:
+            names = vars(_infra)
+            theirs, names["websockets"] = names["websockets"], ours
+            try:
+                server = viser.ViserServer(host=self._host, port=port, label="chilopod live", verbose=False)
+            finally:
+                names["websockets"] = theirs
+        if not self._serves:
+            server.stop()
+            raise RuntimeError(f"the page cannot be guarded with viser {viser.__version__}")
+        self._viser = server
+        return server
+
+    def _serve(self, handler: Any, *where: Any, process_request: Any, **how: Any) -> Any:
+        self._serves = True
+        how |= {"max_size": _LARGEST, "create_connection": partial(_Guarded, self)}
+        return serve(handler, *where, process_request=partial(self._answer, process_request), **how)
+
+    # -- requests
+    # ---------------------------------------------------------------------------------------------------------------
+
+    def _answer(self, answer: Any, connection: ServerConnection, request: Request) -> Response | None:
+        host = _only(request.headers.get_all("Host")) or ""
+        why = self._unwelcome(connection, request, host)
+        response: Response | None
+        if why:
+            self._refuse(f"a request {why}")
+            response, host = connection.respond(403, f"chilopod live refuses a request {why}.\n"), ""
+        else:
+            try:
+                response = answer(connection, request)
+            except (ValueError, OSError, LookupError):  # a path or a header that is none
+                response = connection.respond(400, "chilopod live cannot read this request.\n")
+        if response is not None:
+            response.headers.update(_HEADERS, **{"Content-Security-Policy": _policy(host)})
+            if self._token is not None and not why:
+                cookie = f"{_cookie(connection)}={self._token}"
+                response.headers["Set-Cookie"] = f"{cookie}; HttpOnly; SameSite=Strict; Path=/"
+        return response
+
+    def _unwelcome(self, connection: ServerConnection, request: Request, host: str) -> str | None:
+        """Why somebody may not come in."""
+        headers, origin = request.headers, _only(request.headers.get_all("Origin"))
+        if not _HOST.fullmatch(host) or (self._local and host.lower() not in self._names(connection)):
+            return f"for another host than this page's, {ascii(host)[:80]}"
+        if origin not in (None, f"http://{host}"):
+            return f"from another page, {ascii(origin)[:80]}"
+        if self._token is not None and not self._has_token(connection, request):
+            return "without the token: open the link that chilopod printed"
+        if "websocket" not in ",".join(headers.get_all("Upgrade")).lower():
+            return None
+        if origin is None:
+            return "that does not say from which page it comes"
+        if headers.get_all("Sec-WebSocket-Protocol") != [f"viser-v{viser.__version__}"]:
+            return "from another version of the page: reload it"
+        crowd = self._viser is None or len(self._viser._websock_server._live_connections) >= _MOST
+        return "while there are too many browsers" if crowd else None
+
+    def _names(self, connection: ServerConnection) -> set[str]:
+        port = connection.local_address[1]
+        own = f"[{self._host}]" if ":" in self._host else self._host
+        names = {"127.0.0.1", "localhost", "[::1]", own.lower()}
+        return {f"{name}:{port}" for name in names} | (names if port == 80 else set())
+
+    def _has_token(self, connection: ServerConnection, request: Request) -> bool:
+        try:
+            shown = parse_qs(urlsplit(request.path).query, max_num_fields=20).get("token", [])
+            for cookie in ";".join(request.headers.get_all("Cookie")).split(";"):
+                name, _, value = cookie.strip().partition("=")
+                shown += [value] if name == _cookie(connection) else []
+            return any(hmac.compare_digest(each.encode(), str(self._token).encode()) for each in shown)
+        except ValueError:  # a path or a text that is none
+            return False
+
+    def _refuse(self, what: str) -> None:
+        self.refused += 1
+        if self.refused == 1:
+            _LOG.warning("the page refused %s; what else it refuses is only counted", what)
+
+    # -- messages
+    # ---------------------------------------------------------------------------------------------------------------
+
+    def message(self, connection: ServerConnection, raw: Any) -> bytes | None:
+        """What was checked of a message, written down anew for viser to read; None if it is refused."""
+        read: Any = None
+        try:
+            read = msgspec.msgpack.decode(raw)
+            kind = _KINDS[read["type"]]
+            fields = {"type", *(each.name for each in dataclasses.fields(kind))}
+            # Types are those that viser gives; any float is one of them.
+            offered = (
+                fields.issuperset(read) and _bounded(read) and self._offers(connection, msgspec.convert(read, kind))
+            )
+        except (ValueError, TypeError, LookupError, RecursionError):
+            offered = False
+        if not offered:
+            self._refuse(f"a message, {reprlib.repr(read)!a}")
+        return msgspec.msgpack.encode(read) if offered else None
+
+    def _offers(self, connection: ServerConnection, message: Any) -> bool:
+        """Whether the page has what a message is about."""
+        server = self._viser
+        assert server is not None
+        there = list(server._websock_server._live_connections.items())
+        here = server.get_clients().get(next((number for number, each in there if each is connection), -1))
+        scopes = [server.gui] if here is None else [server.gui, here.gui]
+        match message:
+            case _messages.ScenePointerMessage(event_type=event, ray_origin=start, ray_direction=ray, screen_pos=at):
+                return event == "click" and start is not None and ray is not None and len(at) == 1
+            case _messages.SceneNodeDragMessage(name=name, instance_index=part):
+                node: Any = server.scene.get_handle_by_name(name)
+                return bool(node and node._impl.drag_cb) and part in range(len(node.batched_positions))
+            case _messages.GuiUpdateMessage(uuid=uuid, updates=updates):
+                handles = [scope._gui_input_handle_from_uuid.get(uuid) for scope in scopes]
+                return [*updates] == ["value"] and any(each and _takes(each, updates["value"]) for each in handles)
+            case _messages.CommandTriggerMessage(uuid=uuid):
+                keys = [scope._command_handle_from_uuid.get(uuid) for scope in scopes]
+                return any(key and not key.disabled for key in keys)
+        return isinstance(message, _messages.ViewerCameraMessage)
+
+
+class _Guarded(ServerConnection):
+    """A browser's connection that gives viser nothing but what the gate lets through, and not too fast."""
+
+    def __init__(self, gate: Gate, *args: Any, **more: Any) -> None:
+        super().__init__(*args, **more)
+        self._gate, self._due = gate, 0.0
+
+    async def recv(self, *args: Any, **more: Any) -> Any:
+        while True:
+            raw = await super().recv(*args, **more)
+            now = self.loop.time()
+            self._due = max(self._due + 1.0 / _RATE, now - _AT_ONCE)
+            if self._due > now:
+                await asyncio.sleep(self._due - now)
+            message = self._gate.message(self, raw)
+            if message is not None:
+                return message
+
+
+def _bounded(value: Any) -> bool:
+    """Whether all numbers are finite and no text is long."""
+    if isinstance(value, dict):
+        return _bounded([*value.keys(), *value.values()])
+    if isinstance(value, list):
+        return all(map(_bounded, value))
+    if isinstance(value, str):
+        return len(value) <= _LONGEST
+    return value is None or abs(value) <= _FARTHEST
+
+
+def _takes(handle: Any, value: Any) -> bool:
+    """Whether an element can be set to a value by hand."""
+    if handle.disabled or not handle.visible:
+        return False
+    if isinstance(handle, viser.GuiCheckboxHandle):
+        return isinstance(value, bool)
+    if isinstance(handle, viser.GuiButtonHandle):
+        return value is True
+    if isinstance(handle, viser.GuiDropdownHandle):
+        return value in handle.options
+    if not isinstance(handle, viser.GuiSliderHandle | viser.GuiNumberHandle) or None in (handle.min, handle.max):
+        return False
+    is_number = isinstance(value, int if isinstance(handle.value, int) else int | float)
+    return is_number and not isinstance(value, bool) and handle.min <= value <= handle.max
+
+
+def _is_local(host: str) -> bool:
+    """Whether an address is this machine's own, which nobody else reaches."""
+    try:
+        return host == "localhost" or ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def _cookie(connection: ServerConnection) -> str:
+    return f"chilopod-{connection.local_address[1]}"  # cookies are those of all ports
+
+
+def _only(values: list[str]) -> str | None:
+    """The value of a header; an empty one, which nothing is, if there are several."""
+    return values[0] if len(values) == 1 else "" if values else None
+
+
+def _policy(host: str) -> str:
+    """What a page may load and who may frame it: its own two scripts, and nothing from elsewhere."""
+    return (
+        f"default-src 'none'; script-src {_scripts()} 'wasm-unsafe-eval'; worker-src blob:; "
+        "style-src 'unsafe-inline'; img-src data: blob:; font-src data:; "
+        f"connect-src 'self' data: blob: {f'ws://{host}' if host else ''}; "
+        "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    )
+
+
+@cache
+def _scripts() -> str:
+    """Hashes of viser's two scripts: one that unpacks, and what it unpacks from five digits of 88 for four bytes."""
+    page = (Path(viser.__file__).parent / "client" / "build" / "index.html").read_text(encoding="utf-8")
+    digits = {digit: place for place, digit in enumerate(sorted({*map(chr, range(33, 127))} - {*"\"&'<>`"}))}
+    packed = bytearray()
+    try:
+        ((text, styles, unpacking),) = re.findall(
+            r'<script data-p="([^"]*)" data-ss="(\d+)"[^>]*>(.*?)</script>', page, re.DOTALL
+        )
+        for start in range(0, len(text), 5):
+            number, five = 0, text[start : start + 5]
+            for digit in five:
+                number = 88 * number + digits[digit]
+            packed += number.to_bytes(5, "big")[1 - len(five) :]
+        code = zstandard.ZstdDecompressor().decompress(packed)[int(styles) :]
+    except (ValueError, LookupError, zstandard.ZstdError):
+        return "'unsafe-inline'"  # the page is made otherwise
+    hashes = (hashlib.sha256(each).digest() for each in (unpacking.encode(), code))
+    return " ".join(f"'sha256-{base64.b64encode(each).decode()}'" for each in hashes)
