@@ -42,6 +42,7 @@ def batches(trials: Sequence[Trial], on_cores: int | None = None) -> list[list[T
             trial.recording,
             _sight(trial),
             json.dumps(trial.steering, sort_keys=True),
+            trial.code,
             # Whether its sensors are noisy is said once for a batch.
             trial.disturbance.bearing > 0.0,
             trial.brief,

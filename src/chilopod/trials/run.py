@@ -12,6 +12,7 @@ from chilopod.output import check_room
 from chilopod.progress import Progress, silent
 from chilopod.record import check_memory
 from chilopod.trials.batch import batches
+from chilopod.trials.description import meanwhile_unchanged
 from chilopod.trials.executors import Executor, current
 from chilopod.trials.sharing import alone, shared
 from chilopod.trials.store import Store
@@ -53,8 +54,9 @@ def run(
     OutputError
         If the folder has no room for them.
     """
+    trials = _as_now(trials)
     check_fits(trials)
-    records = {trial.file_name: record for trial, record in run_each(trials, folder, progress, executor)}
+    records = {trial.file_name: record for trial, record in _each(trials, folder, progress, executor)}
     return [records[trial.file_name] for trial in trials]
 
 
@@ -83,6 +85,12 @@ def run_each(
     trials, folder, progress, executor
         As for :func:`run`.
     """
+    yield from _each(_as_now(trials), folder, progress, executor)
+
+
+def _each(
+    trials: Sequence[Trial], folder: str | Path | None, progress: Progress, executor: Executor | None
+) -> Iterator[tuple[Trial, xr.Dataset]]:
     store = None if folder is None else Store(folder)
     asked = {trial.file_name: trial for trial in trials}
     missing = []
@@ -105,6 +113,14 @@ def run_each(
         words = f"{done} of {len(asked)} trials{executor.words}"
         progress(done / len(asked), f"{words}, {elsewhere} walked by another process" if elsewhere else words)
     progress(1.0, f"{len(asked)} trials")
+
+
+def _as_now(trials: Sequence[Trial]) -> list[Trial]:
+    found = [trial.as_now() for trial in trials]
+    with meanwhile_unchanged():
+        for trial in found:
+            trial.file_name  # noqa: B018  (from here on it is known what each is)
+    return found
 
 
 def together(records: Sequence[xr.Dataset]) -> xr.Dataset:
