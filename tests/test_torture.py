@@ -19,6 +19,7 @@ SHORT = {
     "trials": (run.SavedTrials(quick=True), 15),
     "same-bits": (run.SameBits(), 6),
     "invariances": (run.Invariances(), 8),
+    "edited-controllers": (run.EditedControllers(), 8),
 }
 
 
@@ -71,6 +72,11 @@ def test_it_finds_records_that_depend_on_the_batch(tmp_path, monkeypatch):
 
     monkeypatch.setattr(chilopod.tasks, "walk", depending)
     assert Kind.WRONG in {kind for kind, _, _ in attacked("same-bits", tmp_path, 3)}
+
+
+def test_it_finds_edited_controllers_that_are_the_old_ones(tmp_path, monkeypatch):
+    monkeypatch.setattr("chilopod.trials.reach.Reach._parts", lambda *_: iter(()))
+    assert Kind.WRONG in {kind for kind, _, _ in attacked("edited-controllers", tmp_path, 5)}
 
 
 @pytest.mark.parametrize(

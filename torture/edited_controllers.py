@@ -111,8 +111,11 @@ PLACES: dict[str, tuple[str, str, str]] = {
         "gain = Gain(V)",
         "self.gain",
     ),
-    "__getattr__": ("", "def __getattr__(self, name):\n        if name == 'gain': return V\n"
-                    "        raise AttributeError", "self.gain"),
+    "__getattr__": (
+        "",
+        "def __getattr__(self, name):\n        if name == 'gain': return V\n        raise AttributeError",
+        "self.gain",
+    ),
     "after it was made": ("", "def __post_init__(self): object.__setattr__(self, '_gain', V)", "self._gain"),
     "default of a field": ("", "gain: float = V", "self.gain"),
     "factory of a field": ("", "gain: tuple = field(default_factory=lambda: (V,))", "self.gain[0]"),
@@ -140,7 +143,7 @@ class EditedControllers:
     """One number of a controller, somewhere in what its code reaches; the controller is imported anew."""
 
     name = "edited-controllers"
-    per_minute = 1500
+    per_minute = 600
 
     def attack(self, chance: Random, place: Place) -> Outcome:
         """One edit."""
@@ -189,7 +192,7 @@ def _described(where: str, value: str, folder: Path) -> tuple[str, str, float]:
         return name, why, float(own.Own().act(None, None).leg_yaw[0][0])
 
 
-class _imported:  # noqa: N801
+class _imported:
     """The modules in a folder, imported anew and forgotten at the end."""
 
     def __init__(self, folder: Path) -> None:

@@ -21,6 +21,7 @@ from pathlib import Path
 
 from arguments import Arguments
 from disks import Disks
+from edited_controllers import EditedControllers
 from environments import Environments
 from invariances import Invariances
 from kills import Kills
@@ -35,7 +36,7 @@ from workers import Attacks, tried
 RESULTS = Path(__file__).with_name("results.json")
 _KINDS = (
     *(RobotFiles, Arguments, SavedTrials, SavedBranches, Kills, Disks, Streams, Environments),
-    *(SameBits, Invariances),
+    *(SameBits, Invariances, EditedControllers),
 )
 CLASSES: dict[str, Callable[[], Attacks]] = {each.name: each for each in _KINDS}
 _SHOWN = 12  # different faults of a class that are printed

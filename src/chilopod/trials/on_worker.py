@@ -14,8 +14,9 @@ from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 from chilopod.cores import use_at_most
+from chilopod.engine.named import path_of
 from chilopod.errors import ClusterError, ParameterError, one_line
-from chilopod.trials.trial import RECORD_VERSION
+from chilopod.sources import digest
 
 if TYPE_CHECKING:
     from chilopod.trials.trial import Trial
@@ -26,14 +27,15 @@ PACKAGES = ("chilopod", "numpy", "numba")
 TWIN_PACKAGE = "mujoco-core"
 """That has to be where there are trials of the twin."""
 
-_RECORDS = "version of records"
+_SOURCES = "source code of chilopod"
+_DIGITS = 12  # of a digest, in an error
 _ONE_AT_A_TIME = threading.Lock()
 _PR_SET_PDEATHSIG = 1  # of prctl(2)
 
 
 def versions(packages: Sequence[str] = (*PACKAGES, TWIN_PACKAGE)) -> dict[str, str]:
     """Of what makes a record what it is, in this process."""
-    found = {_RECORDS: str(RECORD_VERSION)}
+    found = {_SOURCES: digest()[:_DIGITS]}
     for package in packages:
         try:
             found[package] = metadata.version(package)
@@ -66,12 +68,14 @@ def packed(batch: Sequence[Trial]) -> bytes:
     """
     for trial in batch:
         trial.check_findable()
+        if trial.code[1]:
+            raise ParameterError(trial.not_kept(trial.code[1]), field="cluster", allowed="to walk them on this machine")
     packages = (*PACKAGES, TWIN_PACKAGE) if batch[0].engine == "twin" else PACKAGES
     try:
         trials = pickle.dumps(list(batch), pickle.HIGHEST_PROTOCOL)
     except Exception as error:  # whatever a class of one's own does
         raise _not_importable(batch[0].controller, error) from error
-    return pickle.dumps((versions(packages), trials), pickle.HIGHEST_PROTOCOL)
+    return pickle.dumps((versions(packages), [trial.text for trial in batch], trials), pickle.HIGHEST_PROTOCOL)
 
 
 def walked_there(job: bytes, place: str) -> bytes:
@@ -111,17 +115,23 @@ def dask_setup(worker: object) -> None:
 
     with suppress(ValueError):  # only the main thread may say so
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+    sys.stdout = sys.stderr  # what a controller prints there is no result
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def _walked(job: bytes, place: str) -> Any:
-    expected, packed_trials = pickle.loads(job)
-    check_versions(expected, versions(tuple(name for name in expected if name != _RECORDS)), place)
+    expected, texts, packed_trials = pickle.loads(job)
+    check_versions(expected, versions(tuple(name for name in expected if name != _SOURCES)), place)
     try:
         trials = pickle.loads(packed_trials)
     except Exception as error:  # whatever somebody else's module does when it is imported
         raise _not_importable(None, error) from error
+    for trial, text in zip(trials, texts, strict=True):
+        if trial.text != text:
+            own = [f"engine {trial.engine}"] * (":" in trial.engine) + [path_of(type(trial.controller))]
+            problem = f"the code of {' or '.join(own)}, or of what it imports, is another on a worker than here"
+            raise ClusterError(problem, field="cluster", value=place)
     import numba
     from distributed import get_worker
 

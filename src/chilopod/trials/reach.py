@@ -49,7 +49,7 @@ _GIVEN = frozenset(
     f"__{name}__"
     for name in (
         *("dict", "weakref", "doc", "firstlineno", "static_attributes", "annotations", "annotations_cache"),
-        *("annotate_func", "dataclass_fields", "dataclass_params", "orig_bases", "parameters"),
+        *("annotate_func", "slotnames", "dataclass_fields", "dataclass_params", "orig_bases", "parameters"),
     )
 ) | {"_abc_impl"}
 _MADE = frozenset(f"_{name}_" for name in ("member_names", "member_map", "value2member_map", "unhashable_values"))

@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterator, Sequence
 
 import xarray as xr
 
-from chilopod.trials.batch import batches
+from chilopod.errors import AnalysisError
+from chilopod.trials.batch import NOT_KEPT, batches
 from chilopod.trials.claims import Claims
 from chilopod.trials.executors import Executor
 from chilopod.trials.store import Store
@@ -22,6 +23,8 @@ _PATIENCE = 120.0  # s in which they have to be done with one trial; one that is
 def alone(share: Sequence[list[Trial]], executor: Executor) -> Iterator[tuple[Walked, int]]:
     """What :func:`shared` gives, where nothing is kept."""
     for walked in _walked(share, executor):
+        for _, record in walked:
+            record.attrs.pop(NOT_KEPT, None)
         yield walked, 0
 
 
@@ -66,7 +69,13 @@ def _walked(
                 yield mine
 
     for index, records in executor.walk(taken()):
-        yield list(zip(begun[index], records, strict=True))
+        walked = list(zip(begun[index], records, strict=True))
+        for trial, record in walked:
+            if record.attrs.get("trial") != trial.text:
+                raise AnalysisError(
+                    "gave the record of another trial, or one that other code walked", field=type(executor).__name__
+                )
+        yield walked
 
 
 class _Part:

@@ -160,7 +160,8 @@ class Trial:
         try:
             return code_of(self.controller) + sources_of(self.engine), ""
         except UnknownKindError as error:
-            return f"of this process {id(self.controller):x}", str(error)
+            can = "numbers, text, arrays, lists, dictionaries, enums, functions, classes and modules can"
+            return f"of this process {id(self.controller):x}", f"{error}, which cannot be described; {can}"
 
     def as_now(self) -> Trial:
         """The same trial, with code and fields of its controller as they are now."""
@@ -224,6 +225,11 @@ class Trial:
                     value=path,
                     allowed="what stands at the top of a module that can be imported, or trials without a folder",
                 )
+
+    def not_kept(self, why: str) -> str:
+        """A line for whoever wonders why a folder does not have this trial."""
+        who = f"engine {self.engine}" if self.controller is None else f"controller {path_of(type(self.controller))}"
+        return f"{who}: its trials walk and are not kept: {why}"
 
 
 def versions_of(engine: str) -> dict[str, Any]:
