@@ -20,6 +20,7 @@ SHORT = {
     "same-bits": (run.SameBits(), 6),
     "invariances": (run.Invariances(), 8),
     "edited-controllers": (run.EditedControllers(), 8),
+    "broken-engines": (run.BrokenEngines(), 2),
 }
 
 
@@ -77,6 +78,11 @@ def test_it_finds_records_that_depend_on_the_batch(tmp_path, monkeypatch):
 def test_it_finds_edited_controllers_that_are_the_old_ones(tmp_path, monkeypatch):
     monkeypatch.setattr("chilopod.trials.reach.Reach._parts", lambda *_: iter(()))
     assert Kind.WRONG in {kind for kind, _, _ in attacked("edited-controllers", tmp_path, 5)}
+
+
+def test_it_finds_broken_engines_that_are_believed(tmp_path, monkeypatch):
+    monkeypatch.setattr("chilopod.trials.batch.check_asked", lambda data, *asked: data)
+    assert Kind.WRONG in {kind for kind, _, _ in attacked("broken-engines", tmp_path, 6)}
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from arguments import Arguments
+from broken_engines import BrokenEngines
 from disks import Disks
 from edited_controllers import EditedControllers
 from environments import Environments
@@ -36,7 +37,7 @@ from workers import Attacks, tried
 RESULTS = Path(__file__).with_name("results.json")
 _KINDS = (
     *(RobotFiles, Arguments, SavedTrials, SavedBranches, Kills, Disks, Streams, Environments),
-    *(SameBits, Invariances, EditedControllers),
+    *(SameBits, Invariances, EditedControllers, BrokenEngines),
 )
 CLASSES: dict[str, Callable[[], Attacks]] = {each.name: each for each in _KINDS}
 _SHOWN = 12  # different faults of a class that are printed

@@ -117,6 +117,9 @@ def _steered(trials: Sequence[Trial], until: float) -> tuple[Walk, list[Drawn], 
         record=first.recording,
         expected=first.duration,
     )
+    if len(walk.robots) != len(trials):
+        problem = f"start gave a walk of {len(walk.robots)} robots instead of {len(trials)}"
+        raise AnalysisError(problem, field=f"engine {first.engine}")
     noise = None if own_noise or not asked else np.stack([each.bearing for each in drawn])
     missed = np.stack([each.missed for each in drawn])
     referee = CourseReferee(courses, first.robot.gait, missed if missed.any() else None) if courses else None
@@ -132,7 +135,7 @@ def _doubts(trial: Trial) -> str:
     if who not in _KNOWN:
         cycle = min(trial.robot.gait.period, trial.duration)
         one, other = (_steered([trial], cycle)[0].to_dataset() for _ in range(2))
-        if not one.identical(other):
+        if isinstance(one, xr.Dataset) and not one.identical(other):
             _KNOWN[who] = "it steers otherwise when it sees the same again (a clock, np.random, a count?)"
         elif trial.as_now().code != trial.code:
             _KNOWN[who] = "what its code can reach changes while it steers"
