@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import pickle
 import threading
+import time
 import traceback
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -97,7 +98,7 @@ def walked_there(job: bytes, place: str) -> bytes:
 
 
 def unpacked(answer: bytes) -> Any:
-    """The records that a worker sent, or what went wrong there."""
+    """The records that a worker sent, and how long it walked, s; or what went wrong there."""
     found = pickle.loads(answer)
     if isinstance(found, Exception):
         raise found
@@ -140,7 +141,9 @@ def _walked(job: bytes, place: str) -> Any:
     threads = get_worker().state.nthreads
     use_at_most(threads)
     numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
-    return walked(trials)
+    begun = time.monotonic()
+    records = walked(trials)
+    return records, time.monotonic() - begun
 
 
 def _not_importable(controller: object, error: Exception) -> ParameterError:

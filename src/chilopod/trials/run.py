@@ -103,11 +103,13 @@ def _each(
     if store:
         check_room(store.folder, sum(trial.least_bytes for trial in missing))
     executor = current() if executor is None else executor
-    share = executor.cut(batches(missing))
+    share = batches(missing)
     check_memory(_COPIES * max((sum(trial.least_bytes for trial in batch) for batch in share), default=0.0))
     done = len(asked) - len(missing)
     progress(done / max(len(asked), 1), f"{done} of {len(asked)} trials")
-    for walked, elsewhere in shared(missing, store, executor) if store and missing else alone(share, executor):
+    for walked, elsewhere in (
+        shared(missing, store, executor) if store and missing else alone(executor.cut(share), executor)
+    ):
         yield from walked
         done += len(walked)
         words = f"{done} of {len(asked)} trials{executor.words}"

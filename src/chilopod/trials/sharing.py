@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import xarray as xr
 
@@ -20,7 +20,7 @@ _LOOK = 0.2  # s between two looks whether other processes are done
 _PATIENCE = 120.0  # s in which they have to be done with one trial; one that is stopped never is
 
 
-def alone(share: Sequence[list[Trial]], executor: Executor) -> Iterator[tuple[Walked, int]]:
+def alone(share: Iterable[list[Trial]], executor: Executor) -> Iterator[tuple[Walked, int]]:
     """What :func:`shared` gives, where nothing is kept."""
     for walked in _walked(share, executor):
         for _, record in walked:
@@ -56,7 +56,7 @@ def shared(trials: Sequence[Trial], store: Store, executor: Executor) -> Iterato
 
 
 def _walked(
-    share: Sequence[list[Trial]], executor: Executor, free: Callable[[list[Trial]], list[Trial]] = list
+    share: Iterable[list[Trial]], executor: Executor, free: Callable[[list[Trial]], list[Trial]] = list
 ) -> Iterator[Walked]:
     """Batches of trials with their records; ``free`` says which of a batch are to be walked when it is begun."""
     begun: list[list[Trial]] = []
