@@ -93,27 +93,36 @@ def _each(
 ) -> Iterator[tuple[Trial, xr.Dataset]]:
     store = None if folder is None else Store(folder)
     asked = {trial.file_name: trial for trial in trials}
-    missing = []
-    for trial in asked.values():
+    kept = [trial for trial in asked.values() if store and store.has(trial)]
+    executor, done = current() if executor is None else executor, len(kept)
+
+    def walk(missing: Sequence[Trial]) -> Iterator[tuple[Trial, xr.Dataset]]:
+        nonlocal done
+        if store:
+            check_room(store.folder, sum(trial.least_bytes for trial in missing))
+        share = batches(missing)
+        check_memory(_COPIES * max((sum(trial.least_bytes for trial in batch) for batch in share), default=0.0))
+        progress(done / max(len(asked), 1), f"{done} of {len(asked)} trials")
+        steps = shared(missing, store, executor) if store and missing else alone(executor.cut(share), executor)
+        for walked, elsewhere in steps:
+            yield from walked
+            done += len(walked)
+            words = f"{done} of {len(asked)} trials{executor.words}"
+            progress(done / len(asked), f"{words}, {elsewhere} walked by another process" if elsewhere else words)
+
+    # What is missing comes first: a study that is killed again and again gets on however much is there to be read.
+    there = {trial.file_name for trial in kept}
+    yield from walk([trial for name, trial in asked.items() if name not in there])
+    damaged = []
+    for trial in kept:
         found = store.read(trial) if store else None
         if found is None:
-            missing.append(trial)
+            damaged.append(trial)
         else:
             yield trial, found
-    if store:
-        check_room(store.folder, sum(trial.least_bytes for trial in missing))
-    executor = current() if executor is None else executor
-    share = batches(missing)
-    check_memory(_COPIES * max((sum(trial.least_bytes for trial in batch) for batch in share), default=0.0))
-    done = len(asked) - len(missing)
-    progress(done / max(len(asked), 1), f"{done} of {len(asked)} trials")
-    for walked, elsewhere in (
-        shared(missing, store, executor) if store and missing else alone(executor.cut(share), executor)
-    ):
-        yield from walked
-        done += len(walked)
-        words = f"{done} of {len(asked)} trials{executor.words}"
-        progress(done / len(asked), f"{words}, {elsewhere} walked by another process" if elsewhere else words)
+    if damaged:
+        done -= len(damaged)
+        yield from walk(damaged)
     progress(1.0, f"{len(asked)} trials")
 
 
