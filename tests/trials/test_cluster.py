@@ -13,6 +13,7 @@ import textwrap
 import time
 from dataclasses import replace
 
+import distributed
 import psutil
 import pytest
 
@@ -224,6 +225,17 @@ def test_records_are_the_same_to_the_bit_wherever_they_walk(cluster, tmp_path):
     assert parts == sorted(parts)
     assert len(parts) > 8
     assert any("2 workers" in words for _, words in told)
+
+
+def test_a_stranger_on_this_machine_is_refused(cluster):
+    address = cluster._client.cluster.scheduler_address
+    assert address.startswith("tls://127.0.0.1:")
+    with pytest.raises(ClusterError, match="does not answer|is none"):
+        Cluster(address)
+    with pytest.raises(ClusterError, match="does not answer|is none"):
+        Cluster(address.replace("tls:", "tcp:"))
+    with pytest.raises((OSError, RuntimeError)):
+        distributed.Client(address, security=distributed.Security.temporary(), timeout=2)
 
 
 def test_batches_are_shared_out_evenly(cluster):
