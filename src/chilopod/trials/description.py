@@ -103,7 +103,7 @@ def _once(value: object, module: str, path: str) -> str:
     top, known = module.partition(".")[0], _described.get()
     known = {} if known is None else known
     if value not in known:
-        reach = Reach([top])
+        reach = Reach(top)
         if top != "chilopod":
             reach.see(value, path)
         known[value] = reach.digest if top != "chilopod" else ""

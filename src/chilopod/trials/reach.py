@@ -55,6 +55,10 @@ _GIVEN = frozenset(
 _MADE = frozenset(f"_{name}_" for name in ("member_names", "member_map", "value2member_map", "unhashable_values"))
 _IMPORT = dis.opmap["IMPORT_NAME"]
 _HIDING = frozenset(f"__{name}__" for name in ("reduce", "reduce_ex", "getstate", "getnewargs", "getnewargs_ex"))
+_CODE = (
+    *("code", "consts", "exceptiontable", "names", "varnames", "freevars", "cellvars", "flags", "name", "argcount"),
+    *("posonlyargcount", "kwonlyargcount"),
+)
 _FIELD = ("name", "default", "default_factory", "init", "compare", "kw_only", "metadata")
 
 
@@ -68,11 +72,11 @@ class Reach:
     Parameters
     ----------
     own
-        Names of top-level packages that are one's own wherever they are installed.
+        Top-level package that is one's own even where it is installed.
     """
 
-    def __init__(self, own: Iterable[str] = ()) -> None:
-        self._own = frozenset(own) - {"chilopod"}
+    def __init__(self, own: str = "") -> None:
+        self._own = own
         self._hash = hashlib.sha256()
         self._seen: dict[int, int] = {}
         self._alive: list[object] = []  # so that no other object gets the address of one that was seen
@@ -83,14 +87,7 @@ class Reach:
         return self._hash.hexdigest()[:16]
 
     def see(self, value: object, path: str) -> None:
-        """Add an object, and all that can be reached from it.
-
-        Parameters
-        ----------
-        value
-            Any object.
-        path
-            How it was reached, in words.
+        """Add an object, reached as ``path`` says, and all that can be reached from it.
 
         Raises
         ------
@@ -104,7 +101,7 @@ class Reach:
         except Exception as error:  # whatever somebody else's objects do when they are looked at
             raise UnknownKindError(f"{path}: {in_words(error)}") from None
 
-    def _see(self, value: object, path: str) -> None:
+    def _see(self, value: Any, path: str) -> None:
         kind = type(value)
         if kind in _ATOMS:
             return self._put(kind.__name__, hex(value) if isinstance(value, int) else repr(value))
@@ -117,7 +114,7 @@ class Reach:
             self._seen[id(value)] = len(self._seen)
             self._alive.append(value)
         self._put(kind.__module__, kind.__qualname__)
-        if isinstance(value, set | frozenset):
+        if kind in (set, frozenset):
             return self._put(*sorted(self._apart(each, path) for each in value))
         for label, part in self._parts(value, kind, path):
             self._put(label)
@@ -134,25 +131,23 @@ class Reach:
 
     def _parts(self, value: Any, kind: type, path: str) -> Parts:
         """What an object consists of, each with what leads there."""
-        if isinstance(value, enum.Enum):
-            return iter([(".name", value._name_), (".value", value._value_), (".__class__", kind)])
-        if isinstance(value, FunctionType):
+        if kind is FunctionType:
             return self._function(value, path)
         if isinstance(value, ModuleType):
             return self._module(value, path)
         if isinstance(value, type):
             return self._class(value)
-        if isinstance(value, np.ndarray) and kind is np.ndarray and not value.dtype.hasobject:
-            return iter([(".dtype", str(value.dtype.descr)), (".shape", value.shape), ("[...]", value.tobytes())])
+        if kind is np.ndarray and not value.dtype.hasobject:
+            return _array_parts(value)
+        if isinstance(value, enum.Enum):
+            return _attributes("_name_", "_value_", "__class__")(value)
         if isinstance(getattr(value, "py_func", None), FunctionType):  # as numba keeps it
-            return iter([("", value.py_func), (".targetoptions", value.targetoptions)])
-        if kind in _KINDS:
-            return iter(_KINDS[kind](value))
-        return self._instance(value, kind, path)
+            return _attributes("py_func", "targetoptions")(value)
+        return _KINDS[kind](value) if kind in _KINDS else self._instance(value, kind, path)
 
     def _instance(self, value: Any, kind: type, path: str) -> Parts:
         """What pickle would keep, of classes that hide nothing from it."""
-        unknown = UnknownKindError(f"{path}: {_kind_words(kind)}")
+        unknown = UnknownKindError(f"{path}: an object of type {kind.__qualname__}")
         for each in filter(lambda each: self._is_own(each.__module__), kind.__mro__):
             for how in vars(each).keys() & _HIDING:
                 if self._is_own(getattr(vars(each)[how], "__globals__", {}).get("__name__", "")):
@@ -174,12 +169,7 @@ class Reach:
         if function.__globals__.get("__name__") == "functools" and hasattr(function, "registry"):
             yield ".registry", function.registry  # of singledispatch, without what it remembers
             return
-        yield "", function.__code__
-        yield ".__defaults__", function.__defaults__
-        yield ".__kwdefaults__", function.__kwdefaults__
-        for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
-            yield f".{name}", cell
-        yield ".__dict__", vars(function)
+        yield from _attributes("__code__", "__defaults__", "__kwdefaults__", "__closure__", "__dict__")(function)
         space = function.__globals__
         if self._is_own(space.get("__name__", "")):
             imported = self._imported(function.__code__, space, path)
@@ -204,33 +194,23 @@ class Reach:
             if hasattr(module, "__path__"):
                 return
             raise UnknownKindError(f"{path}: a module without a file")
-        try:
-            content = Path(file).read_bytes()
-        except OSError as error:
-            raise UnknownKindError(f"{path}: a module whose file cannot be read ({error.strerror})") from None
+        content = Path(file).read_bytes()
         code = _compiled(content) if file.endswith(".py") else None
         yield "", content if code is None else code
-        if code is not None:
-            found = self._imported(code, vars(module), path, nested=False)
-            outer = module.__name__.rpartition(".")[0]
-            for name, each in sorted({**found, outer: sys.modules.get(outer)}.items()):
-                if isinstance(each, ModuleType) and self._is_own(each.__name__):
-                    yield f" -> {name}", each
+        outer = module.__name__.rpartition(".")[0]
+        found = self._imported(code, vars(module), path, nested=False) if code else {}
+        for name, each in sorted({**found, outer: sys.modules.get(outer)}.items()):
+            if each is not None and self._is_own(each.__name__):
+                yield f" -> {name}", each
 
     def _class(self, kind: type) -> Parts:
         yield ".__module__", path_of(kind)
-        yield ".__class__", type(kind)
-        for index, base in enumerate(kind.__bases__):
-            yield f".__bases__[{index}]", base
-        home = sys.modules.get(kind.__module__)
-        if home is not None:
-            yield "", home
+        yield from _attributes("__class__", "__bases__")(kind)
+        yield "", sys.modules.get(kind.__module__)
         fields = vars(kind).get("__dataclass_fields__", {})
-        for name, each in fields.items():
-            for aspect in _FIELD:
-                yield f".{name} ({aspect})", getattr(each, aspect)
-        if fields:
-            yield " (dataclass)", repr(vars(kind)["__dataclass_params__"])
+        for each in fields.values():
+            yield from _attributes(*_FIELD)(each)
+        yield " (dataclass)", repr(vars(kind).get("__dataclass_params__"))
         if issubclass(kind, enum.Enum):
             yield ".__members__", kind.__members__
         skipped = _GIVEN | _MADE if issubclass(kind, enum.Enum) else _GIVEN
@@ -268,16 +248,18 @@ class Reach:
     # ---------------------------------------------------------------------------------------------------------------
 
     def _named(self, value: Any) -> str:
+        module: Any
+        name: Any
         """Name and version of what a package of others has under its own name; empty for all else."""
         if isinstance(value, ModuleType):
             module, name = value.__name__, ""
         elif isinstance(value, np.ufunc):
-            places = ("numpy", "scipy.special")
             name = value.__name__
-            module = next((each for each in places if getattr(sys.modules.get(each), name, None) is value), None)
+            module = "numpy" if hasattr(np, name) else "scipy.special"
         elif callable(value) and not self._is_own(type(value).__module__):
-            module, name = (getattr(value, each, None) for each in ("__module__", "__qualname__"))
-            module = value.__globals__.get("__name__") if isinstance(value, FunctionType) else module
+            name = getattr(value, "__qualname__", None)
+            # What wraps another has that one's module.
+            module = getattr(value, "__globals__", {}).get("__name__", getattr(value, "__module__", None))
         else:
             return ""
         if not isinstance(module, str) or not isinstance(name, str) or self._is_own(module):
@@ -288,27 +270,11 @@ class Reach:
         return f"{module}:{name} of {_brought_by(module)}" if found is value else ""
 
     def _is_own(self, module: str) -> bool:
-        return module.partition(".")[0] in self._own or not _brought_by(module)
+        return module.partition(".")[0] == self._own or not _brought_by(module)
 
 
-def _kind_words(kind: type) -> str:
-    return f"an object of type {kind.__qualname__}"
-
-
-def _code_parts(code: CodeType) -> Parts:
-    for name in ("code", "exceptiontable", "names", "varnames", "freevars", "cellvars", "flags", "name"):
-        yield "", getattr(code, f"co_{name}")
-    for count in (code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount):
-        yield "", count
-    for each in code.co_consts:
-        yield "", each
-
-
-def _cell_parts(cell: CellType) -> Parts:
-    try:
-        yield "", cell.cell_contents
-    except ValueError:  # an empty one
-        yield "", None
+def _array_parts(array: Any) -> Parts:
+    return iter([(".dtype", str(array.dtype.descr)), (".shape", array.shape), ("[...]", array.tobytes())])
 
 
 def _dict_parts(values: Mapping[Any, object]) -> Parts:
@@ -317,7 +283,7 @@ def _dict_parts(values: Mapping[Any, object]) -> Parts:
         yield f"[{key!r:.40}]" if isinstance(key, str | int | float) else "[...]", value
 
 
-def _attributes(*names: str) -> Callable[[Any], Iterable[tuple[str, object]]]:
+def _attributes(*names: str) -> Callable[[Any], Parts]:
     return lambda value: ((f".{name}", getattr(value, name)) for name in names)
 
 
@@ -326,13 +292,13 @@ def _item_parts(values: Iterable[object]) -> Parts:
 
 
 _SLOT = _attributes("__objclass__", "__name__")
-_KINDS: dict[type, Callable[[Any], Iterable[tuple[str, object]]]] = {
+_KINDS: dict[type, Callable[[Any], Parts]] = {
     tuple: _item_parts,
     list: _item_parts,
     dict: _dict_parts,
     MappingProxyType: _dict_parts,
-    CodeType: _code_parts,
-    CellType: _cell_parts,
+    CodeType: _attributes(*(f"co_{name}" for name in _CODE)),
+    CellType: _attributes("cell_contents"),
     MethodType: _attributes("__func__", "__self__"),
     BuiltinFunctionType: _attributes("__name__", "__self__"),
     property: _attributes("fget", "fset", "fdel"),
@@ -340,7 +306,7 @@ _KINDS: dict[type, Callable[[Any], Iterable[tuple[str, object]]]] = {
     staticmethod: _attributes("__func__"),
     np.vectorize: _attributes("pyfunc", "otypes", "excluded", "signature"),
     functools.cached_property: _attributes("func"),
-    type(lru_cache(lambda: 0)): lambda value: [("", value.__wrapped__), ("", value.cache_parameters())],
+    type(lru_cache(lambda: 0)): _attributes("__wrapped__"),
     MemberDescriptorType: _SLOT,
     GetSetDescriptorType: _SLOT,
     type(str.join): _SLOT,
@@ -376,34 +342,20 @@ def _compiled(content: bytes) -> CodeType | None:
 def _brought_by(module: str) -> str:
     """Name and version of the package that a module of others is in; empty for one's own."""
     top = module.partition(".")[0]
-    if top == "chilopod":
-        return top
-    file = getattr(sys.modules.get(module) or sys.modules.get(top), "__file__", None)
-    if module == "__main__":
-        return ""
-    return _package_of(top, None if file is None else str(file))
+    if top in ("chilopod", "__main__"):
+        return top if top == "chilopod" else ""
+    file = getattr(sys.modules.get(module, sys.modules.get(top)), "__file__", None)
+    return _package_of(top, file)
 
 
 @lru_cache(maxsize=4096)
 def _package_of(top: str, file: str | None) -> str:
-    python = "Python {}.{}".format(*sys.version_info)
-    if file is None:
-        return python if top in sys.stdlib_module_names else ""
-    places = Path(file).parts
-    if "site-packages" not in places and "dist-packages" not in places:
-        inside = Path(file).is_relative_to(Path(dataclasses.__file__).parent)
-        return python if inside and top in sys.stdlib_module_names else ""
-    brought = _distribution(top)
-    if brought is None:
-        return ""
-    # A version may be brought anew with other code.
-    files = [line for line in (brought.read_text("RECORD") or "").splitlines() if ".py,sha256=" in line]
-    return f"{top} {brought.version} {hashlib.sha256(repr(sorted(files)).encode()).hexdigest()[:8]}"
-
-
-def _distribution(top: str) -> metadata.Distribution | None:
-    try:
-        return metadata.distribution(top)
-    except metadata.PackageNotFoundError:
-        names = metadata.packages_distributions().get(top)
-        return metadata.distribution(names[0]) if names else None
+    place = Path(file or dataclasses.__file__)
+    if {"site-packages", "dist-packages"} & {*place.parts}:
+        try:
+            return f"{top} {metadata.version(top)}"
+        except metadata.PackageNotFoundError:
+            version = getattr(sys.modules[top], "__version__", "")
+            return f"{top} {version}" if version else ""
+    inside = top in sys.stdlib_module_names and place.is_relative_to(Path(dataclasses.__file__).parent)
+    return "Python {}.{}".format(*sys.version_info) if inside else ""
