@@ -128,10 +128,14 @@ def _walked(job: bytes, place: str) -> Any:
         trials = pickle.loads(packed_trials)
     except Exception as error:  # whatever somebody else's module does when it is imported
         raise _not_importable(None, error) from error
-    for trial, text in zip(trials, texts, strict=True):
-        if trial.text != text:
-            own = [f"engine {trial.engine}"] * (":" in trial.engine) + [path_of(type(trial.controller))]
-            problem = f"the code of {' or '.join(own)}, or of what it imports, is another on a worker than here"
+    from chilopod.trials.description import meanwhile_unchanged
+
+    with meanwhile_unchanged():
+        here = [trial.text for trial in trials]
+    for trial, there, text in zip(trials, here, texts, strict=True):
+        if there != text:
+            own = f"engine {trial.engine}" if trial.controller is None else path_of(type(trial.controller))
+            problem = f"the code of {own}, or of what it imports, is another on a worker than here"
             raise ClusterError(problem, field="cluster", value=place)
     import numba
     from distributed import get_worker

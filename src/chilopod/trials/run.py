@@ -54,7 +54,7 @@ def run(
     OutputError
         If the folder has no room for them.
     """
-    trials = _as_now(trials)
+    trials = as_now(trials)
     check_fits(trials)
     records = {trial.file_name: record for trial, record in _each(trials, folder, progress, executor)}
     return [records[trial.file_name] for trial in trials]
@@ -85,7 +85,7 @@ def run_each(
     trials, folder, progress, executor
         As for :func:`run`.
     """
-    yield from _each(_as_now(trials), folder, progress, executor)
+    yield from _each(as_now(trials), folder, progress, executor)
 
 
 def _each(
@@ -126,7 +126,8 @@ def _each(
     progress(1.0, f"{len(asked)} trials")
 
 
-def _as_now(trials: Sequence[Trial]) -> list[Trial]:
+def as_now(trials: Sequence[Trial]) -> list[Trial]:
+    """The same trials, with the code and the fields of their controllers as they are now."""
     found = [trial.as_now() for trial in trials]
     with meanwhile_unchanged():
         for trial in found:
