@@ -61,6 +61,11 @@ PLACES: dict[str, tuple[str, str, str]] = {
         "GAINS.a",
     ),
     "named tuple": ("Gains = namedtuple('Gains', 'a b')\nGAINS = Gains(V, 1)", "", "GAINS.a"),
+    "made from text": (
+        "exec('@dataclass(frozen=True)\\nclass Gains:\\n  def a(self): return V')\nGAINS = Gains()",
+        "",
+        "GAINS.a()",
+    ),
     "enum": ("class Gain(enum.Enum):\n    A = V", "", "Gain.A.value"),
     "ufunc": ("F = np.sin if V < 0.25 else np.cos", "", "float(F(1.0))"),
     "ufunc of one's own": ("F = np.frompyfunc(lambda x: V * x, 1, 1)", "", "float(F(1.0))"),

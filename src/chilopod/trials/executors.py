@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from chilopod.trials.trial import Trial
 
 _SECONDS = 2.5  # of work in a batch, about
-_USUAL = 30.0  # s of a walk of which a core walks as many as an engine says, until it is known better
+_USUAL = 10.0  # s of a walk of which a core walks as many as an engine says, until it is known better
 _LANES = 8  # robots that a core walks at once in the planar model
 
 

@@ -53,6 +53,9 @@ _GIVEN = frozenset(
     )
 ) | {"_abc_impl"}
 _MADE = frozenset(f"_{name}_" for name in ("member_names", "member_map", "value2member_map", "unhashable_values"))
+_WRITTEN = frozenset(
+    f"__{name}__" for name in ("init", "repr", "eq", "hash", "setattr", "delattr", "replace", "lt", "le", "gt", "ge")
+)
 _IMPORT = dis.opmap["IMPORT_NAME"]
 _HIDING = frozenset(f"__{name}__" for name in ("reduce", "reduce_ex", "getstate", "getnewargs", "getnewargs_ex"))
 _CODE = (
@@ -216,8 +219,8 @@ class Reach:
         skipped = _GIVEN | _MADE if issubclass(kind, enum.Enum) else _GIVEN
         for name, part in sorted(vars(kind).items()):
             # What dataclass writes follows from the fields.
-            written = fields and getattr(getattr(part, "__code__", None), "co_filename", "") == "<string>"
-            if name not in skipped and not written:
+            written = name in _WRITTEN and getattr(getattr(part, "__code__", None), "co_filename", "") == "<string>"
+            if name not in skipped and not (fields and written):
                 yield f".{name}", part
 
     def _imported(
