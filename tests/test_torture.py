@@ -22,6 +22,8 @@ SHORT = {
     "same-bits": (run.SameBits(), 6),
     "verbs": (run.Verbs(quick=True), 5),
     "invariances": (run.Invariances(), 8),
+    "edited-controllers": (run.EditedControllers(), 8),
+    "broken-engines": (run.BrokenEngines(), 2),
 }
 
 
@@ -85,6 +87,16 @@ def test_it_finds_a_walk_that_is_changed_by_a_look(tmp_path, monkeypatch):
 
     monkeypatch.setattr(PlanarWalk, "pose", cutting)
     assert Kind.WRONG in {kind for kind, _, _ in attacked("verbs", tmp_path, 1)}
+
+
+def test_it_finds_edited_controllers_that_are_the_old_ones(tmp_path, monkeypatch):
+    monkeypatch.setattr("chilopod.trials.reach.Reach._parts", lambda *_: iter(()))
+    assert Kind.WRONG in {kind for kind, _, _ in attacked("edited-controllers", tmp_path, 5)}
+
+
+def test_it_finds_broken_engines_that_are_believed(tmp_path, monkeypatch):
+    monkeypatch.setattr("chilopod.trials.batch.check_asked", lambda data, *asked: data)
+    assert Kind.WRONG in {kind for kind, _, _ in attacked("broken-engines", tmp_path, 6)}
 
 
 @pytest.mark.parametrize(

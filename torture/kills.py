@@ -1,4 +1,4 @@
-"""Studies that are killed at any moment, and asked for again: nothing lost, nothing walked twice that was kept."""
+"""Studies that are killed at any moment, and asked for again: seconds are lost, and nothing is walked twice."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import time
+from functools import partial
 from random import Random
 
 import xarray as xr
@@ -14,63 +15,100 @@ import xarray as xr
 from in_process import Place, snapshot
 from outcomes import Ending, FoundFault, Kind, Outcome, is_temporary, judged
 from processes import commanded
-from studies import content, whole
+from studies import content, put, whole
 
-_PLANAR = ("walk", "aoi2022-planar", "--duration", "20 s", "--rate", "50", "--seed", "1", "--repeats", "150", "--json")
-_TWIN = ("walk", "aoi2022", "--engine", "twin", "--duration", "0.6 s", "--seed", "1", "--repeats", "12", "--json")
+_PLANAR = ("walk", "aoi2022-planar", "--seed", "1", "--json")
+_SHORT = (*_PLANAR, "--duration", "200 s", "--rate", "2", "--repeats", "600")
+_LONG = (*_PLANAR, "--duration", "3000 s", "--rate", "0.2", "--repeats", "40")
+_TWIN = ("walk", "aoi2022", "--engine", "twin", "--seed", "1", "--json", "--duration", "10 s", "--repeats", "150")
 _KEPT = ("--trials", "kept")
 STUDIES = {
-    (*_PLANAR, *_KEPT, "--out", "x.nc"): 4,
+    (*_SHORT, *_KEPT, "--out", "x.nc"): 3,
+    (*_LONG, *_KEPT): 3,
     (*_TWIN, *_KEPT): 3,
-    (*_PLANAR, *_KEPT, "--cluster", "2"): 2,
+    (*_SHORT, *_KEPT, "--cluster", "2"): 1,
     (*_TWIN, *_KEPT, "--cluster", "2"): 1,
 }
+"""About a minute each, and how often each is chosen."""
+MOMENTS = 2.0, 12.0
+"""s after its start at which a study is killed."""
+LOST = 5.0
+"""s of work that may be lost."""
+_LEFT = 3  # trials that are missing when it is asked again to the end
 _SIGNALS = {signal.SIGKILL: 5, signal.SIGINT: 3, signal.SIGTERM: 2}
+_PATIENCE = 600.0  # s
+_by = partial(commanded, limit=_PATIENCE)
 
 
 class Kills:
-    """A study of several batches; a signal; the study again."""
+    """A study of a minute, a part of it there already; a signal; the study again, but for a few trials put there."""
 
     name = "kills"
     per_minute = 5
 
+    def __init__(self, studies: dict[tuple[str, ...], int] | None = None) -> None:
+        self._studies = studies or STUDIES
+
     def attack(self, chance: Random, place: Place) -> Outcome:
         """One kill, at any moment from the start of the process on."""
-        (study,) = chance.choices(tuple(STUDIES), tuple(STUDIES.values()))
+        (study,) = chance.choices(tuple(self._studies), tuple(self._studies.values()))
         (number,) = chance.choices(tuple(_SIGNALS), tuple(_SIGNALS.values()))
-        part = chance.random()
-        place.tried.write_text(f"chilopod {' '.join(study)}; {number.name} after {part:.3f} of its time")
-        right = whole(place, *study, by=commanded)
+        moment, part = chance.uniform(*MOMENTS), chance.uniform(0.0, 0.8)
+        right = whole(place, *study, by=_by)
+        names = sorted(right.kept)
+        had = set(chance.sample(names, int(part * len(names))))
+        put({f"kept/{name}": right.kept[name] for name in had}, place.here)
+        words = f"chilopod {' '.join(study)}; {number.name} after {moment:.1f} s, {len(had)} of {len(names)} there"
+        place.tried.write_text(words)
+        begun, killed = time.time(), [0.0]
 
         def kill(process: subprocess.Popen[bytes]) -> None:
-            time.sleep(part * right.seconds)
+            time.sleep(moment)
+            killed[0] = time.time() if process.poll() is None else 0.0
             if number is signal.SIGKILL:
                 os.killpg(process.pid, number)
             else:
                 process.send_signal(number)
 
-        first = commanded(study, place, kill)
-        _stopped(first, number, place)
-        before, kept = snapshot(place.here / "kept"), content(place.here / "kept")
+        _stopped(_by(study, place, kill), number, place)
+        kept = content(place.here / "kept")
         wrong = [name for name, each in kept.items() if not is_temporary(name) and each != right.kept.get(name)]
         if wrong:
             raise FoundFault(Kind.LEFT, f"{wrong[0]} is not whole after {number.name}")
-        second = commanded((*study, "--force"), place)
+        new = [name for name in kept if not is_temporary(name) and name not in had]
+        written = [(place.here / "kept" / name).stat().st_mtime for name in new]
+        again = self._again(study, number, place, chance)
+        # Until the first trial is there, the process starts, and has no more to do for that than when nothing is left.
+        lost = max(0.0, killed[0] - (max(written) if written else begun + again))
+        if killed[0] and lost > LOST:
+            raise FoundFault(Kind.REPEATED, f"{lost:.1f} s of work lost, {len(new)} new after {moment:.1f} s")
+        return Outcome(Kind.ENDED, f"{len(new)} new after {moment:.1f} s, {lost:.1f} s lost")
+
+    def _again(self, study: tuple[str, ...], number: signal.Signals, place: Place, chance: Random) -> float:
+        """Ask again for a study of which all but a few trials are there: its result, its files, its time."""
+        right = whole(place, *study, by=_by)
+        there = {name for name in content(place.here / "kept") if not is_temporary(name)}
+        missing = sorted(right.kept.keys() - there)
+        left = chance.sample(missing, min(_LEFT, len(missing)))
+        put({f"kept/{name}": right.kept[name] for name in missing if name not in left}, place.here)
+        before, start = snapshot(place.here / "kept"), time.monotonic()
+        second = _by((*study, "--force"), place)
+        seconds = time.monotonic() - start
         judged(second, {}, {name: 0 for name in snapshot(place.root) if not name.startswith("tmp/")})
         if second.code != 0 or second.out != right.ending.out:
             raise FoundFault(Kind.WRONG, f"another result after {number.name}: {second.err[-200:]}")
-        now = {name: each for name, each in content(place.here).items()}
+        now = content(place.here)
         for name, each in right.files.items():
             if not _same(name, now.get(name), each):
                 raise FoundFault(Kind.WRONG, f"{name} is another after {number.name}")
         after = snapshot(place.here / "kept")
-        twice = [name for name in kept if not is_temporary(name) and before[name] != after[name]]
+        twice = [name for name in right.kept if name not in left and before[name] != after[name]]
         if twice:
-            raise FoundFault(Kind.REPEATED, f"{len(twice)} of {len(kept)} files are new, such as {twice[0]}")
+            raise FoundFault(Kind.REPEATED, f"{len(twice)} files are new, such as {twice[0]}")
         beside = {*now} - {*right.files}
         if beside:
             raise FoundFault(Kind.LEFT, f"{', '.join(sorted(beside))} after {number.name}")
-        return Outcome(Kind.ENDED, f"{len(kept)} of {len(right.files)} files were kept")
+        return seconds
 
 
 def _same(name: str, now: bytes | None, right: bytes) -> bool:

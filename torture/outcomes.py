@@ -76,7 +76,7 @@ _UNRAISED = re.compile(r"^Exception ignored [^\n]*\n(?:[^\n]*\n)*?KeyboardInterr
 # What may stand on stderr beside an error.
 _SAID = re.compile(
     r"^(?:[^:]+: +\d+ (?:%|s|min|h).*|The page is .*|note: .*|wrote .*|kept .*|the controller took .*|"
-    r".*: walked again, .*|)$"
+    r".*: walked again, .*|.*: its trials walk and are not kept: .*|)$"
 )
 _FIELD = re.compile(
     r"--[a-z0-9]|\b(?:body|springs|legs|gait|ground|twin|provenance)\b|"

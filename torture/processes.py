@@ -45,6 +45,7 @@ def commanded(
     arguments: Sequence[str],
     place: Place,
     meanwhile: Callable[[subprocess.Popen[bytes]], None] | None = None,
+    limit: float = LIMIT,
     **options: Any,
 ) -> Ending:
     """How a command ends in a process of its own; what it prints goes into the files of the place, if nowhere else."""
@@ -52,7 +53,7 @@ def commanded(
         process = start(arguments, place, **{"stdout": out, "stderr": err, **options})
         if meanwhile:
             meanwhile(process)
-        code = ended(process)
+        code = ended(process, limit)
     return Ending(code, place.out.read_text(errors="replace"), place.err.read_text(errors="replace"))
 
 

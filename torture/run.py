@@ -20,7 +20,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from arguments import Arguments
+from broken_engines import BrokenEngines
 from disks import Disks
+from edited_controllers import EditedControllers
 from environments import Environments
 from invariances import Invariances
 from kills import Kills
@@ -38,7 +40,7 @@ from workers import Attacks, tried
 RESULTS = Path(__file__).with_name("results.json")
 _KINDS = (
     *(RobotFiles, Arguments, SavedTrials, SavedBranches, Kills, Disks, Streams, Environments),
-    *(SameBits, Verbs, Invariances, Processors, LiveClients),
+    *(SameBits, Verbs, Invariances, Processors, LiveClients, EditedControllers, BrokenEngines),
 )
 CLASSES: dict[str, Callable[[], Attacks]] = {each.name: each for each in _KINDS}
 _SHOWN = 12  # different faults of a class that are printed

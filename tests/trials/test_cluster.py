@@ -4,6 +4,7 @@ CHILOPOD_KILLS says how often each kind of process is killed, each time at anoth
 """
 
 import contextlib
+import importlib
 import os
 import random
 import signal
@@ -12,7 +13,9 @@ import sys
 import textwrap
 import time
 from dataclasses import replace
+from pathlib import Path
 
+import distributed
 import psutil
 import pytest
 
@@ -226,11 +229,42 @@ def test_records_are_the_same_to_the_bit_wherever_they_walk(cluster, tmp_path):
     assert any("2 workers" in words for _, words in told)
 
 
+def test_a_stranger_on_this_machine_is_refused(cluster):
+    address = cluster._client.cluster.scheduler_address
+    assert address.startswith("tls://127.0.0.1:")
+    with pytest.raises(ClusterError, match=r"does not answer|is none"):
+        Cluster(address)
+    with pytest.raises(ClusterError, match=r"does not answer|is none"):
+        Cluster(address.replace("tls:", "tcp:"))
+    with pytest.raises((OSError, RuntimeError)):
+        distributed.Client(address, security=distributed.Security.temporary(), timeout=2)
+
+
+@pytest.mark.parametrize("folder", [True, False])
+def test_a_worker_with_another_text_of_a_controller_is_refused(cluster, controllers, tmp_path, folder):
+    name = f"another_{folder}"
+    file = Path(controllers.__file__).with_name(f"{name}.py")
+    file.write_text("from somebodys_own import *\nclass Another(Counted):\n    gain = 1\n")
+    own = importlib.import_module(name)
+    file.write_text(file.read_text().replace("gain = 1", "gain = 2"))
+    asked = [replace(BASE, duration=0.7, controller=own.Another(str(tmp_path / "log")))]
+    with pytest.raises(ClusterError, match=rf"the code of {name}:Another, or of what it imports, is another"):
+        run(asked, tmp_path / "kept" if folder else None, executor=cluster)
+    assert not list(tmp_path.glob("kept/*"))
+
+
+def test_a_worker_with_other_sources_is_refused(monkeypatch):
+    with Cluster(1) as there:
+        monkeypatch.setattr("chilopod.trials.on_worker.digest", lambda: "0" * 64)
+        with pytest.raises(ClusterError, match=r"source code of chilopod is \w{12} on a worker and 0{12} here"):
+            run([replace(BASE, duration=0.7)], executor=there)
+
+
 def test_batches_are_shared_out_evenly(cluster):
-    cut = cluster.cut([list(range(32))] * 6 + [list(range(8))])
-    assert [number for piece in cut for number in piece] == [*range(32)] * 6 + [*range(8)]
+    cut = list(cluster.cut([TRIALS[:32]] * 6 + [TRIALS[:8]]))
+    assert [trial for piece in cut for trial in piece] == TRIALS[:32] * 6 + TRIALS[:8]
     assert max(map(len, cut)) <= 13
-    assert cluster.cut([]) == []
+    assert list(cluster.cut([])) == []
 
 
 # ---- kill -9 --------------------------------------------------------------------------------------------------------
@@ -252,7 +286,7 @@ def test_a_worker_that_is_killed_is_replaced_and_nothing_walks_twice(cluster, co
     walks = sum(int(line) for line in log.read_text().split())
     assert killed
     # A worker has two batches, and there may be one more on its way back.
-    assert len(TRIALS) <= walks <= len(TRIALS) + 3 * len(cluster.cut([TRIALS])[0])
+    assert len(TRIALS) <= walks <= len(TRIALS) + 3 * max(map(len, cluster.cut([TRIALS])))
     here = run(counted)
     assert all(one.identical(other) for one, other in zip(here, there, strict=True))
     waited_for(lambda: len(worker_processes()) == 2)

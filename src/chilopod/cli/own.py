@@ -29,17 +29,25 @@ def own_controller(path: str | None) -> Controller | None:
 @contextmanager
 def own_code(show: Callable[[str, float, str], None]) -> Iterator[None]:
     """Find modules in the current folder too, after all others; show how far walks are that are under way; and say at
-    the end if controllers took most of the time."""
+    the end if controllers took most of the time. What own code prints goes to stderr, for stdout has the result."""
     from chilopod.engine import watched
 
     here = os.getcwd()
     added = here not in sys.path and "" not in sys.path
     if added:
         sys.path.append(here)
+    streams, stdout = (sys.stdout, sys.stderr), os.dup(1)
     try:
+        # The streams of Python, and those of processes that it starts.
+        streams[0].flush()
+        os.dup2(2, 1)
+        sys.stdout = sys.stderr
         with watched(lambda done, words: show("under way", done, words)) as spent:
             yield
     finally:
+        sys.stdout, sys.stderr = streams
+        os.dup2(stdout, 1)
+        os.close(stdout)
         if added:
             sys.path.remove(here)
     if spent.share > _SLOW and spent.controller > _NOTICED:

@@ -254,7 +254,9 @@ def _answer(controller: Controller, event: Event, seen: Observation) -> Command:
 def _asked(controller: Controller, name: str, ask: Callable[[], _T]) -> _T:
     try:
         return ask()
-    except (Exception, SystemExit) as error:  # whatever somebody else's code does
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # whatever somebody else's code does
         raise AnalysisError(f"raised {in_words(error)}", field=_of(controller, name)) from error
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping
+from functools import partial
 from importlib import import_module
 from typing import Any, Final
 
@@ -18,6 +19,7 @@ ENGINES: Final = tuple(_MODULES)
 """What walks: the planar model, or the whole robot in three dimensions."""
 
 _PARTS: Final = ("traits", "common", "initial_states", "start", "resume")
+_SAME_TIME: Final = 1e-9  # s
 _PATH: Final = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_][\w.]*")
 
 
@@ -59,40 +61,67 @@ class _Own:
             raise ParameterError(f"is no engine: it has no {missing[0]}", field="engine", value=name)
         if not isinstance(engine.traits, Traits):
             raise ParameterError("is no engine: its traits are no chilopod.engine.Traits", field="engine", value=name)
-        self._name, self._engine = name, engine
+        self._name, self._engine = f"engine {name}", engine
         self.traits: Traits = engine.traits
 
     def common(self, robot: Robot) -> Hashable:
-        shared = self._blamed("common", robot)
+        shared = _theirs(self._name, "common", self._engine.common, robot)
         try:
             hash(shared)
         except TypeError:
-            raise AnalysisError("common gave what has no hash", field=f"engine {self._name}") from None
+            raise AnalysisError("common gave what has no hash", field=self._name) from None
         return shared
 
     def initial_states(self, *arguments: Any, **named: Any) -> Array:
-        return self._blamed("initial_states", *arguments, **named)
+        return _theirs(self._name, "initial_states", self._engine.initial_states, *arguments, **named)
 
     def start(self, *arguments: Any, **named: Any) -> Walk:
-        walk: Walk = self._blamed("start", *arguments, **named)
-        missing = missing_parts(walk)
-        if missing:
-            raise AnalysisError(
-                f"start gave no chilopod.engine.Walk: it has no {', '.join(missing)}", field=f"engine {self._name}"
-            )
-        return walk
+        return self._walk("start", *arguments, **named)
 
     def resume(self, saved: bytes) -> Walk:
-        walk: Walk = self._blamed("resume", saved)
-        return walk
+        return self._walk("resume", saved)
 
-    def _blamed(self, name: str, *arguments: Any, **named: Any) -> Any:
-        try:
-            return getattr(self._engine, name)(*arguments, **named)
-        except ChilopodError:
-            raise
-        except (Exception, SystemExit) as error:
-            raise AnalysisError(f"{name} raised {in_words(error)}", field=f"engine {self._name}") from error
+    def _walk(self, how: str, *arguments: Any, **named: Any) -> Walk:
+        walk: Any = _theirs(self._name, how, getattr(self._engine, how), *arguments, **named)
+        missing = _theirs(self._name, how, missing_parts, walk)
+        if missing:
+            raise AnalysisError(f"{how} gave no chilopod.engine.Walk: it has no {', '.join(missing)}", field=self._name)
+        wrapped: Any = _OwnWalk(self._name, walk)
+        return wrapped
+
+
+class _OwnWalk:
+    """A walk of somebody else's engine, the same way."""
+
+    def __init__(self, name: str, walk: Any) -> None:
+        self._name, self._walk = name, walk
+
+    def __getattr__(self, name: str) -> Any:
+        found = _theirs(self._name, name, getattr, self._walk, name)
+        return partial(_theirs, self._name, name, found) if callable(found) else found
+
+    @property
+    def time(self) -> float:
+        return _theirs(self._name, "time", lambda: float(self._walk.time))
+
+    @property
+    def robots(self) -> tuple[Robot, ...]:
+        return _theirs(self._name, "robots", lambda: tuple(self._walk.robots))
+
+    def advance(self, until: float) -> None:
+        _theirs(self._name, "advance", self._walk.advance, until)
+        if not abs(self.time - until) <= _SAME_TIME:
+            raise AnalysisError(f"advance({until:g}) went to {self.time} s", field=self._name)
+
+
+def _theirs(who: str, what: str, call: Callable[..., Any], /, *arguments: Any, **named: Any) -> Any:
+    """What somebody else's code gives; what goes wrong in it is said to be its own fault."""
+    try:
+        return call(*arguments, **named)
+    except (ChilopodError, KeyboardInterrupt):
+        raise
+    except BaseException as error:
+        raise AnalysisError(f"{what} raised {in_words(error)}", field=who) from error
 
 
 def controller_named(path: str) -> Controller:
@@ -108,9 +137,9 @@ def controller_named(path: str) -> Controller:
         raise ParameterError("is no class", field="controller", value=path, allowed="package.module:Class")
     try:
         controller: Controller = made()
-    except ParameterError:
+    except (ParameterError, KeyboardInterrupt):
         raise
-    except (Exception, SystemExit) as error:  # it is somebody else's code
+    except BaseException as error:  # it is somebody else's code
         raise ParameterError(
             f"cannot be made: {in_words(error)}",
             field="controller",
@@ -155,7 +184,9 @@ def _imported(field: str, path: str) -> Any:
     module_name, _, name = path.partition(":")
     try:
         found: Any = import_module(module_name)
-    except (Exception, SystemExit) as error:  # whatever somebody else's module does when it is imported
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # whatever somebody else's module does when it is imported
         raise ParameterError(f"cannot be imported: {in_words(error)}", field=field, value=path) from error
     for part in name.split("."):
         if not hasattr(found, part):

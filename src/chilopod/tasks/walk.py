@@ -19,7 +19,7 @@ from chilopod.progress import Progress, silent
 from chilopod.record import RATE
 from chilopod.robot import Robot
 from chilopod.tasks.shown import paths
-from chilopod.trials import NONE, Disturbance, Trial, WalkSummary, run, run_each, straight, summaries, together
+from chilopod.trials import NONE, Disturbance, Trial, WalkSummary, as_now, run, run_each, straight, summaries, together
 
 _MOST_BENT = 1.5  # rad; at a right angle modules run into each other
 
@@ -226,6 +226,7 @@ def ends(
     told
         Called with the number of a walk and its record as soon as that is there.
     """
+    trials = tuple(as_now(trials))
     number = {trial.file_name: index for index, trial in enumerate(trials)}
     found: dict[int, WalkSummary] = {}
     unbent = True

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from chilopod.trials.cluster import Cluster
     from chilopod.trials.disturbance import NONE, Disturbance, Drawn, draw
     from chilopod.trials.executors import Executor, Here, using
-    from chilopod.trials.run import check_fits, run, run_each, together
+    from chilopod.trials.run import as_now, check_fits, run, run_each, together
     from chilopod.trials.store import Store
     from chilopod.trials.summary import AVERAGED, WalkSummary, axis_radius, mean_joint_angles, straight, summaries
     from chilopod.trials.trial import Trial
@@ -26,7 +26,7 @@ else:
             "cluster": ("Cluster",),
             "disturbance": ("NONE", "Disturbance", "Drawn", "draw"),
             "executors": ("Executor", "Here", "using"),
-            "run": ("check_fits", "run", "run_each", "together"),
+            "run": ("as_now", "check_fits", "run", "run_each", "together"),
             "store": ("Store",),
             "summary": ("AVERAGED", "WalkSummary", "axis_radius", "mean_joint_angles", "straight", "summaries"),
             "trial": ("Trial",),
@@ -44,6 +44,7 @@ __all__ = [
     "Store",
     "Trial",
     "WalkSummary",
+    "as_now",
     "axis_radius",
     "batches",
     "check_fits",

@@ -10,13 +10,18 @@ import numpy as np
 import xarray as xr
 
 from chilopod.cores import cores
-from chilopod.engine import engine_named, event_times, steer
+from chilopod.engine import Walk, engine_named, event_times, steer
 from chilopod.errors import AnalysisError
 from chilopod.steering import CourseReferee, Target, of_course
-from chilopod.trials.description import file_text, plain
-from chilopod.trials.disturbance import draw
+from chilopod.trials.asked import check_asked
+from chilopod.trials.description import classes_in, file_text, is_ours, plain
+from chilopod.trials.disturbance import Drawn, draw
 from chilopod.trials.trial import Trial
 
+NOT_KEPT = "not kept"
+"""Attribute of a record that is not to be kept: why. It stays nowhere."""
+
+_KNOWN: dict[str, str] = {}  # what was found of controllers, by all that makes them
 _MOST_BYTES = 256e6
 """Of the records of a batch, about."""
 
@@ -42,6 +47,7 @@ def batches(trials: Sequence[Trial], on_cores: int | None = None) -> list[list[T
             trial.recording,
             _sight(trial),
             json.dumps(trial.steering, sort_keys=True),
+            trial.code,
             # Whether its sensors are noisy is said once for a batch.
             trial.disturbance.bearing > 0.0,
             trial.brief,
@@ -73,6 +79,25 @@ def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
         If an argument is out of range, or the controller fails.
     """
     first = trials[0]
+    # Who steers otherwise when asked the same again is found out before.
+    doubts = first.code[1] or _doubts(first)
+    walk, drawn, referee = _steered(trials, first.duration)
+    name = type(first.controller).__name__
+    if first.controller is not None and json.dumps(plain(first.controller, name)) != json.dumps(first.steering):
+        raise AnalysisError("changed its own fields while it steered, so its trials are not what they say", field=name)
+    data = check_asked(walk.to_dataset(), walk, trials, drawn)
+    if referee is not None:
+        referee.add_to(data, walk)
+    records = _apart(data.assign_attrs({NOT_KEPT: doubts} if doubts else {}), trials)
+    return [
+        of_course(record, trial.robot, trial.brief) if referee else record
+        for record, trial in zip(records, trials, strict=True)
+    ]
+
+
+def _steered(trials: Sequence[Trial], until: float) -> tuple[Walk, list[Drawn], CourseReferee | None]:
+    """Walk trials of one batch up to a time, s: their walk, what was drawn for each, and who watched."""
+    first = trials[0]
     engine, targets = (
         engine_named(first.engine),
         [each.target.position for each in trials if isinstance(each.target, Target)],
@@ -92,21 +117,32 @@ def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
         record=first.recording,
         expected=first.duration,
     )
+    if len(walk.robots) != len(trials):
+        problem = f"start gave a walk of {len(walk.robots)} robots instead of {len(trials)}"
+        raise AnalysisError(problem, field=f"engine {first.engine}")
     noise = None if own_noise or not asked else np.stack([each.bearing for each in drawn])
     missed = np.stack([each.missed for each in drawn])
     referee = CourseReferee(courses, first.robot.gait, missed if missed.any() else None) if courses else None
-    steer(walk, first.duration, first.controller, bearing_noise=noise, referee=referee)
-    name = type(first.controller).__name__
-    if first.controller is not None and json.dumps(plain(first.controller, name)) != json.dumps(first.steering):
-        raise AnalysisError("changed its own fields while it steered, so its trials are not what they say", field=name)
-    data = walk.to_dataset()
-    if referee is not None:
-        referee.add_to(data, walk)
-    records = _apart(data, trials)
-    return [
-        of_course(record, trial.robot, trial.brief) if referee else record
-        for record, trial in zip(records, trials, strict=True)
-    ]
+    steer(walk, until, first.controller, bearing_noise=noise, referee=referee)
+    return walk, drawn, referee
+
+
+def _doubts(trial: Trial) -> str:
+    """Why a controller's walks cannot be had again, if so: its first gait cycle is walked twice, once a process."""
+    if trial.controller is None or all(is_ours(kind) for kind in classes_in(trial.controller)):
+        return ""
+    who = json.dumps([trial.steering, trial.code, trial.engine])
+    if who not in _KNOWN:
+        cycle = min(trial.robot.gait.period, trial.duration)
+        one, other = (_steered([trial], cycle)[0].to_dataset() for _ in range(2))
+        # An engine may give anything.
+        if not getattr(one, "identical", lambda _: True)(other):
+            _KNOWN[who] = "it steers otherwise when it sees the same again (a clock, np.random, a count?)"
+        elif trial.as_now().code != trial.code:
+            _KNOWN[who] = "what its code can reach changes while it steers"
+        else:
+            _KNOWN[who] = ""
+    return _KNOWN[who]
 
 
 def _sight(trial: Trial) -> Hashable:

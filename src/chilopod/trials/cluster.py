@@ -13,18 +13,17 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, suppress
 from itertools import islice
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Self
 
 from chilopod.errors import ClusterError, one_line
 from chilopod.trials.dask_client import connected
+from chilopod.trials.executors import Pace
 from chilopod.trials.on_worker import packed, unpacked, walked_there
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from chilopod.trials.trial import Trial
-
-T = TypeVar("T")
 
 _SHARES = 8  # batches that a worker gets of a study, at least, so that all are done at about the same time
 _AHEAD = 2  # batches a worker has, with that which it walks
@@ -60,7 +59,7 @@ class Cluster:
 
     def __init__(self, where: str | int, threads: int | None = None) -> None:
         self._where = where
-        self._stack = ExitStack()
+        self._stack, self._pace = ExitStack(), Pace()
         try:
             self._client: Any = connected(where, threads, self._stack)
             self._seen = time.monotonic()
@@ -91,17 +90,17 @@ class Cluster:
         """How many workers."""
         return f", {self.workers} worker{'s' * (self.workers != 1)}"
 
-    def cut(self, batches: list[list[T]]) -> list[list[T]]:
-        """In even pieces, so small that every worker gets several, and not smaller than a worker has threads."""
+    def cut(self, batches: Sequence[list[Trial]]) -> Iterator[list[Trial]]:
+        """In even pieces, so small that every worker gets several and is done with one in seconds, and not smaller than
+        a worker has threads."""
         threads = max(self._threads, default=1)
         trials = sum(len(batch) for batch in batches)
         largest = -(-trials // (_SHARES * max(self.workers, 1)))
-        pieces = []
         for batch in batches:
             size = -(-len(batch) // -(-len(batch) // largest))
             size = -(-size // threads) * threads
-            pieces += [batch[i : i + size] for i in range(0, len(batch), size)]
-        return pieces
+            for i in range(0, len(batch), size):
+                yield from self._pace.pieces(batch[i : i + size], threads)
 
     def walk(self, batches: Iterable[Sequence[Trial]]) -> Iterator[tuple[int, list[xr.Dataset]]]:
         """The number of a batch and its records, as they come; a batch is taken when it is sent.
@@ -146,7 +145,9 @@ class Cluster:
                 elif isinstance(answer, BaseException):
                     raise self._in_words(answer)
                 else:
-                    yield index, unpacked(answer)
+                    records, seconds = unpacked(answer)
+                    self._pace.took(batch, max(self._threads, default=1), seconds)
+                    yield index, records
         finally:
             # What nobody waits for any more does not walk. (Cancelling what fetches it would leave tasks of dask's
             # alone with their exceptions, of which asyncio complains.)

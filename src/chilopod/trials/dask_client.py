@@ -58,6 +58,7 @@ def connected(where: str | int, threads: int | None, stack: ExitStack) -> Any:
     stack.enter_context(_quiet())
     stack.enter_context(dask.config.set(_SETTINGS))
     if isinstance(where, int):
+        needs("cryptography", extra="cluster")
         folder = tempfile.TemporaryDirectory(prefix="chilopod-cluster-", ignore_cleanup_errors=True)
         # Of the scheduler, which has no argument for it.
         stack.enter_context(dask.config.set({"temporary-directory": stack.enter_context(folder)}))
@@ -128,6 +129,8 @@ def _own(workers: int, threads: int, distributed: Any, stack: ExitStack) -> Any:
             n_workers=0,
             threads_per_worker=threads,
             host="127.0.0.1",
+            # Whoever reaches a scheduler runs code as its user: this one talks to those alone that have its keys.
+            security=distributed.Security.temporary(),
             # Its server of figures on itself stays, without the dashboard, but on no port that others want.
             scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
             silence_logs=logging.CRITICAL,

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import enum
-import functools
 import hashlib
 import sys
-import types
 from collections.abc import Iterator
-from functools import lru_cache
+from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -17,18 +17,11 @@ import numpy as np
 from chilopod.engine.named import path_of
 from chilopod.errors import ParameterError
 from chilopod.robot import Robot
+from chilopod.trials.reach import Reach
 
 _DIGITS = 16
 _LARGEST = 2**63
-# What every class has, or a dataclass is given: its fields are described one by one.
-_GIVEN = frozenset(
-    f"__{name}__"
-    for name in (
-        *("module", "qualname", "doc", "dict", "weakref", "slots", "firstlineno", "static_attributes"),
-        *("annotations", "annotations_cache", "annotate_func", "dataclass_fields", "dataclass_params", "match_args"),
-        *("init", "repr", "eq", "hash", "setattr", "delattr", "replace", "getstate", "setstate"),
-    )
-)
+_described: ContextVar[dict[object, str] | None] = ContextVar("described", default=None)
 
 
 def plain(value: object, field: str) -> Any:
@@ -37,8 +30,8 @@ def plain(value: object, field: str) -> Any:
     Parameters
     ----------
     value
-        Number, text, None, enum, array, or a tuple or frozen dataclass of these. Of classes of one's own their path and
-        a digest of their code as it is now; of a dataclass the fields that count in comparisons.
+        Number, text, None, enum, array, or a tuple or frozen dataclass of these: of classes their path, of a dataclass
+        the fields that count in comparisons. What code they have is told by :func:`code_of`.
     field
         What to call it where it is refused.
 
@@ -49,7 +42,7 @@ def plain(value: object, field: str) -> Any:
     """
     kind: Any = type(value)
     if isinstance(value, enum.Enum):
-        return {"enum": _class(kind), "name": value.name}
+        return {"enum": path_of(kind), "name": value.name}
     if (
         value is None
         or kind in (bool, float, str)
@@ -65,7 +58,7 @@ def plain(value: object, field: str) -> Any:
         return {"tuple": [plain(each, f"{field}[{index}]") for index, each in enumerate(value)]}
     if dataclasses.is_dataclass(value) and not isinstance(value, type) and kind.__dataclass_params__.frozen:
         return {
-            "class": _class(kind),
+            "class": path_of(kind),
             "fields": {name: plain(getattr(value, name), f"{field}.{name}") for name in _counted(value)},
         }
     raise ParameterError(
@@ -76,17 +69,65 @@ def plain(value: object, field: str) -> Any:
     )
 
 
+def code_of(value: object) -> str:
+    """A digest of everything that the code of what :func:`plain` takes can reach, as it is now; empty for our own.
+
+    Raises
+    ------
+    UnknownKindError
+        If it reaches what cannot be described.
+    """
+    told: list[str] = []
+    for each in _parts(value):
+        kind, beside = type(each), Reach()
+        told.append(_once(kind, kind.__module__, kind.__qualname__))
+        for name in sorted(getattr(each, "__dict__", {}).keys() - _declared(each)):
+            beside.see(vars(each)[name], f"{kind.__qualname__}.{name}")
+            told += [name, beside.digest]
+    return hashlib.sha256(repr(told).encode()).hexdigest()[:_DIGITS] if any(told) else ""
+
+
+def sources_of(engine: str) -> str:
+    """A digest of the module of an engine of one's own, and of all its own that it imports; empty for our own.
+
+    Raises
+    ------
+    UnknownKindError
+        If their files cannot be read.
+    """
+    module = engine.partition(":")[0] if ":" in engine else "chilopod"
+    return _once(sys.modules[module], module, module)
+
+
+def _once(value: object, module: str, path: str) -> str:
+    top, known = module.partition(".")[0], _described.get()
+    known = {} if known is None else known
+    if value not in known:
+        reach = Reach(top)
+        if top != "chilopod":
+            reach.see(value, path)
+        known[value] = reach.digest if top != "chilopod" else ""
+    return known[value]
+
+
+@contextmanager
+def meanwhile_unchanged() -> Iterator[None]:
+    """While nobody edits classes, each is described once."""
+    token = _described.set({})
+    try:
+        yield
+    finally:
+        _described.reset(token)
+
+
 def classes_in(value: object) -> Iterator[type]:
     """All classes of one's own in what :func:`plain` takes."""
-    if isinstance(value, enum.Enum):
-        yield type(value)
-    elif isinstance(value, tuple):
-        for each in value:
-            yield from classes_in(each)
-    elif dataclasses.is_dataclass(value):
-        yield type(value)
-        for name in _counted(value):
-            yield from classes_in(getattr(value, name))
+    return (type(each) for each in _parts(value))
+
+
+def is_ours(kind: type) -> bool:
+    """Whether chilopod brings a class."""
+    return kind.__module__.partition(".")[0] == "chilopod"
 
 
 def is_findable(kind: type) -> bool:
@@ -109,54 +150,28 @@ def robot_text(robot: Robot) -> str:
     return robot.with_(name="robot", provenance={}).to_toml()
 
 
+def _parts(value: object) -> Iterator[Any]:
+    """Enums and dataclasses in what :func:`plain` takes."""
+    if isinstance(value, enum.Enum):
+        yield value
+    elif isinstance(value, tuple):
+        for each in value:
+            yield from _parts(each)
+    elif dataclasses.is_dataclass(value):
+        yield value
+        for name in _counted(value):
+            yield from _parts(getattr(value, name))
+
+
+def _declared(value: Any) -> set[str]:
+    """Attributes of an object that its class tells all about."""
+    if isinstance(value, enum.Enum):
+        return set(vars(value))
+    cached = {
+        name for each in type(value).__mro__ for name, part in vars(each).items() if isinstance(part, cached_property)
+    }
+    return cached.union(each.name for each in dataclasses.fields(value))
+
+
 def _counted(value: Any) -> list[str]:
     return [each.name for each in dataclasses.fields(value) if each.compare]
-
-
-@lru_cache(maxsize=256)
-def _class(kind: Any) -> str:
-    """Path and code of a class; of one that others cannot find also which of this process it is."""
-    own = "" if is_findable(kind) else f" {id(kind):x}"
-    return f"{path_of(kind)} {_code_of(kind)}{own}"
-
-
-def _code_of(kind: type) -> str:
-    """A digest of what the methods and constants of a class are now, whatever its file says; empty for our own.
-
-    Our own have :data:`chilopod.trials.trial.RECORD_VERSION`.
-    """
-    told = []
-    for each in kind.__mro__:
-        package = each.__module__.partition(".")[0]
-        if package == "chilopod" or (package in sys.stdlib_module_names - {"__main__"} and is_findable(each)):
-            continue
-        told.append([(name, _told(part)) for name, part in sorted(vars(each).items()) if name not in _GIVEN])
-    return hashlib.sha256(repr(told).encode()).hexdigest()[:_DIGITS] if told else ""
-
-
-def _told(part: Any) -> object:
-    """What tells a method or a constant from another, the same in every process."""
-    if isinstance(part, staticmethod | classmethod):
-        return type(part).__name__, _told(part.__func__)
-    if isinstance(part, property):
-        return "property", _told(part.fget)
-    if isinstance(part, functools.cached_property):
-        return "property", _told(part.func)
-    if isinstance(part, enum.Enum):
-        return part.name, _told(part.value)
-    part = getattr(part, "py_func", part)  # as numba keeps it
-    if isinstance(part, types.FunctionType):
-        held = [_told(cell.cell_contents) for cell in part.__closure__ or ()]
-        defaults = [_told(each) for each in part.__defaults__ or ()]
-        named = [(name, _told(each)) for name, each in sorted((part.__kwdefaults__ or {}).items())]
-        return "function", _told(part.__code__), defaults, named, held
-    if isinstance(part, types.CodeType):
-        return part.co_code.hex(), part.co_names, part.co_varnames, [_told(each) for each in part.co_consts]
-    if isinstance(part, frozenset | set):
-        return "set", sorted(repr(_told(each)) for each in part)
-    if isinstance(part, type):
-        return "class", path_of(part)
-    try:
-        return plain(part, "")
-    except ParameterError:
-        return path_of(type(part))

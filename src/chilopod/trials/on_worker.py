@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import pickle
 import threading
+import time
 import traceback
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -14,8 +15,9 @@ from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 from chilopod.cores import use_at_most
+from chilopod.engine.named import path_of
 from chilopod.errors import ClusterError, ParameterError, one_line
-from chilopod.trials.trial import RECORD_VERSION
+from chilopod.sources import digest
 
 if TYPE_CHECKING:
     from chilopod.trials.trial import Trial
@@ -26,14 +28,15 @@ PACKAGES = ("chilopod", "numpy", "numba")
 TWIN_PACKAGE = "mujoco-core"
 """That has to be where there are trials of the twin."""
 
-_RECORDS = "version of records"
+_SOURCES = "source code of chilopod"
+_DIGITS = 12  # of a digest, in an error
 _ONE_AT_A_TIME = threading.Lock()
 _PR_SET_PDEATHSIG = 1  # of prctl(2)
 
 
 def versions(packages: Sequence[str] = (*PACKAGES, TWIN_PACKAGE)) -> dict[str, str]:
     """Of what makes a record what it is, in this process."""
-    found = {_RECORDS: str(RECORD_VERSION)}
+    found = {_SOURCES: digest()[:_DIGITS]}
     for package in packages:
         try:
             found[package] = metadata.version(package)
@@ -66,12 +69,14 @@ def packed(batch: Sequence[Trial]) -> bytes:
     """
     for trial in batch:
         trial.check_findable()
+        if trial.code[1]:
+            raise ParameterError(trial.not_kept(trial.code[1]), field="cluster", allowed="to walk them on this machine")
     packages = (*PACKAGES, TWIN_PACKAGE) if batch[0].engine == "twin" else PACKAGES
     try:
         trials = pickle.dumps(list(batch), pickle.HIGHEST_PROTOCOL)
     except Exception as error:  # whatever a class of one's own does
         raise _not_importable(batch[0].controller, error) from error
-    return pickle.dumps((versions(packages), trials), pickle.HIGHEST_PROTOCOL)
+    return pickle.dumps((versions(packages), [trial.text for trial in batch], trials), pickle.HIGHEST_PROTOCOL)
 
 
 def walked_there(job: bytes, place: str) -> bytes:
@@ -93,7 +98,7 @@ def walked_there(job: bytes, place: str) -> bytes:
 
 
 def unpacked(answer: bytes) -> Any:
-    """The records that a worker sent, or what went wrong there."""
+    """The records that a worker sent, and how long it walked, s; or what went wrong there."""
     found = pickle.loads(answer)
     if isinstance(found, Exception):
         raise found
@@ -111,17 +116,27 @@ def dask_setup(worker: object) -> None:
 
     with suppress(ValueError):  # only the main thread may say so
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+    sys.stdout = sys.stderr  # what a controller prints there is no result
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def _walked(job: bytes, place: str) -> Any:
-    expected, packed_trials = pickle.loads(job)
-    check_versions(expected, versions(tuple(name for name in expected if name != _RECORDS)), place)
+    expected, texts, packed_trials = pickle.loads(job)
+    check_versions(expected, versions(tuple(name for name in expected if name != _SOURCES)), place)
     try:
         trials = pickle.loads(packed_trials)
     except Exception as error:  # whatever somebody else's module does when it is imported
         raise _not_importable(None, error) from error
+    from chilopod.trials.description import meanwhile_unchanged
+
+    with meanwhile_unchanged():
+        here = [trial.text for trial in trials]
+    for trial, there, text in zip(trials, here, texts, strict=True):
+        if there != text:
+            own = f"engine {trial.engine}" if trial.controller is None else path_of(type(trial.controller))
+            problem = f"the code of {own}, or of what it imports, is another on a worker than here"
+            raise ClusterError(problem, field="cluster", value=place)
     import numba
     from distributed import get_worker
 
@@ -130,7 +145,9 @@ def _walked(job: bytes, place: str) -> Any:
     threads = get_worker().state.nthreads
     use_at_most(threads)
     numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))
-    return walked(trials)
+    begun = time.monotonic()
+    records = walked(trials)
+    return records, time.monotonic() - begun
 
 
 def _not_importable(controller: object, error: Exception) -> ParameterError:

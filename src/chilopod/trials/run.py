@@ -12,6 +12,7 @@ from chilopod.output import check_room
 from chilopod.progress import Progress, silent
 from chilopod.record import check_memory
 from chilopod.trials.batch import batches
+from chilopod.trials.description import meanwhile_unchanged
 from chilopod.trials.executors import Executor, current
 from chilopod.trials.sharing import alone, shared
 from chilopod.trials.store import Store
@@ -53,8 +54,9 @@ def run(
     OutputError
         If the folder has no room for them.
     """
+    trials = as_now(trials)
     check_fits(trials)
-    records = {trial.file_name: record for trial, record in run_each(trials, folder, progress, executor)}
+    records = {trial.file_name: record for trial, record in _each(trials, folder, progress, executor)}
     return [records[trial.file_name] for trial in trials]
 
 
@@ -83,28 +85,54 @@ def run_each(
     trials, folder, progress, executor
         As for :func:`run`.
     """
+    yield from _each(as_now(trials), folder, progress, executor)
+
+
+def _each(
+    trials: Sequence[Trial], folder: str | Path | None, progress: Progress, executor: Executor | None
+) -> Iterator[tuple[Trial, xr.Dataset]]:
     store = None if folder is None else Store(folder)
     asked = {trial.file_name: trial for trial in trials}
-    missing = []
-    for trial in asked.values():
+    kept = [trial for trial in asked.values() if store and store.has(trial)]
+    executor, done = current() if executor is None else executor, len(kept)
+
+    def walk(missing: Sequence[Trial]) -> Iterator[tuple[Trial, xr.Dataset]]:
+        nonlocal done
+        if store:
+            check_room(store.folder, sum(trial.least_bytes for trial in missing))
+        share = batches(missing)
+        check_memory(_COPIES * max((sum(trial.least_bytes for trial in batch) for batch in share), default=0.0))
+        progress(done / max(len(asked), 1), f"{done} of {len(asked)} trials")
+        steps = shared(missing, store, executor) if store and missing else alone(executor.cut(share), executor)
+        for walked, elsewhere in steps:
+            yield from walked
+            done += len(walked)
+            words = f"{done} of {len(asked)} trials{executor.words}"
+            progress(done / len(asked), f"{words}, {elsewhere} walked by another process" if elsewhere else words)
+
+    # What is missing comes first: a study that is killed again and again gets on however much is there to be read.
+    there = {trial.file_name for trial in kept}
+    yield from walk([trial for name, trial in asked.items() if name not in there])
+    damaged = []
+    for trial in kept:
         found = store.read(trial) if store else None
         if found is None:
-            missing.append(trial)
+            damaged.append(trial)
         else:
             yield trial, found
-    if store:
-        check_room(store.folder, sum(trial.least_bytes for trial in missing))
-    executor = current() if executor is None else executor
-    share = executor.cut(batches(missing))
-    check_memory(_COPIES * max((sum(trial.least_bytes for trial in batch) for batch in share), default=0.0))
-    done = len(asked) - len(missing)
-    progress(done / max(len(asked), 1), f"{done} of {len(asked)} trials")
-    for walked, elsewhere in shared(missing, store, executor) if store and missing else alone(share, executor):
-        yield from walked
-        done += len(walked)
-        words = f"{done} of {len(asked)} trials{executor.words}"
-        progress(done / len(asked), f"{words}, {elsewhere} walked by another process" if elsewhere else words)
+    if damaged:
+        done -= len(damaged)
+        yield from walk(damaged)
     progress(1.0, f"{len(asked)} trials")
+
+
+def as_now(trials: Sequence[Trial]) -> list[Trial]:
+    """The same trials, with the code and the fields of their controllers as they are now."""
+    found = [trial.as_now() for trial in trials]
+    with meanwhile_unchanged():
+        for trial in found:
+            trial.file_name  # noqa: B018  (from here on it is known what each is)
+    return found
 
 
 def together(records: Sequence[xr.Dataset]) -> xr.Dataset:

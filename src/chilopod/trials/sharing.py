@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import xarray as xr
 
-from chilopod.trials.batch import batches
+from chilopod.errors import AnalysisError
+from chilopod.trials.batch import NOT_KEPT, batches
 from chilopod.trials.claims import Claims
 from chilopod.trials.executors import Executor
 from chilopod.trials.store import Store
@@ -19,9 +20,11 @@ _LOOK = 0.2  # s between two looks whether other processes are done
 _PATIENCE = 120.0  # s in which they have to be done with one trial; one that is stopped never is
 
 
-def alone(share: Sequence[list[Trial]], executor: Executor) -> Iterator[tuple[Walked, int]]:
+def alone(share: Iterable[list[Trial]], executor: Executor) -> Iterator[tuple[Walked, int]]:
     """What :func:`shared` gives, where nothing is kept."""
     for walked in _walked(share, executor):
+        for _, record in walked:
+            record.attrs.pop(NOT_KEPT, None)
         yield walked, 0
 
 
@@ -53,7 +56,7 @@ def shared(trials: Sequence[Trial], store: Store, executor: Executor) -> Iterato
 
 
 def _walked(
-    share: Sequence[list[Trial]], executor: Executor, free: Callable[[list[Trial]], list[Trial]] = list
+    share: Iterable[list[Trial]], executor: Executor, free: Callable[[list[Trial]], list[Trial]] = list
 ) -> Iterator[Walked]:
     """Batches of trials with their records; ``free`` says which of a batch are to be walked when it is begun."""
     begun: list[list[Trial]] = []
@@ -66,7 +69,13 @@ def _walked(
                 yield mine
 
     for index, records in executor.walk(taken()):
-        yield list(zip(begun[index], records, strict=True))
+        walked = list(zip(begun[index], records, strict=True))
+        for trial, record in walked:
+            if record.attrs.get("trial") != trial.text:
+                raise AnalysisError(
+                    "gave the record of another trial, or one that other code walked", field=type(executor).__name__
+                )
+        yield walked
 
 
 class _Part:

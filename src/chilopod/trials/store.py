@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from chilopod.errors import OutputError
 from chilopod.output import check_folder, made_folder, sync_folder, write_atomic
+from chilopod.trials.batch import NOT_KEPT
 from chilopod.trials.claims import Claims
 from chilopod.trials.file import Unsound, content_of, read_whole, record_of
 from chilopod.trials.trial import Trial
@@ -45,7 +46,7 @@ class Store:
 
     def __init__(self, folder: str | Path, tell: Callable[[str], object] = _logger.warning) -> None:
         self.folder = check_folder(folder)
-        self._tell = tell
+        self._tell, self._said = tell, set[str]()
 
     def has(self, trial: Trial) -> bool:
         """Whether there is something that has the name of a trial's record."""
@@ -78,7 +79,7 @@ class Store:
             return None
 
     def write(self, trial: Trial, record: xr.Dataset) -> None:
-        """Keep a record, for good once :meth:`sync` has been called.
+        """Keep a record, for good once :meth:`sync` has been called; unless it says that it is not to be kept.
 
         Raises
         ------
@@ -90,10 +91,16 @@ class Store:
         trial.check_findable()
         if record.attrs.get("trial") != trial.text:
             raise OutputError(
-                "is that of another trial, or was walked by another version of chilopod or of the engine",
+                "is that of another trial, or was walked by other code",
                 field="record",
                 allowed=f"a record for {trial.file_name}",
             )
+        if NOT_KEPT in record.attrs:
+            words = trial.not_kept(record.attrs.pop(NOT_KEPT))
+            if words not in self._said:
+                self._tell(words)
+            self._said.add(words)
+            return
         content = content_of(record)
         # Whoever deletes the folder while trials walk loses what was in it, not the walks to come: it is made again.
         write_atomic(self.folder / trial.file_name, content, durable=True, temporary=_UNFINISHED)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -17,12 +17,15 @@ from chilopod.engine.named import check_controller, path_of
 from chilopod.errors import ParameterError
 from chilopod.record import LONGEST, RATE, Recording, in_range
 from chilopod.robot import Robot
+from chilopod.sources import digest
 from chilopod.steering import Course, Target
-from chilopod.trials.description import classes_in, is_findable, plain, robot_text
+from chilopod.trials.description import classes_in, code_of, is_findable, is_ours, plain, robot_text, sources_of
 from chilopod.trials.disturbance import Disturbance
+from chilopod.trials.reach import UnknownKindError
 
-RECORD_VERSION = 6
-"""Goes up whenever the same trial would give another record; files of other versions are left alone."""
+_DIGITS = 16
+_ABOVE = ("analysis", "cli", "gym", "live", "paper", "report", "stability", "tasks")
+"""Subpackages that no walk is made with: who edits these finds trials that were kept before."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +46,7 @@ class Trial:
         Where the robot is to go, if anywhere: one target, or a course of them, which ends the walk.
     controller
         What steers it, if anything: any frozen dataclass with ``events`` and ``act``, whose fields are plain data. Its
-        class, the text of that class and its fields are part of what the trial is.
+        fields, and everything that the code of its class can reach, are part of what the trial is.
     disturbance
         How much differs from trial to trial.
     rate
@@ -152,11 +155,26 @@ class Trial:
         return None if self.controller is None else plain(self.controller, type(self.controller).__name__)
 
     @cached_property
+    def code(self) -> tuple[str, str]:
+        """Digest of what the code of controller and engine is, and why it has none that others could find, if so."""
+        try:
+            return code_of(self.controller) + sources_of(self.engine), ""
+        except UnknownKindError as error:
+            can = "numbers, text, arrays, lists, dictionaries, enums, functions, classes and modules can"
+            return f"of this process {id(self.controller):x}", f"{error}, which cannot be described; {can}"
+
+    def as_now(self) -> Trial:
+        """The same trial, with code and fields of its controller as they are now."""
+        own = ":" in self.engine or any(not is_ours(kind) for kind in classes_in(self.controller))
+        return replace(self) if own else self
+
+    @cached_property
     def text(self) -> str:
         """All of it as JSON; equal texts are equal trials."""
         return json.dumps(
             {
                 **versions_of(self.engine),
+                "code": self.code[0],
                 "engine": self.engine,
                 "robot": robot_text(self.robot),
                 "duration": self.duration,
@@ -208,13 +226,18 @@ class Trial:
                     allowed="what stands at the top of a module that can be imported, or trials without a folder",
                 )
 
+    def not_kept(self, why: str) -> str:
+        """A line for whoever wonders why a folder does not have this trial."""
+        who = f"engine {self.engine}" if self.controller is None else f"controller {path_of(type(self.controller))}"
+        return f"{who}: its trials walk and are not kept: {why}"
+
 
 def versions_of(engine: str) -> dict[str, Any]:
     """Of what makes a record, as they stand in a trial's text."""
     return {
-        "version": RECORD_VERSION,
         # What else a version says of a checkout, the sources say better.
         "chilopod": chilopod.__version__.partition("+")[0],
+        "sources": digest(_ABOVE)[:_DIGITS],
         "engine_version": engine_named(engine).traits.version,
     }
 

@@ -1,0 +1,364 @@
+"""Everything that the code of a class can reach, as a digest: another one when any of it changes.
+
+A walk over objects, from a class through its bases, attributes, functions, closures, default values and the globals
+that functions name. Code of others (Python, installed packages, chilopod) is described by name and version, code of
+one's own down to its instructions and constants. What is looked up by names made while the code runs cannot be seen
+so: therefore every module of one's own counts as a whole too, with all modules of one's own that it imports. What is
+none of the kinds in the table below is refused. Files that code reads, clocks and networks are not code.
+"""
+
+from __future__ import annotations
+
+import builtins
+import copyreg
+import dataclasses
+import dis
+import enum
+import functools
+import hashlib
+import sys
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import lru_cache
+from importlib import import_module, metadata
+from pathlib import Path
+from types import (
+    BuiltinFunctionType,
+    CellType,
+    CodeType,
+    FunctionType,
+    GetSetDescriptorType,
+    MappingProxyType,
+    MemberDescriptorType,
+    MethodType,
+    ModuleType,
+)
+from typing import Any
+
+import numpy as np
+
+from chilopod.engine.named import path_of
+from chilopod.errors import in_words
+
+Parts = Iterator[tuple[str, object]]
+
+_ATOMS = (type(None), bool, int, float, complex, str, bytes, bytearray, range, slice, type(...), type(NotImplemented))
+# May be one object or several with equal contents, as it happens to be compiled.
+_VALUES = (tuple, frozenset, CodeType)
+_GIVEN = frozenset(
+    f"__{name}__"
+    for name in (
+        *("dict", "weakref", "doc", "firstlineno", "static_attributes", "annotations", "annotations_cache"),
+        *("annotate_func", "slotnames", "dataclass_fields", "dataclass_params", "orig_bases", "parameters"),
+    )
+) | {"_abc_impl"}
+_MADE = frozenset(f"_{name}_" for name in ("member_names", "member_map", "value2member_map", "unhashable_values"))
+_WRITTEN = frozenset(
+    f"__{name}__" for name in ("init", "repr", "eq", "hash", "setattr", "delattr", "replace", "lt", "le", "gt", "ge")
+)
+_IMPORT = dis.opmap["IMPORT_NAME"]
+_HIDING = frozenset(f"__{name}__" for name in ("reduce", "reduce_ex", "getstate", "getnewargs", "getnewargs_ex"))
+_CODE = (
+    *("code", "consts", "exceptiontable", "names", "varnames", "freevars", "cellvars", "flags", "name", "argcount"),
+    *("posonlyargcount", "kwonlyargcount"),
+)
+_FIELD = ("name", "default", "default_factory", "init", "compare", "kw_only", "metadata")
+
+
+class UnknownKindError(Exception):
+    """Something cannot be described; says in words which, and where it was reached."""
+
+
+class Reach:
+    """A digest of everything that can be reached from the objects that it is shown, in order.
+
+    Parameters
+    ----------
+    own
+        Top-level package that is one's own even where it is installed.
+    """
+
+    def __init__(self, own: str = "") -> None:
+        self._own = own
+        self._hash = hashlib.sha256()
+        self._seen: dict[int, int] = {}
+        self._alive: list[object] = []  # so that no other object gets the address of one that was seen
+
+    @property
+    def digest(self) -> str:
+        """Of all that was seen so far."""
+        return self._hash.hexdigest()[:16]
+
+    def see(self, value: object, path: str) -> None:
+        """Add an object, reached as ``path`` says, and all that can be reached from it.
+
+        Raises
+        ------
+        UnknownKindError
+            If there is something of a kind that nobody can describe.
+        """
+        try:
+            self._see(value, path)
+        except UnknownKindError:
+            raise
+        except Exception as error:  # whatever somebody else's objects do when they are looked at
+            raise UnknownKindError(f"{path}: {in_words(error)}") from None
+
+    def _see(self, value: Any, path: str) -> None:
+        kind = type(value)
+        if kind in _ATOMS:
+            return self._put(kind.__name__, hex(value) if isinstance(value, int) else repr(value))
+        named = self._named(value)
+        if named:
+            return self._put("named", named)
+        if kind not in _VALUES:
+            if id(value) in self._seen:
+                return self._put("seen", self._seen[id(value)])
+            self._seen[id(value)] = len(self._seen)
+            self._alive.append(value)
+        self._put(kind.__module__, kind.__qualname__)
+        if kind in (set, frozenset):
+            return self._put(*sorted(self._apart(each, path) for each in value))
+        for label, part in self._parts(value, kind, path):
+            self._put(label)
+            self._see(part, path + label)
+        return self._put("end")
+
+    def _apart(self, value: object, path: str) -> str:
+        other = Reach(self._own)
+        other.see(value, f"{path}{{}}")
+        return other.digest
+
+    def _put(self, *words: object) -> None:
+        self._hash.update(repr(words).encode())
+
+    def _parts(self, value: Any, kind: type, path: str) -> Parts:
+        """What an object consists of, each with what leads there."""
+        if kind is FunctionType:
+            return self._function(value, path)
+        if isinstance(value, ModuleType):
+            return self._module(value, path)
+        if isinstance(value, type):
+            return self._class(value)
+        if kind is np.ndarray and not value.dtype.hasobject:
+            return _array_parts(value)
+        if isinstance(value, enum.Enum):
+            return _attributes("_name_", "_value_", "__class__")(value)
+        if isinstance(getattr(value, "py_func", None), FunctionType):  # as numba keeps it
+            return _attributes("py_func", "targetoptions")(value)
+        return _KINDS[kind](value) if kind in _KINDS else self._instance(value, kind, path)
+
+    def _instance(self, value: Any, kind: type, path: str) -> Parts:
+        """What pickle would keep, of classes that hide nothing from it."""
+        unknown = UnknownKindError(f"{path}: an object of type {kind.__qualname__}")
+        for each in filter(lambda each: self._is_own(each.__module__), kind.__mro__):
+            for how in vars(each).keys() & _HIDING:
+                if self._is_own(getattr(vars(each)[how], "__globals__", {}).get("__name__", "")):
+                    raise unknown
+        try:
+            reduce = copyreg.dispatch_table.get(kind)
+            found = reduce(value) if reduce else value.__reduce_ex__(4)
+        except Exception:
+            raise unknown from None
+        if not isinstance(found, tuple):
+            raise unknown
+        for part in (kind, *found[:3], *(list(each) for each in found[3:5] if each is not None)):
+            yield "", part
+
+    # -- code
+    # ---------------------------------------------------------------------------------------------------------------
+
+    def _function(self, function: FunctionType, path: str) -> Parts:
+        if function.__globals__.get("__name__") == "functools" and hasattr(function, "registry"):
+            yield ".registry", function.registry  # of singledispatch, without what it remembers
+            return
+        yield from _attributes("__code__", "__defaults__", "__kwdefaults__", "__closure__", "__dict__")(function)
+        space = function.__globals__
+        if self._is_own(space.get("__name__", "")):
+            imported = self._imported(function.__code__, space, path)
+            names = _named_in(function.__code__) | imported.keys()
+            yield from self._reached(names, {**vars(builtins), **space, **imported}, "", set())
+            home = sys.modules.get(space.get("__name__", ""))
+            if home is not None and vars(home) is space:
+                yield ".__module__", home
+
+    def _reached(self, names: set[str], space: Mapping[str, object], prefix: str, inside: set[int]) -> Parts:
+        """Whatever these names may lead to, in modules of one's own also theirs."""
+        for name in sorted(names & space.keys()):
+            value = space[name]
+            yield f" -> {prefix}{name}", value
+            if isinstance(value, ModuleType) and id(value) not in inside and self._is_own(value.__name__):
+                yield from self._reached(names, vars(value), f"{prefix}{name}.", inside | {id(value)})
+
+    def _module(self, module: ModuleType, path: str) -> Parts:
+        """The text of a module of one's own, and of all those that it imports."""
+        file = getattr(module, "__file__", None)
+        if file is None:
+            if hasattr(module, "__path__"):
+                return
+            raise UnknownKindError(f"{path}: a module without a file")
+        content = Path(file).read_bytes()
+        code = _compiled(content) if file.endswith(".py") else None
+        yield "", content if code is None else code
+        outer = module.__name__.rpartition(".")[0]
+        found = self._imported(code, vars(module), path, nested=False) if code else {}
+        for name, each in sorted({**found, outer: sys.modules.get(outer)}.items()):
+            if each is not None and self._is_own(each.__name__):
+                yield f" -> {name}", each
+
+    def _class(self, kind: type) -> Parts:
+        yield ".__module__", path_of(kind)
+        yield from _attributes("__class__", "__bases__")(kind)
+        yield "", sys.modules.get(kind.__module__)
+        fields = vars(kind).get("__dataclass_fields__", {})
+        for each in fields.values():
+            yield from _attributes(*_FIELD)(each)
+        yield " (dataclass)", repr(vars(kind).get("__dataclass_params__"))
+        if issubclass(kind, enum.Enum):
+            yield ".__members__", kind.__members__
+        skipped = _GIVEN | _MADE if issubclass(kind, enum.Enum) else _GIVEN
+        for name, part in sorted(vars(kind).items()):
+            # What dataclass writes follows from the fields.
+            written = name in _WRITTEN and getattr(getattr(part, "__code__", None), "co_filename", "") == "<string>"
+            if name not in skipped and not (fields and written):
+                yield f".{name}", part
+
+    def _imported(
+        self, code: CodeType, space: Mapping[str, Any], path: str, nested: bool = True
+    ) -> dict[str, ModuleType | None]:
+        """Modules that code imports when it runs, imported now; None where there is none."""
+        found: dict[str, ModuleType | None] = {}
+        if nested:
+            if {"import_module", "__import__"} & {*code.co_names}:
+                raise UnknownKindError(f"{path}: code that imports modules by name")
+            for each in code.co_consts:
+                found |= self._imported(each, space, path) if isinstance(each, CodeType) else {}
+        if _IMPORT not in code.co_code[::2]:
+            return found
+        constants: list[Any] = []
+        for each in dis.get_instructions(code):
+            constants += [each.argval] if each.opname == "LOAD_CONST" else []
+            if each.opname == "IMPORT_NAME":
+                level, wanted = constants[-2], constants[-1] or ()
+                name = "." * level + each.argval
+                found[each.argval] = module = _module_named(name, space)
+                for part in wanted if module and self._is_own(module.__name__) else ():
+                    inner = vars(module).get(part) or _module_named(name + "." * bool(each.argval) + part, space)
+                    found |= {part: inner} if isinstance(inner, ModuleType) else {}
+        return found
+
+    # -- code of others
+    # ---------------------------------------------------------------------------------------------------------------
+
+    def _named(self, value: Any) -> str:
+        module: Any
+        name: Any
+        """Name and version of what a package of others has under its own name; empty for all else."""
+        if isinstance(value, ModuleType):
+            module, name = value.__name__, ""
+        elif isinstance(value, np.ufunc):
+            name = value.__name__
+            module = "numpy" if hasattr(np, name) else "scipy.special"
+        elif callable(value) and not self._is_own(type(value).__module__):
+            name = getattr(value, "__qualname__", None)
+            # What wraps another has that one's module.
+            module = getattr(value, "__globals__", {}).get("__name__", getattr(value, "__module__", None))
+        else:
+            return ""
+        if not isinstance(module, str) or not isinstance(name, str) or self._is_own(module):
+            return ""
+        found: Any = sys.modules.get(module)
+        for part in filter(None, name.split(".")):
+            found = getattr(found, part, None)
+        return f"{module}:{name} of {_brought_by(module)}" if found is value else ""
+
+    def _is_own(self, module: str) -> bool:
+        return module.partition(".")[0] == self._own or not _brought_by(module)
+
+
+def _array_parts(array: Any) -> Parts:
+    return iter([(".dtype", str(array.dtype.descr)), (".shape", array.shape), ("[...]", array.tobytes())])
+
+
+def _dict_parts(values: Mapping[Any, object]) -> Parts:
+    for key, value in values.items():
+        yield " (key)", key
+        yield f"[{key!r:.40}]" if isinstance(key, str | int | float) else "[...]", value
+
+
+def _attributes(*names: str) -> Callable[[Any], Parts]:
+    return lambda value: ((f".{name}", getattr(value, name)) for name in names)
+
+
+def _item_parts(values: Iterable[object]) -> Parts:
+    return ((f"[{index}]", each) for index, each in enumerate(values))
+
+
+_SLOT = _attributes("__objclass__", "__name__")
+_KINDS: dict[type, Callable[[Any], Parts]] = {
+    tuple: _item_parts,
+    list: _item_parts,
+    dict: _dict_parts,
+    MappingProxyType: _dict_parts,
+    CodeType: _attributes(*(f"co_{name}" for name in _CODE)),
+    CellType: _attributes("cell_contents"),
+    MethodType: _attributes("__func__", "__self__"),
+    BuiltinFunctionType: _attributes("__name__", "__self__"),
+    property: _attributes("fget", "fset", "fdel"),
+    classmethod: _attributes("__func__"),
+    staticmethod: _attributes("__func__"),
+    np.vectorize: _attributes("pyfunc", "otypes", "excluded", "signature"),
+    functools.cached_property: _attributes("func"),
+    type(lru_cache(lambda: 0)): _attributes("__wrapped__"),
+    MemberDescriptorType: _SLOT,
+    GetSetDescriptorType: _SLOT,
+    type(str.join): _SLOT,
+    type(object.__init__): _SLOT,
+    type("".__str__): _attributes("__self__", "__name__"),
+}
+
+
+def _named_in(code: CodeType) -> set[str]:
+    """Names that code looks up, and text in it that may be one."""
+    names = {*code.co_names, *(each for each in code.co_consts if isinstance(each, str) and each.isidentifier())}
+    return names.union(*(_named_in(each) for each in code.co_consts if isinstance(each, CodeType)))
+
+
+def _module_named(name: str, space: Mapping[str, Any]) -> ModuleType | None:
+    try:
+        return import_module(name, space.get("__package__"))
+    except Exception:  # whatever somebody else's module does
+        return None
+
+
+@lru_cache(maxsize=256)
+def _compiled(content: bytes) -> CodeType | None:
+    """What a text says, in whatever words; None if it is no Python."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            return compile(content, "", "exec", dont_inherit=True)
+        except (SyntaxError, ValueError):
+            return None
+
+
+def _brought_by(module: str) -> str:
+    """Name and version of the package that a module of others is in; empty for one's own."""
+    top = module.partition(".")[0]
+    if top in ("chilopod", "__main__"):
+        return top if top == "chilopod" else ""
+    file = getattr(sys.modules.get(module, sys.modules.get(top)), "__file__", None)
+    return _package_of(top, file)
+
+
+@lru_cache(maxsize=4096)
+def _package_of(top: str, file: str | None) -> str:
+    place = Path(file or dataclasses.__file__)
+    if {"site-packages", "dist-packages"} & {*place.parts}:
+        try:
+            return f"{top} {metadata.version(top)}"
+        except metadata.PackageNotFoundError:
+            version = getattr(sys.modules[top], "__version__", "")
+            return f"{top} {version}" if version else ""
+    inside = top in sys.stdlib_module_names and place.is_relative_to(Path(dataclasses.__file__).parent)
+    return "Python {}.{}".format(*sys.version_info) if inside else ""

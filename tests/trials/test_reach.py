@@ -1,0 +1,138 @@
+"""Everything that the code of a controller can reach is part of what a trial is, or the trial is not kept."""
+
+import importlib
+import os
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chilopod import load_robot
+from chilopod.engine import Command, Event
+from chilopod.trials import Trial, run
+
+sys.path.append(str(Path(__file__).parents[2] / "torture"))
+edits = importlib.import_module("edited_controllers")
+PLANAR = load_robot("aoi2022-planar")
+REFUSED = {"hidden state", "ufunc of one's own", "imported by name", "state of a generator"}
+BY_NAME = {"global by name", "attribute by name", "evaluated", "helper by name"}
+
+
+@pytest.mark.parametrize("where", edits.PLACES)
+def test_an_edit_anywhere_makes_another_trial_or_none_that_is_kept(where, tmp_path):
+    outcome = edits.edited(where, "0.2", "0.3", tmp_path)
+    assert outcome.kind is (edits.Kind.REFUSED if where in REFUSED else edits.Kind.ENDED)
+    assert outcome.said == "" or outcome.kind is edits.Kind.REFUSED
+
+
+@pytest.mark.parametrize("where", sorted(edits.PLACES.keys() - REFUSED - BY_NAME))
+def test_it_is_seen_in_objects_too_whatever_files_say_by_now(where, tmp_path, monkeypatch):
+    monkeypatch.setattr("chilopod.trials.reach.Reach._module", lambda *_: iter(()))
+    assert edits.edited(where, "0.2", "0.3", tmp_path).said == ""
+
+
+@dataclass(frozen=True)
+class Attr:
+    """Whose gain is its class's."""
+
+    gain = 0.1
+
+    def events(self, gait):
+        return [Event("now", 0.0, 0.1)]
+
+    def act(self, event, seen):
+        return Command(leg_yaw=[[type(self).gain, 0.0]])
+
+
+@pytest.mark.parametrize("anew", [True, False])
+def test_a_class_that_is_changed_in_the_meantime_is_another(tmp_path, monkeypatch, anew):
+    asked = [Trial(PLANAR, 0.7, controller=Attr())]
+    (first,) = run(asked, tmp_path)
+    monkeypatch.setattr(Attr, "gain", -0.05)
+    (second,) = run([Trial(PLANAR, 0.7, controller=Attr())] if anew else asked, tmp_path)
+    assert [float(record.command[0, 0, 0]) for record in (first, second)] == [0.1, -0.05]
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+@dataclass(frozen=True)
+class Locked(Attr):
+    """Reaches what nobody can describe."""
+
+    lock = threading.Lock()
+
+
+def test_what_cannot_be_described_walks_and_is_not_kept(tmp_path, caplog):
+    asked = [Trial(PLANAR, 0.7, seed, controller=Locked()) for seed in range(3)]
+    assert len({each.file_name for each in asked}) == 3
+    assert [record.attrs.get("not kept") for record in run(asked, tmp_path)] == [None] * 3
+    assert not tmp_path.exists() or not list(tmp_path.iterdir())
+    (said,) = [each.message for each in caplog.records]
+    assert "Locked: its trials walk and are not kept: Locked.lock: an object of type lock, which cannot be" in said
+
+
+COUNT, STATE = [0], [0.0]
+
+
+@dataclass(frozen=True)
+class Random(Attr):
+    def act(self, event, seen):
+        return Command(leg_yaw=[[np.random.uniform(0.0, 0.1), 0.0]])  # noqa: NPY002
+
+
+@dataclass(frozen=True)
+class Counting(Attr):
+    def act(self, event, seen):
+        COUNT[0] += 1
+        return Command(leg_yaw=[[0.01 * (COUNT[0] % 7), 0.0]])
+
+
+@dataclass(frozen=True)
+class Remembering(Attr):
+    def act(self, event, seen):
+        STATE[0] += 1.0
+        return Command(leg_yaw=[[0.1, 0.0]])
+
+
+@dataclass(frozen=True)
+class Clock(Attr):
+    def act(self, event, seen):
+        return Command(leg_yaw=[[time.perf_counter() % 1e-3, 0.0]])
+
+
+@pytest.mark.parametrize("controller", [Random(), Counting(), Remembering(), Clock()])
+def test_a_controller_that_does_not_repeat_itself_is_not_kept(controller, tmp_path, caplog):
+    records = run([Trial(PLANAR, 0.7, seed, controller=controller) for seed in range(2)], tmp_path)
+    assert [each.status.item() for each in records] == ["walked"] * 2
+    assert list(tmp_path.iterdir()) == []
+    (said,) = [each.message for each in caplog.records]
+    reason = "changes while it steers" if isinstance(controller, Remembering) else "when it sees the same again"
+    assert reason in said
+
+
+def test_a_fresh_process_describes_the_same_and_walks_import_nothing_that_is_not_part_of_it(tmp_path):
+    places = [where for where in edits.PLACES if where not in REFUSED]
+    script = f"""
+        import sys
+        from pathlib import Path
+        from chilopod import load_robot
+        from chilopod.steering import LegYawController, Target
+        from chilopod.trials import Trial, run
+        from chilopod.trials.trial import _ABOVE
+        steered = dict(target=Target(0.7, 1.3), controller=LegYawController())
+        run([Trial(load_robot("aoi2022"), 0.1, engine="twin"), Trial(load_robot("aoi2022-planar"), 0.1, **steered)])
+        assert not {{name.split(".")[1] for name in sys.modules if name.startswith("chilopod.")}} & {{*_ABOVE}}
+        sys.path.append({str(Path(edits.__file__).parent)!r})
+        import edited_controllers as edits
+        for where in {places}:
+            print(edits._described(where, "0.2", Path({str(tmp_path)!r}))[0])
+    """
+    there = {**os.environ, "PYTHONHASHSEED": "7"}
+    command = [sys.executable, "-c", textwrap.dedent(script)]
+    done = subprocess.run(command, env=there, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == [edits._described(where, "0.2", tmp_path)[0] for where in places]
