@@ -10,6 +10,7 @@ from chilopod import load_robot, planar
 from chilopod.analysis.radius_law import radius_laws
 from chilopod.tasks import radius_law
 from chilopod.tasks.radius_law import end_of_walk
+from chilopod.trials import mean_joint_angles, summaries
 from chilopod.twin import simulate
 
 ROBOT = load_robot("aoi2022")
@@ -32,6 +33,31 @@ def test_the_end_of_a_circle_is_its_radius():
     assert float(end.speed) == pytest.approx(0.05)
     assert end.direction.item() == "right"
     assert float(end.moved) == pytest.approx(0.0)
+
+
+def test_the_last_five_seconds_are_the_same_everywhere():
+    """What `walk` prints of a record and what the studies make of it: one window, one radius."""
+    robot = load_robot("aoi2022-planar").set_from_text(["springs.stiffness[0]=8 N*mm/deg"])
+    start = planar.initial_states(robot, joint_angles=0.1)
+    record = planar.simulate(robot, 9.7, initial=start, rate=10.0).assign_attrs(robot=robot.name)
+    (ended,), end = summaries(robot, record), end_of_walk(record, robot)
+    np.testing.assert_array_equal(ended.joint_angles, end.mean_angle.values)
+    assert ended.axis_radius == float(end.axis_radius)
+    last = record.joint_angle.isel(robot=0).transpose("time", "joint").values[-50:]
+    np.testing.assert_allclose(ended.joint_angles, last.mean(0), rtol=1e-13)
+    assert ended.axis_radius == pytest.approx(5.0 * robot.module_length / np.abs(last.mean(0)).sum(), rel=1e-13)
+    early = mean_joint_angles(record, 2.0, before=5.0).isel(robot=0).values
+    np.testing.assert_allclose(early, record.joint_angle.isel(robot=0).values[-70:-50].mean(0), rtol=1e-13)
+
+
+def test_a_straight_walk_has_an_infinite_radius_everywhere():
+    robot = load_robot("aoi2022-planar")
+    record = planar.simulate(robot, 6.0, rate=10.0)
+    (ended,), end = summaries(robot, record), end_of_walk(record, robot)
+    assert ended.axis_radius == float(end.axis_radius) == np.inf
+    assert ended.as_json()["axis_radius_m"] is None
+    np.testing.assert_array_equal(robot.axis_radius([[0.0] * 5, [5e-324] * 5]), np.inf)
+    assert np.isnan(robot.axis_radius([np.nan] + [0.1] * 4))
 
 
 class Trying:

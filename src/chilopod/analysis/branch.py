@@ -301,13 +301,10 @@ def _walked(
     points, make, unit = branch.points, _followed(robot, parameter), robot.unit_of(parameter)
     models = [make(point.value) for point in points]
     means = walk_means(models, [point.orbit for point in points])
-    bent = np.abs(means.mean_angle).sum(axis=1)
-    length = np.array([model.robot.module_length for model in models])
     weight = np.array([model.robot.body.mass * GRAVITY for model in models])
     speed = np.array([drift.speed for drift in means.drifts])
     multipliers = np.array([point.multipliers for point in points])
-    with np.errstate(divide="ignore"):
-        radius = (robot.body.modules - 1) * length / bent
+    radius = [float(model.robot.axis_radius(angles)) for model, angles in zip(models, means.mean_angle, strict=True)]
 
     def column(values: Any, what: str | None = None) -> tuple[Any, ...]:
         return (("point",), np.asarray(values), {} if what is None else {"units": what})

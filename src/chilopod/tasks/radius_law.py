@@ -17,7 +17,7 @@ from chilopod.errors import AnalysisError
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import RadiusLaw
-from chilopod.trials import AVERAGED, NONE, Trial, run
+from chilopod.trials import AVERAGED, NONE, Trial, mean_joint_angles, run
 
 DURATION = 90.0
 """s, of every trial: beside the onset a bend takes a minute to grow."""
@@ -92,17 +92,15 @@ def end_of_walk(record: xr.Dataset, robot: Robot) -> xr.Dataset:
     Returns
     -------
     Dataset over joint: ``mean_angle`` over the last 5 s (rad), ``bend``, the sum of their sizes (rad), ``axis_radius``
-    (m), ``direction`` (left, right, straight; empty where the walk failed), ``moved``, by how much the sum differs from
+    (m; infinite if straight), ``direction`` (left, right, straight; empty where the walk failed), ``moved``, by how much the sum differs from
     that of the 10 s before (rad), ``settled``, whether that is less than :data:`SETTLED` of the bend, ``speed`` of
     module 1 over the last 12 s (m/s), and ``status``.
     """
     walk = record.isel(robot=0)
-    angles, times = walk.joint_angle.transpose("time", "joint").values, walk.time.values
-    late = times > times[-1] - AVERAGED + 1e-9
-    before = (times > times[-1] - AVERAGED - 10.0) & ~late
-    last = angles[late].mean(axis=0)
+    times = walk.time.values
+    last = mean_joint_angles(walk).values
     bend = float(np.abs(last).sum())
-    moved = abs(bend - float(np.abs(angles[before].mean(axis=0)).sum()))
+    moved = abs(bend - float(np.abs(mean_joint_angles(walk, 10.0, before=AVERAGED)).sum()))
     failed = walk.status.item() != Status.WALKED.label
     side = "straight" if bend < CURVED else "right" if last.sum() > 0.0 else "left"
     place = walk.position.transpose("time", "axis").values
@@ -114,7 +112,7 @@ def end_of_walk(record: xr.Dataset, robot: Robot) -> xr.Dataset:
         {
             "mean_angle": ("joint", last, {"units": "rad"}),
             "bend": ((), bend, {"units": "rad"}),
-            "axis_radius": ((), (robot.body.modules - 1) * robot.module_length / max(bend, 1e-9), {"units": "m"}),
+            "axis_radius": ((), float(robot.axis_radius(last)), {"units": "m"}),
             "direction": ((), np.array("" if failed else side, dtype=object)),
             "moved": ((), moved, {"units": "rad"}),
             "settled": ((), moved <= SETTLED * bend),
