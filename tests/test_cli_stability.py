@@ -31,6 +31,7 @@ def test_stability_json_has_all_reduced_exponents_by_falling_real_part(capsys):
         "robot",
         "period_s",
         "stable",
+        "verdict",
         "exponents_per_s",
         "multipliers",
         "half_period_multipliers",
@@ -180,3 +181,18 @@ def test_random_arguments_never_end_in_a_traceback(capsys, parameter, low, high)
     if code == 2:
         assert out == ""
         assert len(err.splitlines()) == 1
+
+
+def test_what_the_errors_leave_undecided_is_said_so(capsys):
+    """Every exponent is negative, and the bound is larger than the distance to 1."""
+    arguments = ["stability", "aoi2022-planar", "--set", "body.length=1e5 m"]
+    assert main(arguments) == 0
+    out = capsys.readouterr().out
+    assert "the straight walk is undecided" in out
+    assert "the largest is nearer to 1 than that" in out
+    assert main([*arguments, "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert (result["stable"], result["verdict"]) == (None, "undecided")
+    assert main(["stability", "aoi2022-planar", "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert (result["stable"], result["verdict"]) == (True, "stable")

@@ -33,4 +33,4 @@ def test_modules_are_no_continuous_parameter():
 def test_stability_agrees_with_the_sign_of_the_leading_exponent():
     for k1 in (11.0, 13.0):
         found = straight_walk(ROBOT.with_value(K1, stiffness(k1)))
-        assert found.stable == (found.exponents.values[0].real < 0) == (k1 > 12)
+        assert found.stable is bool(found.exponents.values[0].real < 0) == (k1 > 12)

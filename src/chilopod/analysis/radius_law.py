@@ -67,10 +67,8 @@ def radius_laws(robot: Robot, progress: Progress = silent) -> RadiusLaws:
     stiffest = max(robot.springs.stiffness)
     low, high = (part * stiffest for part in _BETWEEN)
     walks = curved_walks(robot, K1, (low, high), side=-1, progress=progress)
-    # Bent further, modules run into each other.
-    possible = walks.stable.values & (np.abs(walks.mean_angle.values).max(axis=1) <= 0.5 * np.pi)
     axis, path = (
-        RadiusLaw.of_branch(walks.parameter_si.values, walks[name].values, possible, robot.unit_of(K1))
+        RadiusLaw.of_branch(walks.parameter_si.values, walks[name].values, walks.stable.values, robot.unit_of(K1))
         for name in ("axis_radius", "path_radius")
     )
     return RadiusLaws(axis, path, walks)

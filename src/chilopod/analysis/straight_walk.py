@@ -18,6 +18,7 @@ from chilopod.notebook import block, table, words
 from chilopod.planar import PlanarModel
 from chilopod.robot import Robot
 from chilopod.stability import Kind
+from chilopod.stability.matrix_errors import VERDICTS
 
 ComplexArray = NDArray[np.complex128]
 
@@ -45,9 +46,14 @@ class StraightWalk(ReadOnlyArrays):
     joint_components: ComplexArray
 
     @property
-    def stable(self) -> bool:
-        """Whether every disturbance dies out."""
+    def stable(self) -> bool | None:
+        """Whether every disturbance dies out; None where the errors of the multipliers leave it undecided."""
         return self.exponents.multipliers.stable
+
+    @property
+    def verdict(self) -> str:
+        """Stable, unstable or undecided."""
+        return VERDICTS[self.stable]
 
     @property
     def moduli(self) -> NDArray[np.float64]:
@@ -62,6 +68,7 @@ class StraightWalk(ReadOnlyArrays):
             "robot": self.robot.name,
             "period_s": self.robot.gait.period,
             "stable": self.stable,
+            "verdict": self.verdict,
             "exponents_per_s": _pairs(self.exponents.values),
             "multipliers": _pairs(multipliers.values),
             "half_period_multipliers": None if half is None else _pairs(half),
@@ -78,7 +85,7 @@ class StraightWalk(ReadOnlyArrays):
             for modulus, exponent in zip(self.moduli, self.exponents.values, strict=True)
         ]
         return block(
-            f"{self.robot.name}: the straight walk is {'stable' if self.stable else 'unstable'}",
+            f"{self.robot.name}: the straight walk is {self.verdict}",
             words(f"The largest multipliers of {len(rows)}; the walk is stable if all are smaller than 1 in size."),
             table(("size of the multiplier", "grows by (1/s)", "turns by (rad/s)"), rows, most=6),
         )

@@ -65,12 +65,12 @@ def _write(files: list[Path], result: dict[str, Any], force: bool) -> list[Path]
 
 
 def _print_stability(described: Robot, found: StraightWalk) -> None:
-    verdict = "stable" if found.stable else "unstable"
-    typer.echo(f"{described.name}: the straight walk is {verdict} (period {described.gait.period:g} s)")
+    typer.echo(f"{described.name}: the straight walk is {found.verdict} (period {described.gait.period:g} s)")
     typer.echo("  exponent (1/s)              |multiplier|   joint angles of the mode, front to rear")
     for exponent, modulus, components in zip(found.exponents.values, found.moduli, found.joint_components, strict=True):
         typer.echo(f"  {_complex(exponent, 6):<26}  {modulus:<12.6g}   {_components(components)}")
-    typer.echo(f"  multipliers are within {found.exponents.multipliers.error_bound:.1e}")
+    nearer = "; the largest is nearer to 1 than that" if found.stable is None else ""
+    typer.echo(f"  multipliers are within {found.exponents.multipliers.error_bound:.1e}{nearer}")
 
 
 def bifurcation(

@@ -72,8 +72,8 @@ class CourseReferee:
     """Referee of robots that walk one course each, see :class:`chilopod.engine.Referee`.
 
     A robot's next target is put up when it has arrived at the one before, or that one's time is over, or it cannot be
-    reached in its time at all: the shortest path, with circles as tight as the course says, is longer than what feet
-    cover. After its last one the robot is halted.
+    reached in its time at all: even the straight line to it is longer than what feet cover. After its last one the
+    robot is halted.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ class CourseReferee:
                 path = float(shortest_path(seen_from, self._common.tightest))
                 self._number[robot], self._places[robot, number] = number, place
                 self._begin[robot, number], self._shortest[robot, number] = now, path
-                if path <= most:
+                if away - ARRIVAL_RADIUS <= most:
                     self._aims[robot] = place
                     break
                 self._end[robot, number], self._verdicts[robot, number] = now, Verdict.TOO_FAR.label
