@@ -158,6 +158,13 @@ class CourseReferee:
         """Where the targets are whose turn it is, m, shape (robots, 2); NaN where there is none."""
         return self._aims.copy()
 
+    def time_left(self, now: float) -> Array:
+        """Time until the last target's is over if none is reached, s, shape (robots,); 0 for robots that are done."""
+        patience, number = self._common.patience, np.maximum(self._number, 0)
+        begin = self._begin[np.arange(len(number)), np.minimum(number, self._begin.shape[1] - 1)]
+        until = np.where(np.isnan(begin), now, begin) + patience * (self._counts - number)
+        return np.where(self.busy, until - now, 0.0)
+
     @property
     def busy(self) -> NDArray[np.bool_]:
         """Who has a target still, shape (robots,)."""
