@@ -16,7 +16,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chilopod import stability, units
-from chilopod.analysis.straight_walk import WalkBifurcation, bifurcations, family
+from chilopod.analysis.straight_walk import WalkBifurcation, bifurcations, family, interval_text
 from chilopod.engine import Status
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.netcdf import unsealed
@@ -104,7 +104,11 @@ def curved_walks(
     """
     forks = [each for each in bifurcations(robot, parameter, between) if each.point.kind is Kind.PITCHFORK]
     if not forks:
-        raise AnalysisError("the straight walk has no pitchfork in this interval", field=parameter)
+        raise AnalysisError(
+            "the straight walk has no pitchfork in this interval",
+            field=parameter,
+            value=interval_text(robot, parameter, between),
+        )
     fork = forks[-1]
     make = _followed(robot, parameter)
     # The positive side of the mode is that of positive joint angles.
@@ -183,7 +187,7 @@ def resumed(
         raise ParameterError(
             "does not hold the saved branch's last point, beyond which nothing is left to follow",
             field="between",
-            value=" to ".join(units.format(each, unit, digits=4) for each in (low, high)),
+            value=interval_text(robot, parameter, (low, high)),
             allowed=f"an interval with {units.format(end, unit, digits=6)} in it",
         )
     branch = proceed(

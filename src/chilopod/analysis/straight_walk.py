@@ -269,7 +269,14 @@ def first_loss(
             raise AnalysisError(
                 f"stability is lost by a {points[-1].point.kind.label}, not a {kind.label}", field=parameter
             )
-    raise AnalysisError(f"no {kind.label} in the interval", field=parameter)
+    raise AnalysisError(
+        f"no {kind.label} in the interval", field=parameter, value=interval_text(robot, parameter, between)
+    )
+
+
+def interval_text(robot: Robot, parameter: str, between: tuple[float, float]) -> str:
+    """An interval (SI units) in the unit that the parameter is written in."""
+    return " to ".join(units.format(each, robot.unit_of(parameter), digits=4) for each in between)
 
 
 def pitchfork(robot: Robot, normal_form: bool = True) -> WalkBifurcation:

@@ -108,17 +108,18 @@ def bifurcation(
     result = {"robot": described.name, "points": [point.as_json() for point in points]}
     deliver(
         lambda: _write(files, result, force),
-        lambda: print_json(result) if as_json else _print_bifurcations(described, parameter, between, points),
+        lambda: print_json(result) if as_json else _print_bifurcations(described, parameter, (low, high), points),
     )
 
 
 def _print_bifurcations(
-    described: Robot, parameter: str, between: tuple[str, str], points: Sequence[WalkBifurcation]
+    described: Robot, parameter: str, between: tuple[float, float], points: Sequence[WalkBifurcation]
 ) -> None:
     if not points:
-        typer.echo(
-            f"{described.name}: no bifurcation of the straight walk for {parameter} between {' and '.join(between)}"
-        )
+        from chilopod import units
+
+        ends = " and ".join(units.format(each, described.unit_of(parameter), digits=6) for each in between)
+        typer.echo(f"{described.name}: no bifurcation of the straight walk for {parameter} between {ends}")
         return
     for each in points:
         point = each.point
