@@ -24,7 +24,8 @@ ComplexArray = NDArray[np.complex128]
 
 _FEWEST_PARTS = 8
 _A_PART = 5e-6  # s, of one state
-_LONGEST = 60.0  # s
+_ENOUGH = 100  # modules
+_LONGEST = 3600.0  # s
 
 
 @dataclass(frozen=True)
@@ -156,30 +157,46 @@ class WalkBifurcation(ReadOnlyArrays):
         )
 
 
-def straight_walk(robot: Robot) -> StraightWalk:
+def straight_walk(robot: Robot, longest: float = _LONGEST) -> StraightWalk:
     """Floquet analysis of the straight walk in the planar model.
+
+    Parameters
+    ----------
+    robot
+        The robot.
+    longest
+        Time that the analysis may be expected to take, s.
 
     Raises
     ------
     AnalysisError
-        If it would take far more than a minute, as of a hundred modules or of very light ones.
+        If it is expected to take longer, as of a hundred modules or of very light ones.
     """
     model = PlanarModel(robot)
     # The period is cut into parts that contract by a factor of 1e6 at most, and matrices of this size are split along
     # them: an estimate of the time that this takes, good to a factor of two on a desk of today.
-    parts = max(_FEWEST_PARTS, 0.5 * model.contraction / math.log(1e6))
+    # Of a long chain the estimate itself takes minutes; one of fewer, heavier modules contracts less.
+    enough = min(robot.body.modules, _ENOUGH)
+    contraction = PlanarModel(robot.with_value("body.modules", float(enough))).contraction
+    parts = max(_FEWEST_PARTS, 0.5 * contraction / math.log(1e6))
     seconds = _A_PART * parts * model.dimension**2.5
-    if seconds > _LONGEST:
+    if seconds > longest:
         raise AnalysisError(
-            f"the exponents would take about {seconds / 60.0:.3g} minutes: {model.dimension} states, the fastest of "
-            f"which dies out {model.contraction:.3g} e-folds a period",
+            f"the exponents would take about {_duration(seconds)}: {model.dimension} states, the fastest of which dies "
+            f"out {contraction:.3g} e-folds a period or more",
             field="body.modules",
             value=robot.body.modules,
-            allowed=f"what takes about {_LONGEST / 60.0:.0f} minute: fewer modules, or longer and heavier ones",
+            allowed=f"what takes about {_duration(longest)}: fewer modules, or longer and heavier ones",
         )
     found = stability.exponents(model)
     components = np.array([joint_components(mode, robot.body.modules) for mode in found.modes.T])
     return StraightWalk(robot, found, components)
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 120.0:
+        return f"{seconds:.3g} s"
+    return f"{seconds / 60.0:.3g} minutes" if seconds < 7200.0 else f"{seconds / 3600.0:.3g} hours"
 
 
 def family(robot: Robot, parameter: str) -> Callable[[float], PlanarModel]:

@@ -29,6 +29,7 @@ Array = NDArray[np.float64]
 
 _BETWEEN = (1.0 / 20.0, 3.0)  # of the stiffest spring: as for the radius law
 _NICE = 5
+_GROWTH = 30.0  # s that a short question may take
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ def growth_of(robot: Robot) -> Growth:
     """Of the straight walk in the planar theory."""
     from chilopod.analysis import straight_walk
 
-    exponents = straight_walk(robot).as_json()["exponents_per_s"]
+    exponents = straight_walk(robot, longest=_GROWTH).as_json()["exponents_per_s"]
     return Growth(robot, max(real for real, _ in exponents))
 
 
