@@ -1,6 +1,7 @@
 """What outsiders broke in walks of both engines, and its relatives."""
 
 import io
+import itertools
 import json
 
 import numpy as np
@@ -294,3 +295,15 @@ def test_controllers_that_are_none_are_named(engine, robot):
         steer(engine.start(robot), 1.0, Asked(answer=Command()), bearing_noise=np.zeros((2, 9)))
     with pytest.raises(ParameterError, match="bearing_noise"):
         steer(engine.start(robot), 9.0, Asked(answer=Command()), bearing_noise=np.zeros((1, 2)))
+
+
+def test_events_that_never_end_are_refused():
+    class Endless:
+        def events(self, gait):
+            return (Event("again", 0.5, 0.1) for _ in itertools.count())
+
+        def act(self, event, seen):
+            return Command()
+
+    with pytest.raises(ParameterError, match=r"Endless.events.*are too many.*10000 in a gait cycle"):
+        steer(planar.start(load_robot("aoi2022-planar")), 1.0, Endless())
