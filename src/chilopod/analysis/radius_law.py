@@ -10,6 +10,7 @@ import xarray as xr
 from chilopod import units
 from chilopod.analysis.branch import curved_walks
 from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
+from chilopod.frozen import Short
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import RadiusLaw
@@ -19,7 +20,7 @@ _BETWEEN = (1.0 / 20.0, 3.0)
 
 
 @dataclass(frozen=True)
-class RadiusLaws:
+class RadiusLaws(Short):
     """Which k1 turns how tightly, by two measures of a radius.
 
     Attributes

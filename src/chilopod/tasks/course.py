@@ -14,6 +14,7 @@ import xarray as xr
 from chilopod.engine import Controller, engine_named
 from chilopod.engine.named import check_controller, path_of
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.frozen import Short
 from chilopod.notebook import block, table, words
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
@@ -42,7 +43,7 @@ _PATIENCE = 25.0  # s for a target, of an engine whose walks are as fast as the 
 
 
 @dataclass(frozen=True)
-class Driver:
+class Driver(Short):
     """A robot made ready for courses.
 
     Attributes
@@ -70,7 +71,7 @@ class Driver:
 
 
 @dataclass(frozen=True)
-class Driven:
+class Driven(Short):
     """Walks along a course, and what became of its targets.
 
     Attributes
