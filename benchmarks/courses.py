@@ -36,12 +36,12 @@ ROBOTS = {"planar": ("aoi2022-planar", 64), "twin": ("aoi2022", 8)}
 ROUNDS = 2
 
 
-def courses(ready: Driver, engine: str, count: int) -> list[Trial]:
+def courses(ready: Driver, count: int) -> list[Trial]:
     assert ready.law is not None
     seeds = range(1000, 1000 + count)
     return [
-        trial_of(ready, replace(course, tightest=ready.law.tightest), seed, engine=engine, brief=True)
-        for seed, course in zip(seeds, random_courses(seeds, engine), strict=True)
+        trial_of(ready, replace(course, tightest=ready.law.tightest), seed, brief=True)
+        for seed, course in zip(seeds, random_courses(seeds, ready.engine), strict=True)
     ]
 
 
@@ -85,7 +85,7 @@ def busy(count: int) -> Iterator[None]:
 def row(engine: str, threads: int, others: int = 0) -> list[str]:
     name, count = ROBOTS[engine]
     ready = driver(load_robot(name), VARIABLE, engine=engine)
-    groups = batches(courses(ready, engine, count))
+    groups = batches(courses(ready, count))
     driven([replace(groups[0][0])])  # compiled
     taken, alone = [], []
     with busy(others):

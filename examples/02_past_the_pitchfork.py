@@ -11,7 +11,6 @@ import matplotlib.pyplot as plt
 from chilopod import load_robot, units
 from chilopod.analysis import curved_walks
 from chilopod.tasks import walk
-from chilopod.trials import axis_radius
 
 spring = "springs.stiffness[0]"
 robot = load_robot("aoi2022-planar").override(spring, "8 N*mm/deg")
@@ -43,7 +42,7 @@ for seed, place, bent in zip(
     (1, 2, 3, 4), record.position.transpose("robot", "time", "axis").values, angles, strict=True
 ):
     left.plot(*place.T, label=f"seed {seed}")
-    right.semilogy(record.time, axis_radius(robot, bent))
+    right.semilogy(record.time, robot.axis_radius(bent))
 left.set(xlabel="x (m)", ylabel="y (m)", title="path of the front module", aspect="equal")
 left.legend()
 right.axhline(settled.axis_radius.item(), color="black", linestyle="--", label="the branch")

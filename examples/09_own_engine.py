@@ -15,7 +15,7 @@ import numpy as np
 from chilopod import load_robot, planar
 from chilopod.engine import Traits, check_engine, steer
 from chilopod.engine.arguments import as_robots
-from chilopod.trials import axis_radius, mean_joint_angles
+from chilopod.trials import mean_joint_angles
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ for name, engine, look in (("good feet", planar, "C0-"), ("worn feet", worn, "C1
     walk = engine.start([soft, soft], initial=bent)
     steer(walk, 90.0)
     record = walk.to_dataset()
-    left, right = axis_radius(soft, mean_joint_angles(record).transpose("robot", "joint").values)
+    left, right = soft.axis_radius(mean_joint_angles(record).transpose("robot", "joint").values)
     print(f"{name}: radius {left:.3f} m to the left, {right:.3f} m to the right")
     axes.plot(*record.position.transpose("axis", "time", "robot").values, look, label=[name, "_"])
 axes.set(xlabel="x (m)", ylabel="y (m)", title="paths of the front module", aspect="equal")

@@ -31,6 +31,7 @@ def test_stability_json_has_all_reduced_exponents_by_falling_real_part(capsys):
         "robot",
         "period_s",
         "stable",
+        "verdict",
         "exponents_per_s",
         "multipliers",
         "half_period_multipliers",
@@ -180,3 +181,34 @@ def test_random_arguments_never_end_in_a_traceback(capsys, parameter, low, high)
     if code == 2:
         assert out == ""
         assert len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("command", ["bifurcation", "branch"])
+def test_numbers_without_a_unit_are_said_to_be_si(capsys, command):
+    code, out, err = call(capsys, command, PRESET, "--parameter", K1, "--between", "2", "75")
+    note = "note: a number without a unit is SI: --between is 2 N*m/rad to 75 N*m/rad, that is 34.91 N*mm/deg to 1309"
+    assert err.startswith(note)
+    if command == "bifurcation":
+        assert code == 0
+        assert "no bifurcation of the straight walk for springs.stiffness[0] between 34.9066 N*mm/deg and 1309" in out
+    else:
+        assert code == 2
+        assert "'34.91 N*mm/deg to 1309 N*mm/deg': the straight walk has no pitchfork in this interval" in err
+    for between in (("0.2", "75 N*mm/deg"), ("11 N*mm/deg", "13 N*mm/deg")):
+        _, _, err = bifurcation(capsys, between=between)
+        assert ("note: a number without a unit is SI" in err) is (between[0] == "0.2")
+
+
+def test_what_the_errors_leave_undecided_is_said_so(capsys):
+    """Every exponent is negative, and the bound is larger than the distance to 1."""
+    arguments = ["stability", "aoi2022-planar", "--set", "body.length=1e5 m"]
+    assert main(arguments) == 0
+    out = capsys.readouterr().out
+    assert "the straight walk is undecided" in out
+    assert "the largest is nearer to 1 than that" in out
+    assert main([*arguments, "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert (result["stable"], result["verdict"]) == (None, "undecided")
+    assert main(["stability", "aoi2022-planar", "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert (result["stable"], result["verdict"]) == (True, "stable")

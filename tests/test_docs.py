@@ -125,3 +125,45 @@ def test_commands_parse():
         while hasattr(command, "commands") and words and words[0] in command.commands:
             command = command.commands[words.pop(0)]
         command.make_context(f"{page}: {line}", words)
+
+
+def test_every_command_is_in_the_table():
+    table = re.findall(r"^\| `([^|]*)` \|", PAGES["docs/command-line.md"], re.MULTILINE)
+    listed = {name.partition(" ")[0] for name in table}
+    assert listed == set(typer.main.get_command(app).commands)
+
+
+# What users write, and what commands write.
+MADE = re.compile(
+    r"^(my|mine|steer|mymodule)\.|NAME|^(report|build|turn|course)/|^(course|walk)\.html$|(paper|figures)/stride"
+)
+    r"^(my|mine|steer|mymodule)\.|NAME|^(report|build|turn|course)/|^(course|walk)\.html$|paper/stride/|figures/stride"
+)
+
+
+def test_every_file_that_a_page_names_is_there():
+    there = {each.as_posix() for each in ROOT.rglob("*.*") if ".venv" not in each.parts}
+    for page, text in PAGES.items():
+        for name in re.findall(r"(?<![\w:/])[\w./-]+\.(?:py|md|js|toml|json|html|css|lock)\b", text):
+            plain = name.removeprefix("../").removeprefix("../").removeprefix("./")
+            assert MADE.search(plain) or any(each.endswith(f"/{plain}") for each in there), f"{page}: {name}"
+
+
+@pytest.mark.parametrize("role", ["dotted", "relative"])
+def test_every_module_that_the_code_names_is_there(role):
+    """Imports are checked elsewhere; these are names in docstrings and comments."""
+    source = ROOT / "src"
+    for file in source.rglob("*.py"):
+        text = file.read_text(encoding="utf-8")
+        if role == "relative":
+            for name in re.findall(r":mod:`\.([\w.]+)`", text):
+                assert file.with_name(f"{name}.py").exists(), f"{file}: .{name}"
+            continue
+        for name in re.findall(r"\bchilopod(?:\.\w+)+", text):
+            place, *parts = source / "chilopod", *name.split(".")[1:]
+            while parts and (place / parts[0]).is_dir():
+                place /= parts.pop(0)
+            # Of a package that loads what it exports on first use any name may be an export: it says which.
+            init = (place / "__init__.py").read_text(encoding="utf-8")
+            known = not parts or (place / f"{parts[0]}.py").exists() or re.search(rf"\b{parts[0]}\b", init)
+            assert known, f"{file}: {name}"

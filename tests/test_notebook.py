@@ -176,7 +176,7 @@ def test_turn():
 
 
 def test_course():
-    ready = Driver(ROBOT, strategy_named("leg-yaw"), None, None, remarks=(NASTY,))
+    ready = Driver(ROBOT, strategy_named("leg-yaw"), None, None, "planar", remarks=(NASTY,))
     html = drive(ready, course_named("0 deg, 0.4 m; 170 deg, 1 m", patience=4.0))._repr_html_()
     assert NASTY in said(html)
     assert cells(html)[1][:2] == ["-", "1 of 2"]

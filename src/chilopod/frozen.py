@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sized
+from dataclasses import fields, is_dataclass
 from typing import Any, TypeVar
 
 import numpy as np
@@ -29,7 +31,44 @@ def read_only(array: AnyArray) -> AnyArray:
     return copy
 
 
-class ReadOnlyArrays:
+_MOST_SHOWN, _WIDEST, _FEW = 12, 88, 6  # fields; characters of one; numbers of an array
+
+
+class Short:
+    """Base of dataclasses that print as a few lines: large parts are named with their size."""
+
+    def __init_subclass__(cls, **named: Any) -> None:
+        super().__init_subclass__(**named)
+        if "__repr__" not in cls.__dict__:  # in place of the one that the decorator would make
+            cls.__repr__ = _short  # type: ignore[method-assign]
+
+
+def _short(result: Any) -> str:
+    shown = [each.name for each in fields(result) if each.repr]
+    lines = [f"    {name}={_part(getattr(result, name))}" for name in shown[:_MOST_SHOWN]]
+    if len(shown) > _MOST_SHOWN:
+        lines.append(f"    and {', '.join(shown[_MOST_SHOWN:])}"[: _WIDEST + 20])
+    return "\n".join([f"{type(result).__name__}(", *lines, ")"])
+
+
+def _part(value: Any) -> str:
+    """A field in one line."""
+    kind = type(value).__name__
+    if isinstance(value, np.ndarray):
+        if value.size > _FEW or value.dtype == object:
+            return f"<{value.dtype} array of shape {value.shape}>"
+        return np.array2string(value, precision=6, separator=", ").replace("\n", "")
+    if isinstance(value, tuple | list) and len(value) and is_dataclass(value[0]):
+        return f"<{len(value)} times {type(value[0]).__name__}>"
+    if is_dataclass(value) or hasattr(value, "dims"):  # results, and datasets
+        return f"<{kind}>"
+    text = repr(value)
+    if len(text) <= _WIDEST and "\n" not in text:
+        return text
+    return f"<{kind} of {len(value)}>" if isinstance(value, Sized) else f"<{kind}>"
+
+
+class ReadOnlyArrays(Short):
     """Base of frozen dataclasses whose arrays are as frozen as their fields, also after a copy or a pickle.
 
     A subclass with a ``__post_init__`` of its own calls this one last.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -107,8 +108,10 @@ def check_size(record: Recording | None, until: float, numbers: int) -> None:
     Raises
     ------
     ParameterError
-        If it would be.
+        If it would be, or if ``until`` is no time.
     """
+    if not (isinstance(until, Real) and until >= 0.0):
+        raise ParameterError("is no time", field="expected", value=until, allowed="0 s or more")
     if record is not None and (until * record.rate + 1.0) * numbers > MOST_NUMBERS:
         raise ParameterError(
             "the record would be too large", field="rate", value=record.rate, allowed="fewer robots, samples or seconds"

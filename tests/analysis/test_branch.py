@@ -14,6 +14,7 @@ from chilopod.netcdf import netcdf, sealed
 from chilopod.planar import PlanarModel
 from chilopod.planar.along import walk_means
 from chilopod.report import write_branch
+from chilopod.report.figures.branch import panel
 from chilopod.robot import load_robot
 from chilopod.stability.branches.branch_points import BranchPoint
 from chilopod.stability.branches.curve import Curve
@@ -94,9 +95,12 @@ def test_near_zero_forward_offset_the_branch_folds_back(former):
 
 def test_nothing_happens_on_the_way_to_very_soft_springs():
     data = curved_walks(ROBOT, K1, (stiffness(1.0), stiffness(20.0)))
+    within = data.verdict.values != "out of range"
     assert data.attrs["ending"] == "left the interval"
     assert list(data.special.values[1:]) == [""] * (data.sizes["point"] - 1)
-    assert data.stable.values[1:].all()
+    assert data.stable.values[1:][within[1:]].all()
+    moduli = np.hypot(data.multiplier_real.values, data.multiplier_imag.values)
+    assert (moduli[1:] < 1.0).all()
 
 
 def test_the_direction_confirms_the_verdict(right):
@@ -164,6 +168,33 @@ def test_a_damaged_or_edited_file_is_refused(tmp_path):
         make(path)
         with pytest.raises(ParameterError, match="cannot be read"):
             read_walks(path)
+
+
+def test_joints_beyond_their_range_are_no_stable_walk():
+    """The engines end a walk there, and so do the law and the live page."""
+    branch = curved_walks(ROBOT, K1, (stiffness(0.35), stiffness(20.0)), points=60)
+    beyond = branch.most_bent.values > 0.5 * np.pi
+    assert 0 < beyond.sum() < beyond.size
+    assert ((branch.verdict.values == "out of range") == beyond).all()
+    assert not (branch.stable.values & beyond).any()
+    assert (branch.most_bent.values >= np.abs(branch.mean_angle.values).max(axis=1)).all()
+    points = as_json(branch)["points"]
+    assert {point["stable"] for point in points if point["verdict"] == "out of range"} == {None}
+    assert {point["verdict"] for point in points if point["stable"]} == {"stable"}
+
+
+@pytest.mark.parametrize("joints", [5, 9, 40])
+def test_the_figure_shows_every_joint(right, joints):
+    angles = np.repeat(right.mean_angle.values, 8, axis=1)[:, :joints]
+    data = (
+        right.drop_dims("joint")
+        .assign(mean_angle=(("point", "joint"), angles))
+        .assign_coords(joint=range(1, joints + 1))
+    )
+    drawn = panel(data).draw(False).axes[0]
+    names = drawn.get_legend_handles_labels()[1]
+    assert [name for name in names if name.startswith("joint")] == [f"joint {joint}" for joint in data.joint.values]
+    assert len({str(line.get_color()) for line in drawn.lines if line.get_label().startswith("joint")}) == joints
 
 
 def test_no_pitchfork_is_said():

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
+from chilopod import stability
 from chilopod.analysis import bifurcations, first_loss, straight_walk
 from chilopod.analysis.parameters import ALL, K1, stiffness
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.planar import PlanarModel
 from chilopod.robot import load_robot
 from chilopod.stability import Kind
 
@@ -33,4 +35,21 @@ def test_modules_are_no_continuous_parameter():
 def test_stability_agrees_with_the_sign_of_the_leading_exponent():
     for k1 in (11.0, 13.0):
         found = straight_walk(ROBOT.with_value(K1, stiffness(k1)))
-        assert found.stable == (found.exponents.values[0].real < 0) == (k1 > 12)
+        assert found.stable is bool(found.exponents.values[0].real < 0) == (k1 > 12)
+
+
+def test_long_chains_are_refused_before_the_work_and_short_ones_are_not(monkeypatch):
+    """Hours are refused, by what a chain of fewer modules takes; minutes are not."""
+    asked = []
+    contraction = PlanarModel.contraction.fget
+    monkeypatch.setattr(
+        PlanarModel, "contraction", property(lambda model: asked.append(model.modules) or contraction(model))
+    )
+    with pytest.raises(AnalysisError, match=r"body\.modules = 1000.*hours: 2001 states.*about 60 minutes"):
+        straight_walk(ROBOT.with_value("body.modules", 1000))
+    assert asked == [100]
+    monkeypatch.setattr(stability, "exponents", lambda model: (_ for _ in ()).throw(InterruptedError))
+    with pytest.raises(InterruptedError):  # it begins
+        straight_walk(ROBOT.with_value("body.modules", 30))
+    with pytest.raises(AnalysisError, match=r"2\.49 minutes"):
+        straight_walk(ROBOT.with_value("body.modules", 30), longest=60.0)

@@ -1,6 +1,7 @@
 """What outsiders broke in walks of both engines, and its relatives."""
 
 import io
+import itertools
 import json
 import threading
 
@@ -435,3 +436,15 @@ def test_a_robot_put_on_the_floor_anew_beside_the_beginning_of_a_cycle_leaves_th
         each.command(Command(leg_yaw=(0.1, 0.1)))
         each.advance(4.2 * PLANAR.gait.period)
     np.testing.assert_array_equal(walk.states()[1], once.states()[1])
+
+
+def test_events_that_never_end_are_refused():
+    class Endless:
+        def events(self, gait):
+            return (Event("again", 0.5, 0.1) for _ in itertools.count())
+
+        def act(self, event, seen):
+            return Command()
+
+    with pytest.raises(ParameterError, match=r"Endless.events.*are too many.*10000 in a gait cycle"):
+        steer(planar.start(load_robot("aoi2022-planar")), 1.0, Endless())

@@ -1,5 +1,7 @@
 """The environments keep Gymnasium's contract, alone and in a batch, and their episodes are those of trials."""
 
+import copy
+import pickle
 import sys
 from importlib import reload
 
@@ -12,9 +14,9 @@ from gymnasium.wrappers import RecordEpisodeStatistics
 from gymnasium.wrappers.vector import RecordEpisodeStatistics as RecordBatchStatistics
 
 import chilopod.gym
-from chilopod import load_robot
+from chilopod import load_robot, planar
 from chilopod.errors import ChilopodError, ExtraError, ParameterError
-from chilopod.gym import Episodes, Steered, baseline, episodes
+from chilopod.gym import Episodes, Rewards, Steered, baseline, episodes
 from chilopod.steering import SpringLaw, random_course
 from chilopod.trials import NONE, Disturbance
 
@@ -126,6 +128,83 @@ def test_a_robot_that_breaks_ends_its_episode_and_its_neighbour_walks_on():
     assert np.isfinite(seen).all()
 
 
+FOLDS = np.array([-1, 1, 1], dtype=np.float32)
+
+
+def gained(env, action):
+    """Rewards until the episode ends, with one action all along, and whether the robot walked to the end."""
+    total, over = 0.0, False
+    while not over:
+        _, reward, terminated, truncated, info = env.step(np.float32(action))
+        total, over = total + reward, terminated or truncated
+    return total, info["verdict"] != "stopped"
+
+
+@pytest.mark.parametrize("name", [TURN, COURSE])
+def test_folding_is_no_way_out(name):
+    """Whatever a robot does that does not fold after all, and walks on to the end of its time, gains more."""
+    env = gymnasium.make(name).unwrapped
+    env.reset(seed=3)
+    before = []
+    while True:
+        before.append(copy.deepcopy(env))
+        if env.step(FOLDS)[2]:
+            break
+    here = before[-4]
+    folded, _ = gained(copy.deepcopy(here), FOLDS)
+    ends = [gained(copy.deepcopy(here), action) for action in ([1, 0, 0], [1, 1, 1], [1, -1, -1], [0.5, -1, -1])]
+    assert all(walked for _, walked in ends)
+    assert all(total > folded + 0.5 for total, _ in ends)
+
+
+def test_folding_gains_less_than_walking_straight_on():
+    def mean(action):
+        batch = gymnasium.make_vec(COURSE, num_envs=4)
+        batch.reset(seed=0)
+        total, going = np.zeros(4), np.ones(4, dtype=bool)
+        while going.any():
+            _, reward, terminated, truncated, _ = batch.step(np.tile(np.float32(action), (4, 1)))
+            total += np.where(going, reward, 0.0)
+            going &= ~(terminated | truncated)
+        return total.mean()
+
+    assert mean(FOLDS) < mean([1, 0, 0]) - 5.0
+
+
+def test_a_failure_is_charged_with_the_time_that_was_left():
+    env = gymnasium.make(COURSE, patience=30.0, targets=3).unwrapped
+    env.reset(seed=1)  # a target to the right
+    gait, cycles, over = env.episodes.robot.gait, 0, False
+    while not over:
+        _, reward, over, _, info = env.step(FOLDS)
+        cycles += 1
+    left = 3 * 30.0 - cycles * gait.period  # the time of no target was over
+    assert (info["verdict"], info["arrived"], cycles < 50) == ("stopped", 0, True)
+    assert reward == pytest.approx(-1.01 - (0.01 / gait.period + gait.speed) * left)
+
+
+@pytest.mark.parametrize("engine", ["planar", "twin"])
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))], ids=["copy", "pickle"])
+def test_a_copy_of_an_environment_goes_on_to_the_same_bits(engine, copied):
+    batch = gymnasium.make_vec(TURN, num_envs=2, engine=engine).unwrapped
+    alone = gymnasium.make(TURN, engine=engine, render_mode="rgb_array").unwrapped
+    for env in (batch, alone):
+        before = copied(env)  # before the first episode
+        action = np.full(env.action_space.shape, 0.7, dtype=np.float32)
+        for each in (env, before):
+            each.reset(seed=1)
+            each.step(action)
+            each.render()
+        twins = [env, before, copied(env)]
+        found = [[each.step(action) for _ in range(2)] for each in twins]
+        for other in found[1:]:
+            for one, step in zip(found[0], other, strict=True):
+                np.testing.assert_array_equal(one[0], step[0])
+                np.testing.assert_array_equal(one[1:4], step[1:4])
+        assert len({str(each.np_random.bit_generator.state) for each in twins}) == 1
+    assert len({each.render().tobytes() for each in twins}) == 1
+
+
 def test_time_that_is_over_truncates():
     env = gymnasium.make(TURN, patience=32.4).unwrapped
     env.reset(seed=2)  # a target to the right
@@ -148,8 +227,15 @@ def test_seeds_may_be_one_each_and_numpy_s():
     batch = gymnasium.make_vec(TURN, num_envs=2)
     first, _ = batch.reset(seed=np.int64(3))
     np.testing.assert_array_equal(first, batch.reset(seed=[np.int64(3), 4])[0])
-    with pytest.raises(ParameterError, match="seed"):
-        batch.reset(seed=[3])
+    np.testing.assert_array_equal(first, batch.reset(seed=np.array([3, 4]))[0])
+    np.testing.assert_array_equal(first, batch.reset(seed=np.array(3))[0])
+    alone = gymnasium.make(TURN).unwrapped
+    np.testing.assert_array_equal(first[0], alone.reset(seed=np.array(3))[0])
+    wrong = [(batch, [3]), (batch, "ab"), (batch, [-1, 2])]
+    for env, seed in [*wrong, *((each, one) for each in (batch, alone) for one in (1.5, -1, "a", {}))]:
+        with pytest.raises(ParameterError, match="seed") as caught:
+            env.reset(seed=seed)
+        assert "\n" not in str(caught.value)
 
 
 def test_wrappers_of_gymnasium_go_with_both():
@@ -200,6 +286,13 @@ def test_an_action_that_is_none_is_one_line(action, words):
         ({"springs": "second"}, "first or all"),
         ({"patience": 3.0}, "too short"),
         ({"render_mode": "human"}, "rgb_array"),
+        *(({"targets": targets}, "targets.*1 to 1000") for targets in (10**9, -1, 0, 1.5, "1", None)),
+        ({"patience": np.nan}, "patience"),
+        ({"engine": 5}, "engine = 5: must be a name.*planar, twin"),
+        ({"engine": ["planar"]}, "must be a name"),
+        ({"robot": 5}, "robot = 5"),
+        ({"disturbance": 5}, "disturbance = 5: must be a Disturbance"),
+        ({"rewards": 5}, "rewards = 5: must be a Rewards"),
     ],
 )
 def test_an_environment_that_cannot_be_is_one_line(named, words):
@@ -252,3 +345,27 @@ def test_controllers_as_policies_do_what_they_do_with_what_is_seen():
     assert seen.joint_angles.shape == (3, joints)
     with pytest.raises(ParameterError, match="leg-yaw"):
         baseline("leg-jaw", episodes)
+
+
+@pytest.mark.parametrize("count", [0, -1, 1.5, "2", 10**9])
+def test_a_batch_has_a_number_of_robots(count):
+    with pytest.raises(ParameterError, match=r"num_envs.*must be a whole number"):
+        chilopod.gym.TurnVectorEnv(num_envs=count)
+
+
+def test_episodes_that_no_memory_holds_are_refused(monkeypatch):
+    monkeypatch.setattr(episodes.memory, "available", lambda: 1e6)
+    with pytest.raises(ParameterError, match=r"num_envs \* targets \* patience.*of memory"):
+        chilopod.gym.TurnVectorEnv(num_envs=1000, targets=50)
+
+
+@pytest.mark.parametrize("worth", [np.nan, "1", None, np.inf])
+def test_rewards_are_numbers(worth):
+    with pytest.raises(ParameterError, match="arrival"):
+        Rewards(arrival=worth)
+
+
+@pytest.mark.parametrize("expected", [np.nan, -1.0])
+def test_how_long_a_walk_is_likely_to_be_is_a_time(expected):
+    with pytest.raises(ParameterError, match="expected"):
+        planar.start(load_robot("aoi2022-planar"), expected=expected)

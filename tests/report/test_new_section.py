@@ -6,7 +6,7 @@ from pathlib import Path
 
 import chilopod.paper
 import chilopod.report.figures
-from chilopod.cli import main
+from chilopod.cli import main, reproduce
 from chilopod.paper import sections
 from chilopod.report.figures import drawings
 
@@ -26,10 +26,13 @@ def test_what_the_page_says_adds_a_section(monkeypatch, capsys, tmp_path):
         where = tmp_path.joinpath(*package.__name__.split("."))
         monkeypatch.setattr(package, "__path__", [*package.__path__, str(where)])
     # The lines that make it known, at the end of the two registries.
-    import_section, entry = known
+    import_section, entry, listed = known
     names = vars(drawings).copy()
     exec(import_section + import_drawn, names)
     monkeypatch.setattr(sections, "SECTIONS", (*sections.SECTIONS, *eval(f"({entry})", names)))
+    # That of the command lists the names, and its own test holds it to the sections.
+    monkeypatch.setattr(reproduce, "_SECTIONS", (*reproduce._SECTIONS, *eval(f"({listed})")))
+    assert set(reproduce._SECTIONS) == {each.name for each in sections.SECTIONS}
     monkeypatch.setattr(drawings, "DRAWINGS", (*drawings.DRAWINGS, *eval(f"({line})", names)))
 
     assert main(["reproduce", "--only", "stride", "--out", str(tmp_path / "report"), "--json"]) == 0

@@ -11,6 +11,7 @@ from chilopod.stability import (
     FlowsMany,
     FlowsStates,
     FlowsWithError,
+    Multipliers,
     PeriodicSystem,
     SystemLike,
     exponents,
@@ -234,3 +235,21 @@ def test_a_sweep_in_threads_is_that_of_one_after_the_other():
 
     systems = [damped(delta) for delta in np.linspace(0.1, 2.0, 12)]
     assert [m.values.tolist() for m in sweep(systems)] == [multipliers(s).values.tolist() for s in systems]
+
+
+@pytest.mark.parametrize(
+    ("values", "bounds", "stable"),
+    [
+        ([0.5, 0.9], [0.01, 0.01], True),
+        ([1.2, 0.5], [0.01, 0.01], False),
+        ([1.0 - 1e-9, 0.5], [1e-7, 1e-9], None),
+        ([1.0 + 1e-9, 0.5], [1e-7, 1e-9], None),
+        ([1.2, 0.5], [0.01, 2.0], False),
+        ([0.5], [np.inf], None),
+        ([1.0], [0.0], None),
+        ([np.nan], [0.0], None),
+    ],
+)
+def test_a_verdict_within_the_errors_is_undecided(values, bounds, stable):
+    found = Multipliers(np.array(values, complex), None, max(bounds), np.array(bounds), np.zeros(1), 1.0)
+    assert found.stable is stable

@@ -133,12 +133,22 @@ def test_what_cannot_be_driven_is_refused(changed, strategy, spring, error, word
 
 
 def test_the_whole_robot_walks_a_course():
-    whole = Driver(load_robot("aoi2022"), ON_COURSES["leg-yaw"], LegYawController(), None)
-    done = drive(whole, course_named("0 deg, 0.25 m; 170 deg, 6 m", 1.5), engine="twin")
+    whole = Driver(load_robot("aoi2022"), ON_COURSES["leg-yaw"], LegYawController(), None, "twin")
+    done = drive(whole, course_named("0 deg, 0.25 m; 170 deg, 6 m", 1.5))
+    assert done.engine == "twin"
     (record,) = done.records
     assert "pose" in record
     assert record.goal_verdict.values[0].tolist() == ["out of time", "out of reach"]
     assert done.as_json()["walks"][0]["targets"][0]["nearest_m"] == pytest.approx(0.25, abs=0.1)
+
+
+def test_a_driver_walks_in_its_own_engine_only():
+    ready = Driver(load_robot("aoi2022"), ON_COURSES["leg-yaw"], LegYawController(), None, "twin")
+    with pytest.raises(ParameterError, match="another engine") as refused:
+        drive(ready, NEAR, engine="planar")
+    assert (refused.value.field, refused.value.value, refused.value.allowed) == ("engine", "planar", "twin")
+    assert trial_of(ready, NEAR).engine == "twin"
+    assert driver(ROBOT, ON_COURSES["leg-yaw"]).engine == "planar"
 
 
 def test_leg_yaw_needs_no_pitchfork():

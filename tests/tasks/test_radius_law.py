@@ -10,6 +10,7 @@ from chilopod import load_robot, planar
 from chilopod.analysis.radius_law import radius_laws
 from chilopod.tasks import radius_law
 from chilopod.tasks.radius_law import end_of_walk
+from chilopod.trials import Trial, mean_joint_angles, run, summaries
 from chilopod.twin import simulate
 
 ROBOT = load_robot("aoi2022")
@@ -34,6 +35,31 @@ def test_the_end_of_a_circle_is_its_radius():
     assert float(end.moved) == pytest.approx(0.0)
 
 
+def test_the_last_five_seconds_are_the_same_everywhere():
+    """What `walk` prints of a record and what the studies make of it: one window, one radius."""
+    robot = load_robot("aoi2022-planar").set_from_text(["springs.stiffness[0]=8 N*mm/deg"])
+    start = planar.initial_states(robot, joint_angles=0.1)
+    record = planar.simulate(robot, 9.7, initial=start, rate=10.0).assign_attrs(robot=robot.name)
+    (ended,), end = summaries(robot, record), end_of_walk(record, robot)
+    np.testing.assert_array_equal(ended.joint_angles, end.mean_angle.values)
+    assert ended.axis_radius == float(end.axis_radius)
+    last = record.joint_angle.isel(robot=0).transpose("time", "joint").values[-50:]
+    np.testing.assert_allclose(ended.joint_angles, last.mean(0), rtol=1e-13)
+    assert ended.axis_radius == pytest.approx(5.0 * robot.module_length / np.abs(last.mean(0)).sum(), rel=1e-13)
+    early = mean_joint_angles(record, 2.0, before=5.0).isel(robot=0).values
+    np.testing.assert_allclose(early, record.joint_angle.isel(robot=0).values[-70:-50].mean(0), rtol=1e-13)
+
+
+def test_a_straight_walk_has_an_infinite_radius_everywhere():
+    robot = load_robot("aoi2022-planar")
+    record = planar.simulate(robot, 6.0, rate=10.0)
+    (ended,), end = summaries(robot, record), end_of_walk(record, robot)
+    assert ended.axis_radius == float(end.axis_radius) == np.inf
+    assert ended.as_json()["axis_radius_m"] is None
+    np.testing.assert_array_equal(robot.axis_radius([[0.0] * 5, [5e-324] * 5]), np.inf)
+    assert np.isnan(robot.axis_radius([np.nan] + [0.1] * 4))
+
+
 class Trying:
     """The planar model, as one that nobody has a theory of."""
 
@@ -52,8 +78,24 @@ def trying(monkeypatch):
 def test_the_law_of_an_exact_engine_is_that_of_its_branch():
     robot = load_robot("aoi2022-planar")
     law, exact = radius_law(robot), radius_laws(robot).axis
-    np.testing.assert_array_equal(law.values, exact.values)
-    np.testing.assert_array_equal(law.radii, exact.radii)
+    held = exact.values >= law.values[0]
+    np.testing.assert_array_equal(law.values, exact.values[held])
+    np.testing.assert_array_equal(law.radii, exact.radii[held])
+
+
+def test_no_spring_of_the_law_folds_the_robot():
+    """The settled walk at the softest spring of the branch keeps its joints below 90 deg, and no walk gets there."""
+    robot = load_robot("aoi2022-planar")
+    law, exact = radius_law(robot), radius_laws(robot).axis
+    assert not (radius_laws(robot).walks.most_bent.values[: len(exact.values)] > 0.5 * np.pi).any()
+
+    def folded(value):
+        walker = robot.with_value("springs.stiffness[0]", float(value))
+        ends = run([Trial(walker, 90.0, seed, rate=1.0) for seed in range(100, 120)])
+        return [str(end.status.values[0]) for end in ends].count("out of range")
+
+    assert folded(exact.values[0]) == 20
+    assert folded(law.values[0]) == 0
 
 
 def test_the_law_by_trials_is_that_of_the_branch_and_is_kept(trying, tmp_path):

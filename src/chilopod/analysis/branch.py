@@ -16,21 +16,24 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chilopod import stability, units
-from chilopod.analysis.straight_walk import WalkBifurcation, bifurcations, family
+from chilopod.analysis.straight_walk import WalkBifurcation, bifurcations, family, interval_text
+from chilopod.engine import Status
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.netcdf import unsealed
 from chilopod.planar.along import FollowedModel, walk_means
+from chilopod.planar.stretch import MOST_BENT
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import Branch, BranchPoint, Criticality, Ending, Kind, follow, proceed, switch
 from chilopod.stability.branches.branch import LONGEST
+from chilopod.stability.matrix_errors import VERDICTS
 
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-10
 """Of the nonlinear flow along a branch; orbits are then good to about 1e-10 (the tests hold 1e-9 against 1e-14)."""
 
-VERSION = 1
+VERSION = 2
 """Of what a branch is kept as: goes up whenever its data mean something else, or would go on in another way."""
 
 GRAVITY = 9.80665
@@ -44,6 +47,8 @@ _SUFFIX = {
     "cost_of_transport": "",
     "multiplier": "",
 }
+_STABLE = {VERDICTS[stable]: stable for stable in VERDICTS}
+
 _SAME = ("body", "springs", "legs", "gait", "ground")  # what must agree for a branch to go on; names may differ
 
 
@@ -79,12 +84,14 @@ def curved_walks(
 
     Returns
     -------
-    Dataset over point (along the branch): the parameter (``parameter_si`` in SI units), ``stable``, ``special`` (kind,
-    or empty), ``multiplier`` (modulus of the largest), ``multiplier_real`` and ``multiplier_imag`` over (point, state),
-    ``mean_angle`` over (point, joint), ``axis_radius`` (the paper's (N-1) L / sum |theta|), ``path_radius`` (from the
-    drift per period), ``heading_rate`` (left positive), ``speed``, ``floor_power`` and ``leg_power`` (means over a
-    period), ``cost_of_transport`` (leg power over weight times speed), ``orbit`` over (point, state) and ``tangent``
-    over (point, component).
+    Dataset over point (along the branch): the parameter (``parameter_si`` in SI units), ``verdict`` (stable, unstable,
+    undecided; out of range where a joint bends within the cycle by more than a right angle, at which engines end a
+    walk), ``stable`` (whether that is the verdict), ``special`` (kind, or empty), ``multiplier`` (modulus of the
+    largest), ``multiplier_real`` and ``multiplier_imag`` over (point, state), ``mean_angle`` over (point, joint),
+    ``most_bent`` (largest angle of a joint within the cycle), ``axis_radius`` (the paper's (N-1) L / sum |theta|),
+    ``path_radius`` (from the drift per period), ``heading_rate`` (left positive), ``speed``, ``floor_power`` and
+    ``leg_power`` (means over a period), ``cost_of_transport`` (leg power over weight times speed), ``orbit`` over
+    (point, state) and ``tangent`` over (point, component).
 
     Attributes hold what the branch goes on from (:func:`resumed`), and of the pitchfork its ``criticality`` by the
     normal form, its ``coefficient`` (1/rad^2), the ``direction`` in which the branch leaves it, and whether that
@@ -97,7 +104,11 @@ def curved_walks(
     """
     forks = [each for each in bifurcations(robot, parameter, between) if each.point.kind is Kind.PITCHFORK]
     if not forks:
-        raise AnalysisError("the straight walk has no pitchfork in this interval", field=parameter)
+        raise AnalysisError(
+            "the straight walk has no pitchfork in this interval",
+            field=parameter,
+            value=interval_text(robot, parameter, between),
+        )
     fork = forks[-1]
     make = _followed(robot, parameter)
     # The positive side of the mode is that of positive joint angles.
@@ -176,7 +187,7 @@ def resumed(
         raise ParameterError(
             "does not hold the saved branch's last point, beyond which nothing is left to follow",
             field="between",
-            value=" to ".join(units.format(each, unit, digits=4) for each in (low, high)),
+            value=interval_text(robot, parameter, (low, high)),
             allowed=f"an interval with {units.format(end, unit, digits=6)} in it",
         )
     branch = proceed(
@@ -227,7 +238,8 @@ def as_json(data: xr.Dataset) -> dict[str, Any]:
         "points": [
             {
                 "value": float(at.parameter),
-                "stable": bool(at.stable),
+                "stable": _STABLE.get(str(at.verdict.values)),
+                "verdict": str(at.verdict.values),
                 "special": str(at.special.values) or None,
                 "mean_joint_angles_rad": [float(angle) for angle in at.mean_angle],
                 **{f"{name}_{_SUFFIX[name]}".rstrip("_"): plain(float(at[name])) for name in columns},
@@ -301,13 +313,14 @@ def _walked(
     points, make, unit = branch.points, _followed(robot, parameter), robot.unit_of(parameter)
     models = [make(point.value) for point in points]
     means = walk_means(models, [point.orbit for point in points])
-    bent = np.abs(means.mean_angle).sum(axis=1)
-    length = np.array([model.robot.module_length for model in models])
     weight = np.array([model.robot.body.mass * GRAVITY for model in models])
     speed = np.array([drift.speed for drift in means.drifts])
     multipliers = np.array([point.multipliers for point in points])
-    with np.errstate(divide="ignore"):
-        radius = (robot.body.modules - 1) * length / bent
+    verdicts = [
+        Status.OUT_OF_RANGE.label if most > MOST_BENT else VERDICTS[point.stable]
+        for most, point in zip(means.most_bent, points, strict=True)
+    ]
+    radius = [float(model.robot.axis_radius(angles)) for model, angles in zip(models, means.mean_angle, strict=True)]
 
     def column(values: Any, what: str | None = None) -> tuple[Any, ...]:
         return (("point",), np.asarray(values), {} if what is None else {"units": what})
@@ -315,12 +328,14 @@ def _walked(
     return xr.Dataset(
         {
             "parameter": column([units.from_si(point.value, unit) for point in points], unit),
-            "stable": column([point.stable for point in points]),
+            "verdict": column(np.array(verdicts, dtype=object)),
+            "stable": column([verdict == VERDICTS[True] for verdict in verdicts]),
             "special": column(
                 np.array([point.special.label if point.special else "" for point in points], dtype=object)
             ),
             "multiplier": column(np.abs(multipliers[:, 0])),
             "mean_angle": (("point", "joint"), means.mean_angle, {"units": "rad"}),
+            "most_bent": column(means.most_bent, "rad"),
             "axis_radius": column(radius, "m"),
             "path_radius": column([drift.radius for drift in means.drifts], "m"),
             "heading_rate": column([drift.heading_rate for drift in means.drifts], "rad/s"),

@@ -10,6 +10,7 @@ import xarray as xr
 from chilopod import units
 from chilopod.analysis.branch import curved_walks
 from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
+from chilopod.frozen import Short
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import RadiusLaw
@@ -19,7 +20,7 @@ _BETWEEN = (1.0 / 20.0, 3.0)
 
 
 @dataclass(frozen=True)
-class RadiusLaws:
+class RadiusLaws(Short):
     """Which k1 turns how tightly, by two measures of a radius.
 
     Attributes
@@ -67,10 +68,8 @@ def radius_laws(robot: Robot, progress: Progress = silent) -> RadiusLaws:
     stiffest = max(robot.springs.stiffness)
     low, high = (part * stiffest for part in _BETWEEN)
     walks = curved_walks(robot, K1, (low, high), side=-1, progress=progress)
-    # Bent further, modules run into each other.
-    possible = walks.stable.values & (np.abs(walks.mean_angle.values).max(axis=1) <= 0.5 * np.pi)
     axis, path = (
-        RadiusLaw.of_branch(walks.parameter_si.values, walks[name].values, possible, robot.unit_of(K1))
+        RadiusLaw.of_branch(walks.parameter_si.values, walks[name].values, walks.stable.values, robot.unit_of(K1))
         for name in ("axis_radius", "path_radius")
     )
     return RadiusLaws(axis, path, walks)

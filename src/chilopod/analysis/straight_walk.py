@@ -18,12 +18,14 @@ from chilopod.notebook import block, table, words
 from chilopod.planar import PlanarModel
 from chilopod.robot import Robot
 from chilopod.stability import Kind
+from chilopod.stability.matrix_errors import VERDICTS
 
 ComplexArray = NDArray[np.complex128]
 
 _FEWEST_PARTS = 8
 _A_PART = 5e-6  # s, of one state
-_LONGEST = 60.0  # s
+_ENOUGH = 100  # modules
+_LONGEST = 3600.0  # s
 
 
 @dataclass(frozen=True)
@@ -45,9 +47,14 @@ class StraightWalk(ReadOnlyArrays):
     joint_components: ComplexArray
 
     @property
-    def stable(self) -> bool:
-        """Whether every disturbance dies out."""
+    def stable(self) -> bool | None:
+        """Whether every disturbance dies out; None where the errors of the multipliers leave it undecided."""
         return self.exponents.multipliers.stable
+
+    @property
+    def verdict(self) -> str:
+        """Stable, unstable or undecided."""
+        return VERDICTS[self.stable]
 
     @property
     def moduli(self) -> NDArray[np.float64]:
@@ -62,6 +69,7 @@ class StraightWalk(ReadOnlyArrays):
             "robot": self.robot.name,
             "period_s": self.robot.gait.period,
             "stable": self.stable,
+            "verdict": self.verdict,
             "exponents_per_s": _pairs(self.exponents.values),
             "multipliers": _pairs(multipliers.values),
             "half_period_multipliers": None if half is None else _pairs(half),
@@ -78,7 +86,7 @@ class StraightWalk(ReadOnlyArrays):
             for modulus, exponent in zip(self.moduli, self.exponents.values, strict=True)
         ]
         return block(
-            f"{self.robot.name}: the straight walk is {'stable' if self.stable else 'unstable'}",
+            f"{self.robot.name}: the straight walk is {self.verdict}",
             words(f"The largest multipliers of {len(rows)}; the walk is stable if all are smaller than 1 in size."),
             table(("size of the multiplier", "grows by (1/s)", "turns by (rad/s)"), rows, most=6),
         )
@@ -149,30 +157,46 @@ class WalkBifurcation(ReadOnlyArrays):
         )
 
 
-def straight_walk(robot: Robot) -> StraightWalk:
+def straight_walk(robot: Robot, longest: float = _LONGEST) -> StraightWalk:
     """Floquet analysis of the straight walk in the planar model.
+
+    Parameters
+    ----------
+    robot
+        The robot.
+    longest
+        Time that the analysis may be expected to take, s.
 
     Raises
     ------
     AnalysisError
-        If it would take far more than a minute, as of a hundred modules or of very light ones.
+        If it is expected to take longer, as of a hundred modules or of very light ones.
     """
     model = PlanarModel(robot)
     # The period is cut into parts that contract by a factor of 1e6 at most, and matrices of this size are split along
     # them: an estimate of the time that this takes, good to a factor of two on a desk of today.
-    parts = max(_FEWEST_PARTS, 0.5 * model.contraction / math.log(1e6))
+    # Of a long chain the estimate itself takes minutes; one of fewer, heavier modules contracts less.
+    enough = min(robot.body.modules, _ENOUGH)
+    contraction = PlanarModel(robot.with_value("body.modules", float(enough))).contraction
+    parts = max(_FEWEST_PARTS, 0.5 * contraction / math.log(1e6))
     seconds = _A_PART * parts * model.dimension**2.5
-    if seconds > _LONGEST:
+    if seconds > longest:
         raise AnalysisError(
-            f"the exponents would take about {seconds / 60.0:.3g} minutes: {model.dimension} states, the fastest of "
-            f"which dies out {model.contraction:.3g} e-folds a period",
+            f"the exponents would take about {_duration(seconds)}: {model.dimension} states, the fastest of which dies "
+            f"out {contraction:.3g} e-folds a period or more",
             field="body.modules",
             value=robot.body.modules,
-            allowed=f"what takes about {_LONGEST / 60.0:.0f} minute: fewer modules, or longer and heavier ones",
+            allowed=f"what takes about {_duration(longest)}: fewer modules, or longer and heavier ones",
         )
     found = stability.exponents(model)
     components = np.array([joint_components(mode, robot.body.modules) for mode in found.modes.T])
     return StraightWalk(robot, found, components)
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 120.0:
+        return f"{seconds:.3g} s"
+    return f"{seconds / 60.0:.3g} minutes" if seconds < 7200.0 else f"{seconds / 3600.0:.3g} hours"
 
 
 def family(robot: Robot, parameter: str) -> Callable[[float], PlanarModel]:
@@ -262,7 +286,14 @@ def first_loss(
             raise AnalysisError(
                 f"stability is lost by a {points[-1].point.kind.label}, not a {kind.label}", field=parameter
             )
-    raise AnalysisError(f"no {kind.label} in the interval", field=parameter)
+    raise AnalysisError(
+        f"no {kind.label} in the interval", field=parameter, value=interval_text(robot, parameter, between)
+    )
+
+
+def interval_text(robot: Robot, parameter: str, between: tuple[float, float]) -> str:
+    """An interval (SI units) in the unit that the parameter is written in."""
+    return " to ".join(units.format(each, robot.unit_of(parameter), digits=4) for each in between)
 
 
 def pitchfork(robot: Robot, normal_form: bool = True) -> WalkBifurcation:

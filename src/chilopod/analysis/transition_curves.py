@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from chilopod import units
 from chilopod.analysis.straight_walk import bifurcations
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.frozen import Short
 from chilopod.notebook import Line, Mark, block, plot, table
 from chilopod.planar import PlanarModel
 from chilopod.progress import Progress, silent
@@ -24,7 +25,7 @@ Box = tuple[tuple[float, float], tuple[float, float]]
 
 
 @dataclass(frozen=True)
-class TransitionCurve:
+class TransitionCurve(Short):
     """A curve of bifurcations of the straight walk in the plane of two parameters.
 
     Attributes

@@ -68,7 +68,10 @@ def branch(
     The axis radius is that of the arc into which the body is bent, as in the paper; the path radius that of the circle
     on the floor; the cost of transport is leg power over weight times speed.
 
-    With --out, draws the branch (unstable parts dashed) and writes it as netCDF and CSV; --resume goes on with it.
+    Where a joint bends by more than a right angle, walks end: such points are out of range.
+
+    With --out, draws the branch (unstable parts dashed, those out of range dotted) and writes it as netCDF and CSV;
+    --resume goes on with it.
     """
     described = read_robot(robot, overrides)
     chosen = between or (None if resume else _BETWEEN)
@@ -129,9 +132,10 @@ def _print(data: xr.Dataset) -> None:
     typer.echo(f"  {unit:<12} axis radius (m)  path radius (m)  speed (m/s)  cost of transport  stability")
     for i in range(data.sizes["point"]):
         at = data.isel(point=i)
-        special = str(at.special.values)
-        stability = "stable" if bool(at.stable) else "unstable"
+        special, verdict = str(at.special.values), str(at.verdict.values)
+        # At a special point a multiplier is 1, and nothing else is to be said of stability.
+        shown = special if special and verdict == "undecided" else ", ".join(filter(None, (special, verdict)))
         typer.echo(
             f"  {float(at.parameter):<12.6g} {float(at.axis_radius):<15.4g}  {float(at.path_radius):<15.4g}  "
-            f"{float(at.speed):<11.4g}  {float(at.cost_of_transport):<17.3g}  {special or stability}"
+            f"{float(at.speed):<11.4g}  {float(at.cost_of_transport):<17.3g}  {shown}"
         )

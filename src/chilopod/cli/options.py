@@ -275,4 +275,17 @@ def interval(robot: Robot, parameter: str, between: tuple[str, str]) -> tuple[fl
             robot.override(parameter, text)
     if not low < high:
         raise ParameterError("must rise from a lower to a higher value", field="between", value=" ".join(between))
+    shown = robot.unit_of(parameter)
+    if shown != unit and any(map(_bare, between)):
+        taken = f"{units.format(low, unit, digits=4)} to {units.format(high, unit, digits=4)}"
+        own = f"{units.format(low, shown, digits=4)} to {units.format(high, shown, digits=4)}"
+        typer.echo(f"note: a number without a unit is SI: --between is {taken}, that is {own}", err=True)
     return low, high
+
+
+def _bare(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -65,12 +65,12 @@ def _write(files: list[Path], result: dict[str, Any], force: bool) -> list[Path]
 
 
 def _print_stability(described: Robot, found: StraightWalk) -> None:
-    verdict = "stable" if found.stable else "unstable"
-    typer.echo(f"{described.name}: the straight walk is {verdict} (period {described.gait.period:g} s)")
+    typer.echo(f"{described.name}: the straight walk is {found.verdict} (period {described.gait.period:g} s)")
     typer.echo("  exponent (1/s)              |multiplier|   joint angles of the mode, front to rear")
     for exponent, modulus, components in zip(found.exponents.values, found.moduli, found.joint_components, strict=True):
         typer.echo(f"  {_complex(exponent, 6):<26}  {modulus:<12.6g}   {_components(components)}")
-    typer.echo(f"  multipliers are within {found.exponents.multipliers.error_bound:.1e}")
+    nearer = "; the largest is nearer to 1 than that" if found.stable is None else ""
+    typer.echo(f"  multipliers are within {found.exponents.multipliers.error_bound:.1e}{nearer}")
 
 
 def bifurcation(
@@ -108,17 +108,18 @@ def bifurcation(
     result = {"robot": described.name, "points": [point.as_json() for point in points]}
     deliver(
         lambda: _write(files, result, force),
-        lambda: print_json(result) if as_json else _print_bifurcations(described, parameter, between, points),
+        lambda: print_json(result) if as_json else _print_bifurcations(described, parameter, (low, high), points),
     )
 
 
 def _print_bifurcations(
-    described: Robot, parameter: str, between: tuple[str, str], points: Sequence[WalkBifurcation]
+    described: Robot, parameter: str, between: tuple[float, float], points: Sequence[WalkBifurcation]
 ) -> None:
     if not points:
-        typer.echo(
-            f"{described.name}: no bifurcation of the straight walk for {parameter} between {' and '.join(between)}"
-        )
+        from chilopod import units
+
+        ends = " and ".join(units.format(each, described.unit_of(parameter), digits=6) for each in between)
+        typer.echo(f"{described.name}: no bifurcation of the straight walk for {parameter} between {ends}")
         return
     for each in points:
         point = each.point

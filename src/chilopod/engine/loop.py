@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from heapq import merge
-from itertools import count, takewhile
+from itertools import count, islice, takewhile
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -25,6 +25,9 @@ _T = TypeVar("_T")
 
 _MOMENT = 0.3
 """s, for which a walk goes on without a word, about: that long Ctrl-C may have to wait too."""
+
+_MOST_EVENTS = 10_000
+"""In a gait cycle: more come from a generator that never ends."""
 
 _FIRST, _SHORTEST = 0.02, 1e-3
 """s of the walk, at first and at least, that it goes on for at a time."""
@@ -98,7 +101,11 @@ def event_times(controller: Controller, gait: Gait, duration: float) -> Iterator
 def _numbered(controller: Controller, gait: Gait, since: float, until: float) -> Iterator[tuple[float, int, Event]]:
     """As :func:`event_times`, with the number of each event; without those of cycles that were over at ``since`` (s):
     who walks a moment at a time need not count from the beginning every time."""
-    events = _asked(controller, "events", lambda: list(controller.events(gait)))
+    events = _asked(controller, "events", lambda: list(islice(controller.events(gait), _MOST_EVENTS + 1)))
+    if len(events) > _MOST_EVENTS:
+        raise ParameterError(
+            "are too many", field=_of(controller, "events"), allowed=f"at most {_MOST_EVENTS} in a gait cycle"
+        )
     for event in events:
         if not isinstance(event, Event):
             raise ParameterError("is no chilopod.engine.Event", field=_of(controller, "events"), value=event)

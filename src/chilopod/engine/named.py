@@ -34,6 +34,8 @@ def engine_named(name: str) -> Engine:
         If there is none.
     """
     engine: Engine
+    if not isinstance(name, str):
+        raise ParameterError("must be a name", field="engine", value=name, allowed=", ".join(ENGINES))
     if name in _MODULES:
         engine = import_module(_MODULES[name])  # a module is an engine
         return engine

@@ -19,9 +19,10 @@ Array = NDArray[np.float64]
 SPRINGS = ("first", "all")
 """Which springs an action sets."""
 
-_SOFTEST = (
-    1.0 / 7.0
-)  # of the stiffest spring, where the robot file says nothing: there the paper's robot turns most tightly
+_SOFTEST = 1.0 / 7.0
+"""Part of the stiffest spring, where the robot file says nothing: at it the paper's robot turns, and bends, ever more
+tightly, until a joint leaves its range."""
+
 _ROUNDING = 1e-6  # by which single precision may miss the end of a range
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +14,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from chilopod.engine import engine_named
+from chilopod.engine.arguments import as_seeds
 from chilopod.errors import ParameterError
 from chilopod.gym.episodes import Episodes, Step
 from chilopod.robot import Robot, load_robot
@@ -28,6 +29,11 @@ Pixels = NDArray[np.uint8]
 _PRESETS = {"planar": "aoi2022-planar", "twin": "aoi2022"}
 _RENDER_MODES = ("rgb_array",)
 _FPS = 10  # pictures of a film, each a gait cycle
+
+
+def _without_pictures(env: Any) -> dict[str, Any]:
+    """State of an environment for copies; pictures are drawn from the episodes anew."""
+    return {name: None if name in ("_picture", "_pictures") else each for name, each in env.__dict__.items()}
 
 
 class CourseVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
@@ -64,13 +70,15 @@ class CourseVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
         render_mode: str | None = None,
         **named: Any,
     ) -> None:
-        self.num_envs, self.render_mode = num_envs, render_mode
         self.episodes = _episodes(num_envs, robot, engine, render_mode, {"targets": self.targets, **named})
+        self.num_envs, self.render_mode = num_envs, render_mode
         self.single_observation_space, self.single_action_space = _spaces(self.episodes)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._generators: list[np.random.Generator] | None = None
         self._pictures: list[Picture] | None = None
+
+    __getstate__ = _without_pictures
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
@@ -85,7 +93,7 @@ class CourseVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
             Not used.
         """
         seeds = _seeds(seed, self.num_envs)
-        super().reset(seed=None if seed is None or isinstance(seed, Sequence) else operator.index(seed))
+        super().reset(seed=None if np.ndim(seed) else seeds[0])  # type: ignore[arg-type]
         if self._generators is None:
             drawn = self.np_random.integers(1 << 31, size=self.num_envs)
             self._generators = [np_random(int(each))[0] for each in drawn]
@@ -139,8 +147,11 @@ class CourseEnv(gymnasium.Env[Row, Row]):
         self._over = False
         self._picture: Picture | None = None
 
+    __getstate__ = _without_pictures
+
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Row, dict[str, Any]]:
         """Begin an episode; with a seed the one that trials draw from it."""
+        (seed,) = _seeds(seed, 1)
         super().reset(seed=seed)
         step, self._over = self.episodes.begin([self.np_random], [seed]), False
         return step.observation[0], _info(step)
@@ -178,6 +189,7 @@ def _episodes(
         raise ParameterError(
             "there is no such render mode", field="render_mode", value=render_mode, allowed=", ".join(_RENDER_MODES)
         )
+    engine_named(engine)
     if robot is None:
         robot = _PRESETS.get(engine, _PRESETS["planar"])
     walker = robot if isinstance(robot, Robot) else load_robot(robot)
@@ -193,11 +205,18 @@ def _spaces(episodes: Episodes) -> tuple[Space[Row], Space[Row]]:
 
 
 def _seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:
-    if seed is None or not isinstance(seed, Sequence):
-        return [None if seed is None else operator.index(seed) + number for number in range(count)]
+    if seed is None:
+        return [None] * count
+    if not isinstance(seed, Sequence | np.ndarray) or np.ndim(seed) == 0:
+        return [_whole(seed) + number for number in range(count)]
     if len(seed) != count:
         raise ParameterError("has the wrong length", field="seed", value=len(seed), allowed=str(count))
-    return [None if each is None else operator.index(each) for each in seed]
+    return [None if each is None else _whole(each) for each in seed]
+
+
+def _whole(seed: object) -> int:
+    (number,) = as_seeds([seed], "seed") or []
+    return number
 
 
 def _infos(step: Step) -> dict[str, Any]:

@@ -8,32 +8,40 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chilopod import memory
 from chilopod.engine import Observation, Walk, engine_named
+from chilopod.engine.arguments import as_number
 from chilopod.errors import ParameterError
 from chilopod.gym.actions import Actions
 from chilopod.gym.sight import Sight
 from chilopod.record import LONGEST
 from chilopod.robot import Robot
+from chilopod.stability.arguments import checked_count
 from chilopod.steering import CourseReferee, Judged, Verdict, random_course
-from chilopod.steering.course import RANDOM_DISTANCES
+from chilopod.steering.course import MOST_GOALS, RANDOM_DISTANCES
 from chilopod.tasks.course import patience_of
 from chilopod.trials import Disturbance, Drawn, draw
 
 Array = NDArray[np.float64]
 Marks = NDArray[np.bool_]
 
+_MOST = 1 << 20  # robots
+_A_LOOK = 2.0 * (8.0 + 1.0)  # bytes that a look's error and whether it misses take, drawn and in one array
 _SEEDS = 1 << 31  # of episodes that nobody gave one, less than this
 
 
 @dataclass(frozen=True)
 class Rewards:
     """What a step is worth.
+
+    A robot that fails is charged as if it walked straight away from its targets until their time is over, with the
+    penalty for failing on top: walking on to the end of the time is then never worse, whatever the robot does with it.
 
     Attributes
     ----------
@@ -44,13 +52,18 @@ class Rewards:
     cycle
         For every gait cycle.
     failure
-        For a robot that falls, or bends a joint too far.
+        For a robot that falls, or bends a joint too far, besides that charge.
     """
 
     progress: float = 1.0
     arrival: float = 1.0
     cycle: float = -0.01
     failure: float = -1.0
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            if not np.isfinite(as_number(each.name, getattr(self, each.name))):
+                raise ParameterError("must be finite", field=each.name, value=getattr(self, each.name))
 
 
 @dataclass(frozen=True)
@@ -149,14 +162,17 @@ class Episodes:
         rewards: Rewards = Rewards(),
         remember: bool = False,
     ) -> None:
-        if not 1 <= count <= 1 << 20:
-            raise ParameterError("is no number of robots", field="num_envs", value=count, allowed="1 to a million")
-        self._engine, self._targets, self._count = engine_named(engine), targets, count
+        self._targets = checked_count("targets", targets, MOST_GOALS)
+        self._count = checked_count("num_envs", count, _MOST)
+        for name, given, wanted in (("disturbance", disturbance, Disturbance), ("rewards", rewards, Rewards)):
+            if not isinstance(given, wanted):
+                raise ParameterError(f"must be a {wanted.__name__}", field=name, value=given)
+        self._name, self._engine = engine, engine_named(engine)
         self._engine.common(robot)
         self.actions = Actions.of(robot, springs)
         self._patience = patience_of(engine) if patience is None else patience
         self._disturbance, self.rewards = disturbance, rewards
-        common = random_course(0, self._patience, targets)
+        common = random_course(0, self._patience, self._targets)
         self.sight = Sight(self.actions, common.range)
         gait, least = robot.gait, RANDOM_DISTANCES[1] / robot.gait.speed
         if self._patience < least:
@@ -167,10 +183,27 @@ class Episodes:
                 allowed=f"{least:g} s or more",
             )
         self._period = gait.period
-        self._looks = int(np.ceil(common.duration / gait.period)) + targets + 1
+        self._looks = int(np.ceil(common.duration / gait.period)) + self._targets + 1
+        needed = _A_LOOK * self._looks * self._count
+        if needed > memory.available():
+            raise ParameterError(
+                f"would take {memory.in_words(needed)} of memory",
+                field="num_envs * targets * patience",
+                value=f"{self._count} * {common.duration:g} s",
+                allowed=f"less, {memory.in_words(memory.available())} are free",
+            )
         self.moments: deque[Moment] | None = deque(maxlen=self._looks) if remember else None
         self._walk: Walk | None = None
         self._generators: list[np.random.Generator] = []
+
+    def __getstate__(self) -> dict[str, Any]:
+        # An engine may be a module, and a walk compiled: both are made anew, the walk to the bit.
+        saved = None if self._walk is None else self._walk.save()
+        return {**self.__dict__, "_engine": None, "_walk": saved}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state, _engine=engine_named(state["_name"]))
+        self._walk = None if state["_walk"] is None else self._engine.resume(state["_walk"])
 
     @property
     def robot(self) -> Robot:
@@ -284,7 +317,7 @@ class Episodes:
     def _look(self, walk: Walk, fresh: Marks) -> Step:
         """Judge, put up the next targets, and see; at the end of a step."""
         referee, seen, pose = self._referee, walk.observe(), walk.pose()
-        away = _distance(referee.aims, pose)
+        away, left = _distance(referee.aims, pose), referee.time_left(walk.time)
         judged = referee.judge(walk)
         busy, aims = referee.busy, referee.aims
         others = judged.moved & busy
@@ -296,7 +329,7 @@ class Episodes:
                 bearing=np.where(others, again.bearing, seen.bearing),
                 distance=np.where(others, again.distance, seen.distance),
             )
-        reward = self._reward(judged, fresh, self._away - away)
+        reward = self._reward(judged, fresh, self._away - away, left)
         self._away = np.where(others, _distance(aims, pose), away)
         terminated = judged.gone | (judged.arrived & ~busy)
         truncated = (judged.late | judged.unseen) & ~busy
@@ -317,10 +350,12 @@ class Episodes:
         }
         return Step(self.sight.row(self._through(seen)), reward, terminated, truncated, info)
 
-    def _reward(self, judged: Judged, fresh: Marks, nearer: Array) -> Array:
+    def _reward(self, judged: Judged, fresh: Marks, nearer: Array, left: Array) -> Array:
         worth = self.rewards
+        # At worst a robot that walks on gains as little as this in the time that is left.
+        least = min(worth.cycle, 0.0) / self._period - abs(worth.progress) * self.robot.gait.speed
         reward = worth.progress * np.nan_to_num(nearer) + worth.arrival * judged.arrived
-        reward += worth.cycle + worth.failure * judged.gone
+        reward += worth.cycle + np.where(judged.gone, worth.failure + least * left, 0.0)
         reward[fresh] = 0.0
         return np.asarray(reward)
 

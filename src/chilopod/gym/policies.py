@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chilopod.engine import Controller
+from chilopod.engine import Controller, event_times
 from chilopod.errors import ParameterError, nearest_name
 from chilopod.gym.episodes import Episodes
 from chilopod.steering import ON_COURSES, VARIABLE, steered
@@ -47,7 +47,8 @@ class Steered:
         rows, actions = np.atleast_2d(observation), self.episodes.actions
         seen = self.episodes.sight.seen(rows)
         yaw, stiffness = seen.leg_yaw.copy(), np.tile(actions.robot.springs.stiffness, (len(rows), 1))
-        for event in self.controller.events(actions.robot.gait):
+        gait = actions.robot.gait
+        for _, event in event_times(self.controller, gait, gait.period):
             command = self.controller.act(event, seen)
             if command.leg_yaw is not None:
                 wanted = np.broadcast_to(command.leg_yaw, yaw.shape)

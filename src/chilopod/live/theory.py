@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.analysis.parameters import K1
-from chilopod.engine import engine_named
+from chilopod.engine import Status, engine_named
 from chilopod.errors import ChilopodError
 from chilopod.robot import Robot
 from chilopod.steering import RadiusLaw
@@ -29,6 +29,7 @@ Array = NDArray[np.float64]
 
 _BETWEEN = (1.0 / 20.0, 3.0)  # of the stiffest spring: as for the radius law
 _NICE = 5
+_GROWTH = 30.0  # s that a short question may take
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ def growth_of(robot: Robot) -> Growth:
     """Of the straight walk in the planar theory."""
     from chilopod.analysis import straight_walk
 
-    exponents = straight_walk(robot).as_json()["exponents_per_s"]
+    exponents = straight_walk(robot, longest=_GROWTH).as_json()["exponents_per_s"]
     return Growth(robot, max(real for real, _ in exponents))
 
 
@@ -123,6 +124,7 @@ def theory_of(robot: Robot, engine: str, told: Callable[[Theory], None]) -> None
 def _exact(known: Theory, told: Callable[[Theory], None]) -> None:
     from chilopod.analysis import curved_walks, first_loss
     from chilopod.stability import Kind
+    from chilopod.tasks.radius_law import that_holds
 
     robot = known.robot
     assert robot is not None
@@ -139,7 +141,7 @@ def _exact(known: Theory, told: Callable[[Theory], None]) -> None:
         side=-1,
         progress=lambda done, words: told(replace(known, remark=_share(done, "following the curved walks"))),
     )
-    possible = np.abs(walks.mean_angle.values).max(axis=1) <= 0.5 * np.pi
+    possible = walks.verdict.values != Status.OUT_OF_RANGE.label
     known = replace(
         known,
         springs=walks.parameter_si.values[possible],
@@ -147,7 +149,8 @@ def _exact(known: Theory, told: Callable[[Theory], None]) -> None:
         stable=walks.stable.values[possible],
     )
     try:
-        known = replace(known, law=RadiusLaw.of_branch(known.springs, known.radii, known.stable, robot.unit_of(K1)))
+        law = RadiusLaw.of_branch(known.springs, known.radii, known.stable, robot.unit_of(K1))
+        known = replace(known, law=that_holds(law, robot))
     except ChilopodError as error:
         known = replace(known, remark=error.problem)
     told(known)

@@ -24,9 +24,8 @@ def spring_text(stiffness: float) -> str:
 
 
 def radius_of(seen: Seen) -> float:
-    """Radius of the arc that the body makes, m: the paper's measure."""
-    robot = seen.robot
-    return (robot.body.modules - 1) * robot.module_length / max(seen.bend, 1e-9)
+    """Radius of the arc that the body makes, m: the paper's measure, infinite if straight."""
+    return float(seen.robot.axis_radius(seen.mean_angles))
 
 
 def sentences(seen: Seen, settings: Settings, theory: Theory, growth: Growth | None) -> list[str]:

@@ -119,6 +119,8 @@ class WalkMeans(ReadOnlyArrays):
     ----------
     mean_angle
         Of every joint, rad, shape (walks, N-1).
+    most_bent
+        Largest angle of any joint within the period, rad, shape (walks,).
     leg_power
         Mean power the legs deliver, W, shape (walks,).
     floor_power
@@ -128,6 +130,7 @@ class WalkMeans(ReadOnlyArrays):
     """
 
     mean_angle: Array
+    most_bent: Array
     leg_power: Array
     floor_power: Array
     drifts: tuple[Drift, ...]
@@ -162,6 +165,7 @@ def walk_means(models: Sequence[PlanarModel], orbits: ArrayLike) -> WalkMeans:
         parts = [walk_means(models[i : i + at_once], orbits[i : i + at_once]) for i in starts]
         return WalkMeans(
             np.concatenate([part.mean_angle for part in parts]),
+            np.concatenate([part.most_bent for part in parts]),
             np.concatenate([part.leg_power for part in parts]),
             np.concatenate([part.floor_power for part in parts]),
             tuple(drift for part in parts for drift in part.drifts),
@@ -176,10 +180,12 @@ def walk_means(models: Sequence[PlanarModel], orbits: ArrayLike) -> WalkMeans:
     if not ok.all():
         raise AnalysisError("the motion diverges within a period", field="orbits")
     share = 0.5 * weights * widths[:, None] / first.period
-    mean_angle = np.einsum("sn,wsnj->wj", share, recorded[..., 3 : first.modules + 2])
+    angles = recorded[..., 3 : first.modules + 2]
+    mean_angle, most_bent = np.einsum("sn,wsnj->wj", share, angles), np.abs(angles).max(axis=(1, 2, 3))
     legs, floor = _powers(models, recorded, widths[:, None] * fractions)
     drifts = tuple(Drift(ahead, left, turn, first.period) for ahead, left, turn in states[:, -3:].tolist())
-    return WalkMeans(mean_angle, np.einsum("sn,wsn->w", share, legs), np.einsum("sn,wsn->w", share, floor), drifts)
+    powers = (np.einsum("sn,wsn->w", share, power) for power in (legs, floor))
+    return WalkMeans(mean_angle, most_bent, *powers, drifts)
 
 
 def _check_one_each(models: Sequence[PlanarModel], states: Array, name: str) -> None:

@@ -64,6 +64,8 @@ def read_table(robot: str | Path) -> tuple[dict[str, Any], str]:
     RobotFileError
         If there is no such file or preset, or it is no TOML.
     """
+    if not isinstance(robot, str | Path):
+        raise RobotFileError("is no robot", field="robot", value=robot, allowed="a preset or the path of a file")
     source, path = str(robot), Path(robot)
     names = presets()
     if source in names:

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final, Self
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 from pydantic import PlainValidator, model_validator
 
 from chilopod import units
@@ -152,6 +154,19 @@ class Robot(Description):
     def module_length(self) -> float:
         """Length of one module, m."""
         return self.body.length / self.body.modules
+
+    def axis_radius(self, joint_angles: ArrayLike) -> NDArray[np.float64]:
+        """Radius of the arc that the body axis makes, m, shape (...): the paper's (N-1) L / sum |theta|.
+
+        Parameters
+        ----------
+        joint_angles
+            Mean angles of the yaw joints, rad, shape (..., N-1). The radius is infinite where all are zero, and NaN
+            where one is.
+        """
+        bent = np.abs(np.asarray(joint_angles, dtype=np.float64)).sum(-1)
+        with np.errstate(divide="ignore", over="ignore"):  # a bend of next to nothing is straight
+            return np.asarray((self.body.modules - 1) * self.module_length / bent)
 
     @property
     def module_mass(self) -> float:

@@ -18,7 +18,7 @@ from chilopod.stability.arguments import checked_count
 from chilopod.stability.capabilities import FlowsFrames, SystemLike, flows_tangents, is_autonomous
 from chilopod.stability.krylov.closing import LARGE
 from chilopod.stability.krylov.leading import leading_multipliers, whole_pairs
-from chilopod.stability.matrix_errors import DRAWN, FIRST_ORDER, eigenvalues_moved
+from chilopod.stability.matrix_errors import DRAWN, FIRST_ORDER, eigenvalues_moved, stable_within
 from chilopod.stability.orbits import Orbit, find_large_orbit, find_orbit, from_known, known_state
 from chilopod.stability.returns import ReturnMap, flow_with_error, return_maps
 from chilopod.stability.scales import numerical_balance, sizes
@@ -75,9 +75,10 @@ class Multipliers(ReadOnlyArrays):
     remarks: tuple[str, ...] = ()
 
     @property
-    def stable(self) -> bool:
-        """Whether all multipliers lie inside the unit circle, by more than the error bound: the largest decide."""
-        return bool((np.abs(self.values) < 1.0 - self.error_bound).all())
+    def stable(self) -> bool | None:
+        """Whether all multipliers lie inside the unit circle: True or False by more than the error bounds, None where
+        these leave it undecided."""
+        return stable_within(self.values, self.error_bound, self.error_bounds)
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.frozen import Short
 from chilopod.notebook import block, table, words
 from chilopod.stability.asked import Asking
 from chilopod.stability.branches.fold import Fold
@@ -45,7 +46,7 @@ _BESIDE = 1e-6  # of the interval: how far beside a crossing rates of change are
 
 
 @dataclass(frozen=True)
-class Located(Sequence[BifurcationPoint]):
+class Located(Short, Sequence[BifurcationPoint]):
     """The bifurcations that :func:`locate` found: a sequence of points by rising parameter, and how the search ended.
 
     Attributes

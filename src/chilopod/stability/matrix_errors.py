@@ -13,7 +13,35 @@ FIRST_ORDER = 1e-6
 DRAWN = 10.0
 """How much farther eigenvalues may move than by the worst of some changes at random."""
 
+VERDICTS = {True: "stable", False: "unstable", None: "undecided"}
+"""Words for what :func:`stable_within` finds."""
+
 _DRAWS = 8
+
+
+def stable_within(
+    values: NDArray[np.complex128], bound: float, bounds: NDArray[np.float64] | float | None = None
+) -> bool | None:
+    """Stability by multipliers with errors.
+
+    Parameters
+    ----------
+    values
+        Multipliers, shape (n,).
+    bound
+        Bound on the error of every multiplier that is not small.
+    bounds
+        Bounds on the errors one by one, shape (n,); by default all have ``bound``.
+
+    Returns
+    -------
+    True if all lie inside the unit circle by more than their errors, False if one lies outside by more than its own,
+    None if the errors leave it undecided.
+    """
+    modulus = np.abs(values)
+    if (modulus < 1.0 - bound).all():
+        return True
+    return False if (modulus > 1.0 + (bound if bounds is None else bounds)).any() else None
 
 
 def eigenvalues_moved(values: NDArray[np.complex128], matrix: Array, error: Array) -> Array:

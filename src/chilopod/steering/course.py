@@ -138,8 +138,9 @@ class Course:
     range
         How far the scanner sees, m; by default that of the same one (its data sheet).
     tightest
-        Radius of the tightest circle that the robot walks, m: what it takes for the shortest path to a target. 0 for a
-        robot that turns on the spot.
+        Radius of the circles that the shortest path to a target is made of, m; 0 for a robot that turns on the spot.
+        That of a radius law is the paper's measure, of the body axis: module 1 itself goes round in smaller circles, so
+        that a walk may be shorter than this path.
 
     Raises
     ------

@@ -72,8 +72,8 @@ class CourseReferee:
     """Referee of robots that walk one course each, see :class:`chilopod.engine.Referee`.
 
     A robot's next target is put up when it has arrived at the one before, or that one's time is over, or it cannot be
-    reached in its time at all: the shortest path, with circles as tight as the course says, is longer than what feet
-    cover. After its last one the robot is halted.
+    reached in its time at all: even the straight line to it is longer than what feet cover. After its last one the
+    robot is halted.
 
     Parameters
     ----------
@@ -158,6 +158,13 @@ class CourseReferee:
         """Where the targets are whose turn it is, m, shape (robots, 2); NaN where there is none."""
         return self._aims.copy()
 
+    def time_left(self, now: float) -> Array:
+        """Time until the last target's is over if none is reached, s, shape (robots,); 0 for robots that are done."""
+        patience, number = self._common.patience, np.maximum(self._number, 0)
+        begin = self._begin[np.arange(len(number)), np.minimum(number, self._begin.shape[1] - 1)]
+        until = np.where(np.isnan(begin), now, begin) + patience * (self._counts - number)
+        return np.where(self.busy, until - now, 0.0)
+
     @property
     def busy(self) -> NDArray[np.bool_]:
         """Who has a target still, shape (robots,)."""
@@ -227,7 +234,7 @@ class CourseReferee:
                 path = float(shortest_path(seen_from, self._common.tightest))
                 self._number[robot], self._places[robot, number] = number, place
                 self._begin[robot, number], self._shortest[robot, number] = now, path
-                if path <= most:
+                if away - ARRIVAL_RADIUS <= most:
                     self._aims[robot] = place
                     break
                 self._end[robot, number], self._verdicts[robot, number] = now, Verdict.TOO_FAR.label

@@ -14,6 +14,7 @@ import xarray as xr
 from chilopod.engine import Controller, engine_named
 from chilopod.engine.named import check_controller, path_of
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.frozen import Short
 from chilopod.notebook import block, table, words
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
@@ -42,7 +43,7 @@ _PATIENCE = 25.0  # s for a target, of an engine whose walks are as fast as the 
 
 
 @dataclass(frozen=True)
-class Driver:
+class Driver(Short):
     """A robot made ready for courses.
 
     Attributes
@@ -55,6 +56,8 @@ class Driver:
         What steers; None for nothing.
     law
         The robot's radius law; None where it has none and the strategy needs none.
+    engine
+        Name of the engine that the law belongs to and that walks.
     remarks
         What is to be said of it.
     """
@@ -63,18 +66,19 @@ class Driver:
     strategy: Strategy
     controller: Controller | None
     law: RadiusLaw | None
+    engine: str
     remarks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
-class Driven:
+class Driven(Short):
     """Walks along a course, and what became of its targets.
 
     Attributes
     ----------
     driver
         What walked.
-    course, engine
+    course
         What was asked for.
     trials
         With all that makes each walk.
@@ -84,7 +88,6 @@ class Driven:
 
     driver: Driver
     course: Course
-    engine: str
     trials: tuple[Trial, ...]
     records: tuple[xr.Dataset, ...]
 
@@ -92,6 +95,11 @@ class Driven:
     def robot(self) -> Robot:
         """That walked."""
         return self.driver.robot
+
+    @property
+    def engine(self) -> str:
+        """Name of the engine."""
+        return self.driver.engine
 
     @property
     def strategy(self) -> Strategy:
@@ -265,7 +273,7 @@ def driver(
         controller = ActuatedAxis.of(walker, law)
     else:
         walker, controller = steered(walker, strategy, spring)
-    return Driver(walker, strategy, controller, law, tuple(remarks))
+    return Driver(walker, strategy, controller, law, engine, tuple(remarks))
 
 
 def drive(
@@ -274,7 +282,7 @@ def drive(
     *,
     seed: int | None = None,
     repeats: int = 1,
-    engine: str = "planar",
+    engine: str | None = None,
     folder: str | Path | None = None,
     progress: Progress = silent,
 ) -> Driven:
@@ -291,7 +299,7 @@ def drive(
     repeats
         How many walks.
     engine
-        Of :data:`chilopod.engine.ENGINES`, or one's own as ``package.module:object``.
+        Name of the driver's engine, which is also the default.
     folder
         Where trials are kept; without one nothing is kept.
     progress
@@ -302,14 +310,19 @@ def drive(
     ParameterError
         If memory cannot hold the records, or something is out of range.
     """
+    if engine not in (None, driver.engine):
+        raise ParameterError(
+            "the driver was made ready for another engine", field="engine", value=engine, allowed=driver.engine
+        )
+    engine = driver.engine
     check_drive(driver.robot, course, seed=seed, repeats=repeats, engine=engine)
     if driver.controller is not None:
         check_controller(driver.controller)
     if driver.law is not None:
         course = replace(course, tightest=driver.law.tightest)
-    trials = repeated(trial_of(driver, course, engine=engine, poses=engine_named(engine).traits.poses), seed, repeats)
+    trials = repeated(trial_of(driver, course, poses=engine_named(engine).traits.poses), seed, repeats)
     records = run(trials, folder, progress)
-    return Driven(driver, course, engine, trials, tuple(records))
+    return Driven(driver, course, trials, tuple(records))
 
 
 def check_drive(
@@ -327,9 +340,7 @@ def check_drive(
     check_fits([one] * repeats)
 
 
-def trial_of(
-    driver: Driver, course: Course, seed: int = 0, *, engine: str = "planar", poses: bool = False, brief: bool = False
-) -> Trial:
+def trial_of(driver: Driver, course: Course, seed: int = 0, *, poses: bool = False, brief: bool = False) -> Trial:
     """The trial of a course, with the disturbance that all studies have."""
     return Trial(
         driver.robot,
@@ -338,7 +349,7 @@ def trial_of(
         target=course,
         controller=driver.controller,
         rate=_RATE,
-        engine=engine,
+        engine=driver.engine,
         poses=poses,
         brief=brief,
     )

@@ -17,7 +17,7 @@ from chilopod.errors import AnalysisError
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import RadiusLaw
-from chilopod.trials import AVERAGED, NONE, Trial, run
+from chilopod.trials import AVERAGED, NONE, Trial, mean_joint_angles, run
 
 DURATION = 90.0
 """s, of every trial: beside the onset a bend takes a minute to grow."""
@@ -28,6 +28,9 @@ CURVED = 0.25
 SETTLED = 0.05
 """Of its bend: a curve has settled if it changed by less than this in the 10 s before its end."""
 
+HELD = 16
+"""Walks that must hold at a spring: of 20 none leaves the range then, as a rule."""
+
 _LAW_SPRINGS = (0.2, 0.3, 0.37, 0.44, 0.51, 0.59, 0.68, 0.78, 0.9)  # of the stiffest spring
 _LAW_BEND = 0.8  # rad in all, to start with
 
@@ -37,8 +40,9 @@ def radius_law(
 ) -> RadiusLaw:
     """Radius of the curved walks over k1, by the paper's measure of it.
 
-    An engine whose walks are those of the planar theory has the law of the exact branch. That of any other is measured
-    in undisturbed walks that start bent.
+    An engine whose walks are those of the planar theory has the law of the exact branch, from the softest spring on
+    that holds a robot which bends from straight on (:func:`that_holds`). The law of any other engine is measured in
+    undisturbed walks that start bent; springs at which these fail are no part of it.
 
     Parameters
     ----------
@@ -57,7 +61,7 @@ def radius_law(
         If there is no such branch; or fewer than three springs curve, or softer ones do not curve more tightly.
     """
     if engine_named(engine).traits.exact:
-        return radius_laws(robot, progress).axis
+        return that_holds(radius_laws(robot, progress).axis, robot, engine)
     stiffest = units.from_si(max(robot.springs.stiffness), PAPER_UNIT)
     springs = [float(round(part * stiffest, 2)) for part in _LAW_SPRINGS]
     joints = robot.body.modules - 1
@@ -86,23 +90,51 @@ def radius_law(
     return RadiusLaw.of_branch([stiffness(each) for each in values], radii, [True] * len(values), PAPER_UNIT)
 
 
+def that_holds(law: RadiusLaw, robot: Robot, engine: str = "planar") -> RadiusLaw:
+    """The part of a radius law whose circles a robot reaches from straight on.
+
+    A robot bends farther on its way into a circle than on the circle, and no two feet are alike, so that a joint may
+    leave its range although that of the settled walk does not. The softest spring that is left is the first at which
+    none of :data:`HELD` walks does, with the disturbance that all studies have.
+
+    Parameters
+    ----------
+    law
+        Radius law by the branch of settled walks.
+    robot
+        The robot; its first spring does not matter.
+    engine
+        Name of the engine that walks.
+
+    Raises
+    ------
+    AnalysisError
+        If robots fail at so many springs that no law is left.
+    """
+    for first, value in enumerate(law.values[:-2].tolist()):
+        walker = robot.with_value(K1, value)
+        ends = run([Trial(walker, DURATION, seed, rate=1.0, engine=engine) for seed in range(HELD)])
+        if all(end.status.values[0] == Status.WALKED.label for end in ends):
+            return RadiusLaw(law.values[first:], law.radii[first:], law.unit)
+    raise AnalysisError("a joint leaves its range at every spring that bends the robot", field="springs")
+
+
 def end_of_walk(record: xr.Dataset, robot: Robot) -> xr.Dataset:
     """What one trial's record comes to.
 
     Returns
     -------
     Dataset over joint: ``mean_angle`` over the last 5 s (rad), ``bend``, the sum of their sizes (rad), ``axis_radius``
-    (m), ``direction`` (left, right, straight; empty where the walk failed), ``moved``, by how much the sum differs from
+    (m; infinite if straight), ``direction`` (left, right, straight; empty where the walk failed), ``moved``, the
+    difference from
     that of the 10 s before (rad), ``settled``, whether that is less than :data:`SETTLED` of the bend, ``speed`` of
     module 1 over the last 12 s (m/s), and ``status``.
     """
     walk = record.isel(robot=0)
-    angles, times = walk.joint_angle.transpose("time", "joint").values, walk.time.values
-    late = times > times[-1] - AVERAGED + 1e-9
-    before = (times > times[-1] - AVERAGED - 10.0) & ~late
-    last = angles[late].mean(axis=0)
+    times = walk.time.values
+    last = mean_joint_angles(walk).values
     bend = float(np.abs(last).sum())
-    moved = abs(bend - float(np.abs(angles[before].mean(axis=0)).sum()))
+    moved = abs(bend - float(np.abs(mean_joint_angles(walk, 10.0, before=AVERAGED)).sum()))
     failed = walk.status.item() != Status.WALKED.label
     side = "straight" if bend < CURVED else "right" if last.sum() > 0.0 else "left"
     place = walk.position.transpose("time", "axis").values
@@ -114,7 +146,7 @@ def end_of_walk(record: xr.Dataset, robot: Robot) -> xr.Dataset:
         {
             "mean_angle": ("joint", last, {"units": "rad"}),
             "bend": ((), bend, {"units": "rad"}),
-            "axis_radius": ((), (robot.body.modules - 1) * robot.module_length / max(bend, 1e-9), {"units": "m"}),
+            "axis_radius": ((), float(robot.axis_radius(last)), {"units": "m"}),
             "direction": ((), np.array("" if failed else side, dtype=object)),
             "moved": ((), moved, {"units": "rad"}),
             "settled": ((), moved <= SETTLED * bend),

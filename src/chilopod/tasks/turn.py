@@ -16,6 +16,7 @@ from chilopod.analysis.parameters import K1
 from chilopod.engine import Controller, engine_named
 from chilopod.engine.named import check_controller, path_of
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.frozen import Short
 from chilopod.notebook import block, table, words
 from chilopod.progress import Progress, silent
 from chilopod.record import LONGEST, in_range
@@ -35,7 +36,7 @@ _AS_NEAR = 1e-9  # m
 
 
 @dataclass(frozen=True)
-class Turn:
+class Turn(Short):
     """A turning task and how it went.
 
     Attributes

@@ -14,6 +14,7 @@ import xarray as xr
 from chilopod.engine import Controller, HasFootCreep, engine_named
 from chilopod.engine.named import path_of
 from chilopod.errors import ParameterError
+from chilopod.frozen import Short
 from chilopod.notebook import block, table
 from chilopod.progress import Progress, silent
 from chilopod.record import RATE
@@ -25,7 +26,7 @@ _MOST_BENT = 1.5  # rad; at a right angle modules run into each other
 
 
 @dataclass(frozen=True)
-class Ends:
+class Ends(Short):
     """What walks came to that differ in nothing but their seed.
 
     Attributes

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from chilopod.trials.executors import Executor, Here, using
     from chilopod.trials.run import as_now, check_fits, run, run_each, together
     from chilopod.trials.store import Store
-    from chilopod.trials.summary import AVERAGED, WalkSummary, axis_radius, mean_joint_angles, straight, summaries
+    from chilopod.trials.summary import AVERAGED, WalkSummary, mean_joint_angles, straight, summaries
     from chilopod.trials.trial import Trial
 else:
     __getattr__, __dir__ = exports(
@@ -28,7 +28,7 @@ else:
             "executors": ("Executor", "Here", "using"),
             "run": ("as_now", "check_fits", "run", "run_each", "together"),
             "store": ("Store",),
-            "summary": ("AVERAGED", "WalkSummary", "axis_radius", "mean_joint_angles", "straight", "summaries"),
+            "summary": ("AVERAGED", "WalkSummary", "mean_joint_angles", "straight", "summaries"),
             "trial": ("Trial",),
         },
     )
@@ -45,7 +45,6 @@ __all__ = [
     "Trial",
     "WalkSummary",
     "as_now",
-    "axis_radius",
     "batches",
     "check_fits",
     "draw",

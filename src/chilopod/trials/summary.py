@@ -32,7 +32,7 @@ class WalkSummary:
     joint_angles
         Means over the last :data:`AVERAGED` s, rad, shape (N-1,); NaN if the walk failed.
     axis_radius
-        The paper's (N-1) L / sum |theta| of these, m; infinite if straight.
+        Radius by these, see :meth:`chilopod.robot.Robot.axis_radius`, m: infinite if the walk is straight.
     x, y
         Of the centre of module 1 at the end, m.
     """
@@ -73,11 +73,23 @@ class WalkSummary:
         }
 
 
-def mean_joint_angles(record: xr.Dataset, seconds: float = AVERAGED) -> xr.DataArray:
-    """Joint angles averaged over the last ``seconds`` of a record (all of a shorter one), rad, over (robot, joint)."""
+def mean_joint_angles(record: xr.Dataset, seconds: float = AVERAGED, before: float = 0.0) -> xr.DataArray:
+    """Joint angles averaged over some time at the end of a record, rad, over (robot, joint).
+
+    Parameters
+    ----------
+    record
+        Walks, as any engine records them.
+    seconds
+        Length of that time, s. Its first moment does not count, so that whole cycles are averaged with equal weights:
+        5 s at 10 Hz are 50 samples. Of a shorter record all samples count.
+    before
+        Time from its end to the end of the record, s.
+    """
     times = record.time.values
-    first = int(np.searchsorted(times, times[-1] - seconds * (1.0 + 1e-9)))
-    return record.joint_angle.isel(time=slice(first, None)).mean("time", skipna=False)
+    last = times[-1] - before + 1e-9  # samples are at round times, up to round-off
+    first, end = np.searchsorted(times, [last - seconds, last])
+    return record.joint_angle.isel(time=slice(int(first), int(end))).mean("time", skipna=False)
 
 
 def straight(record: xr.Dataset) -> bool:
@@ -86,17 +98,10 @@ def straight(record: xr.Dataset) -> bool:
     return not record.joint_angle.values.any()
 
 
-def axis_radius(robot: Robot, angles: Array) -> Array:
-    """The paper's (N-1) L / sum |theta|, m, of joint angles over the last axis; infinite where all are zero."""
-    bent = np.abs(angles).sum(-1)
-    with np.errstate(divide="ignore", over="ignore"):  # what hardly bends at all is straight
-        return np.asarray((robot.body.modules - 1) * robot.module_length / bent)
-
-
 def summaries(robot: Robot, record: xr.Dataset) -> Sequence[WalkSummary]:
     """The end of every walk of a record."""
     angles = mean_joint_angles(record).transpose("robot", "joint").values
-    radii = axis_radius(robot, angles)
+    radii = robot.axis_radius(angles)
     ends = record.position.isel(time=-1).transpose("robot", "axis").values
     return [
         WalkSummary(str(status), angle, float(radius), float(end[0]), float(end[1]))

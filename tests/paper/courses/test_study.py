@@ -27,7 +27,7 @@ def variable(context):
 
 
 def test_all_strategies_walk_the_same_courses(context, variable):
-    data = compared(context.robot, variable, PLANAR[Size.TINY], "planar", Size.TINY, context.folder)
+    data = compared(context.robot, variable, PLANAR[Size.TINY], Size.TINY, context.folder)
     assert list(data.case.values) == list(ON_COURSES)
     assert data.seconds.notnull().all()
     assert (data.seconds <= 40.0 + 1e-6).all()

@@ -148,7 +148,7 @@ def under(
             set_on_the_way = replace(variable, robot=variable.robot.set_from_text(condition.changes))
         fixed = without_setting(robot if condition.only_variable else changed, variable, _FIXED, spring)
         for each in (set_on_the_way, fixed):
-            cases.append(Case(condition.name, each, condition.disturbance, condition.engine))
+            cases.append(Case(condition.name, replace(each, engine=condition.engine), condition.disturbance))
     data = driven(cases, seeds, size, folder, progress)
     both = xr.Dataset(
         {

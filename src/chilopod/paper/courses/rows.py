@@ -7,7 +7,15 @@ import xarray as xr
 
 from chilopod.paper.courses.robust import USUAL
 from chilopod.paper.courses.statistics import Interval
-from chilopod.paper.courses.summary import Summary, Verdicts, share_of_courses, share_of_targets, summaries, verdicts
+from chilopod.paper.courses.summary import (
+    Summary,
+    Verdicts,
+    share_of_courses,
+    share_of_targets,
+    summaries,
+    titled,
+    verdicts,
+)
 from chilopod.paper.table import NOT_PRINTED, Row, listing
 from chilopod.steering import VARIABLE
 
@@ -50,7 +58,7 @@ def _remark(found: Summary) -> str:
         f"leg yaw {found.effort:.2f} rad² s; steering cost of transport {found.cost:.2g}"
     ]
     if np.isfinite(found.detour):
-        parts.append(f"path {found.detour:.2f} of the shortest")
+        parts.append(f"path {found.detour:.2f} of the shortest with circles as tight as the radius law knows")
     return ", ".join(parts)
 
 
@@ -95,17 +103,14 @@ def condition_rows(data: xr.Dataset) -> list[Row]:
                 f"{strategy} {percent(share_of_targets(one.arrived))} of targets, "
                 f"{percent(share_of_courses(one.arrived))} of courses"
                 for strategy, one in (
-                    (_title(str(each), data), data.sel(condition=name, strategy=each)) for each in data.strategy.values
+                    (titled(str(each), data.attrs["spring"]), data.sel(condition=name, strategy=each))
+                    for each in data.strategy.values
                 )
             ),
             "" if name == USUAL else "the law does not know",
         )
         for name in data.condition.values
     ]
-
-
-def _title(strategy: str, data: xr.Dataset) -> str:
-    return strategy if strategy == VARIABLE.name else f"{strategy} {data.attrs['spring']:g}"
 
 
 def _row(quantity: str, computed: str, remark: str) -> Row:

@@ -55,7 +55,7 @@ class Whole:
 
 def _compared(context: Context, found: Found, report: Progress) -> xr.Dataset:
     plan = PLANAR[context.size]
-    return compared(context.robot, prepared(context), plan, "planar", context.size, context.folder, report)
+    return compared(context.robot, prepared(context), plan, context.size, context.folder, report)
 
 
 def _robust(context: Context, found: Found, report: Progress) -> Robust:
@@ -72,7 +72,7 @@ def _robust(context: Context, found: Found, report: Progress) -> Robust:
 def _whole(context: Context, found: Found, report: Progress) -> Whole:
     robot, size, folder = context.whole, context.size, context.folder
     variable = prepared(context, "twin")
-    data = compared(robot, variable, WHOLE[size], "twin", size, folder, part(report, 0.0, 0.7))
+    data = compared(robot, variable, WHOLE[size], size, folder, part(report, 0.0, 0.7))
     best, conditions = best_fixed(data, _WHOLE_BEST), whole_conditions(robot)
     walks = under(robot, variable, best, conditions, WHOLE_COURSES[size], size, folder, part(report, 0.7, 1.0))
     return Whole(data, walks)

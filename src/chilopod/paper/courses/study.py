@@ -74,20 +74,17 @@ class Case:
         Robot and controller.
     disturbance
         Besides what the course's seed draws.
-    engine
-        Where it walks.
     """
 
     name: str
     driver: Driver
     disturbance: Disturbance = field(default_factory=Disturbance)
-    engine: str = "planar"
 
     def on(self, course: Course, seed: int) -> Trial:
         """Its trial of a course."""
         law = self.driver.law
         here = course if law is None else replace(course, tightest=law.tightest)
-        walk = trial_of(self.driver, here, seed, engine=self.engine, brief=True)
+        walk = trial_of(self.driver, here, seed, brief=True)
         return replace(walk, disturbance=self.disturbance)
 
 
@@ -115,7 +112,7 @@ def driven(
     ``goal_path`` and ``goal_shortest`` (m), ``goal_effort`` (rad^2 s), ``goal_spring_work`` and ``goal_drive_work``
     (J); over (course, goal): ``bearing`` (rad) and ``away`` (m) of the target when its turn comes.
     """
-    engine = cases[0].engine
+    engine = cases[0].driver.engine
     tiny = size is Size.TINY and engine != "planar"
     courses = [_TINY] * len(seeds) if tiny else random_courses(seeds, engine)
     asked = {
@@ -153,7 +150,6 @@ def compared(
     robot: Robot,
     variable: Driver,
     plan: Plan,
-    engine: str = "planar",
     size: Size = Size.FULL,
     folder: Path | None = None,
     progress: Progress = silent,
@@ -168,8 +164,6 @@ def compared(
         It with the spring that is set on the way.
     plan
         How much.
-    engine
-        Where they walk.
     size, folder, progress
         As for :func:`driven`.
 
@@ -183,7 +177,7 @@ def compared(
     tried = [(name, float(spring)) for name, springs in plan.springs.items() for spring in springs]
     shares = np.full(len(tried), np.nan)
     if len(plan.others) > 0:
-        asked = [Case(f"{name} {k:g}", without_setting(robot, variable, name, k), engine=engine) for name, k in tried]
+        asked = [Case(f"{name} {k:g}", without_setting(robot, variable, name, k)) for name, k in tried]
         done = driven(asked, plan.others, size, folder, part(progress, 0.0, 0.3, "springs"))
         shares = done.arrived.mean(("course", "goal")).values
     best = {name: _best(name, tried, shares) for name in plan.springs}
@@ -191,7 +185,7 @@ def compared(
         name: variable if name == VARIABLE.name else without_setting(robot, variable, name, best.get(name))
         for name in ON_COURSES
     }
-    cases = [Case(name, each, engine=engine) for name, each in drivers.items()]
+    cases = [Case(name, each) for name, each in drivers.items()]
     data = driven(cases, plan.courses, size, folder, part(progress, 0.3, 1.0))
     costs = [steering_cost(case.driver.robot, data.isel(case=row)) for row, case in enumerate(cases)]
     data["cost"] = ("case", np.array(costs), {"units": "1"})
@@ -208,7 +202,8 @@ def prepared(context: Context, engine: str = "planar") -> Driver:
     if engine == "planar":
         return driver(context.robot, VARIABLE)
     if context.size is Size.TINY:
-        return replace(driver(context.robot, VARIABLE), robot=context.whole.override("springs.adjustable[0]", True))
+        walker = context.whole.override("springs.adjustable[0]", True)
+        return replace(driver(context.robot, VARIABLE), robot=walker, engine=engine)
     return driver(context.whole, VARIABLE, engine=engine, folder=context.folder)
 
 
@@ -216,9 +211,9 @@ def without_setting(robot: Robot, variable: Driver, strategy: str, spring: float
     """A strategy that sets no spring on the way, with its spring (N*mm/deg) if it has one."""
     law, plan = variable.law, ON_COURSES[strategy]
     if plan is ACTUATED and law is not None:
-        return Driver(robot, plan, ActuatedAxis.of(robot, law), law)
+        return Driver(robot, plan, ActuatedAxis.of(robot, law), law, variable.engine)
     walker, controller = steered(robot, plan, None if spring is None else stiffness(spring))
-    return Driver(walker, plan, controller, law)
+    return Driver(walker, plan, controller, law, variable.engine)
 
 
 def _best(strategy: str, tried: Sequence[tuple[str, float]], shares: Array) -> float:

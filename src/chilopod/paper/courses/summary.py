@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from chilopod.paper.courses.statistics import Interval, bootstrap_mean, bootstrap_ratio, wilson
 from chilopod.paper.scatter import Answer
-from chilopod.steering import ACTUATED, VARIABLE
+from chilopod.steering import ACTUATED, ON_COURSES, VARIABLE
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,8 @@ class Summary:
     seconds
         For a target that is reached.
     spent
-        On all targets, for every one that is reached, s.
+        On all targets, for every one that is reached, s; one that is not reached counts with its whole patience, also
+        where the robot has failed before.
     later, course_later
         By how much later than the variable spring, s, at targets that both reach, and of courses that both reach as a
         whole; the mean of the differences.
@@ -42,7 +43,7 @@ class Summary:
     effort
         Of the leg yaw, mean, rad^2 s a course.
     detour
-        Path over the shortest, of all targets that are reached together.
+        Path over the shortest with circles of the radius law, of all targets that are reached together.
     cost
         Steering cost of transport.
     """
@@ -65,8 +66,17 @@ class Summary:
 
     @property
     def title(self) -> str:
-        """Name, and spring if it has one."""
-        return self.name if np.isnan(self.spring) else f"{self.name} {self.spring:g}"
+        """Name, or the springs that it walks with."""
+        return titled(self.name, self.spring)
+
+
+def titled(name: str, spring: float) -> str:
+    """Title of a strategy: its name, or the spring (N*mm/deg) that it walks with. On courses the best spring of a
+    strategy may lie on either side of the bifurcation that it is named for."""
+    strategy = ON_COURSES[name]
+    if strategy is VARIABLE or strategy.springs is None or np.isnan(spring):
+        return name
+    return f"{'first spring' if strategy.springs.endswith(']') else 'all springs'} {spring:g}"
 
 
 def summaries(data: xr.Dataset) -> dict[str, Summary]:
@@ -90,7 +100,7 @@ def _summary(one: xr.Dataset, variable: xr.Dataset) -> Summary:
         targets=share_of_targets(one.arrived),
         courses=share_of_courses(one.arrived),
         seconds=bootstrap_mean(seconds),
-        spent=bootstrap_ratio(one.seconds.sum("goal").values, arrived.sum(axis=1)),
+        spent=bootstrap_ratio(np.where(arrived, seconds, one.attrs["patience_s"]).sum(axis=1), arrived.sum(axis=1)),
         later=bootstrap_mean(seconds - _reached(variable, "seconds")),
         course_later=bootstrap_mean((seconds - _reached(variable, "seconds")).sum(axis=1)),
         work=bootstrap_mean(_work(one)),

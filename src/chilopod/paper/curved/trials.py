@@ -28,7 +28,7 @@ from chilopod.planar import PlanarModel
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.stability.returns import whole_period
-from chilopod.trials import AVERAGED, Disturbance, Trial, run
+from chilopod.trials import AVERAGED, Disturbance, Trial, mean_joint_angles, run
 
 Array = NDArray[np.float64]
 
@@ -220,23 +220,19 @@ def _walking_time(robot: Robot, e_folds: float) -> float:
 def _outcome(record: xr.Dataset, robot: Robot) -> xr.Dataset:
     """What one trial's record comes to."""
     walk = record.isel(robot=0)
-    angles, times = walk.joint_angle.values, walk.time.values
-    end = times[-1] - AVERAGED
-    last = angles[times > end + 1e-9].mean(axis=0)
-    before = angles[(times <= end + 1e-9) & (times > end - BEFORE + 1e-9)].mean(axis=0)
+    last = mean_joint_angles(walk).values
+    before = mean_joint_angles(walk, BEFORE, before=AVERAGED).values
     change, bend = float(np.abs(last - before).max()), float(np.abs(last).max())
     # A straight walk settles for ever; one that only just starts to bend is as straight, but no longer gets straighter.
     straight = bend < STRAIGHT and bend <= max(np.abs(before).max(), _ROUNDING)
     settled = walk.status.item() == Status.WALKED.label and (straight or change <= SETTLED * bend)
-    with np.errstate(divide="ignore"):
-        radius = (robot.body.modules - 1) * robot.module_length / np.abs(last).sum()
     side = "straight" if straight else "right" if last.sum() > 0.0 else "left"
     return xr.Dataset(
         {
             "mean_angle": ("joint", last, {"units": "rad"}),
             "change": ((), change, {"units": "rad"}),
             "settled": ((), settled),
-            "axis_radius": ((), radius, {"units": "m"}),
+            "axis_radius": ((), float(robot.axis_radius(last)), {"units": "m"}),
             "direction": ((), np.array(side if settled else "", dtype=object)),
             "status": ((), np.array(walk.status.item(), dtype=object)),
             "end_state": ("state", _reduced(walk.isel(time=-1))),

@@ -49,7 +49,7 @@ def twin_numerics(robot: Robot, size: Size = Size.FULL, progress: Progress = sil
         found = base_series(finer, base_series_data(), springs, tolerance=tolerance, duration=duration)
         angles = found.bends
         speeds.append(found.speeds)
-        radii.append((robot.body.modules - 1) * robot.module_length / np.abs(angles).sum(axis=1))
+        radii.append(robot.axis_radius(angles))
         try:
             onsets.append(square_root_fit(1.0 / np.array(springs), np.abs(angles[:, 0]), resampled=0).critical)
         except AnalysisError:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -13,6 +14,12 @@ from numpy.typing import NDArray
 from chilopod.report.kit import style
 from chilopod.report.kit.panel import Panel
 
+_LINES: dict[str, Any] = {
+    "stable": "-",
+    "unstable": (0, (4, 2)),
+    "undecided": (0, (4, 2, 1, 2)),
+    "out of range": (0, (1, 2)),
+}
 _LAYOUTS = (style.Layout("ABC", 3.7), style.Layout("A;B;C", 9.5))
 
 
@@ -23,7 +30,8 @@ def panel(data: xr.Dataset) -> Panel:
         name="branch",
         title=f"Curved walks over {shown}",
         draw=lambda narrow: _draw(data, narrow),
-        alt=f"Mean joint angles, radii of axis and path, and cost of transport over {shown}; unstable parts dashed.",
+        alt=f"Mean joint angles, radii of axis and path, and cost of transport over {shown}; unstable parts dashed, "
+        "those out of range dotted.",
         text=(),
         data=data,
     )
@@ -41,22 +49,22 @@ def table(data: xr.Dataset) -> xr.Dataset:
 def _draw(data: xr.Dataset, narrow: bool) -> Figure:
     figure, axes = style.figure(*_LAYOUTS, narrow)
     x = data.parameter.values
-    stable = data.stable.values
+    verdicts = _between(data)
     unit = data.parameter.attrs["units"].replace("*", "·")
     label = f"{data.attrs['varied']} ({unit})"
 
-    for joint, color in zip(data.joint.values, (style.BLACK, *style.CURVES), strict=False):
+    for joint, (color, _) in zip(data.joint.values, style.joint_styles(data.sizes["joint"]), strict=True):
         angle = np.rad2deg(data.mean_angle.sel(joint=joint).values)
-        _curve(axes["A"], x, angle, stable, color, f"joint {joint}")
+        _curve(axes["A"], x, angle, verdicts, color, f"joint {joint}")
     axes["A"].set(ylabel="mean joint angle (deg)", title="Bend")
 
-    _curve(axes["B"], x, data.axis_radius.values, stable, style.BLUE, "body axis, (N−1) L / Σ|θ|")
-    _curve(axes["B"], x, data.path_radius.values, stable, style.ORANGE, "path of module 1")
+    _curve(axes["B"], x, data.axis_radius.values, verdicts, style.BLUE, "body axis, (N−1) L / Σ|θ|")
+    _curve(axes["B"], x, data.path_radius.values, verdicts, style.ORANGE, "path of module 1")
     axes["B"].set(ylabel="radius (m)", title="Radius of the turn")
     # The radius grows without bound towards the pitchfork; what matters is what a robot can turn in.
     axes["B"].set_ylim(0.0, 2.0)
 
-    _curve(axes["C"], x, data.cost_of_transport.values, stable, style.GREEN, "")
+    _curve(axes["C"], x, data.cost_of_transport.values, verdicts, style.GREEN, "")
     axes["C"].set(ylabel="cost of transport (1)", title="What it costs")
 
     for axes_ in axes.values():
@@ -65,29 +73,38 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
     _mark(axes["A"], data)
     bottom, top = axes["A"].get_ylim()
     axes["A"].set_ylim(top=top + 0.4 * (top - bottom))  # room for the legend
-    axes["A"].legend(loc="upper right", ncols=2)
-    axes["B"].plot([], [], color=style.GREY, linestyle=(0, (4, 2)), label="unstable")
+    axes["A"].legend(loc="upper right", ncols=max(2, data.sizes["joint"] // 3))
+    for verdict in sorted({verdict for *_, verdict in _stretches(verdicts)} - {"stable"} | {"unstable"}):
+        axes["B"].plot([], [], color=style.GREY, linestyle=_LINES[verdict], label=verdict)
     axes["B"].legend(loc="upper left")
     return figure
 
 
+def _between(data: xr.Dataset) -> list[str]:
+    """Verdicts along a branch; at special points, where a multiplier is 1, that of the point before."""
+    found: list[str] = []
+    for verdict, special in zip(data.verdict.values, data.special.values, strict=True):
+        found.append(found[-1] if found and special and verdict == "undecided" else str(verdict))
+    return found
+
+
 def _curve(
-    axes: Axes, x: NDArray[np.float64], y: NDArray[np.float64], stable: NDArray[np.bool_], color: str, name: str
+    axes: Axes, x: NDArray[np.float64], y: NDArray[np.float64], verdicts: list[str], color: Any, name: str
 ) -> None:
     if name:
         axes.plot([], [], color=color, label=name)  # the legend names the colour, whatever the stability
-    for first, last, solid in _stretches(stable):
-        axes.plot(x[first : last + 1], y[first : last + 1], color=color, linestyle="-" if solid else (0, (4, 2)))
+    for first, last, verdict in _stretches(verdicts):
+        axes.plot(x[first : last + 1], y[first : last + 1], color=color, linestyle=_LINES[verdict])
 
 
-def _stretches(stable: NDArray[np.bool_]) -> Iterator[tuple[int, int, bool]]:
-    """First and last point of every stretch of equal stability; the next one starts where the last one ends."""
+def _stretches(verdicts: list[str]) -> Iterator[tuple[int, int, str]]:
+    """First and last point of every stretch of equal verdicts; the next one starts where the last one ends."""
     first = 0
     # What a stretch is called is decided by its second point: its first may be the critical one in between.
-    for index in range(1, len(stable)):
-        last = index == len(stable) - 1
-        if last or stable[index + 1] != stable[index]:
-            yield first, index, bool(stable[index])
+    for index in range(1, len(verdicts)):
+        last = index == len(verdicts) - 1
+        if last or verdicts[index + 1] != verdicts[index]:
+            yield first, index, verdicts[index]
             first = index
 
 

@@ -18,8 +18,6 @@ Array = NDArray[np.float64]
 
 INVERSE_UNIT = "deg/(N·mm)"
 
-JOINT_STYLES = tuple(zip((style.BLACK, *style.CURVES), "os^vD", strict=False))
-
 
 def errorbars(axes: Axes, x: Array, y: Array, error: Array, color: str, marker: str, name: str = "") -> None:
     """Means with standard errors."""
@@ -60,7 +58,7 @@ def _inverse(x: ArrayLike) -> Array:
 
 def draw_times(axes: Axes, walk: xr.Dataset) -> tuple[float, float]:
     """Joint angles (deg) over time; returns the limits of the axis."""
-    for joint, (color, _) in zip(walk.joint.values, JOINT_STYLES, strict=False):
+    for joint, (color, _) in zip(walk.joint.values, style.joint_styles(walk.sizes["joint"]), strict=True):
         angle = np.rad2deg(walk.joint_angle.sel(joint=joint).values)
         axes.plot(walk.time.values, angle, color=color, lw=0.9, label=f"joint {joint}")
     axes.set(xlabel="time (s)", ylabel="yaw joint angle (deg)")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from chilopod.paper import printed
 from chilopod.paper.curved.study import CurvedStudy, axis_radius, bend_order, bent, fluctuation
 from chilopod.paper.curved.trials import on_branch
-from chilopod.report.figures.compliance import JOINT_STYLES, draw_times, errorbars, means, over_compliance
+from chilopod.report.figures.compliance import draw_times, errorbars, means, over_compliance
 from chilopod.report.kit import style
 from chilopod.report.kit.panel import Panel
 from chilopod.report.kit.words import SPRING_UNIT, k, listing, number, spring, typeset
@@ -217,7 +217,8 @@ def _draw_joints(study: CurvedStudy, narrow: bool) -> Figure:
     trials, here = study.trials, bent(study.trials)
     inverse = 1.0 / trials.spring.values
     grid, angles = _along(study, float(trials.spring.values[here.any(axis=1)].min()))
-    for index, (joint, (color, marker)) in enumerate(zip(trials.joint.values, JOINT_STYLES, strict=False)):
+    styles = style.joint_styles(trials.sizes["joint"])
+    for index, (joint, (color, marker)) in enumerate(zip(trials.joint.values, styles, strict=True)):
         axes.plot(grid, np.abs(angles[:, index]), color=color, lw=1.3)
         counted = here | (trials.direction.values == "straight")
         mean, error = means(np.abs(np.rad2deg(trials.mean_angle.sel(joint=joint).values)), counted)

@@ -17,7 +17,6 @@ from chilopod.paper.walk_measures import onset_with_error, radius_at
 from chilopod.report.figures import robot_durations
 from chilopod.report.figures.compliance import (
     INVERSE_UNIT,
-    JOINT_STYLES,
     draw_asked,
     draw_times,
     errorbars,
@@ -217,7 +216,7 @@ def _draw_joints(found: RobotWalks, narrow: bool) -> Figure:
     figure, by_letter = style.figure(*_ONE, narrow)
     axes, base = by_letter["A"], found.base
     inverse = 1.0 / base.spring.values
-    for joint, (color, marker) in zip(base.joint.values, JOINT_STYLES, strict=False):
+    for joint, (color, marker) in zip(base.joint.values, style.joint_styles(base.sizes["joint"]), strict=True):
         mean, error = means(np.abs(np.rad2deg(base.mean_angle.sel(joint=joint).values)))
         errorbars(axes, inverse, mean, error, color, marker, f"joint {joint}")
         axes.plot(inverse, mean, color=color, lw=1.0)

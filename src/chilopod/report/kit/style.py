@@ -130,6 +130,15 @@ def note(axes: Axes, text: str, at: tuple[float, float], away: tuple[float, floa
     axes.annotate(text, at, away, textcoords="offset points", fontsize=SMALL, **look)
 
 
+def joint_styles(count: int) -> list[tuple[Any, str]]:
+    """Colour and marker of every joint, front to rear: all different, also of more joints than there are colours to
+    tell apart easily."""
+    colors: list[Any] = [BLACK, *CURVES]
+    if count > len(colors):
+        colors = [mpl.colormaps["viridis"](index / count) for index in range(count)]
+    return [(color, "os^vD"[index % 5]) for index, color in enumerate(colors[:count])]
+
+
 def grid(axes: Axes, which: str = "both") -> None:
     """Thin lines to read values by."""
     axes.grid(True, axis="both" if which == "both" else "x" if which == "x" else "y")

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
+from chilopod.frozen import Short
 from chilopod.notebook import Line, Mark, block, plot, table, words
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, Step
 from chilopod.stability.branches.branch_starts import IN_FOLD, Start, anchored, begin, branch_sizes, switch
@@ -63,7 +64,7 @@ class Ending(enum.Enum):
 
 
 @dataclass(frozen=True)
-class Branch:
+class Branch(Short):
     """A followed branch.
 
     Attributes

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.matrix_errors import stable_within
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import ReturnMap, Section
 
@@ -54,9 +55,10 @@ class BranchPoint(ReadOnlyArrays):
     bifurcation: BifurcationPoint | None = None
 
     @property
-    def stable(self) -> bool:
-        """Whether all multipliers lie inside the unit circle, by more than the error bound."""
-        return bool((np.abs(self.multipliers) < 1.0 - self.error_bound).all())
+    def stable(self) -> bool | None:
+        """Whether all multipliers lie inside the unit circle: True or False by more than the error bound, None where it
+        leaves that undecided, as at most special points."""
+        return stable_within(self.multipliers, self.error_bound)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,8 @@
 
 The return map is looked at in the ends of a step and at nine places in between. Where polynomials of degree eight
 through what vanishes at an event fit, and stay clear of zero or pass it once, nothing else happens; elsewhere the step
-is searched, on orbits that are solved for, for all crossings of the unit circle (:mod:`.crossings`).
+is searched, on orbits that are solved for, for all crossings of the unit circle
+(:mod:`~chilopod.stability.unit_circle.crossings`).
 What is guaranteed is that of an interpolation: a course of the multipliers that the places show is followed however
 close its crossings lie; one that is confined between two places, which are a sixth of a step apart at most, is not
 seen.

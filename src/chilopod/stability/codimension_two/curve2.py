@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import ReadOnlyArrays, Short
 from chilopod.notebook import Line, Mark, block, plot, table
 from chilopod.stability.codimension_two.codimension2 import Codimension2
 from chilopod.stability.points import Kind
@@ -71,7 +71,7 @@ class Point2(ReadOnlyArrays):
 
 
 @dataclass(frozen=True)
-class Curve2:
+class Curve2(Short):
     """A curve of bifurcation points.
 
     Attributes

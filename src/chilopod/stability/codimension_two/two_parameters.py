@@ -1,7 +1,7 @@
 """Curves of bifurcation points in two parameters: where a bifurcation goes as a second parameter changes.
 
-A curve is followed by its arclength (see :mod:`.branch` for that of orbits in one parameter) with the
-equations of :mod:`.bordered`, and on the way the points of codimension two are located (see
+A curve is followed by its arclength (see :mod:`~chilopod.stability.branches.branch` for that of orbits in one
+parameter) with the equations of :mod:`.bordered`, and on the way the points of codimension two are located (see
 :mod:`.detection`).
 """
 

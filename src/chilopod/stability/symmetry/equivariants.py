@@ -158,7 +158,7 @@ def symmetric_crossing(block: Block, critical: Critical) -> SymmetricCrossing:
     Parameters
     ----------
     block
-        The block; :func:`chilopod.stability.isotypic.isotypic` makes them.
+        The block; :func:`chilopod.stability.symmetry.isotypic.isotypic` makes them.
     critical
         Where it crosses.
     """

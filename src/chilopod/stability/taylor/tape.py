@@ -1,7 +1,7 @@
 """A right-hand side as data: the list of the elementary operations that evaluate it.
 
-A :class:`chilopod.stability.graph.Graph` collects operations while a function is traced, and
-:func:`chilopod.stability.ordering.ordered` orders them into a :class:`Tape`. The operations are those whose
+A :class:`chilopod.stability.taylor.graph.Graph` collects operations while a function is traced, and
+:func:`chilopod.stability.taylor.ordering.ordered` orders them into a :class:`Tape`. The operations are those whose
 Taylor coefficients obey a recurrence (Griewank and Walther, *Evaluating Derivatives*, 2nd ed., SIAM 2008, sec. 13.2):
 
 * ``LINEAR``: a sum of nodes with constant weights, ``PRODUCT``, ``SQUARE``, ``QUOTIENT``;

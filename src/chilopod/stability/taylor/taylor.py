@@ -1,7 +1,7 @@
 """Flows of taped right-hand sides, by Taylor series in compiled code that is the same for all of them.
 
-A :class:`TaylorFlow` holds a tape (:func:`chilopod.stability.trace.trace`) and what steps must respect; the values of
-its parameters are an argument of every call, so one object serves a whole family::
+A :class:`TaylorFlow` holds a tape (:func:`chilopod.stability.taylor.trace.trace`) and what steps must respect; the
+values of its parameters are an argument of every call, so one object serves a whole family::
 
     traced = trace(rhs, n, args, events=[(guard, reset)])
     flow = TaylorFlow(traced.tape, edges=(0.0, T), period=T, directions=(-1.0,))

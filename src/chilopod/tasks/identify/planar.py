@@ -22,6 +22,7 @@ from chilopod import units
 from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT, stiffness
 from chilopod.analysis.straight_walk import bifurcations, first_loss, pitchfork
 from chilopod.errors import AnalysisError
+from chilopod.frozen import Short
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import Kind
@@ -39,7 +40,7 @@ _NO_PITCHFORK = 100.0
 
 
 @dataclass(frozen=True)
-class Identification:
+class Identification(Short):
     """What the data say about the constants.
 
     Attributes

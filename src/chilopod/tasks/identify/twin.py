@@ -30,6 +30,7 @@ from chilopod import units
 from chilopod.analysis.parameters import K1, stiffness
 from chilopod.engine import engine_named
 from chilopod.errors import ChilopodError
+from chilopod.frozen import Short
 from chilopod.output import check_folder, write_atomic
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
@@ -104,7 +105,7 @@ class Fit:
 
 
 @dataclass(frozen=True)
-class TwinIdentification:
+class TwinIdentification(Short):
     """What a search found.
 
     Attributes
