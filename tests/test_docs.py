@@ -137,8 +137,6 @@ def test_every_command_is_in_the_table():
 MADE = re.compile(
     r"^(my|mine|steer|mymodule)\.|NAME|^(report|build|turn|course)/|^(course|walk)\.html$|(paper|figures)/stride"
 )
-    r"^(my|mine|steer|mymodule)\.|NAME|^(report|build|turn|course)/|^(course|walk)\.html$|paper/stride/|figures/stride"
-)
 
 
 def test_every_file_that_a_page_names_is_there():

@@ -1,8 +1,9 @@
 """Numbers and arrays that record what is done with them.
 
-A function that is called with these records its operations in a :class:`chilopod.stability.taylor.graph.Graph`. Whatever
-needs the value of a traced number (a branch, an index, a foreign library) raises :class:`Untraceable`; where that value
-depends on the parameters only, :class:`Concrete`, and the function can be traced anew with those as plain numbers.
+A function that is called with these records its operations in a :class:`chilopod.stability.taylor.graph.Graph`.
+Whatever needs the value of a traced number (a branch, an index, a foreign library) raises :class:`Untraceable`; where
+that value depends on the parameters only, :class:`Concrete`, and the function can be traced anew with those as plain
+numbers.
 """
 
 from __future__ import annotations
