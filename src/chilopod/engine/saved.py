@@ -18,7 +18,7 @@ from chilopod.engine.contract import Traits
 from chilopod.errors import ParameterError
 from chilopod.robot import Robot
 
-_MAGIC = b"chilopod walk 1\n"
+_MAGIC = b"chilopod walk 2\n"
 _DIGEST = 32  # bytes
 
 

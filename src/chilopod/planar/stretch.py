@@ -16,11 +16,11 @@ import numpy as np
 from chilopod.compiled import copy_into, njit, parallel_njit
 from chilopod.engine.actuators import FROM, GOAL, RAMPING, SETTLING, SINCE, UNTIL
 from chilopod.engine.actuators import SLOPE as RAMP
-from chilopod.errors import ParameterError
 from chilopod.integrate import GROW, LANES_WORK, MAX_STEPS, SAFETY, SHRINK, STAGES, lanes_step
 from chilopod.lanes import LANES, as_lanes, choose, room
 from chilopod.planar.contact import MOMENTS, sum_moments
 from chilopod.planar.dynamics import BEHIND, DECAY, LEVEL, ORIGIN, SCRATCH, SLOPE, SPRING, TORQUE, rhs
+from chilopod.planar.shapes import check_shapes
 
 WALKING, DIVERGED, OUT_OF_RANGE, HALTED = range(4)
 MOST_BENT = 0.5 * np.pi
@@ -371,7 +371,7 @@ def carry(
     record
         States over (samples, robots, 2N+4); what no robot reached is left alone.
     """
-    _check_shapes(rows, pieces, robots, states, step, status, record)
+    check_shapes(rows, pieces, robots, states, step, status, record)
     what = (rows, pieces, robots, tolerance, states, step, status, record)
     threads = numba.get_num_threads()
     groups = min(rows.size // _A_GROUP, _GROUPS * threads)
@@ -387,30 +387,3 @@ def _work(rows: Any, pieces: Pieces, step: Any) -> float:
     """How long it will take on one thread, about, s: at least a step a piece, and each as long as the last one."""
     steps = pieces.widths.size * rows.size + (pieces.widths.sum() / np.maximum(step[rows], 1e-6)).sum()
     return float(_A_STEP * pieces.contact.shape[1] * steps)
-
-
-def _check_shapes(rows: Any, pieces: Pieces, robots: Robots, states: Any, step: Any, status: Any, record: Any) -> None:
-    """Refuse what does not fit together, or is nothing: compiled loops would read beyond it.
-
-    Raises
-    ------
-    ParameterError
-        If anything does not.
-    """
-    count, joints, size = len(states), robots.lag.shape[-1], pieces.widths.size
-    intervals = len(pieces.contact)
-    fits = (
-        0 < rows.size <= count
-        and size > 0
-        and pieces.begins.size == pieces.starts.size == pieces.interval.size == pieces.sample.size == size
-        and pieces.contact.shape == pieces.stroke.shape == (intervals, joints + 1, 2)
-        and states.shape[1:] == record.shape[2:] == (2 * joints + 6,)
-        and record.shape[1] == step.size == status.size == count
-        and robots.scalars.shape == (count, 4)
-        and robots.feet.shape == robots.yaw.shape == (count, 2)
-        and robots.damping.shape == robots.lag.shape == robots.torque.shape == (count, joints)
-        and robots.friction.shape == (count, joints + 1, 2)
-        and robots.profile.shape == (7, count, joints)
-    )
-    if not fits:
-        raise ParameterError("do not fit together", field="states", value=states.shape, allowed="see carry()")

@@ -374,7 +374,7 @@ class PlanarWalk:
         status: NDArray[np.intp],
     ) -> None:
         """Carry all robots through pieces of time, in place."""
-        record, told = self._samples.grown(int(pieces[-1].max(initial=-1)) + 1), self._actuators
+        record, told = self._samples.grown(self._timeline.samples if self._record else 0), self._actuators
         rows = np.flatnonzero(status == stretch.WALKING)
         if not rows.size or not len(pieces[0]):
             return

@@ -62,10 +62,15 @@ class Scanner:
             Which robots.
         """
         number = int(now / self._every + _SAME_INSTANT)
+        while self._tick_of(number) > now:  # the same number, however time is cut
+            number -= 1
         if number > self._number:
-            tick = int(np.ceil(number * self._every - _SAME_INSTANT))
-            self._poses[ids] = poses[:, max(tick - before - 1, 0)]
+            self._poses[ids] = poses[:, max(self._tick_of(number) - before - 1, 0)]
             self._number = number
+
+    def _tick_of(self, number: int) -> int:
+        """Control intervals gone by when a scan is taken."""
+        return int(np.ceil(number * self._every - _SAME_INSTANT))
 
     def restart(self, ids: NDArray[np.intp], anew: bool) -> None:
         """Some robots have been put elsewhere; with ``anew`` the noise of their scans is counted from this one."""

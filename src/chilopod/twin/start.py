@@ -111,7 +111,7 @@ def start(
     tolerance, expected = in_range("tolerance", tolerance, 1.0), check_wishes(record, expected)
     if as_number("threads", threads) not in range(1 << 16):
         raise ParameterError("is no number of threads", field="threads", value=threads, allowed="0 (all cores) or more")
-    if not (edit is None or callable(edit)) or not isinstance(traits, Traits):
+    if not callable(edit or common) or not isinstance(traits, Traits):  # type: ignore[redundant-expr]
         raise ParameterError("are none", field="edit, traits", allowed="a function or None; a chilopod.engine.Traits")
     given, noise = as_robots(robots), as_seeds(seeds)
     first = common(given[0])

@@ -147,8 +147,7 @@ class TwinWalk:
     def halt(self, which: NDArray[np.bool_]) -> None:
         """See :class:`chilopod.engine.Walk`."""
         marked = as_marks("which", which, len(self._robots)) & self._on_foot()
-        for robot in np.flatnonzero(marked):
-            self._status[robot] = Status.HALTED
+        self._status = [Status.HALTED if ends else each for ends, each in zip(marked, self._status, strict=True)]
         self._walking = np.flatnonzero(self._on_foot())
 
     def states(self) -> Array:
@@ -184,8 +183,7 @@ class TwinWalk:
             self._seeds[ids] = as_seeds(seeds)
         self._actuators.restart(marked)
         self._leg_yaw.restart(marked)
-        for robot in ids:
-            self._status[robot] = Status.WALKED
+        self._status = [Status.WALKED if anew else each for anew, each in zip(marked, self._status, strict=True)]
         self._walking = np.flatnonzero(self._on_foot())
         self._scanner.restart(ids, anew=seeds is not None)
         self._put_poles()
@@ -211,6 +209,8 @@ class TwinWalk:
                 tick = min(last, self._tick + longest)
                 if len(self._walking):
                     self._step_to(tick)
+                else:  # scans are counted all the same, for whoever is put on the floor anew
+                    self._scanner.passed(self._tick, tick, np.empty((0, tick - self._tick, 7)), self._walking)
                 self._tick = tick
         self._time = until
         if not len(self._walking):
