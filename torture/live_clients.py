@@ -140,12 +140,8 @@ class LiveClients:
 
     def _client(self) -> ClientConnection:
         """A browser's connection, as the page itself opens it; what it is sent is thrown away."""
-        if self._socket is not None:
-            with suppress(TimeoutError, ConnectionClosed):
-                while True:
-                    self._socket.recv(timeout=0)
-            if self._socket.protocol.close_code is None:
-                return self._socket
+        if self._socket is not None and not _closed(self._socket):
+            return self._socket
         port = self._port
         where: dict[str, Any] = {"origin": f"http://127.0.0.1:{port}", "subprotocols": [f"viser-v{viser.__version__}"]}
         self._socket = connect(f"ws://127.0.0.1:{port}", **where, compression=None, max_size=None, close_timeout=0.1)
@@ -174,7 +170,7 @@ class LiveClients:
         before = gate.refused
         with suppress(ConnectionClosed):
             client.send(raw)
-        _until(lambda: gate.refused > before or client.protocol.close_code is not None, "let through")
+        _until(lambda: gate.refused > before or _closed(client), "let through")
 
     def _move(self, chance: Random) -> None:
         client, gate = self._client(), self._live().gate
@@ -341,6 +337,17 @@ def _answer(port: int, text: str) -> str:
         there.sendall(text.encode())
         return there.recv(200).decode(errors="replace").partition("\r\n")[0]
     return ""
+
+
+def _closed(client: ClientConnection) -> bool:
+    """Whether nothing more comes from the page; what has come is thrown away."""
+    try:
+        while True:
+            client.recv(timeout=0)
+    except TimeoutError:
+        return False
+    except ConnectionClosed:
+        return True
 
 
 def _until(done: Callable[[], bool], otherwise: str) -> None:

@@ -43,11 +43,11 @@ def live(
         str,
         typer.Option(
             metavar="ADDRESS",
-            help="Where to listen: by default for this machine only. At any other address, such as 0.0.0.0 (all), a "
+            help="Address to listen at: by default for this machine only. At any other address, such as 0.0.0.0 (all), a "
             "browser needs the token in the link that is printed.",
         ),
     ] = "127.0.0.1",
-    port: Annotated[int, typer.Option(metavar="N", help="At which port; 0 for any that is free.")] = 8080,
+    port: Annotated[int, typer.Option(metavar="N", help="Port to listen at; 0 for any that is free.")] = 8080,
     token: Annotated[
         bool, typer.Option("--token", help="Want the token on this machine too, for one that others use as well.")
     ] = False,
