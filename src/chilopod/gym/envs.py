@@ -207,7 +207,7 @@ def _spaces(episodes: Episodes) -> tuple[Space[Row], Space[Row]]:
 def _seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:
     if seed is None:
         return [None] * count
-    if not isinstance(seed, Sequence | np.ndarray) or np.ndim(seed) == 0:
+    if not isinstance(seed, Sequence | np.ndarray) or not getattr(seed, "ndim", 1):
         return [_whole(seed) + number for number in range(count)]
     if len(seed) != count:
         raise ParameterError("has the wrong length", field="seed", value=len(seed), allowed=str(count))

@@ -65,11 +65,11 @@ def inverted(matrix: Array) -> tuple[Array, bool]:
     the other branch. The shortest one leaves a residual as it is in a direction in which the matrix is singular.
     """
     with contextlib.suppress(np.linalg.LinAlgError):
-        found: Array = np.linalg.inv(matrix)
+        found = np.linalg.inv(matrix)
         if np.abs(found).max() * np.abs(matrix).max() < 1.0 / _SINGULAR:
-            return found, False
+            return np.asarray(found), False
     try:
-        return np.linalg.pinv(matrix, rcond=_SINGULAR), True
+        return np.asarray(np.linalg.pinv(matrix, rcond=_SINGULAR)), True
     except np.linalg.LinAlgError:
         raise AnalysisError("the curve has no direction here", field="step") from None
 
