@@ -43,8 +43,8 @@ def live(
         str,
         typer.Option(
             metavar="ADDRESS",
-            help="Address to listen at: by default for this machine only. At any other address, such as 0.0.0.0 (all), a "
-            "browser needs the token in the link that is printed.",
+            help="Address to listen at: by default for this machine only. At any other address, such as 0.0.0.0 (all), "
+            "a browser needs the token in the link that is printed.",
         ),
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(metavar="N", help="Port to listen at; 0 for any that is free.")] = 8080,
