@@ -146,8 +146,9 @@ def test_a_joint_that_is_dragged_bends_and_springs_back(chromium, live):
         read(page, READY)
 
 
-def test_keys_do_what_controls_do(opened):
+def test_keys_do_what_controls_do(opened, live):
     read(opened, READY)
+    refused = live.gate.refused
     opened.locator("body").press("h")
     read(opened, "first spring softer, stiffer")
     opened.keyboard.press("Escape")
@@ -158,6 +159,7 @@ def test_keys_do_what_controls_do(opened):
     opened.locator("body").press("t")
     read(opened, r"On its way to the target, 1\.[23]\d m off")
     opened.locator("body").press("l")
+    assert live.gate.refused == refused  # the page itself gets through
 
 
 def test_nonsense_in_a_field_is_refused_in_a_line(opened):
