@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from chilopod.steering import Target
 from chilopod.trials.disturbance import Drawn
 from chilopod.trials.trial import Trial
 
+_MOTION = ("position", "heading", "velocity", "heading_rate", "joint_angle", "joint_rate", "leg_yaw")
 _NEAR = 1e-6  # rad, m, s, of stiffness relative
 _STEP = 0.01  # s, that an engine with steps of its own may be off
 
@@ -37,6 +38,32 @@ def check_asked(data: Any, walk: Walk, trials: Sequence[Trial], drawn: Sequence[
         raise AnalysisError(f"gave what was not asked for: {wrong}", field=f"engine {first.engine}")
     asked: xr.Dataset = data
     return asked
+
+
+def check_finite(values: Mapping[str, Any], engine: str) -> None:
+    """Make sure that a robot that walks is somewhere, and one that failed or was halted no more from some sample on.
+
+    Parameters
+    ----------
+    values
+        Variables of its record, by name, shape (times, 1, ...).
+    engine
+        Name of what gave them.
+
+    Raises
+    ------
+    AnalysisError
+        If not.
+    """
+    label, there = str(values["status"][0]), np.isfinite(values["heading"][:, 0])
+    count = len(there) if label == Status.WALKED.label else np.count_nonzero(there)
+    for name in _MOTION:
+        if count == len(there) and np.isfinite(values[name].sum()):  # as nearly always
+            continue
+        finite = np.isfinite(values[name][:, 0]).reshape(len(there), -1).all(axis=1)
+        if not finite[:count].all() or finite[count:].any():
+            problem = f"{name} of a robot that {label} is not finite as long as it walks, or is so afterwards"
+            raise AnalysisError(f"gave what was not asked for: {problem}", field=f"engine {engine}")
 
 
 def _motion(times: Any, robots: int, joints: int) -> xr.Dataset:
@@ -73,27 +100,21 @@ def _outline(data: xr.Dataset, walk: Walk, first: Trial, robots: int) -> str:
 
 def _content(data: xr.Dataset, walk: Walk, trials: Sequence[Trial], drawn: Sequence[Drawn]) -> str:
     """What is wrong with numbers."""
-    first, status, there = trials[0], data["status"].values.tolist(), np.isfinite(data["heading"].values)
+    first, status = trials[0], data["status"].values.tolist()
     if status != [each.label for each in walk.status]:
         return f"status is {status}, not that of the walk"
-    for name in _motion([], 1, 1).data_vars:
-        finite = np.isfinite(data[name].values).all(axis=tuple(range(2, data[name].ndim)))
-        for robot, label in enumerate(status):
-            # Who failed or was halted is there up to a sample, and then no more.
-            count = len(there) if label == Status.WALKED.label else np.count_nonzero(there[:, robot])
-            if not finite[:count, robot].all() or finite[count:, robot].any():
-                return f"{name} of robot {robot}, {label}, is not finite as long as it walks, or is so afterwards"
+    angle, heading = (data[name].values[0] for name in ("joint_angle", "heading"))
+    places = data["target"].transpose(..., "robot", "axis").values if isinstance(first.target, Target) else None
     springs = data["stiffness"].transpose(..., "robot", "joint").values.reshape(-1, *data["joint_angle"].shape[1:])[0]
     for robot, (trial, told) in enumerate(zip(trials, drawn, strict=True)):
         off = {
-            "joint_angle": data["joint_angle"].values[0, robot] - told.joint_angles,
-            "heading": np.sin(0.5 * (data["heading"].values[0, robot] - told.heading)),
+            "joint_angle": angle[robot] - told.joint_angles,
+            "heading": np.sin(0.5 * (heading[robot] - told.heading)),
             "stiffness": springs[robot] / np.array(trial.robot.springs.stiffness) - 1.0,
         }
-        if isinstance(trial.target, Target):
-            place = data["target"].transpose(..., "robot", "axis").values[..., robot, :]
-            off["target"] = place - np.array(trial.target.position)
-        for name, error in off.items() if there[0, robot] else ():
+        if places is not None and isinstance(trial.target, Target):
+            off["target"] = places[..., robot, :] - np.array(trial.target.position)
+        for name, error in off.items() if np.isfinite(heading[robot]) else ():
             if not np.all(np.abs(error) <= _NEAR):
                 return f"{name} of robot {robot} does not start as asked"
     if first.controller is not None and first.course is None:

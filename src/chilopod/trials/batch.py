@@ -13,7 +13,7 @@ from chilopod.cores import cores
 from chilopod.engine import Walk, engine_named, event_times, steer
 from chilopod.errors import AnalysisError
 from chilopod.steering import CourseReferee, Target, of_course
-from chilopod.trials.asked import check_asked
+from chilopod.trials.asked import check_asked, check_finite
 from chilopod.trials.description import classes_in, file_text, is_ours, plain
 from chilopod.trials.disturbance import Drawn, draw
 from chilopod.trials.trial import Trial
@@ -162,7 +162,9 @@ def _apart(data: xr.Dataset, trials: Sequence[Trial]) -> list[xr.Dataset]:
         view = data.isel(robot=slice(index, index + 1))
         # Numbers that lie otherwise in memory are added up in another order: sums have the same bits whether a walk was
         # one of many, alone, or read.
-        record = view.copy(data={name: np.ascontiguousarray(each.values) for name, each in view.data_vars.items()})
+        values = {str(name): np.ascontiguousarray(each.values) for name, each in view.data_vars.items()}
+        check_finite(values, trial.engine)
+        record = view.copy(data=values)
         record.attrs = {**data.attrs, "robot": file_text(trial.robot), "trial": trial.text}
         records.append(record)
     return records
