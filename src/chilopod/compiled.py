@@ -10,15 +10,40 @@ from __future__ import annotations
 import contextlib
 import functools
 import os
+import time
 from pathlib import Path
 from typing import Any
 
 import numba
+from numba.core import event
 
 from chilopod.errors import ParameterError
 
 # Somebody else's wish to debug: as plain Python, what is compiled here would take hours, and its overloads do not run.
 numba.config.DISABLE_JIT = False
+
+
+class _Compiling(event.Listener):
+    """Time that numba has spent compiling in this process, functions that are called by others within them."""
+
+    def __init__(self) -> None:
+        self._before, self._begun, self._depth = 0.0, 0.0, 0
+
+    def on_start(self, event: Any) -> None:
+        self._begun = self._begun if self._depth else time.monotonic()
+        self._depth += 1
+
+    def on_end(self, event: Any) -> None:
+        self._depth -= 1
+        self._before += 0.0 if self._depth else time.monotonic() - self._begun
+
+    def seconds(self) -> float:
+        """So far, s; nothing for what was read from the cache."""
+        return self._before + (time.monotonic() - self._begun if self._depth else 0.0)
+
+
+COMPILING = _Compiling()
+event.register("numba:compile", COMPILING)
 
 
 def _drop_stale() -> None:
