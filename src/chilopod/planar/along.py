@@ -181,8 +181,8 @@ def walk_means(models: Sequence[PlanarModel], orbits: ArrayLike) -> WalkMeans:
     mean_angle, most_bent = np.einsum("sn,wsnj->wj", share, angles), np.abs(angles).max(axis=(1, 2, 3))
     legs, floor = _powers(models, recorded, widths[:, None] * fractions)
     drifts = tuple(Drift(ahead, left, turn, first.period) for ahead, left, turn in states[:, -3:].tolist())
-    powers = (np.einsum("sn,wsn->w", share, power) for power in (legs, floor))
-    return WalkMeans(mean_angle, most_bent, *powers, drifts)
+    leg_power, floor_power = (np.einsum("sn,wsn->w", share, power) for power in (legs, floor))
+    return WalkMeans(mean_angle, most_bent, leg_power, floor_power, drifts)
 
 
 def _alike(models: Sequence[PlanarModel]) -> bool:
