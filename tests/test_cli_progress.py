@@ -2,8 +2,10 @@
 
 import time
 
+import numba
 import pytest
 
+from chilopod import compiled
 from chilopod.cli import progress
 
 
@@ -39,3 +41,22 @@ def test_a_terminal_gets_bars(capsys, hasty, monkeypatch):
         time.sleep(0.05)
         show("part", 1.0, "all of it")
     assert "all of it" in capsys.readouterr().err
+
+
+def test_compiling_is_said_once(capsys, hasty, monkeypatch):
+    before = compiled.COMPILING.seconds()
+    numba.njit(lambda x: x + before)(1.0)  # nothing that is kept
+    spent = compiled.COMPILING.seconds() - before
+    assert spent > 0.0
+    assert compiled.COMPILING.seconds() == before + spent  # it is over
+    monkeypatch.setattr(progress, "_NOTICED", 0.5 * spent)
+    with progress.progress_bar("work"):
+        time.sleep(0.2)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0] == "work: compiling, once on this machine"
+    assert len(lines) > 2
+    assert not any("compiling" in line for line in lines[1:])
+    monkeypatch.setattr(progress, "_NOTICED", 1e9)
+    with progress.progress_bar("work"):
+        time.sleep(0.1)
+    assert "compiling" not in capsys.readouterr().err

@@ -7,20 +7,21 @@ from __future__ import annotations
 
 import hashlib
 import shutil
+import time
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numba
 from llvmlite import ir
-from numba.core import cgutils
+from numba.core import cgutils, event
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 from numba.core.typeconv import Conversion
 from numba.core.typing import signature
 
 from chilopod import sources
 
-__all__ = ["Conversion", "cgutils", "ir", "keep", "pointer_to", "signature"]
+__all__ = ["COMPILING", "Conversion", "cgutils", "ir", "keep", "pointer_to", "signature"]
 
 ABOVE = ("analysis", "cli", "gym", "live", "paper", "report", "tasks", "trials", "twin")
 """Subpackages that compile nothing, and that nothing compiled can reach: they may change without compiling anew."""
@@ -113,3 +114,26 @@ class _Cache(FunctionCache):  # type: ignore[misc]
         if not sources.edited(ABOVE):
             with suppress(OSError):
                 super().save_overload(sig, data)
+
+
+class _Compiling(event.Listener):
+    """Time that numba has spent compiling in this process, functions that are called by others within them."""
+
+    def __init__(self) -> None:
+        self._before, self._begun, self._depth = 0.0, 0.0, 0
+
+    def on_start(self, event: Any) -> None:
+        self._begun = self._begun if self._depth else time.monotonic()
+        self._depth += 1
+
+    def on_end(self, event: Any) -> None:
+        self._depth -= 1
+        self._before += 0.0 if self._depth else time.monotonic() - self._begun
+
+    def seconds(self) -> float:
+        """So far, s; nothing for what was read from the cache."""
+        return self._before + (time.monotonic() - self._begun if self._depth else 0.0)
+
+
+COMPILING = _Compiling()
+event.register("numba:compile", COMPILING)

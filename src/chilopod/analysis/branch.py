@@ -317,7 +317,8 @@ def _walked(
     speed = np.array([drift.speed for drift in means.drifts])
     multipliers = np.array([point.multipliers for point in points])
     verdicts = [
-        Status.OUT_OF_RANGE.label if most > MOST_BENT else VERDICTS[point.stable]
+        # At a special point a multiplier is 1, to which side of it round-off has it says nothing.
+        Status.OUT_OF_RANGE.label if most > MOST_BENT else VERDICTS[None if point.special else point.stable]
         for most, point in zip(means.most_bent, points, strict=True)
     ]
     radius = [float(model.robot.axis_radius(angles)) for model, angles in zip(models, means.mean_angle, strict=True)]

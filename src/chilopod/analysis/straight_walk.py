@@ -160,17 +160,10 @@ class WalkBifurcation(ReadOnlyArrays):
 def straight_walk(robot: Robot, longest: float = _LONGEST) -> StraightWalk:
     """Floquet analysis of the straight walk in the planar model.
 
-    Parameters
-    ----------
-    robot
-        The robot.
-    longest
-        Time that the analysis may be expected to take, s.
-
     Raises
     ------
     AnalysisError
-        If it is expected to take longer, as of a hundred modules or of very light ones.
+        If it is expected to take longer than ``longest`` (s), as of a hundred modules or of very light ones.
     """
     model = PlanarModel(robot)
     # The period is cut into parts that contract by a factor of 1e6 at most, and matrices of this size are split along

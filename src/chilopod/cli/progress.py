@@ -13,6 +13,9 @@ _BETWEEN_LOOKS = 0.1  # s
 _UNTIL_LINE = 2.0  # s: most commands have ended by then
 _BETWEEN_LINES = 5.0  # s
 
+_NOTICED = 1.0  # s of compiling
+_ONCE = "compiling, once on this machine"
+
 _Told = dict[str, tuple[float, str]]
 """By title: the part done, and words."""
 
@@ -49,10 +52,13 @@ def progress_bar(doing: str) -> Iterator[Callable[[str, float, str], None]]:
 
 def _lines(doing: str, told: _Told, over: threading.Event) -> None:
     begun, shown = time.monotonic(), _Told()
-    wait = _UNTIL_LINE
+    wait, said = _UNTIL_LINE, False
     while not over.wait(wait):
         wait, seconds = _BETWEEN_LINES, f"{time.monotonic() - begun:.0f} s"
         now = dict(told)
+        if not said and _compiling():
+            said = True
+            print(f"{doing}: {_ONCE}", file=sys.stderr, flush=True)
         news = [title for title, state in now.items() if shown.get(title) != state] or list(now)[-1:]
         for title in news:
             done, words = now[title]
@@ -60,6 +66,12 @@ def _lines(doing: str, told: _Told, over: threading.Event) -> None:
         if not news:
             print(f"{doing}: {seconds}", file=sys.stderr, flush=True)
         shown = now
+
+
+def _compiling() -> bool:
+    """Whether compiling has taken a while; asked of what is loaded, since a command may need no compiled code."""
+    compiled = sys.modules.get("chilopod.compiled")
+    return compiled is not None and compiled.COMPILING.seconds() > _NOTICED
 
 
 def _bars(doing: str, told: _Told, over: threading.Event) -> None:
@@ -84,4 +96,4 @@ def _bars(doing: str, told: _Told, over: threading.Event) -> None:
                 if title not in tasks:
                     tasks[title] = bar.add_task(title, total=1.0, words="")
                 bar.update(tasks[title], completed=done, words=words)
-            bar.update(alone, visible=not tasks)
+            bar.update(alone, visible=not tasks, words=_ONCE if _compiling() else "")

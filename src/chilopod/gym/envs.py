@@ -204,7 +204,7 @@ def _spaces(episodes: Episodes) -> tuple[Space[Row], Space[Row]]:
     return observations, actions
 
 
-def _seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:
+def _seeds(seed: Any, count: int) -> list[int | None]:
     if seed is None:
         return [None] * count
     if not isinstance(seed, Sequence | np.ndarray) or not getattr(seed, "ndim", 1):

@@ -156,14 +156,8 @@ class Robot(Description):
         return self.body.length / self.body.modules
 
     def axis_radius(self, joint_angles: ArrayLike) -> NDArray[np.float64]:
-        """Radius of the arc that the body axis makes, m, shape (...): the paper's (N-1) L / sum |theta|.
-
-        Parameters
-        ----------
-        joint_angles
-            Mean angles of the yaw joints, rad, shape (..., N-1). The radius is infinite where all are zero, and NaN
-            where one is.
-        """
+        """Radius of the arc that the body axis makes, the paper's (N-1) L / sum |theta|, m, shape (...), of mean joint
+        angles, rad, shape (..., N-1): infinite where all are zero, NaN where one is."""
         bent = np.abs(np.asarray(joint_angles, dtype=np.float64)).sum(-1)
         with np.errstate(divide="ignore", over="ignore"):  # a bend of next to nothing is straight
             return np.asarray((self.body.modules - 1) * self.module_length / bent)

@@ -22,22 +22,9 @@ _DRAWS = 8
 def stable_within(
     values: NDArray[np.complex128], bound: float, bounds: NDArray[np.float64] | float | None = None
 ) -> bool | None:
-    """Stability by multipliers with errors.
-
-    Parameters
-    ----------
-    values
-        Multipliers, shape (n,).
-    bound
-        Bound on the error of every multiplier that is not small.
-    bounds
-        Bounds on the errors one by one, shape (n,); by default all have ``bound``.
-
-    Returns
-    -------
-    True if all lie inside the unit circle by more than their errors, False if one lies outside by more than its own,
-    None if the errors leave it undecided.
-    """
+    """Stability by multipliers, shape (n,), with a bound on the error of all that are not small, or bounds one by one:
+    True if all lie inside the unit circle by more than it, False if one lies outside by more than its own, None if the
+    errors leave it undecided."""
     modulus = np.abs(values)
     if (modulus < 1.0 - bound).all():
         return True

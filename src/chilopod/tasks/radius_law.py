@@ -97,15 +97,6 @@ def that_holds(law: RadiusLaw, robot: Robot, engine: str = "planar") -> RadiusLa
     leave its range although that of the settled walk does not. The softest spring that is left is the first at which
     none of :data:`HELD` walks does, with the disturbance that all studies have.
 
-    Parameters
-    ----------
-    law
-        Radius law by the branch of settled walks.
-    robot
-        The robot; its first spring does not matter.
-    engine
-        Name of the engine that walks.
-
     Raises
     ------
     AnalysisError

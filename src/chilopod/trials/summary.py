@@ -74,18 +74,8 @@ class WalkSummary:
 
 
 def mean_joint_angles(record: xr.Dataset, seconds: float = AVERAGED, before: float = 0.0) -> xr.DataArray:
-    """Joint angles averaged over some time at the end of a record, rad, over (robot, joint).
-
-    Parameters
-    ----------
-    record
-        Walks, as any engine records them.
-    seconds
-        Length of that time, s. Its first moment does not count, so that whole cycles are averaged with equal weights:
-        5 s at 10 Hz are 50 samples. Of a shorter record all samples count.
-    before
-        Time from its end to the end of the record, s.
-    """
+    """Joint angles averaged over some seconds that end so long ``before`` the end of a record (s), rad, over (robot,
+    joint). The first moment does not count, so that whole cycles have equal weights: 5 s at 10 Hz are 50 samples."""
     times = record.time.values
     last = times[-1] - before + 1e-9  # samples are at round times, up to round-off
     first, end = np.searchsorted(times, [last - seconds, last])
