@@ -5,7 +5,7 @@ import time
 import numba
 import pytest
 
-from chilopod import compiled
+from chilopod import numba_internals
 from chilopod.cli import progress
 
 
@@ -44,11 +44,11 @@ def test_a_terminal_gets_bars(capsys, hasty, monkeypatch):
 
 
 def test_compiling_is_said_once(capsys, hasty, monkeypatch):
-    before = compiled.COMPILING.seconds()
+    before = numba_internals.COMPILING.seconds()
     numba.njit(lambda x: x + before)(1.0)  # nothing that is kept
-    spent = compiled.COMPILING.seconds() - before
+    spent = numba_internals.COMPILING.seconds() - before
     assert spent > 0.0
-    assert compiled.COMPILING.seconds() == before + spent  # it is over
+    assert numba_internals.COMPILING.seconds() == before + spent  # it is over
     monkeypatch.setattr(progress, "_NOTICED", 0.5 * spent)
     with progress.progress_bar("work"):
         time.sleep(0.2)

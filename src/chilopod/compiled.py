@@ -15,9 +15,7 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 import numba
 
-from chilopod.numba_internals import COMPILING, keep
-
-__all__ = ["COMPILING", "copy_into", "fused_njit", "njit", "parallel_njit"]
+from chilopod.numba_internals import keep
 
 if numba.config.DISABLE_JIT:
     # As plain Python, what is compiled here would take hours, and its overloads do not run.

@@ -116,7 +116,7 @@ class _Cache(FunctionCache):  # type: ignore[misc]
                 super().save_overload(sig, data)
 
 
-class _Compiling(event.Listener):
+class _Compiling(event.Listener):  # type: ignore[misc]
     """Time that numba has spent compiling in this process, functions that are called by others within them."""
 
     def __init__(self) -> None:

@@ -70,8 +70,8 @@ def _lines(doing: str, told: _Told, over: threading.Event) -> None:
 
 def _compiling() -> bool:
     """Whether compiling has taken a while; asked of what is loaded, since a command may need no compiled code."""
-    compiled = sys.modules.get("chilopod.compiled")
-    return compiled is not None and compiled.COMPILING.seconds() > _NOTICED
+    numba = sys.modules.get("chilopod.numba_internals")
+    return numba is not None and numba.COMPILING.seconds() > _NOTICED
 
 
 def _bars(doing: str, told: _Told, over: threading.Event) -> None:
