@@ -14,7 +14,7 @@ import chilopod
 from chilopod import numba_internals
 
 PACKAGE = Path(chilopod.__file__).parent
-NEEDED = ("__init__.py", "compiled.py", "lazy.py", "numba_internals.py", "sources.py")
+NEEDED = ("__init__.py", "compiled.py", "errors.py", "lazy.py", "numba_internals.py", "sources.py")
 CALLEE = "from chilopod.compiled import njit\n\n@njit\ndef inner(x):\n    return 3.0 * x\n"
 CALLER = "from chilopod.compiled import njit\nfrom chilopod.deep.callee import inner\n\n" + (
     "@njit\ndef outer(x):\n    return inner(x) + 1.0\n"

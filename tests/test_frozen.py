@@ -15,7 +15,7 @@ from chilopod.analysis import bifurcations, straight_walk
 from chilopod.frozen import ReadOnlyArrays, read_only
 from chilopod.planar import PlanarModel, start
 from chilopod.planar.along import FollowedModel, walk_means
-from chilopod.planar.flow import advance
+from chilopod.planar.flow import _advance
 from chilopod.planar.stretch import walk_abreast
 from chilopod.robot import load_robot
 from chilopod.stability.branches.fold import find_fold
@@ -150,7 +150,7 @@ def test_read_only_arrays_compile_no_kernel_a_second_time():
     MODEL.drift(MODEL.orbit)
     MODEL.flow(MODEL.orbit + 1e-3, 0.0, 0.1)
     FollowedModel.flow_each([FollowedModel(PRESET)], MODEL.orbit[None], 0.0, 0.1)
-    arrays = [each for signature in advance.signatures for each in signature if hasattr(each, "layout")]
+    arrays = [each for signature in _advance.signatures for each in signature if hasattr(each, "layout")]
     assert arrays
     assert all(each.mutable for each in arrays)
 
@@ -168,5 +168,5 @@ def test_arrays_of_another_order_in_memory_compile_no_kernel_a_second_time():
     FollowedModel(PRESET).flow(MODEL.orbit + 1e-3, 0.0, 0.1)
     MODEL.flow_states(np.asfortranarray([MODEL.orbit, MODEL.orbit]), 0.0, 0.1)
     start(PRESET, seeds=[3, 4]).advance(0.1)
-    for kernel in (advance, walk_abreast):
+    for kernel in (_advance, walk_abreast):
         assert {layout for signature in kernel.signatures for layout in layouts(signature)} == {"C"}
