@@ -86,7 +86,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         shutil.rmtree(folder, ignore_errors=True)
     print(table(counts))
     if asked.save:
-        RESULTS.write_text(json.dumps(as_json(counts, asked.seed), indent=1) + "\n", encoding="utf-8")
+        RESULTS.write_text(json.dumps(kept_with(counts, asked.seed), indent=1) + "\n", encoding="utf-8")
     return int(any(each.found for each in counts.values()))
 
 
@@ -150,21 +150,24 @@ def table(counts: dict[str, Counts]) -> str:
     return "\n".join([*lines, *(f"{kind.value}: {SENTENCES[kind]}" for kind in kinds)])
 
 
-def as_json(counts: dict[str, Counts], seed: int) -> dict[str, object]:
-    """What came of all classes, as plain numbers."""
+def kept_with(counts: dict[str, Counts], seed: int) -> dict[str, object]:
+    """Counts as plain numbers, with those that are kept of the other classes; of each class its last run."""
+    kept = json.loads(RESULTS.read_text(encoding="utf-8"))["classes"] if RESULTS.exists() else {}
+    kept |= {
+        name: {
+            "seed": seed,
+            "tried": each.tried,
+            **{kind.value: each.kinds[kind] for kind in FINE},
+            "faults": each.found,
+            "seconds": round(each.seconds),
+        }
+        for name, each in counts.items()
+    }
+    classes = {name: kept[name] for name in CLASSES if name in kept}
     return {
-        "seed": seed,
-        "classes": {
-            name: {
-                "tried": each.tried,
-                **{kind.value: each.kinds[kind] for kind in FINE},
-                "faults": each.found,
-                "seconds": round(each.seconds),
-            }
-            for name, each in counts.items()
-        },
-        "tried": sum(each.tried for each in counts.values()),
-        "faults": sum(each.found for each in counts.values()),
+        "classes": classes,
+        "tried": sum(each["tried"] for each in classes.values()),
+        "faults": sum(each["faults"] for each in classes.values()),
     }
 
 
