@@ -7,13 +7,13 @@ cubic coefficient falls.
 
 from __future__ import annotations
 
-import enum
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chilopod.labels import Labelled
 from chilopod.stability.normal_forms.center_manifold import (
     CriticalOrbit,
     Curve,
@@ -51,7 +51,7 @@ _SURE = 2.0  # for the worst of which
 _WRONG = 0.3  # how far off they are, of what the states move
 
 
-class Status(enum.Enum):
+class Status(Labelled):
     """What became of a normal form; each member's ``sentence`` says it in words."""
 
     FOUND = "found", "the coefficients hold within their errors"
@@ -62,10 +62,6 @@ class Status(enum.Enum):
         "the pair is at a root of unity of order 1 to 4, where more terms decide",
     )
     SEVERAL_CRITICAL = "several critical", "another multiplier is on the unit circle as well"
-
-    def __init__(self, label: str, sentence: str) -> None:
-        self.label = label
-        self.sentence = sentence
 
 
 @dataclass(frozen=True)

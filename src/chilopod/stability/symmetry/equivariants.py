@@ -9,7 +9,6 @@ maps Chossat & Golubitsky, SIAM J. Math. Anal. 19 (1988) 1259.
 
 from __future__ import annotations
 
-import enum
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.frozen import ReadOnlyArrays
+from chilopod.labels import Labelled
 from chilopod.stability.symmetry.group_closure import Images
 from chilopod.stability.symmetry.isotypic import Block, Type
 from chilopod.stability.unit_circle.spectra import Event
@@ -41,7 +41,7 @@ _IRRATIONAL = 0.5 * (np.sqrt(5.0) - 1.0)
 """As far from all fractions as a number can be."""
 
 
-class SymmetricKind(enum.Enum):
+class SymmetricKind(Labelled):
     """What happens in a block; each member's ``sentence`` says it in words."""
 
     FOLD_OR_TRANSCRITICAL = (
@@ -71,10 +71,6 @@ class SymmetricKind(enum.Enum):
         "symmetric Neimark-Sacker",
         "oscillations at a second frequency branch off that are waves: rotating, standing, or both kinds",
     )
-
-    def __init__(self, label: str, sentence: str) -> None:
-        self.label = label
-        self.sentence = sentence
 
 
 @dataclass(frozen=True)
