@@ -25,31 +25,8 @@ _SIN = tuple((-1.0) ** k / math.factorial(2 * k + 1) for k in range(8))
 _COS = tuple((-1.0) ** k / math.factorial(2 * k) for k in range(9))
 
 
-@fused_njit
-def _real_cos_sin(a: float) -> tuple[float, float]:
-    """Taylor series to the last bit for angles of up to 45 degrees, which joints seldom leave; half the time."""
-    if abs(a) > _SMALL:
-        return np.cos(a), np.sin(a)
-    z = a * a
-    s = _SIN[7]
-    c = _COS[8]
-    s = _SIN[6] + z * s
-    c = _COS[7] + z * c
-    s = _SIN[5] + z * s
-    c = _COS[6] + z * c
-    s = _SIN[4] + z * s
-    c = _COS[5] + z * c
-    s = _SIN[3] + z * s
-    c = _COS[4] + z * c
-    s = _SIN[2] + z * s
-    c = _COS[3] + z * c
-    s = _SIN[1] + z * s
-    c = _COS[2] + z * c
-    return 1.0 + z * (_COS[1] + z * c), a + a * z * s
-
-
-@njit(forceinline=True)
-def _lanes_series(a: Any) -> Any:
+def _series(a: Any) -> Any:
+    """Cosine and sine by Taylor series, to the last bit for angles of up to 45 degrees."""
     z = a * a
     s = _SIN[6] + z * _SIN[7]
     c = _COS[7] + z * _COS[8]
@@ -64,6 +41,15 @@ def _lanes_series(a: Any) -> Any:
     s = _SIN[1] + z * s
     c = _COS[2] + z * c
     return 1.0 + z * (_COS[1] + z * c), a + a * z * s
+
+
+_real_series, _lanes_series = (each(forceinline=True)(_series) for each in (fused_njit, njit))
+
+
+@fused_njit
+def _real_cos_sin(a: float) -> Any:
+    """By the series for angles that joints seldom leave, in half the time."""
+    return (np.cos(a), np.sin(a)) if abs(a) > _SMALL else _real_series(a)
 
 
 @njit

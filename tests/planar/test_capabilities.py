@@ -12,7 +12,6 @@ from chilopod.stability import (
     FlowsWithError,
     KnowsOrbit,
     SpatiallySymmetric,
-    Switches,
     SystemLike,
 )
 
@@ -22,7 +21,6 @@ FOLLOWED = FollowedModel(load_robot("aoi2022-planar"))
 system: SystemLike = MODEL
 knows_orbit: KnowsOrbit = MODEL
 spatially_symmetric: SpatiallySymmetric = MODEL
-switches: Switches = MODEL
 flows_with_error: FlowsWithError = MODEL
 flows_states: FlowsStates = MODEL
 flows_many: FlowsMany = MODEL
@@ -35,7 +33,6 @@ def test_the_models_have_the_capabilities_they_declare() -> None:
             SystemLike,
             KnowsOrbit,
             SpatiallySymmetric,
-            Switches,
             FlowsWithError,
             FlowsStates,
             FlowsMany,

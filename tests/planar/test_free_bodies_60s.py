@@ -80,7 +80,7 @@ def most_steps_in_a_piece(model, x):
 
     integrate = integrator(counted, on_disk=False).py_func  # interpreted: a period is enough
     work, h, most = np.empty((16, x.size)), 0.0, 0
-    switches = np.append(model.switch_times, model.period)
+    switches = model.schedule.times
     for start, width in zip(switches[:-1], np.diff(switches), strict=True):
         calls = 0
         h, reached = integrate((start, width), x, 0.0, width, h, model.tolerance, work)

@@ -109,9 +109,9 @@ def test_the_model_is_a_periodic_system():
     assert isinstance(MODEL, SystemLike)
     PeriodicSystem(MODEL.dimension, MODEL.period, MODEL.flow, MODEL.symmetry, orbit=MODEL.orbit)
     np.testing.assert_array_equal(MODEL.reflection @ MODEL.reflection, np.eye(13))
-    assert MODEL.switch_times[0] == 0.0
-    assert (np.diff(MODEL.switch_times) > 0.0).all()
-    assert MODEL.switch_times[-1] < MODEL.period
+    assert MODEL.schedule.times[0] == 0.0
+    assert (np.diff(MODEL.schedule.times) > 0.0).all()
+    assert MODEL.schedule.times[-1] == MODEL.period
 
 
 # -- many robots at once

@@ -96,7 +96,7 @@ def test_forces_of_yawed_feet_move_the_robot_as_newton_and_euler_say():
         force.append(pushed.sum((0, 1)))
         moment.append(_cross(foot, pushed).sum())
     # Central differences, where no foot switched in between.
-    switches = np.concatenate([cycle * 0.6 + model.switch_times for cycle in range(6)])
+    switches = np.concatenate([cycle * 0.6 + model.schedule.times[:-1] for cycle in range(6)])
     t = record.time.values[1:-1]
     smooth = np.abs(t[:, None] - switches).min(1) > 2.0 / rate
     for momentum, cause in ((np.array(linear), np.array(force)), (np.array(angular), np.array(moment))):

@@ -8,15 +8,25 @@ from hypothesis import strategies as st
 from planar_strategies import energy_rate, mid_interval, robots, state_of
 
 from chilopod import load_robot
+from chilopod.compiled import njit
 from chilopod.engine import Command
+from chilopod.lanes import as_lanes
 from chilopod.planar import PlanarModel, energy, initial_states, powers, start
-from chilopod.planar.dynamics import BEHIND, DECAY, LEVEL, ORIGIN, SCRATCH, SLOPE, TORQUE, rhs
+from chilopod.planar.dynamics import BEHIND, DECAY, LEVEL, ORIGIN, SCRATCH, SLOPE, TORQUE
 from chilopod.planar.energy import module_motion
+from chilopod.planar.stretch import _slope
 from chilopod.record import Recording, spring_work
 
 N_MM_PER_DEG = 1e-3 * 180 / np.pi
 PRESET = load_robot("aoi2022-planar").override("springs.adjustable", True)
 BENT = np.array([0.3, 0.1, -0.2, 0.15, -0.05])
+
+
+@njit
+def slope_as_walks_have_it(t, x, scalars, springs, damping, moments, scratch, out):
+    """The slope of one robot, in numbers of one lane."""
+    args = as_lanes(scalars, 1), as_lanes(springs, 1), as_lanes(damping, 1), as_lanes(moments, 1), as_lanes(scratch, 1)
+    _slope(as_lanes(t, 1)[0], as_lanes(x, 1), args, as_lanes(out, 1))
 
 
 @given(robots(), st.integers(0, 1000), st.floats(0.0, 0.999), st.floats(0.1, 0.9))
@@ -35,7 +45,8 @@ def test_power_balances_while_springs_change_and_joints_are_driven(robot, seed, 
     stiffness, rate = scale + springs[:, SLOPE] * since + behind, springs[:, SLOPE] - springs[:, DECAY] * behind
     slope = np.empty_like(x)
     args = (model.scalars[0], springs, model.damping, model.moments(interval[:1])[0], np.empty((joints + 1, SCRATCH)))
-    rhs(float(starts[0]), x, tuple(np.array(each) for each in args), slope)
+    given = starts[:1], x, *args
+    slope_as_walks_have_it(*(np.array(each)[..., None] for each in given), slope[:, None])
     power = powers(model, x, t, rate, springs[:, TORQUE])
     gained = energy_rate(model, x, slope, stiffness) + 0.5 * (x[3 : joints + 3] ** 2 * rate).sum()
     _, twist = module_motion(model, x)

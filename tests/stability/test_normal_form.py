@@ -210,20 +210,3 @@ def test_beside_one_to_three_the_errors_grow(distance):
     expected = 2 * (c + nu.conj() * 2 * d * h.conj())
     assert abs(form.cubic - expected.real) <= form.cubic_error
     assert abs(form.rotation - expected.imag) <= form.rotation_error < 0.01 * abs(expected)
-
-
-@pytest.mark.parametrize(("sign", "returns"), [(1.0, 1), (1.0, 3), (-1.0, 1), (-1.0, 2), (-1.0, 4)])
-def test_where_the_cubic_coefficient_vanishes_the_fifth_order_decides(sign, returns):
-    """On b = 2 a^2 + ... no a^3 is left of a' = sign a + a b - 2 a^3 + 0.4 a^5."""
-    jacobian = np.diag([sign, 0.5])
-
-    def mapped(x):
-        a, b = x.T
-        return np.stack([sign * a + a * b - 2.0 * a**3 + 0.4 * a**5, 0.5 * b + a**2 - 0.6 * a**4], axis=1)
-
-    form = normal_form(mapped, at_origin(jacobian, sign, returns=returns), fifth=True)
-    # b = h2 a^2 + h4 a^4 with b(a') = b': (1 - 1/2) h2 = 1, and a'^2 = a^2 + O(a^6), so that (1 - 1/2) h4 = -0.6.
-    once = -1.2 + 0.4
-    passes = returns if sign > 0 or returns % 2 == 0 else 2 * returns
-    assert abs(form.cubic) <= form.cubic_error < 1e-9
-    assert_holds(form.quintic, form.quintic_error, sign * passes * once, 1e-3)

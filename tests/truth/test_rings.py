@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from chilopod.stability.symmetry.equivariants import Critical, SymmetricKind, symmetric_crossing
+from chilopod.stability.symmetry.equivariants import SymmetricKind, symmetric_crossing
 from chilopod.stability.symmetry.groups import commutes, finite_group
 from chilopod.stability.symmetry.isotypic import Type, isotypic
+from chilopod.stability.unit_circle.spectra import Event
 
 
 def ring_group(cells, states, mirrored, scales):
@@ -99,7 +100,7 @@ def test_five_van_der_pol_cells():
         root = cmath.sqrt(0.25 * growth**2 - stiffness)
         known = [cmath.exp((0.5 * growth + sign * root) * duration) for sign in (1, -1)]
         assert paired(np.linalg.eigvals(matrix), known) < 1e-13
-        crossing = symmetric_crossing(block, Critical.PAIR)
+        crossing = symmetric_crossing(block, Event.PAIR)
         assert crossing.critical == 2 * block.dimension
         assert crossing.kind is (
             SymmetricKind.NEIMARK_SACKER if block.trivial else SymmetricKind.SYMMETRIC_NEIMARK_SACKER

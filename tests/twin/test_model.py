@@ -3,13 +3,14 @@
 import mujoco
 import numpy as np
 import pytest
+from leg_tips import tip_place
 
 from chilopod import load_robot
 from chilopod.errors import ParameterError
 from chilopod.paper.straight.study import with_modules
 from chilopod.planar import PlanarModel
 from chilopod.twin import TwinModel
-from chilopod.twin.legs import joint_angles, tip_place
+from chilopod.twin.legs import joint_angles
 
 PRESET = load_robot("aoi2022")
 

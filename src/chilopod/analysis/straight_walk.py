@@ -208,16 +208,12 @@ def family(robot: Robot, parameter: str) -> Callable[[float], PlanarModel]:
     return lambda value: PlanarModel(robot.with_value(parameter, value), use_symmetry=symmetric)
 
 
-def _unsaid(remark: str) -> None:
-    """What is not asked for."""
-
-
 def bifurcations(
     robot: Robot,
     parameter: str,
     between: tuple[float, float],
     normal_form: bool = True,
-    remark: Callable[[str], None] = _unsaid,
+    remark: Callable[[str], None] = lambda sentence: None,
     seconds: float = math.inf,
 ) -> list[WalkBifurcation]:
     """Every bifurcation of the straight walk in an interval of a parameter.

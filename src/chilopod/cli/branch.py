@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -92,28 +92,12 @@ def branch(
         def progress(done: float, words: str) -> None:
             show("branch", done, words)
 
+        how: dict[str, Any] = {"points": points, "longest": longest, "progress": progress}
         if saved is None:
             assert limits is not None
-            data = curved_walks(
-                described,
-                parameter,
-                limits,
-                points=points,
-                longest=longest,
-                side=-1 if left else 1,
-                progress=progress,
-            )
+            data = curved_walks(described, parameter, limits, side=-1 if left else 1, **how)
         else:
-            data = resumed(
-                saved,
-                described,
-                parameter,
-                limits,
-                points=points,
-                longest=longest,
-                side=-1 if left else None,
-                progress=progress,
-            )
+            data = resumed(saved, described, parameter, limits, side=-1 if left else None, **how)
 
     def write() -> list[Path]:
         from chilopod.report import write_branch

@@ -7,7 +7,6 @@ object steers one robot or ten thousand, a model or a machine.
 
 from __future__ import annotations
 
-import enum
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.gait import Gait
+from chilopod.labels import Labelled
 from chilopod.record import Recording
 from chilopod.robot import Robot
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-class Status(enum.Enum):
+class Status(Labelled):
     """How a walk ended; each member's ``sentence`` says it in words."""
 
     WALKED = "walked", "walked to the end"
@@ -33,10 +33,6 @@ class Status(enum.Enum):
     OUT_OF_RANGE = "out of range", "a yaw joint bent by more than a right angle, where modules run into each other"
     FALLEN = "fallen", "module 1 tipped over"
     HALTED = "halted", "stopped where it was told to"
-
-    def __init__(self, label: str, sentence: str) -> None:
-        self.label = label
-        self.sentence = sentence
 
 
 @dataclass(frozen=True)

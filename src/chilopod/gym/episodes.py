@@ -264,14 +264,8 @@ class Episodes:
     # ---------------------------------------------------------------------------------------------------------------
 
     def _begin(self, seeds: Sequence[int | None]) -> Step:
-        drawn, courses = self._drawn(np.arange(self._count), seeds)
-        self._walk = self._engine.start(
-            self.robot,
-            initial=self._initial(drawn),
-            friction=np.stack([each.friction for each in drawn]),
-            seeds=self._scan_seeds(drawn),
-            record=None,
-        )
+        drawn, courses, conditions = self._drawn(np.arange(self._count), seeds)
+        self._walk = self._engine.start(self.robot, record=None, **conditions)
         missed = np.stack([each.missed for each in drawn])
         self._missing = bool(self._disturbance.missed)
         self._referee = CourseReferee(courses, self.robot.gait, missed if self._missing else None, keep=False)
@@ -284,35 +278,31 @@ class Episodes:
 
     def _restart(self, walk: Walk, which: Marks) -> None:
         ids = np.flatnonzero(which)
-        drawn, courses = self._drawn(ids, [None] * len(ids))
-        walk.restart(
-            which,
-            self._initial(drawn),
-            np.stack([each.friction for each in drawn]),
-            self._scan_seeds(drawn),
-        )
+        drawn, courses, conditions = self._drawn(ids, [None] * len(ids))
+        walk.restart(which, **conditions)
         missed = np.stack([each.missed for each in drawn])
         self._referee.restart(which, courses, missed if self._missing else None)
         self._errors[ids] = np.stack([each.bearing for each in drawn])
         self._since[ids], self._arrived[ids] = self._cycle, 0
 
-    def _drawn(self, ids: NDArray[np.intp], seeds: Sequence[int | None]) -> tuple[list[Drawn], list[Any]]:
-        """Disturbances and courses of new episodes of some robots."""
+    def _drawn(
+        self, ids: NDArray[np.intp], seeds: Sequence[int | None]
+    ) -> tuple[list[Drawn], list[Any], dict[str, Any]]:
+        """Disturbances and courses of new episodes of some robots, and with what they walk."""
         chosen = [
             int(self._generators[robot].integers(_SEEDS)) if seed is None else seed
             for robot, seed in zip(ids.tolist(), seeds, strict=True)
         ]
         modules = self.robot.body.modules
         drawn = [draw(self._disturbance, seed, modules, self._looks) for seed in chosen]
-        return drawn, [random_course(seed, self._patience, self._targets) for seed in chosen]
-
-    def _initial(self, drawn: Sequence[Drawn]) -> Array:
         angles, headings = np.stack([each.joint_angles for each in drawn]), np.array([each.heading for each in drawn])
-        return self._engine.initial_states(self.robot, angles, headings)
-
-    def _scan_seeds(self, drawn: Sequence[Drawn]) -> list[int] | None:
         noisy = self._engine.traits.noisy and self._disturbance.bearing > 0.0
-        return [each.scan_seed for each in drawn] if noisy else None
+        conditions = {
+            "initial": self._engine.initial_states(self.robot, angles, headings),
+            "friction": np.stack([each.friction for each in drawn]),
+            "seeds": [each.scan_seed for each in drawn] if noisy else None,
+        }
+        return drawn, [random_course(seed, self._patience, self._targets) for seed in chosen], conditions
 
     def _look(self, walk: Walk, fresh: Marks) -> Step:
         """Judge, put up the next targets, and see; at the end of a step."""

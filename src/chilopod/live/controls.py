@@ -180,7 +180,7 @@ class Controls:
         with gui.add_folder("Pull a joint", expand_by_default=False):
             self._joint: Any = gui.add_dropdown("joint", joints, initial_value="1")
             for name, way in (("Left (J)", 1.0), ("Right (K)", -1.0)):
-                gui.add_button(name).on_click(partial(self._pull_at_button, way))
+                gui.add_button(name).on_click(partial(self._pull, way))
 
     def _recording(self, gui: viser.GuiApi, on_follow: Callable[[bool], None]) -> None:
         self._record = gui.add_button("Record (C)", hint="As netCDF, and as a page that plays it.")
@@ -225,10 +225,7 @@ class Controls:
         share = 0.0 if ended else _A_LENGTH * aside / self._file.module_length
         self._put(wishes.Pull(joint, share * self._file.springs.stiffness[joint]))
 
-    def _pull_at_button(self, way: float, _: object) -> None:
-        self._pull(way)
-
-    def _pull(self, way: float) -> None:
+    def _pull(self, way: float, _: object = None) -> None:
         joint = int(self._joint.value) - 1
         self._put(wishes.Pull(joint, way * _PULL * self._file.springs.stiffness[joint], self._file.gait.period))
 

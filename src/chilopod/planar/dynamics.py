@@ -19,12 +19,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 from numba.extending import overload
 
 from chilopod.compiled import fused_njit
 from chilopod.dual import cos_sin, reciprocal
-from chilopod.lanes import LanesType, absolute, any_less, exponential
+from chilopod.lanes import absolute, any_less, exponential
 from chilopod.planar.contact import C_EX, C_EY, C_PD, C_PP, C_PXE, C_SUM, C_X, C_Y
 
 # Rows of ``args[0]``, the scalars of a robot.
@@ -42,8 +41,8 @@ ORIGIN, LEVEL, SLOPE, BEHIND, DECAY, TORQUE = range(SPRING)
 def _spring_torque(springs: Any, joint: int, angle: Any, t: Any) -> Any:
     """What a spring, and a motor beside it, turn the rear module with at an angle (rad) and time t, N*m.
 
-    ``springs`` is the stiffness of each, shape (N-1,); or, where they change, a description of shape (N-1, 6): TORQUE,
-    and k = LEVEL + SLOPE s + BEHIND e^(-DECAY s), where s = t - ORIGIN.
+    ``springs`` is the stiffness of each, shape (N-1,); or, where they change, a description in lanes, shape (N-1, 6):
+    TORQUE, and k = LEVEL + SLOPE s + BEHIND e^(-DECAY s), where s = t - ORIGIN.
     """
     raise NotImplementedError
 
@@ -57,22 +56,11 @@ def _spring_torque_of(springs: Any, joint: int, angle: Any, t: Any) -> Any:
 
         return constant
 
-    if isinstance(springs.dtype, LanesType):
-
-        def in_lanes(springs: Any, joint: int, angle: Any, t: Any) -> Any:
-            since = t - springs[joint, ORIGIN]
-            stiffness = springs[joint, LEVEL] + springs[joint, SLOPE] * since
-            if any_less(0.0, absolute(springs[joint, BEHIND])):
-                stiffness += springs[joint, BEHIND] * exponential(-springs[joint, DECAY] * since)
-            return springs[joint, TORQUE] - stiffness * angle
-
-        return in_lanes
-
     def changing(springs: Any, joint: int, angle: Any, t: Any) -> Any:
         since = t - springs[joint, ORIGIN]
         stiffness = springs[joint, LEVEL] + springs[joint, SLOPE] * since
-        if springs[joint, BEHIND] != 0.0:
-            stiffness += springs[joint, BEHIND] * np.exp(-springs[joint, DECAY] * since)
+        if any_less(0.0, absolute(springs[joint, BEHIND])):
+            stiffness += springs[joint, BEHIND] * exponential(-springs[joint, DECAY] * since)
         return springs[joint, TORQUE] - stiffness * angle
 
     return changing

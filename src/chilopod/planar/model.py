@@ -105,11 +105,6 @@ class PlanarModel(ReadOnlyArrays):
         """Contact pattern of one period."""
         return self.robot.gait.schedule(self.modules)
 
-    @property
-    def switch_times(self) -> Array:
-        """Instants in [0, period) at which a foot touches down or lifts off, s."""
-        return self.schedule.times[:-1]
-
     @cached_property
     def reflection(self) -> Array:
         """Matrix that mirrors a state left to right, shape (2N+1, 2N+1)."""

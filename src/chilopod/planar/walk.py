@@ -69,14 +69,8 @@ def initial_states(
 
     Parameters
     ----------
-    robot
-        Size and gait.
-    joint_angles
-        rad, shape (N-1,) or (robots, N-1).
-    heading
-        Of module 1, rad, a number or shape (robots,).
-    position
-        Of its centre, m, shape (2,) or (robots, 2).
+    robot, joint_angles, heading, position
+        See :class:`chilopod.engine.Engine`.
 
     Returns
     -------

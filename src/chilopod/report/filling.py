@@ -9,7 +9,6 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from types import TracebackType
 from typing import Any, TypeVar
 
 from chilopod.errors import OutputError
@@ -80,9 +79,7 @@ class Report:
         self._opened = self._thread.submit(self._open)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         self._stopped = error is not None
         self._thread.shutdown(cancel_futures=self._stopped)
         if error is None:

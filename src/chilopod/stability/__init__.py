@@ -20,7 +20,6 @@ from chilopod.stability.capabilities import (
     KnowsOrbit,
     Scaled,
     SpatiallySymmetric,
-    Switches,
     SystemLike,
 )
 from chilopod.stability.codimension_two.codimension2 import Codimension2, CodimensionTwo
@@ -67,7 +66,6 @@ __all__ = [
     "Scaled",
     "SpatiallySymmetric",
     "Start",
-    "Switches",
     "SystemLike",
     "UndeclaredSwitch",
     "begin",

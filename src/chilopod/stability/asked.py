@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from types import TracebackType
 
 from chilopod.errors import AnalysisError, ChilopodError, in_words
 
@@ -18,9 +17,7 @@ class Asking:
     def __enter__(self) -> None:
         pass
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         if isinstance(error, Exception) and not isinstance(error, ChilopodError):
             raise UserError(f"raised {in_words(error)}", field=self._field, value=self._value) from error
 

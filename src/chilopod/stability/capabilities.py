@@ -112,16 +112,6 @@ class SpatiallySymmetric(Protocol):
 
 
 @runtime_checkable
-class Switches(Protocol):
-    """Its right-hand side jumps, or has kinks, at times that are known: its flows stop and start again there."""
-
-    @property
-    def switch_times(self) -> Array:
-        """Instants in [0, T), rising, shape (switches,)."""
-        ...
-
-
-@runtime_checkable
 class FlowsWithError(Protocol):
     """Bounds the error of its flow; of other systems the error is estimated by a second computation."""
 

@@ -14,7 +14,7 @@ from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import NormalForm
 from chilopod.stability.orbits import Orbit
 from chilopod.stability.points import BifurcationPoint, Kind, kind_at_plus_one, with_coefficients
-from chilopod.stability.symmetry.equivariants import Critical, SymmetricCrossing, symmetric_crossing
+from chilopod.stability.symmetry.equivariants import SymmetricCrossing, symmetric_crossing
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.crossings import Crossing
 from chilopod.stability.unit_circle.spectra import Event
@@ -22,8 +22,6 @@ from chilopod.stability.unit_circle.spectra import Event
 ComplexArray = NDArray[np.complex128]
 
 _EPSILON = float(np.finfo(float).eps)
-
-_CRITICAL = {Event.MINUS: Critical.MINUS, Event.PLUS: Critical.PLUS, Event.PAIR: Critical.PAIR}
 
 Formed = Callable[[CriticalOrbit, float], NormalForm | None]
 """The normal form at a critical orbit, by the relative error of the return map; None where there is none to be had."""
@@ -79,7 +77,7 @@ def described(
     asked = with_normal_form or (crossing.event is Event.PLUS and not breaking and kind is None)
     if simple and asked and not crossing.collision:
         form = formed(*_critical_orbit(orbit, crossing.event, nu, mode, left))
-    symmetry = None if block is None else symmetric_crossing(block, _CRITICAL[crossing.event])
+    symmetry = None if block is None else symmetric_crossing(block, crossing.event)
     point = BifurcationPoint(
         _kind(crossing, k, form, symmetry if breaking else None) if kind is None else kind,
         value,

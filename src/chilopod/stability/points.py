@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import enum
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.frozen import ReadOnlyArrays
+from chilopod.labels import Labelled
 from chilopod.notebook import block, table, words
 from chilopod.stability.normal_forms.amplitude import Status
 from chilopod.stability.normal_forms.normal_form import NormalForm
@@ -17,7 +17,7 @@ from chilopod.stability.symmetry.equivariants import SymmetricCrossing
 Array = NDArray[np.float64]
 
 
-class Kind(enum.Enum):
+class Kind(Labelled):
     """What happens at a bifurcation point; each member's ``sentence`` says it in words."""
 
     PITCHFORK = "pitchfork", "a symmetric orbit changes stability and a pair of mirrored orbits branches off"
@@ -29,12 +29,8 @@ class Kind(enum.Enum):
     COLLISION = "collision", "of a conservative system, two multipliers meet at +1 or -1 and leave the unit circle"
     KREIN_COLLISION = "Krein collision", "of a conservative system, two pairs meet on the unit circle and leave it"
 
-    def __init__(self, label: str, sentence: str) -> None:
-        self.label = label
-        self.sentence = sentence
 
-
-class Criticality(enum.Enum):
+class Criticality(Labelled):
     """Which way the new orbits go."""
 
     SUPERCRITICAL = (
@@ -46,10 +42,6 @@ class Criticality(enum.Enum):
         "the new orbits lie before the point and are less stable than the old one: past it the motion jumps away",
     )
     UNDECIDED = "undecided", "the coefficient is zero within its error"
-
-    def __init__(self, label: str, sentence: str) -> None:
-        self.label = label
-        self.sentence = sentence
 
 
 _CLEAR = 3.0  # of its error, for a quadratic coefficient that makes a crossing of two orbits

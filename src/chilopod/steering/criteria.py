@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import enum
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,22 +9,19 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chilopod.frozen import ReadOnlyArrays
+from chilopod.labels import Labelled
 from chilopod.steering.target import ARRIVAL_RADIUS
 
 Array = NDArray[np.float64]
 
 
-class Outcome(enum.Enum):
+class Outcome(Labelled):
     """What became of a turning task; each member's ``sentence`` says it in words."""
 
     ARRIVED = "arrived", f"came within {ARRIVAL_RADIUS:g} m of the target"
     OUTSIDE = "bulged outside", "passed the target on the outside of the turn"
     INSIDE = "turned inside", "passed the target on the inside of the turn"
     FAILED = "failed", "did not walk to the end"
-
-    def __init__(self, label: str, sentence: str) -> None:
-        self.label = label
-        self.sentence = sentence
 
 
 @dataclass(frozen=True)

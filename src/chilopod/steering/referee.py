@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import enum
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from chilopod.engine import Command, Controller, Observation, Status, Walk, event_times
 from chilopod.gait import Gait
+from chilopod.labels import Labelled
 from chilopod.record import bearing_and_distance
 from chilopod.steering.course import Course
 from chilopod.steering.shortest import shortest_path
@@ -26,7 +26,7 @@ LOOK = 0.1
 """s between two looks at where the robots are: the paper's robot goes 6 mm meanwhile."""
 
 
-class Verdict(enum.Enum):
+class Verdict(Labelled):
     """What became of a target of a course; each member's ``sentence`` says it in words."""
 
     ARRIVED = "arrived", f"came within {ARRIVAL_RADIUS:g} m of it"
@@ -34,10 +34,6 @@ class Verdict(enum.Enum):
     UNSEEN = "never seen", "never had it in the scanner's view, in its time"
     TOO_FAR = "out of reach", "farther than the robot can walk in its time"
     STOPPED = "stopped", "did not walk to the end"
-
-    def __init__(self, label: str, sentence: str) -> None:
-        self.label = label
-        self.sentence = sentence
 
 
 @dataclass(frozen=True)

@@ -294,16 +294,10 @@ def drive(
         The robot and what steers it.
     course
         With any radius of the tightest circle: that of the robot takes its place where it is known.
-    seed
-        Of the first walk's disturbances, the others count up from it; None for no disturbance at all.
-    repeats
-        How many walks.
+    seed, repeats, folder, progress
+        As for :func:`chilopod.tasks.walk`.
     engine
         Name of the driver's engine, which is also the default.
-    folder
-        Where trials are kept; without one nothing is kept.
-    progress
-        Called with the part done (0 to 1) and a few words.
 
     Raises
     ------

@@ -158,10 +158,8 @@ def turn(
     duration
         s; by default what the circle takes at the speed of the straight walk without slip, times the engine's haste,
         see :class:`chilopod.engine.Traits`; at least 5 s.
-    seed
-        Of the first repeat's disturbances, the others count up from it; None for no disturbance at all.
-    repeats
-        How many walks.
+    seed, repeats, progress
+        As for :func:`chilopod.tasks.walk`.
     engine
         Of :data:`chilopod.engine.ENGINES`, or one's own as ``package.module:object``. The radius law of the planar
         model is that of its exact branch, any other's that of trials.
@@ -169,8 +167,6 @@ def turn(
         In place of the strategy's: a frozen dataclass, see :class:`chilopod.trials.Trial`.
     folder
         Where all trials are kept, those of the radius law and of the search too; without one nothing is kept.
-    progress
-        Called with the part done (0 to 1) and a few words.
 
     Raises
     ------

@@ -98,10 +98,8 @@ def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
 def _steered(trials: Sequence[Trial], until: float) -> tuple[Walk, list[Drawn], CourseReferee | None]:
     """Walk trials of one batch up to a time, s: their walk, what was drawn for each, and who watched."""
     first = trials[0]
-    engine, targets = (
-        engine_named(first.engine),
-        [each.target.position for each in trials if isinstance(each.target, Target)],
-    )
+    engine = engine_named(first.engine)
+    targets = [each.target.position for each in trials if isinstance(each.target, Target)]
     courses = [each.course for each in trials if each.course]
     asked = sum(1 for _ in event_times(first.controller, first.robot.gait, first.duration)) if first.controller else 0
     drawn = [draw(each.disturbance, each.seed, each.robot.body.modules, asked, each.joint_angles) for each in trials]

@@ -9,7 +9,6 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 NAME = ".chilopod-claims"
@@ -52,9 +51,7 @@ class Claims:
                     time.sleep(_PAUSE)
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._handle is not None:
             handle, self._handle = self._handle, None
             with suppress(OSError):

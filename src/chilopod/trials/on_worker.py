@@ -65,10 +65,9 @@ def packed(batch: Sequence[Trial]) -> bytes:
     Raises
     ------
     ParameterError
-        If the trials cannot travel: their controller's class is not one that a module has by its name.
+        If the trials cannot travel: another process could not find, or tell apart, what steers them.
     """
     for trial in batch:
-        trial.check_findable()
         if trial.code[1]:
             raise ParameterError(trial.not_kept(trial.code[1]), field="cluster", allowed="to walk them on this machine")
     packages = (*PACKAGES, TWIN_PACKAGE) if batch[0].engine == "twin" else PACKAGES

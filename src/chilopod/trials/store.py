@@ -60,12 +60,9 @@ class Store:
 
         Raises
         ------
-        ParameterError
-            If the trial cannot be kept, see :meth:`chilopod.trials.Trial.check_findable`.
         OutputError
             If such a file cannot be moved, or this process has no memory to read it.
         """
-        trial.check_findable()
         path = self.folder / trial.file_name
         try:
             content, header = read_whole(path)
@@ -83,12 +80,9 @@ class Store:
 
         Raises
         ------
-        ParameterError
-            If the trial cannot be kept.
         OutputError
             If it is another trial's record, or the file cannot be written.
         """
-        trial.check_findable()
         if record.attrs.get("trial") != trial.text:
             raise OutputError(
                 "is that of another trial, or was walked by other code",

@@ -156,9 +156,11 @@ class Trial:
 
     @cached_property
     def code(self) -> tuple[str, str]:
-        """Digest of what the code of controller and engine is, and why it has none that others could find, if so."""
+        """Digest of what the code of controller and engine is, and why no other process could find that, if so."""
+        known_here = "__main__:" in self.engine or not all(map(is_findable, classes_in(self.controller)))
+        why = "it is known to this process only; put it at the top of a module that can be imported"
         try:
-            return code_of(self.controller) + sources_of(self.engine), ""
+            return code_of(self.controller) + sources_of(self.engine), why if known_here else ""
         except UnknownKindError as error:
             can = "numbers, text, arrays, lists, dictionaries, enums, functions, classes and modules can"
             return f"of this process {id(self.controller):x}", f"{error}, which cannot be described; {can}"
@@ -203,28 +205,6 @@ class Trial:
         engine = engine_named(self.engine).traits.name
         kind = "".join(each if each.isalnum() else "-" for each in engine)
         return f"{kind}-{digest_of(self.text)}.nc"
-
-    def check_findable(self) -> None:
-        """Make sure that other processes, now or later, can find what walks and what steers: the folder of trials
-        outlives this one.
-
-        Raises
-        ------
-        ParameterError
-            If the class of the controller, or the engine, is known to this process only.
-        """
-        known_here = [path_of(kind) for kind in classes_in(self.controller) if not is_findable(kind)]
-        for name, paths in (
-            ("controller", known_here),
-            ("engine", [self.engine] if "__main__:" in self.engine else []),
-        ):
-            for path in paths:
-                raise ParameterError(
-                    "is known to this process only: its trials can be neither kept nor walked elsewhere",
-                    field=name,
-                    value=path,
-                    allowed="what stands at the top of a module that can be imported, or trials without a folder",
-                )
 
     def not_kept(self, why: str) -> str:
         """A line for whoever wonders why a folder does not have this trial."""

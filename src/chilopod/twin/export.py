@@ -68,17 +68,8 @@ def urdf(robot: Robot) -> str:
     """The robot as the text of a URDF file.
 
     Links are named as in MuJoCo; that of module 1 is the root and floats. Feet alone collide. URDF has no springs, no
-    servos and no friction of the floor: a comment in the file says what they are.
-
-    Parameters
-    ----------
-    robot
-        With a twin.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such robot.
+    servos and no friction of the floor: a comment in the file says what they are. Parameter and
+    error are those of :func:`mjcf`.
     """
     twin, model = twin_of(robot), TwinModel(robot).model
     root = ET.Element("robot", name=robot.name)

@@ -71,18 +71,6 @@ def joint_angles(twin: Twin, ahead: ArrayLike, below: ArrayLike) -> Array:
     return np.stack([hip, knee], axis=-1)
 
 
-def tip_place(twin: Twin, angles: ArrayLike) -> Array:
-    """Forward kinematics: the foot's centre ahead of and below the hip, m, for hip and knee angles, shape (..., 2)."""
-    hip, knee = np.moveaxis(np.asarray(angles, dtype=np.float64), -1, 0)
-    return np.stack(
-        [
-            twin.upper_link * np.sin(hip) + twin.lower_link * np.sin(hip + knee),
-            twin.upper_link * np.cos(hip) + twin.lower_link * np.cos(hip + knee),
-        ],
-        axis=-1,
-    )
-
-
 def servo_targets(robot: Robot, times: ArrayLike) -> Array:
     """Hip and knee of every leg over time.
 

@@ -36,12 +36,10 @@ def simulate(
     ----------
     robots
         One, or one for every walk; they may differ in the numbers of their springs and in nothing else.
-    duration
-        s; the gait is at phase 0 at time 0.
+    duration, friction, forces, progress
+        As for :func:`chilopod.planar.simulate`.
     initial
         From :func:`initial_states`, shape (walks, nq) or (nq,); by default straight from the origin along x.
-    friction
-        Factor on the friction coefficient of every foot, positive, shape (N, 2) or (walks, N, 2).
     controller
         Asked for commands at its events, which act at the first servo target from then on.
     target
@@ -51,16 +49,12 @@ def simulate(
         Of the scanner's noise, one a walk; without them it has none.
     rate
         Samples per second; they are taken at the nearest step.
-    forces
-        Whether to add the force on every foot.
     poses
         Whether to add the positions of all joints, from which the robot can be drawn.
     threads
         At most; 0 for all cores. Results are the same to the bit at any number.
     tolerance
         At which MuJoCo's solver of contact forces stops, relative.
-    progress
-        Called with the part done (0 to 1) and a few words.
 
     Returns
     -------

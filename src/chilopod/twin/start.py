@@ -50,14 +50,8 @@ def initial_states(
 
     Parameters
     ----------
-    robot
-        With a twin.
-    joint_angles
-        Of the yaw joints, rad, shape (N-1,) or (robots, N-1).
-    heading
-        Of module 1, rad, a number or shape (robots,).
-    position
-        Of its centre, m, shape (2,) or (robots, 2).
+    robot, joint_angles, heading, position
+        See :class:`chilopod.engine.Engine`; a robot with a twin.
     edit
         See :class:`Edited`.
 

@@ -38,12 +38,8 @@ def film(
         It with the spring that is set on the way.
     best
         The spring for all of the course, N*mm/deg.
-    folder
-        Where records are kept.
-    progress
-        Called with the part done (0 to 1) and a few words.
-    shorter
-        Which part of the targets is shown.
+    folder, progress, shorter
+        As for :func:`chilopod.paper.movies.movies`.
     """
     goals = COURSES[NAMED]
     course = Course(goals[: max(1, round(shorter * len(goals)))], patience_of("planar"))

@@ -127,10 +127,8 @@ def under(
 
     Parameters
     ----------
-    robot
-        The robot.
-    variable
-        It with the spring that is set on the way.
+    robot, variable
+        As for :func:`chilopod.paper.courses.study.compared`.
     spring
         The one for all, N*mm/deg.
     conditions

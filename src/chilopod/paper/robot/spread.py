@@ -53,12 +53,10 @@ def twin_spread(
     ----------
     robot
         For what is not fitted.
-    folder
-        Where trials are kept.
+    folder, progress
+        As for :func:`chilopod.paper.robot.walks.robot_walks`.
     size
         If not full, two sets, or one.
-    progress
-        Called as the work goes on.
 
     Returns
     -------

@@ -164,12 +164,10 @@ def structures(
     ----------
     robot
         With constants that meet the base series.
-    folder
-        Where trials are kept.
+    folder, progress
+        As for :func:`chilopod.paper.robot.walks.robot_walks`.
     size
         If tiny, one structure, whose constants are not fitted.
-    progress
-        Called as the work goes on.
 
     Returns
     -------

@@ -59,12 +59,10 @@ def robot_turning(
     ----------
     robot
         With a twin.
-    folder
-        Where trials are kept.
+    folder, progress
+        As for :func:`chilopod.paper.robot.walks.robot_walks`.
     size
         If not full, two repeats instead of five, and fewer springs.
-    progress
-        Called as the work goes on.
     """
 
     repeats, springs, duration = size.of(

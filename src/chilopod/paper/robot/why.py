@@ -275,12 +275,10 @@ def ablation(
         With a twin.
     planar
         What the planar limit takes feet and friction from.
-    folder
-        Where trials are kept.
+    folder, progress
+        As for :func:`chilopod.paper.robot.walks.robot_walks`.
     size
         If not full, only the path from the planar limit to the twin, by fewer springs.
-    progress
-        Called as the work goes on.
 
     Returns
     -------

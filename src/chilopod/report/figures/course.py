@@ -45,19 +45,8 @@ def write_course(done: Driven, folder: str | Path, *, replace: bool = True) -> l
     ----------
     done
         The course.
-    folder
-        Created where there is none.
-    replace
-        Whether files that are already there may be replaced.
-
-    Returns
-    -------
-    The files.
-
-    Raises
-    ------
-    OutputError
-        If a file cannot be written; it says where it is kept instead.
+    folder, replace
+        As for :func:`chilopod.report.write_branch`, as what is returned and raised.
     """
     write_all(_files(done, folder), replace=replace)
     return files_of_course(folder)

@@ -5,20 +5,20 @@ What they are is told in Kuznetsov, *Elements of Applied Bifurcation Theory*, se
 
 from __future__ import annotations
 
-import enum
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.frozen import ReadOnlyArrays
+from chilopod.labels import Labelled
 from chilopod.stability.points import Kind
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 
-class CodimensionTwo(enum.Enum):
+class CodimensionTwo(Labelled):
     """What happens at a point of codimension two; each member's ``sentence`` says it in words."""
 
     CUSP = "cusp", "two curves of folds meet and vanish: beyond it one orbit is left of three"
@@ -51,10 +51,6 @@ class CodimensionTwo(enum.Enum):
     PITCHFORK_NEIMARK_SACKER = "pitchfork-Neimark-Sacker", "a pitchfork and a Neimark-Sacker bifurcation at once"
     DOUBLE_PITCHFORK = "double pitchfork", "two pitchforks at once"
     SEVERAL_CRITICAL = "several critical", "another multiplier becomes critical as well"
-
-    def __init__(self, label: str, sentence: str) -> None:
-        self.label = label
-        self.sentence = sentence
 
 
 @dataclass(frozen=True)

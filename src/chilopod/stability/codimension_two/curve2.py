@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import enum
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.frozen import ReadOnlyArrays, Short
+from chilopod.labels import Labelled
 from chilopod.notebook import Line, Mark, block, plot, table
 from chilopod.stability.codimension_two.codimension2 import Codimension2
 from chilopod.stability.points import Kind
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 
-class CurveEnd(enum.Enum):
+class CurveEnd(Labelled):
     """Why a curve ends where it does; each member's ``sentence`` says it in words."""
 
     START = "start", "the curve was followed from here, the other way only"
@@ -27,10 +27,6 @@ class CurveEnd(enum.Enum):
     ENOUGH_POINTS = "enough points", "as many points as were asked for"
     OUT_OF_BUDGET = "out of budget", "as many return maps as were allowed have been evaluated"
     LOST = "lost", "the step became too small: the curve could not be followed further"
-
-    def __init__(self, label: str, sentence: str) -> None:
-        self.label = label
-        self.sentence = sentence
 
 
 @dataclass(frozen=True)

@@ -39,10 +39,6 @@ _SAME = 1e-6  # of a step: how near a curve comes to its start to be closed
 Progress2 = Callable[[int, Point2], None]
 
 
-def _silent(count: int, point: Point2) -> None:
-    """A :data:`Progress2` that shows nothing."""
-
-
 def follow2(
     family2: Family2,
     start: BifurcationPoint,
@@ -55,7 +51,7 @@ def follow2(
     longest: float = 0.05,
     coefficients: bool = True,
     budget: int = BUDGET,
-    progress: Progress2 = _silent,
+    progress: Progress2 = lambda count, point: None,
 ) -> Curve2:
     """Follow a bifurcation point as two parameters change.
 

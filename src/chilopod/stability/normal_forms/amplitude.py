@@ -7,13 +7,13 @@ cubic coefficient falls.
 
 from __future__ import annotations
 
-import enum
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chilopod.labels import Labelled
 from chilopod.stability.normal_forms.center_manifold import (
     CriticalOrbit,
     Curve,
@@ -51,7 +51,7 @@ _SURE = 2.0  # for the worst of which
 _WRONG = 0.3  # how far off they are, of what the states move
 
 
-class Status(enum.Enum):
+class Status(Labelled):
     """What became of a normal form; each member's ``sentence`` says it in words."""
 
     FOUND = "found", "the coefficients hold within their errors"
@@ -62,10 +62,6 @@ class Status(enum.Enum):
         "the pair is at a root of unity of order 1 to 4, where more terms decide",
     )
     SEVERAL_CRITICAL = "several critical", "another multiplier is on the unit circle as well"
-
-    def __init__(self, label: str, sentence: str) -> None:
-        self.label = label
-        self.sentence = sentence
 
 
 @dataclass(frozen=True)
@@ -78,15 +74,12 @@ class Fit:
         FOUND or LINEAR.
     sampled
         The map where it shows most.
-    curve
-        What it is sampled on.
     cubic, cubic_error
         Coefficient of the resonant cubic term.
     """
 
     status: Status
     sampled: Sampled
-    curve: Curve
     cubic: complex
     cubic_error: float
 
@@ -200,20 +193,19 @@ class Search:
         for powers in self._second:
             excess, uncertain = self._excess(found, powers)
             off[powers] = np.abs(excess) + uncertain
-        bend = effect_of_bend(self._mapped, self._at, self._curve, found, off, self._second, order=3)
-        return Fit(status, found, self._curve, complex(value[-1]), float(error[-1]) + bend)
+        bend = _effect_of_bend(self._mapped, self._at, self._curve, found, off, self._second)
+        return Fit(status, found, complex(value[-1]), float(error[-1]) + bend)
 
 
-def effect_of_bend(
+def _effect_of_bend(
     mapped: ReturnedStates,
     at: CriticalOrbit,
     curve: Curve,
     found: Sampled,
     off: Mapping[Powers, Array],
     resonant: Mapping[Powers, bool],
-    order: int,
 ) -> float:
-    """How far a coefficient of odd order may be off because the sampled curve is not quite the centre manifold.
+    """How far the cubic coefficient may be off because the sampled curve is not quite the centre manifold.
 
     Parameters
     ----------
@@ -224,8 +216,6 @@ def effect_of_bend(
         random, are sampled as well.
     resonant
         As in :func:`solve_homological`, of every monomial.
-    order
-        Of the coefficient.
     """
     n = at.state.size
     if n == (1 if at.real else 2):
@@ -250,7 +240,7 @@ def effect_of_bend(
         if image is None:
             return np.inf
         harmonic = np.fft.fft(image @ at.left.conj())[1] / directions.size
-        worst = max(worst, float(abs(harmonic - found.outermost[1])) / (times * largest**order))
+        worst = max(worst, float(abs(harmonic - found.outermost[1])) / (times * largest**3))
     return _SURE * worst
 
 

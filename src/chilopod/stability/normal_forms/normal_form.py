@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.stability.normal_forms.amplitude import Fit, Search, Status
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, ReturnedStates, images
-from chilopod.stability.normal_forms.quintic import quintic_term
 from chilopod.stability.normal_forms.resonances import strong_resonance, uncertainties
 
 Array = NDArray[np.float64]
@@ -52,9 +51,6 @@ class NormalForm:
         Bounds on how far they may be off: noise of the map, truncation, and an orbit that is not exact.
     amplitude
         Largest amplitude at which the map was sampled for these numbers.
-    quintic, quintic_error
-        Coefficient of a^5 where it was asked for and the multiplier is real, a being such that the map has no a^2 and
-        a^4 (at -1); it decides where ``cubic`` is zero within its error and ``quadratic`` (at +1) too.
     resonance
         k where the pair is exp(+-2 pi i / k) within its uncertainty, k = 1 ... 4; else None.
     resonant, resonant_error
@@ -71,8 +67,6 @@ class NormalForm:
     rotation: float = 0.0
     rotation_error: float = 0.0
     amplitude: float = np.nan
-    quintic: float | None = None
-    quintic_error: float | None = None
     resonance: int | None = None
     resonant: complex | None = None
     resonant_error: float | None = None
@@ -87,7 +81,6 @@ def normal_form(
     uncertainty: float = 0.0,
     scale: ArrayLike | None = None,
     orbit_error: float | None = None,
-    fifth: bool = False,
 ) -> NormalForm:
     """Normal form on the centre manifold of a critical orbit.
 
@@ -108,8 +101,6 @@ def normal_form(
     orbit_error
         How far off ``at.state`` may be along the mode (in the amplitude's unit); 0 where it is exact. Without it, what
         its residual and the noise allow: beside a singular H - 1 that is much.
-    fifth
-        Whether to find the quintic coefficient as well, at a real multiplier.
 
     Returns
     -------
@@ -129,8 +120,7 @@ def normal_form(
     if fit is None:
         return NormalForm(Status.OUT_OF_REACH, resonance=resonance)
     if at.real:
-        form = _of_full_period(fit, mapped, at, noise, orbit_error)
-        return _with_fifth_order(form, fit, mapped, at, noise) if fifth else form
+        return _of_full_period(fit, mapped, at, noise, orbit_error)
     cubic = at.returns * np.conj(at.multiplier) * fit.cubic
     error = at.returns * fit.cubic_error
     form = NormalForm(
@@ -201,26 +191,6 @@ def _of_full_period(
         k * cubic + k * (k - 1) * quadratic.real**2,
         k * cubic_error + k * (k - 1) * (2.0 * abs(quadratic) + quadratic_error) * quadratic_error,
         amplitude=fit.sampled.radius,
-    )
-
-
-def _with_fifth_order(
-    form: NormalForm, fit: Fit, mapped: ReturnedStates, at: CriticalOrbit, noise: float
-) -> NormalForm:
-    with np.errstate(all="ignore"):
-        quintic, error = quintic_term(mapped, at, fit, noise)
-    cubic, cubic_error, times = fit.cubic.real, fit.cubic_error, at.returns
-    if at.multiplier.real < 0.0:
-        # a -> -a + c a^3 + e a^5 twice: a -> a - 2 c a^3 + (3 c^2 - 2 e) a^5.
-        quintic, error = 3.0 * cubic**2 - 2.0 * quintic, 2.0 * error + 6.0 * abs(cubic) * cubic_error
-        cubic, cubic_error = -2.0 * cubic, 2.0 * cubic_error
-        times = times // 2 if times % 2 == 0 else times
-    # a -> a + c a^3 + e a^5 so many times.
-    pairs = 3.0 * times * (times - 1) / 2.0
-    return replace(
-        form,
-        quintic=times * quintic + pairs * cubic**2,
-        quintic_error=times * error + 2.0 * pairs * abs(cubic) * cubic_error,
     )
 
 

@@ -9,7 +9,6 @@ maps Chossat & Golubitsky, SIAM J. Math. Anal. 19 (1988) 1259.
 
 from __future__ import annotations
 
-import enum
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,8 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.frozen import ReadOnlyArrays
+from chilopod.labels import Labelled
 from chilopod.stability.symmetry.group_closure import Images
 from chilopod.stability.symmetry.isotypic import Block, Type
+from chilopod.stability.unit_circle.spectra import Event
 
 ComplexArray = NDArray[np.complex128]
 Matrices = NDArray[Any]
@@ -40,15 +41,7 @@ _IRRATIONAL = 0.5 * (np.sqrt(5.0) - 1.0)
 """As far from all fractions as a number can be."""
 
 
-class Critical(enum.Enum):
-    """Where the multipliers meet the unit circle: at +1, at -1, or at a complex pair without strong resonance."""
-
-    PLUS = "+1"
-    MINUS = "-1"
-    PAIR = "pair"
-
-
-class SymmetricKind(enum.Enum):
+class SymmetricKind(Labelled):
     """What happens in a block; each member's ``sentence`` says it in words."""
 
     FOLD_OR_TRANSCRITICAL = (
@@ -79,18 +72,6 @@ class SymmetricKind(enum.Enum):
         "oscillations at a second frequency branch off that are waves: rotating, standing, or both kinds",
     )
 
-    def __init__(self, label: str, sentence: str) -> None:
-        self.label = label
-        self.sentence = sentence
-
-
-class Wave(enum.Enum):
-    """How a direction oscillates at a complex pair."""
-
-    STANDING = "standing"  # along one real direction
-    ROTATING = "rotating"  # elements act as shifts in time by other parts of its period than half
-    OTHER = "other"
-
 
 @dataclass(frozen=True)
 class AxialBranch(ReadOnlyArrays):
@@ -110,15 +91,12 @@ class AxialBranch(ReadOnlyArrays):
     reversed
         Whether an element, or at -1 and at a pair a shift in time, takes w to -w: both halves of the branch are then
         the same orbits, seen differently.
-    wave
-        At a complex pair, what kind of oscillation w is.
     """
 
     direction: ComplexArray
     isotropy: NDArray[np.intp]
     phases: NDArray[np.float64]
     reversed: bool
-    wave: Wave | None
 
 
 @dataclass(frozen=True)
@@ -132,11 +110,11 @@ class SymmetricCrossing:
     critical
         Number of critical multipliers, both of a pair counted.
     codimension
-        Number of parameters that it takes: 1 as a rule. In blocks of complex or quaternionic type multipliers are
-        complex as a rule, and ±1 is an exception.
-    quadratic, cubic
-        Numbers of linearly independent quadratic and cubic maps that commute with the representation (with its
-        negatives too at -1; with phase shifts too at a pair): terms of the normal form.
+        Number of parameters that it takes: 1 as a rule. In blocks of complex type multipliers are complex as a rule,
+        and ±1 is an exception.
+    quadratic
+        Number of linearly independent quadratic maps that commute with the representation (with its negatives too at
+        -1; with phase shifts too at a pair): terms of the normal form.
     branches
         The axial ones, those that keep most elements first.
     complete
@@ -147,12 +125,11 @@ class SymmetricCrossing:
     critical: int
     codimension: int
     quadratic: int
-    cubic: int
     branches: tuple[AxialBranch, ...]
     complete: bool
 
 
-def symmetric_crossing(block: Block, critical: Critical) -> SymmetricCrossing:
+def symmetric_crossing(block: Block, critical: Event) -> SymmetricCrossing:
     """What happens where an eigenvalue of a block's reduced matrix, simple there, crosses the unit circle.
 
     Parameters
@@ -162,35 +139,28 @@ def symmetric_crossing(block: Block, critical: Critical) -> SymmetricCrossing:
     critical
         Where it crosses.
     """
-    if critical is Critical.PAIR:
+    if critical is Event.PAIR:
         space: Matrices = block.half_space
         rho: Matrices = space.conj().T @ block.representation @ space
-        quadratic, cubic = 0, _pair_cubics(rho)
     else:
         space, rho = np.eye(block.dimension), block.representation
-        quadratic, cubic = _real_equivariants(rho)
-        if critical is Critical.MINUS:  # odd by the shift by one period
-            quadratic = 0
+    # At -1 all is odd by the shift by one period.
+    quadratic = _quadratics(rho) if critical is Event.PLUS else 0
     lines, complete = _fixed_lines(rho, critical)
     branches = [_branch(space @ line, block, critical) for line in lines]
-    branches.sort(
-        key=lambda branch: (-branch.isotropy.size, branch.reversed, "" if branch.wave is None else branch.wave.value)
-    )
-    multipliers = 2 * block.repeated if critical is Critical.PAIR else block.dimension
-    codimension = 1 if critical is Critical.PAIR else _REAL_CODIMENSION[block.type]
+    # At a pair, what rotates before what stands.
+    branches.sort(key=lambda b: (-b.isotropy.size, b.reversed, round(abs(complex((b.direction**2).sum())), 6)))
+    multipliers = 2 * block.repeated if critical is Event.PAIR else block.dimension
+    codimension = 1 if critical is Event.PAIR or block.type is Type.REAL else 2
     return SymmetricCrossing(
-        _kind(block, critical, quadratic), multipliers, codimension, quadratic, cubic, tuple(branches), complete
+        _kind(block, critical, quadratic), multipliers, codimension, quadratic, tuple(branches), complete
     )
 
 
-_REAL_CODIMENSION = {Type.REAL: 1, Type.COMPLEX: 2, Type.QUATERNIONIC: 4}
-"""A simple number of the commutant (real, complex, quaternion) is one given real number under so many conditions."""
-
-
-def _kind(block: Block, critical: Critical, quadratic: int) -> SymmetricKind:
-    if critical is Critical.PAIR:
+def _kind(block: Block, critical: Event, quadratic: int) -> SymmetricKind:
+    if critical is Event.PAIR:
         return SymmetricKind.NEIMARK_SACKER if block.trivial else SymmetricKind.SYMMETRIC_NEIMARK_SACKER
-    if critical is Critical.MINUS:
+    if critical is Event.MINUS:
         return SymmetricKind.PERIOD_DOUBLING if block.trivial else SymmetricKind.SYMMETRIC_PERIOD_DOUBLING
     if block.trivial:
         return SymmetricKind.FOLD_OR_TRANSCRITICAL
@@ -199,29 +169,14 @@ def _kind(block: Block, critical: Critical, quadratic: int) -> SymmetricKind:
     return SymmetricKind.EQUIVARIANT_TRANSCRITICAL if quadratic else SymmetricKind.EQUIVARIANT_PITCHFORK
 
 
-def _characters(rho: Matrices) -> tuple[Matrices, Matrices, Matrices]:
-    """Traces of g, g^2 and g^3, shape (order,) each."""
-    square = rho @ rho
-    first, second, third = (np.trace(power, axis1=1, axis2=2) for power in (rho, square, square @ rho))
-    return first, second, third
+def _quadratics(rho: Matrices) -> int:
+    """Number of quadratic equivariants V -> V: how often V is in its symmetric square (Sattinger, Group Theoretic
+    Methods in Bifurcation Theory, Springer 1979)."""
+    one, two = (np.trace(power, axis1=1, axis2=2) for power in (rho, rho @ rho))
+    return round(float((one * (one**2 + two)).mean() / 2.0))
 
 
-def _real_equivariants(rho: Matrices) -> tuple[int, int]:
-    """Numbers of quadratic and cubic equivariants V -> V: how often V is in its symmetric powers (Sattinger, Group
-    Theoretic Methods in Bifurcation Theory, Springer 1979)."""
-    one, two, three = _characters(rho)
-    quadratic = (one * (one**2 + two)).mean() / 2.0
-    cubic = (one * (one**3 + 3.0 * one * two + 2.0 * three)).mean() / 6.0
-    return round(float(quadratic)), round(float(cubic))
-
-
-def _pair_cubics(rho: Matrices) -> int:
-    """The same for maps w w w̄ -> w, the cubic ones that commute with phase shifts; each has a complex factor."""
-    one, two, _ = _characters(rho)
-    return round(float((one.conj() ** 2 * (one**2 + two)).mean().real) / 2.0)
-
-
-def _fixed_lines(rho: Matrices, critical: Critical) -> tuple[list[Matrices], bool]:
+def _fixed_lines(rho: Matrices, critical: Event) -> tuple[list[Matrices], bool]:
     """Unit vectors of the lines that are the fixed-point space of a subgroup, one of each class of conjugate ones, and
     whether the search came to its end.
 
@@ -282,12 +237,12 @@ def _once(matrices: Matrices) -> Matrices:
     return matrices[first]
 
 
-def _eigenspaces(rho: Matrices, critical: Critical) -> tuple[list[Matrices], bool]:
+def _eigenspaces(rho: Matrices, critical: Event) -> tuple[list[Matrices], bool]:
     """Orthonormal bases of the spaces on which single elements act as a phase that a shift in time can undo, each once,
     and whether these are all."""
     e = rho.shape[1]
     # Eigenvectors of a unitary matrix g are those of the Hermitian one with the eigenvalues 2 cos(angle + turn).
-    turn = 1.0 if critical is not Critical.PAIR else np.exp(1j * np.pi * _IRRATIONAL)
+    turn = 1.0 if critical is not Event.PAIR else np.exp(1j * np.pi * _IRRATIONAL)
     turned = turn * rho
     vectors = np.linalg.eigh(turned + np.swapaxes(turned.conj(), 1, 2))[1]
     phases = np.einsum("gai,gab,gbi->gi", vectors.conj(), rho, vectors)
@@ -295,10 +250,10 @@ def _eigenspaces(rho: Matrices, critical: Critical) -> tuple[list[Matrices], boo
     images = Images(2 * e)
     images.add(_probed(np.eye(e)[None], images)[0])
     for columns, values in zip(vectors, phases, strict=True):
-        if critical is Critical.PAIR:
+        if critical is Event.PAIR:
             wanted = [v for i, v in enumerate(values) if (np.abs(values[:i] - v) > _NULL).all()]
         else:
-            wanted = [1.0, -1.0] if critical is Critical.MINUS else [1.0]
+            wanted = [1.0, -1.0] if critical is Event.MINUS else [1.0]
         for phase in wanted:
             space = columns[:, np.abs(values - phase) < _NULL]
             image = _probed((space @ space.conj().T)[None], images)[0]
@@ -310,25 +265,19 @@ def _eigenspaces(rho: Matrices, critical: Critical) -> tuple[list[Matrices], boo
     return spaces, True
 
 
-def _branch(direction: Matrices, block: Block, critical: Critical) -> AxialBranch:
+def _branch(direction: Matrices, block: Block, critical: Event) -> AxialBranch:
     w = direction.astype(np.complex128)
     largest = w[np.abs(w).argmax()]
     w = w * (np.abs(largest) / largest)
     factors = np.einsum("a,gab,b->g", w.conj(), block.representation, w)
-    if critical is Critical.PAIR:
+    if critical is Event.PAIR:
         kept = np.abs(factors) > 1.0 - _ALIGNED
-    elif critical is Critical.MINUS:
+    elif critical is Event.MINUS:
         kept = np.abs(factors.real) > 1.0 - _ALIGNED
     else:
         kept = factors.real > 1.0 - _ALIGNED
     phases = np.angle(factors[kept])
     phases[np.abs(phases) < _NULL] = 0.0
     phases[np.abs(phases) > np.pi - _NULL] = np.pi
-    wave = None
-    if critical is Critical.PAIR:
-        if abs(np.sum(w * w)) > 1.0 - _ALIGNED:
-            wave = Wave.STANDING
-        else:
-            wave = Wave.ROTATING if ((phases != 0.0) & (phases != np.pi)).any() else Wave.OTHER
-    turned = critical is not Critical.PLUS or bool((factors.real < _ALIGNED - 1.0).any())
-    return AxialBranch(w, np.flatnonzero(kept), phases, turned, wave)
+    turned = critical is not Event.PLUS or bool((factors.real < _ALIGNED - 1.0).any())
+    return AxialBranch(w, np.flatnonzero(kept), phases, turned)

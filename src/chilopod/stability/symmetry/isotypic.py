@@ -2,7 +2,8 @@
 representation.
 
 Without tables of characters: the eigenspaces of a generic symmetric matrix that commutes with the group are irreducible
-(a mean over the group of a random one is generic); characters tell which of them are equivalent and of which type, and
+(a mean over the group of a random one is generic); characters tell which of them are equivalent and of which type
+(quaternionic ones are refused), and
 means of random matrices between two of them, the intertwiners, align their bases. Golubitsky, Stewart & Schaeffer,
 Singularities and Groups in Bifurcation Theory II, Springer 1988, sections XII.2 and XII.3; the types: Serre, Linear
 Representations of Finite Groups, Springer 1977, section 13.2.
@@ -36,15 +37,10 @@ to about 1e-12."""
 
 
 class Type(enum.Enum):
-    """What commutes with an irreducible real representation: real numbers, complex numbers or quaternions."""
+    """What commutes with an irreducible real representation: real or complex numbers."""
 
-    REAL = "real", 1
-    COMPLEX = "complex", 2
-    QUATERNIONIC = "quaternionic", 4
-
-    def __init__(self, label: str, size: int) -> None:
-        self.label = label
-        self.size = size
+    REAL = "real"
+    COMPLEX = "complex"
 
 
 @dataclass(frozen=True)
@@ -54,7 +50,7 @@ class Block(ReadOnlyArrays):
     Attributes
     ----------
     type
-        Real, complex or quaternionic.
+        Real or complex.
     basis
         Symmetry-adapted basis B, one copy after the other, in all of them the same matrices: P B = B (I_m ⊗ rho(P)),
         shape (n, m d).
@@ -63,8 +59,8 @@ class Block(ReadOnlyArrays):
     representation
         rho(P) of each element, orthogonal matrices, shape (order, d, d).
     units
-        Basis of what commutes with rho: the identity, and with the complex type a matrix J with J^2 = -1, with the
-        quaternionic one I, J and K = I J; shape (1, d, d), (2, d, d) or (4, d, d).
+        Basis of what commutes with rho: the identity, and with the complex type a matrix J with J^2 = -1; shape
+        (1, d, d) or (2, d, d).
     kernel
         Which elements act as the identity, shape (order,): new orbits keep these symmetries whatever else they break.
     """
@@ -94,7 +90,7 @@ class Block(ReadOnlyArrays):
     @property
     def repeated(self) -> int:
         """How often a matrix that commutes with the group has each eigenvalue of its reduced matrix: d for the real
-        type; d/2 for the others, and with the complex type their conjugates as often."""
+        type; d/2 for the complex type, and their conjugates as often."""
         return self.dimension if self.type is Type.REAL else self.dimension // 2
 
     @property
@@ -105,12 +101,12 @@ class Block(ReadOnlyArrays):
         kernel = f"kernel of order {int(self.kernel.sum())}"
         if self.dimension == 1:
             return f"sign change, {kernel}"
-        return f"{self.dimension}-dimensional, {self.type.label}, {kernel}"
+        return f"{self.dimension}-dimensional, {self.type.value}, {kernel}"
 
     @property
     def half_space(self) -> ComplexArray:
         """Orthonormal basis, as columns, of the complex vectors that make eigenvectors (:meth:`mode`): all of C^d for
-        the real type, where the first unit beyond the identity acts as i for the others, shape (d, d) or (d, d/2)."""
+        the real type, where J acts as i for the complex type, shape (d, d) or (d, d/2)."""
         if self.type is Type.REAL:
             return np.eye(self.dimension, dtype=np.complex128)
         values, vectors = np.linalg.eigh(-1j * self.units[1])
@@ -127,27 +123,14 @@ class Block(ReadOnlyArrays):
         Returns
         -------
         Real type: A, shape (..., m, m), with dual @ M @ basis = A ⊗ I_d. Complex type: A + i B, of the same shape, with
-        dual @ M @ basis = A ⊗ 1 + B ⊗ J. Quaternionic type: complex, shape (..., 2m, 2m), what the quaternions are as
-        complex 2 x 2 matrices. Of a matrix that does not commute, the mean of P M P^-1 over the group is taken.
+        dual @ M @ basis = A ⊗ 1 + B ⊗ J. Of a matrix that does not commute, the mean of P M P^-1 over the group is
+        taken.
         """
         given = np.asarray(matrices, dtype=np.float64)
         m, d = self.multiplicity, self.dimension
         full = (self.dual @ given @ self.basis).reshape(*given.shape[:-2], m, d, m, d)
         parts = np.einsum("...iajb,uab->u...ij", full, self.units) / d
-        if self.type is Type.REAL:
-            return np.asarray(parts[0])
-        first = parts[0] + 1j * parts[1]
-        if self.type is Type.COMPLEX:
-            return np.asarray(first)
-        second = parts[2] + 1j * parts[3]
-        # How q = first + second J acts on w and J w, where I w = i w.
-        return np.concatenate(
-            [
-                np.concatenate([first, -second], axis=-1),
-                np.concatenate([second.conj(), first.conj()], axis=-1),
-            ],
-            axis=-2,
-        )
+        return np.asarray(parts[0] if self.type is Type.REAL else parts[0] + 1j * parts[1])
 
     def reduced_error(self, matrices: ArrayLike, error: ArrayLike = 0.0) -> Array:
         """Bound on the absolute error of the entries of the reduced matrices.
@@ -167,8 +150,7 @@ class Block(ReadOnlyArrays):
         m, d, n = self.multiplicity, self.dimension, self.basis.shape[0]
         entries = np.asarray(error, dtype=np.float64) + 2.0 * n * np.finfo(float).eps * np.abs(given)
         full = (np.abs(self.dual) @ entries @ np.abs(self.basis)).reshape(*given.shape[:-2], m, d, m, d)
-        parts = np.einsum("...iajb,uab->...ij", full, np.abs(self.units)) / d
-        return np.tile(parts, (2, 2)) if self.type is Type.QUATERNIONIC else np.asarray(parts)
+        return np.asarray(np.einsum("...iajb,uab->...ij", full, np.abs(self.units)) / d)
 
     def mode(self, eigenvector: ArrayLike, direction: ArrayLike) -> ComplexArray:
         """The eigenvector of a matrix that commutes with the group, to an eigenvector of its reduced matrix.
@@ -176,16 +158,12 @@ class Block(ReadOnlyArrays):
         Parameters
         ----------
         eigenvector
-            Of the reduced matrix, shape (m,), or (2m,) with the quaternionic type.
+            Of the reduced matrix, shape (m,).
         direction
             Any combination of the columns of :attr:`half_space`, shape (d,).
         """
         a, w = np.asarray(eigenvector, dtype=np.complex128), np.asarray(direction, dtype=np.complex128)
-        m = self.multiplicity
-        result = np.kron(a[:m], w)
-        if self.type is Type.QUATERNIONIC:
-            result = result + np.kron(a[m:], self.units[2] @ w)
-        return np.asarray(self.basis @ result)
+        return np.asarray(self.basis @ np.kron(a, w))
 
 
 def isotypic(group: Group) -> tuple[Block, ...]:
@@ -194,7 +172,8 @@ def isotypic(group: Group) -> tuple[Block, ...]:
     Raises
     ------
     AnalysisError
-        The matrices of the group are not exact enough to tell its representations apart.
+        The matrices of the group are not exact enough to tell its representations apart, or one of these is of
+        quaternionic type.
     """
     random = np.random.default_rng(0)
     for _ in range(_TRIES):
@@ -264,10 +243,16 @@ def _invariant(q: Array, coordinates: NDArray[np.intp], random: np.random.Genera
 
 def _type(square: float, of_squares: float) -> Type | None:
     """Type of an irreducible representation by the means of chi(g)^2 and chi(g^2); None if it is reducible."""
-    known = {(1, 1): Type.REAL, (2, 0): Type.COMPLEX, (4, -2): Type.QUATERNIONIC}
+    known = {(1, 1): Type.REAL, (2, 0): Type.COMPLEX}
     whole = round(square), round(of_squares)
     if abs(square - whole[0]) > _EXACT or abs(of_squares - whole[1]) > _EXACT:
         return None
+    if whole == (4, -2):
+        raise AnalysisError(
+            "the group has a representation of quaternionic type",
+            field="group",
+            allowed="those of real or complex type",
+        )
     return known.get(whole)
 
 
@@ -296,22 +281,17 @@ def _block(group: Group, copies: list[Array], kind: Type, random: np.random.Gene
 
 
 def _units(rho: Array, kind: Type, random: np.random.Generator) -> Array:
-    d = rho.shape[1]
-    units = [np.eye(d)]
-    while len(units) < min(kind.size, 3):
-        matrix = random.standard_normal((d, d))
-        unit = _mean(rho, matrix - matrix.T, rho)
-        for known in units:
-            unit = unit - np.vdot(known, unit) / d * known
-        unit = 0.5 * (unit - unit.T)
-        unit *= np.sqrt(d) / np.linalg.norm(unit)
-        # Which of the two square roots of -1: the one with which the first element that tells them apart turns.
-        turns = np.einsum("gab,ab->g", rho, unit)
-        telling = turns[np.abs(turns) > _EXACT]
-        units.append(-unit if telling.size and telling[0] < 0.0 else unit)
-    if kind is Type.QUATERNIONIC:
-        units.append(units[1] @ units[2])
-    return np.array(units)
+    identity = np.eye(rho.shape[1])
+    if kind is Type.REAL:
+        return identity[None]
+    matrix = random.standard_normal(identity.shape)
+    unit = _mean(rho, matrix - matrix.T, rho)
+    unit = 0.5 * (unit - unit.T)
+    unit *= np.sqrt(len(unit)) / np.linalg.norm(unit)
+    # Which of the two square roots of -1: the one with which the first element that tells them apart turns.
+    turns = np.einsum("gab,ab->g", rho, unit)
+    telling = turns[np.abs(turns) > _EXACT]
+    return np.array([identity, -unit if telling.size and telling[0] < 0.0 else unit])
 
 
 def _rank(block: Block) -> tuple[bool, int, int, tuple[float, ...]]:

@@ -8,7 +8,6 @@ crosses is followed by its rank, which is continuous whatever the multiplicities
 
 from __future__ import annotations
 
-import enum
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from chilopod.errors import ParameterError
+from chilopod.labels import Labelled
 from chilopod.stability.unit_circle.counts import Accounts
 from chilopod.stability.unit_circle.critical import LOST, Root
 from chilopod.stability.unit_circle.spectra import Event, Matrices, Spectra, margins
@@ -42,17 +42,13 @@ _CLOSE = 0.25  # of the nearer end: so far towards the circle a multiplier must 
 _EPSILON = float(np.finfo(float).eps)
 
 
-class Status(enum.Enum):
+class Status(Labelled):
     """How a search ended; each member's ``sentence`` says it in words."""
 
     COMPLETE = "complete", "the counts at both ends and between all points add up"
     CONSERVATIVE = "conservative", "multipliers lie on the circle throughout; where they meet and leave it is listed"
     INCOMPLETE = "incomplete", "not everything is accounted for; the remarks say what and where"
     BUDGET = "budget", "the budget was spent; what was found until then is listed"
-
-    def __init__(self, label: str, sentence: str) -> None:
-        self.label = label
-        self.sentence = sentence
 
 
 @dataclass(frozen=True)

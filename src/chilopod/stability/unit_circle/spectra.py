@@ -4,7 +4,6 @@ one of them is critical."""
 from __future__ import annotations
 
 import bisect
-import enum
 from collections.abc import Callable
 from functools import cache
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.linalg import matrix_balance
 
 from chilopod.errors import AnalysisError
+from chilopod.labels import Labelled
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -28,16 +28,12 @@ _SPARE = 8  # factors beside the idle ones that take part in the sum over what m
 _FILL = 1e-30  # of the largest entry, in place of zeros, so that a triangular matrix can be balanced
 
 
-class Event(enum.Enum):
+class Event(Labelled):
     """Where multipliers of a return map meet the unit circle."""
 
     MINUS = "-1", "a real multiplier passes -1"
     PLUS = "+1", "a real multiplier passes +1"
     PAIR = "pair", "a complex pair passes the unit circle"
-
-    def __init__(self, label: str, sentence: str) -> None:
-        self.label = label
-        self.sentence = sentence
 
 
 class Spectra:
