@@ -31,6 +31,13 @@ def test_a_shell_completes(typed, completed):
     assert (found.returncode, found.stdout.split()) == (0, completed)
 
 
+def test_an_instruction_that_is_none_is_one_line():
+    found = python("doctor", _CHILOPOD_COMPLETE="nosuch")
+    assert (found.returncode, found.stdout) == (2, "")
+    assert found.stderr.startswith("error: _CHILOPOD_COMPLETE = 'nosuch': is none of the instructions")
+    assert found.stderr.count("\n") == 1
+
+
 def test_the_script_for_a_shell_asks_this_command():
     found = python("--show-completion", "bash", _TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION="1")
     assert found.returncode == 0

@@ -6,6 +6,8 @@ Results go to stdout, everything else to stderr. An error is one line on stderr 
 
 from __future__ import annotations
 
+import os
+import re
 import sys
 import traceback
 from collections.abc import Sequence
@@ -15,11 +17,12 @@ import typer
 
 from chilopod.cli import branch, course, doctor, live, reproduce, robot, stability, trials, turn, walk
 from chilopod.cli.options import new_app
-from chilopod.errors import ChilopodError, briefly, one_line
+from chilopod.errors import ChilopodError, ParameterError, briefly, one_line
 from chilopod.process import INTERRUPTED
 
 USAGE_ERROR = 2
 INTERNAL_ERROR = 1
+_COMPLETION = "_CHILOPOD_COMPLETE"  # variable by which a shell asks for completions
 
 app = new_app("Many-legged robots that turn by bifurcation: simulate, analyse and steer them.", completion=True)
 app.command("reproduce", short_help="Repeat the paper, and write a report beside its numbers.")(reproduce.reproduce)
@@ -51,6 +54,14 @@ def _root(
         typer.echo(ctx.get_help())
 
 
+def _check_completion() -> None:
+    asked = os.environ.get(_COMPLETION, "")
+    if asked and not re.fullmatch(r"(complete|source)_(bash|zsh|fish|powershell|pwsh)", asked):
+        raise ParameterError(
+            "is none of the instructions of shells", field=_COMPLETION, value=asked, allowed="complete_bash, or unset"
+        )
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line.
 
@@ -67,6 +78,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     try:
+        _check_completion()
         code = app(arguments, prog_name="chilopod", standalone_mode=False)
     except (typer.Abort, KeyboardInterrupt):
         return _fail("interrupted", INTERRUPTED)
