@@ -16,6 +16,7 @@ import pytest
 from chilopod import load_robot
 from chilopod.engine import Command, Event
 from chilopod.trials import Trial, run
+from chilopod.trials.reach import Reach, UnknownKindError
 
 sys.path.append(str(Path(__file__).parents[2] / "torture"))
 edits = importlib.import_module("edited_controllers")
@@ -113,6 +114,50 @@ def test_a_controller_that_does_not_repeat_itself_is_not_kept(controller, tmp_pa
     (said,) = [each.message for each in caplog.records]
     reason = "changes while it steers" if isinstance(controller, Remembering) else "when it sees the same again"
     assert reason in said
+
+
+LATE = [0.0]
+
+
+@dataclass(frozen=True)
+class Late(Attr):
+    def act(self, event, seen):
+        if seen.time > 1.0:  # after the first gait cycle
+            LATE[0] += 1.0
+        return Command(leg_yaw=[[0.01 * LATE[0], 0.0]])
+
+
+def test_a_controller_whose_state_changes_after_the_first_cycle_is_not_kept(tmp_path, caplog):
+    for seed in range(2):
+        run([Trial(PLANAR, 2.0, seed, controller=Late())], tmp_path)
+    assert list(tmp_path.iterdir()) == []
+    assert {"what its code can reach changes while it steers" in each.message for each in caplog.records} == {True}
+
+
+@dataclass(frozen=True)
+class ByName(Attr):
+    def act(self, event, seen):
+        return Command(leg_yaw=[[sys.modules["ti" + "me"].gain, 0.0]])
+
+
+def test_modules_that_are_looked_up_by_name_cannot_be_described():
+    with pytest.raises(UnknownKindError, match="imports modules by name"):
+        Reach().see(ByName, "ByName")
+
+
+class Table(np.ndarray):
+    """Pickle forgets what it adds to an array."""
+
+
+def test_what_a_subclass_adds_to_an_array_is_part_of_it():
+    found = []
+    for value in (0.01, 0.05):
+        table = np.zeros(1).view(Table)
+        table.gain = value
+        reach = Reach()
+        reach.see(table, "table")
+        found.append(reach.digest)
+    assert found[0] != found[1]
 
 
 def test_a_fresh_process_describes_the_same_and_walks_import_nothing_that_is_not_part_of_it(tmp_path):

@@ -10,8 +10,9 @@ from mujoco.batch import Batch
 from chilopod import load_robot
 from chilopod.engine import Command, Event
 from chilopod.errors import ParameterError
+from chilopod.record import Recording
 from chilopod.steering import LegYawController
-from chilopod.twin import TwinModel, initial_states, simulate
+from chilopod.twin import TwinModel, initial_states, simulate, start
 from chilopod.twin.legs import servo_targets
 
 PRESET = load_robot("aoi2022")
@@ -324,3 +325,11 @@ def test_more_steps_between_two_servo_targets_than_can_be_kept_are_refused():
     with pytest.raises(ParameterError, match="more than can be kept of 1 robots") as caught:
         simulate(PRESET.set_from_text(["twin.control_interval=1e9 s"]), 1.0)
     assert caught.value.field == "twin.control_interval"
+
+
+def test_a_record_with_forces_begins_with_one_sample():
+    """The forces at time 0 are those of the first step, which is still to come."""
+    data = start(PRESET, record=Recording(10.0, forces=True)).to_dataset()
+    assert data.sizes["time"] == 1
+    assert np.isnan(data.foot_force.values).all()
+    assert np.isnan(data.foot_load.values).all()

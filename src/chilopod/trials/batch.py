@@ -21,6 +21,7 @@ from chilopod.trials.trial import Trial
 NOT_KEPT = "not kept"
 """Attribute of a record that is not to be kept: why. It stays nowhere."""
 
+_CHANGES = "what its code can reach changes while it steers"
 _KNOWN: dict[str, str] = {}  # what was found of controllers, by all that makes them
 _MOST_BYTES = 256e6
 """Of the records of a batch, about."""
@@ -85,6 +86,8 @@ def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
     name = type(first.controller).__name__
     if first.controller is not None and json.dumps(plain(first.controller, name)) != json.dumps(first.steering):
         raise AnalysisError("changed its own fields while it steered, so its trials are not what they say", field=name)
+    if not doubts and _is_own(first) and first.as_now().code != first.code:
+        doubts = _KNOWN[_who(first)] = _CHANGES
     data = check_asked(walk.to_dataset(), walk, trials, drawn)
     if referee is not None:
         referee.add_to(data, walk)
@@ -125,11 +128,19 @@ def _steered(trials: Sequence[Trial], until: float) -> tuple[Walk, list[Drawn], 
     return walk, drawn, referee
 
 
+def _is_own(trial: Trial) -> bool:
+    return trial.controller is not None and not all(is_ours(kind) for kind in classes_in(trial.controller))
+
+
+def _who(trial: Trial) -> str:
+    return json.dumps([trial.steering, trial.code, trial.engine])
+
+
 def _doubts(trial: Trial) -> str:
     """Why a controller's walks cannot be had again, if so: its first gait cycle is walked twice, once a process."""
-    if trial.controller is None or all(is_ours(kind) for kind in classes_in(trial.controller)):
+    if not _is_own(trial):
         return ""
-    who = json.dumps([trial.steering, trial.code, trial.engine])
+    who = _who(trial)
     if who not in _KNOWN:
         cycle = min(trial.robot.gait.period, trial.duration)
         one, other = (_steered([trial], cycle)[0].to_dataset() for _ in range(2))
@@ -137,7 +148,7 @@ def _doubts(trial: Trial) -> str:
         if not getattr(one, "identical", lambda _: True)(other):
             _KNOWN[who] = "it steers otherwise when it sees the same again (a clock, np.random, a count?)"
         elif trial.as_now().code != trial.code:
-            _KNOWN[who] = "what its code can reach changes while it steers"
+            _KNOWN[who] = _CHANGES
         else:
             _KNOWN[who] = ""
     return _KNOWN[who]

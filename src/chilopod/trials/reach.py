@@ -164,6 +164,8 @@ class Reach:
             raise unknown
         for part in (kind, *found[:3], *(list(each) for each in found[3:5] if each is not None)):
             yield "", part
+        if isinstance(value, np.ndarray):  # pickle leaves out what a subclass adds
+            yield ".__dict__", getattr(value, "__dict__", None)
 
     # -- code
     # ---------------------------------------------------------------------------------------------------------------
@@ -229,7 +231,8 @@ class Reach:
         """Modules that code imports when it runs, imported now; None where there is none."""
         found: dict[str, ModuleType | None] = {}
         if nested:
-            if {"import_module", "__import__"} & {*code.co_names}:
+            names = {*code.co_names}
+            if {"import_module", "__import__"} & names or {"sys", "modules"} <= names:
                 raise UnknownKindError(f"{path}: code that imports modules by name")
             for each in code.co_consts:
                 found |= self._imported(each, space, path) if isinstance(each, CodeType) else {}

@@ -284,7 +284,9 @@ class TwinWalk:
             data["seen_bearing"] = (("event", "robot"), seen[:, 0], {"units": "rad"})
             data["seen_distance"] = (("event", "robot"), seen[:, 1], {"units": "m"})
         if self._record and self._record.forces:
-            forces = self._forces.rows[:count]
+            known = self._forces.rows[:count]
+            forces = np.full((count, *known.shape[1:]), np.nan)  # at time 0 they are those of a step that is to come
+            forces[: len(known)] = known
             shape = (*forces.shape[:2], plan.robot.body.modules, len(SIDES), 3)
             data.coords["module"] = np.arange(1, plan.robot.body.modules + 1)
             over = ("time", "robot", "module", "side")
