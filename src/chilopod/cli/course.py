@@ -9,29 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from chilopod.cli.options import (
-    ClusterOption,
-    ControllerOption,
-    EngineOption,
-    ForceOption,
-    JsonOption,
     OutOption,
-    RepeatsOption,
-    RobotArg,
-    SeedOption,
-    SetOption,
-    TrialsOption,
-    creep,
-    deliver,
+    WalkOptions,
     free,
-    print_creep,
-    print_json,
     print_table,
-    read_robot,
     reading,
-    walking_on,
+    with_walk_options,
 )
-from chilopod.cli.own import own_code, own_controller
-from chilopod.cli.progress import progress_bar
 
 if TYPE_CHECKING:
     from chilopod.tasks import Driven
@@ -49,8 +33,9 @@ def _strategies() -> list[str]:
     return list(ON_COURSES)
 
 
+@with_walk_options
 def course(
-    robot: RobotArg,
+    options: WalkOptions,
     targets: Annotated[
         str,
         typer.Option(
@@ -87,16 +72,7 @@ def course(
             "70 s (twin).",
         ),
     ] = None,
-    seed: SeedOption = None,
-    repeats: RepeatsOption = 1,
-    engine: EngineOption = "planar",
-    controller: ControllerOption = None,
-    trials: TrialsOption = None,
-    cluster: ClusterOption = None,
-    overrides: SetOption = None,
-    as_json: JsonOption = False,
     out: OutOption = None,
-    force: ForceOption = False,
 ) -> None:
     """Let a robot walk from target to target, and say what became of each.
 
@@ -110,56 +86,45 @@ def course(
     from chilopod import units
     from chilopod.steering import ON_COURSES, course_named, strategy_named
 
-    described = read_robot(robot, overrides)
+    described = options.described
     chosen = strategy_named(strategy, ON_COURSES)
-    with reading("k1"):
-        path = chosen.springs or "springs.stiffness"
-        spring = None if k1 is None else described.override(path, k1).get(path)
+    spring = None if k1 is None else options.spring(chosen.springs, k1)
     with reading("patience"):
         seconds = None if patience is None else units.parse(patience, "s")
     from chilopod.tasks.course import check_drive, drive, driver, patience_of
 
-    own = own_controller(controller)
-    goals = course_named(targets, patience_of(engine) if seconds is None else seconds)
-    check_drive(described, goals, seed=seed, repeats=repeats, engine=engine)
+    own = options.own
+    goals = course_named(targets, patience_of(options.engine) if seconds is None else seconds)
+    check_drive(described, goals, **options.repeated)
     if out:
         from chilopod.report.figures.course import files_of_course
 
-        free(files_of_course(out), force)
+        free(files_of_course(out), options.force)
 
-    with progress_bar("course") as show, own_code(show), walking_on(cluster):
+    with options.walking("course") as show:
         ready = driver(
             described,
             chosen,
             spring,
-            engine=engine,
+            engine=options.engine,
             controller=own,
-            folder=trials,
+            folder=options.trials,
             progress=lambda part, words: show("radius law", part, words),
         )
         done = drive(
             ready,
             goals,
-            seed=seed,
-            repeats=repeats,
-            engine=engine,
-            folder=trials,
+            **options.repeated,
+            folder=options.trials,
             progress=lambda part, words: show("course", part, words),
         )
 
     def write() -> list[Path]:
         from chilopod.report.figures.course import write_course
 
-        return write_course(done, out, replace=force) if out else []
+        return write_course(done, out, replace=options.force) if out else []
 
-    def printed() -> None:
-        creep(done)
-        if as_json:
-            print_json(done.as_json())
-        else:
-            _print(done)
-
-    deliver(write, printed)
+    options.deliver(done, write, lambda: _print(done))
 
 
 def _print(done: Driven) -> None:
@@ -190,7 +155,6 @@ def _print(done: Driven) -> None:
             f"  {sum(walk['arrived'] for walk in walks)} of {len(walks) * goals} targets, {whole} of {len(walks)} "
             "courses whole"
         )
-    print_creep(told["foot_creep_N_s_m"])
 
 
 def _of_targets(goals: list[dict[str, Any]]) -> Iterable[tuple[str, ...]]:

@@ -5,16 +5,21 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import MISSING, dataclass, fields
+from functools import cached_property
+from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 from typer.core import TyperCommand
 
+from chilopod.cli.own import own_code, own_controller
 from chilopod.cli.progress import progress_bar
 from chilopod.errors import ChilopodError
 
 if TYPE_CHECKING:
+    from chilopod.engine import Controller
     from chilopod.robot import Robot
     from chilopod.tasks import Driven, Ends, Turn
 
@@ -199,6 +204,91 @@ def read_robot(robot: str, overrides: Sequence[str] | None) -> Robot:
         raise
 
 
+@dataclass(frozen=True)
+class WalkOptions:
+    """Argument and options that walk, turn and course share, as they were typed."""
+
+    robot: RobotArg
+    seed: SeedOption = None
+    repeats: RepeatsOption = 1
+    engine: EngineOption = "planar"
+    controller: ControllerOption = None
+    trials: TrialsOption = None
+    cluster: ClusterOption = None
+    overrides: SetOption = None
+    as_json: JsonOption = False
+    force: ForceOption = False
+
+    @cached_property
+    def described(self) -> Robot:
+        """Robot with the numbers that ``--set`` changed."""
+        return read_robot(self.robot, self.overrides)
+
+    @cached_property
+    def own(self) -> Controller | None:
+        """Controller of ``--controller``, if any."""
+        return own_controller(self.controller)
+
+    @property
+    def repeated(self) -> dict[str, Any]:
+        """Arguments of every task that say which walks, and where."""
+        return {"seed": self.seed, "repeats": self.repeats, "engine": self.engine}
+
+    @contextmanager
+    def walking(self, what: str) -> Iterator[Callable[[str, float, str], None]]:
+        """Show progress, find the user's modules, and walk on the cluster that was named, in this block."""
+        with progress_bar(what) as show, own_code(show), walking_on(self.cluster):
+            yield show
+
+    def spring(self, path: str | None, k1: str) -> float:
+        """Stiffness of ``--k1`` for the springs that a strategy softens, N*m/rad."""
+        with reading("k1"):
+            path = path or "springs.stiffness"
+            return self.described.override(path, k1).get(path)
+
+    def deliver(
+        self, done: Turn | Driven | Ends, write: Callable[[], Iterable[Path]], show: Callable[[], None]
+    ) -> None:
+        """Write the files of a result, and print it, as JSON where that was asked for; see :func:`deliver`."""
+
+        def printed() -> None:
+            with progress_bar("creep of the feet"):  # may take as long as the walk
+                creeps = done.foot_creep
+            if self.as_json:
+                print_json(done.as_json())
+                return
+            show()
+            if creeps is not None:
+                typer.echo(f"  standing feet creep like viscous ones of {creeps:.0f} N*s/m")
+
+        deliver(write, printed)
+
+
+def with_walk_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Let typer see the fields of :class:`WalkOptions`, which come as the first argument, beside a command's own."""
+    hints = get_type_hints(WalkOptions, include_extras=True)
+    shared = [
+        Parameter(
+            each.name,
+            Parameter.KEYWORD_ONLY,
+            default=Parameter.empty if each.default is MISSING else each.default,
+            annotation=hints[each.name],
+        )
+        for each in fields(WalkOptions)
+    ]
+    _, *own = (
+        each.replace(kind=Parameter.KEYWORD_ONLY) for each in signature(command, eval_str=True).parameters.values()
+    )
+
+    def run(**given: Any) -> None:
+        command(WalkOptions(**{each.name: given.pop(each.name) for each in shared}), **given)
+
+    seen = [shared[0], *own, *shared[1:]]
+    run.__doc__, run.__annotations__ = command.__doc__, {each.name: each.annotation for each in seen}
+    vars(run)["__signature__"] = Signature(seen)
+    return run
+
+
 def print_json(result: dict[str, Any]) -> None:
     """Print a result as one JSON object; NaN and infinity have no place in JSON and are a fault here."""
     typer.echo(json_text(result))
@@ -216,18 +306,6 @@ def print_table(rows: Iterable[Sequence[str]], indent: str = "") -> None:
     for line in table:
         cells = (f"{cell:<{width}}" for cell, width in zip(line, widths, strict=True))
         typer.echo(f"{indent}{'  '.join(cells)}".rstrip())
-
-
-def creep(done: Turn | Driven | Ends) -> None:
-    """Measure how firmly the floor holds standing feet, which may take as long as the walk, while that is shown."""
-    with progress_bar("creep of the feet"):
-        _ = done.foot_creep
-
-
-def print_creep(coefficient: float | None) -> None:
-    """Say how firmly the floor holds standing feet, where they creep."""
-    if coefficient is not None:
-        typer.echo(f"  standing feet creep like viscous ones of {coefficient:.0f} N*s/m")
 
 
 def free(paths: Iterable[Path], force: bool) -> None:

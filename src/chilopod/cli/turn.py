@@ -10,36 +10,21 @@ import typer
 
 from chilopod.cli.options import (
     STAYS_STRAIGHT,
-    ClusterOption,
-    ControllerOption,
-    EngineOption,
-    ForceOption,
-    JsonOption,
     OutOption,
-    RepeatsOption,
-    RobotArg,
-    SeedOption,
-    SetOption,
     StrategyOption,
-    TrialsOption,
-    creep,
-    deliver,
+    WalkOptions,
     free,
-    print_creep,
-    print_json,
-    read_robot,
     reading,
-    walking_on,
+    with_walk_options,
 )
-from chilopod.cli.own import own_code, own_controller
-from chilopod.cli.progress import progress_bar
 
 if TYPE_CHECKING:
     from chilopod.tasks import Turn
 
 
+@with_walk_options
 def turn(
-    robot: RobotArg,
+    options: WalkOptions,
     target: Annotated[
         str,
         typer.Option(
@@ -65,16 +50,7 @@ def turn(
             "takes at the speed of the straight walk, 5 s at least.",
         ),
     ] = None,
-    seed: SeedOption = None,
-    repeats: RepeatsOption = 1,
-    engine: EngineOption = "planar",
-    controller: ControllerOption = None,
-    trials: TrialsOption = None,
-    cluster: ClusterOption = None,
-    overrides: SetOption = None,
-    as_json: JsonOption = False,
     out: OutOption = None,
-    force: ForceOption = False,
 ) -> None:
     """Pick the spring that leads to a target, walk there, and say how well it went.
 
@@ -87,47 +63,36 @@ def turn(
     from chilopod import units
     from chilopod.steering import Target, strategy_named
 
-    described = read_robot(robot, overrides)
+    described = options.described
     goal, chosen = Target.parse(target), strategy_named(strategy)
-    with reading("k1"):
-        path = chosen.springs or "springs.stiffness"
-        spring = k1 if k1 in ("auto", "law") else described.override(path, k1).get(path)
+    spring = k1 if k1 in ("auto", "law") else options.spring(chosen.springs, k1)
     with reading("duration"):
         seconds = None if duration is None else units.parse(duration, "s")
     if out:
         from chilopod.report.figures.turn import files_of_turn
 
-        free(files_of_turn(out), force)
+        free(files_of_turn(out), options.force)
     from chilopod.tasks import turn as walk_there
 
-    with progress_bar("turn") as show, own_code(show), walking_on(cluster):
+    with options.walking("turn") as show:
         done = walk_there(
             described,
             goal,
             chosen,
             spring,
             duration=seconds,
-            seed=seed,
-            repeats=repeats,
-            engine=engine,
-            controller=own_controller(controller),
-            folder=trials,
+            **options.repeated,
+            controller=options.own,
+            folder=options.trials,
             progress=lambda part, words: show("turn", part, words),
         )
 
     def write() -> list[Path]:
         from chilopod.report.figures.turn import write_turn
 
-        return write_turn(done, out, replace=force) if out else []
+        return write_turn(done, out, replace=options.force) if out else []
 
-    def printed() -> None:
-        creep(done)
-        if as_json:
-            print_json(done.as_json())
-        else:
-            _print(done, seed)
-
-    deliver(write, printed)
+    options.deliver(done, write, lambda: _print(done, options.seed))
 
 
 def _print(done: Turn, seed: int | None) -> None:
@@ -156,4 +121,3 @@ def _print(done: Turn, seed: int | None) -> None:
         )
     if done.straight:
         typer.echo(f"  {STAYS_STRAIGHT}: try --seed 1")
-    print_creep(done.foot_creep)

@@ -6,33 +6,17 @@ import math
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from chilopod.cli.options import (
     STAYS_STRAIGHT,
-    ClusterOption,
-    ControllerOption,
-    EngineOption,
-    ForceOption,
-    JsonOption,
-    RepeatsOption,
-    RobotArg,
-    SeedOption,
-    SetOption,
-    TrialsOption,
-    creep,
-    deliver,
+    WalkOptions,
     free,
-    print_creep,
-    print_json,
-    read_robot,
     reading,
-    walking_on,
+    with_walk_options,
 )
-from chilopod.cli.own import own_code, own_controller
-from chilopod.cli.progress import progress_bar
 
 if TYPE_CHECKING:
     from chilopod.record_file import RecordFile
@@ -42,8 +26,9 @@ if TYPE_CHECKING:
 _MUCH = 1e9  # bytes
 
 
+@with_walk_options
 def walk(
-    robot: RobotArg,
+    options: WalkOptions,
     duration: Annotated[str, typer.Option(metavar="TIME", help='How long, such as "60 s" or "2 min".')] = "60 s",
     initial_joints: Annotated[
         str | None,
@@ -53,20 +38,11 @@ def walk(
             "of all joints. Without it the robot starts straight.",
         ),
     ] = None,
-    seed: SeedOption = None,
-    repeats: RepeatsOption = 1,
     rate: Annotated[float | None, typer.Option(metavar="HZ", help="Samples per second, by default 100.")] = None,
     forces: Annotated[bool, typer.Option("--forces", help="Record the force on every foot.")] = False,
-    engine: EngineOption = "planar",
-    controller: ControllerOption = None,
-    trials: TrialsOption = None,
-    cluster: ClusterOption = None,
-    overrides: SetOption = None,
-    as_json: JsonOption = False,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE.nc", help="Write everything over time into this netCDF file.")
     ] = None,
-    force: ForceOption = False,
 ) -> None:
     """Let a robot walk, once or many times, and say where it gets to.
 
@@ -75,36 +51,28 @@ def walk(
     """
     from chilopod import units
 
-    described = read_robot(robot, overrides)
+    described = options.described
     with reading("duration"):
         seconds = units.parse(duration, "s")
     with reading("initial_joints"):
         angles = joint_angles(initial_joints)
-    free([out] if out else [], force)
+    free([out] if out else [], options.force)
     from chilopod.record import RATE
     from chilopod.tasks import ends, planned
 
     with ExitStack() as stack:
-        with progress_bar("walk") as show, own_code(show), walking_on(cluster):
-            walks = planned(
-                described,
-                seconds,
-                seed=seed,
-                repeats=repeats,
-                joint_angles=angles,
-                rate=RATE if rate is None else rate,
-                forces=forces,
-                engine=engine,
-                controller=own_controller(controller),
-            )
+        with options.walking("walk") as show:
+            rate = RATE if rate is None else rate
+            how: dict[str, Any] = {"joint_angles": angles, "rate": rate, "forces": forces, "controller": options.own}
+            walks = planned(described, seconds, **how, **options.repeated)
             file = stack.enter_context(_record_file(out, walks)) if out else None
             done = ends(
                 walks,
-                trials,
+                options.trials,
                 lambda part, words: show("walk", part, words),
                 file.add if file else lambda index, record: None,
             )
-        deliver(lambda: file.write(replace=force) if file else [], lambda: _show(done, as_json))
+        options.deliver(done, lambda: file.write(replace=options.force) if file else [], lambda: _print(done))
 
 
 def _record_file(path: Path, walks: Sequence[Trial]) -> RecordFile:
@@ -117,14 +85,6 @@ def _record_file(path: Path, walks: Sequence[Trial]) -> RecordFile:
     if size > _MUCH:
         typer.echo(f"{path} will have {in_words(size)} or more", err=True)
     return file
-
-
-def _show(done: Ends, as_json: bool) -> None:
-    creep(done)
-    if as_json:
-        print_json(done.as_json())
-    else:
-        _print(done)
 
 
 def _print(done: Ends) -> None:
@@ -141,7 +101,6 @@ def _print(done: Ends) -> None:
         typer.echo(f"  {label:<6}  {end.x:<8.3f}  {end.y:<8.3f}  {radius:<10}  {bends}")
     if done.straight:
         typer.echo(f'  {STAYS_STRAIGHT}: try --seed 1, or --initial-joints "2 deg"')
-    print_creep(done.foot_creep)
 
 
 def joint_angles(text: str | None) -> tuple[float, ...]:
