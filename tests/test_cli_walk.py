@@ -187,6 +187,8 @@ def test_turn_with_a_given_spring_and_the_other_strategies(capsys):
         (["--target", "45 deg, 1 m", "--k1", "0 N*mm/deg"], ["must be positive"]),
         (["--target", "45 deg, 1 m", "--k1", "atuo"], ["atuo"]),
         (["--target", "45 deg, 1 m", "--strategy", "hopf", "--k1", "law"], ["radius law"]),
+        (["--target", "45 deg, 1 m", "--strategy", "leg-yaw", "--k1", "9 N*mm/deg"], ["--k1", "leg-yaw", "auto"]),
+        (["--target", "45 deg, 1 m", "--strategy", "leg-yaw", "--k1", "law"], ["--k1", "leg-yaw", "auto"]),
         (["--target", "45 deg, 1 m", "--repeats", "2"], ["seed"]),
         (["--target", "45 deg, 1 m", "--duration", "0 s"], ["duration"]),
         (["--target", "45 deg, 1 m", "--duration", "1e9 s"], ["duration", "100000"]),

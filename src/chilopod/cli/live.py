@@ -7,13 +7,17 @@ import signal
 import webbrowser
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from chilopod.cli.options import EngineOption, ForceOption, SetOption, free, read_robot, reading
 from chilopod.live.wishes import LARGEST_SEED
+
+if TYPE_CHECKING:
+    from chilopod.live import Live
 
 
 def _strategies() -> list[str]:
@@ -69,8 +73,7 @@ def live(
     recorded. Needs: pip install "chilopod[live]".
     """
     from chilopod import units
-    from chilopod.errors import OutputError, ParameterError
-    from chilopod.output import write_all
+    from chilopod.errors import ParameterError
 
     with reading("duration"):
         seconds = math.inf if duration is None else units.parse(duration, "s")
@@ -83,17 +86,9 @@ def live(
     described = read_robot(robot, overrides)
     from chilopod.live import Live
 
-    def keep(name: str, record: bytes, page: str, folder: Path | None = out) -> None:
-        assert folder is not None
-        try:
-            for path in write_all(zip(_files(folder, name), (record, page), strict=True), replace=force):
-                typer.echo(f"wrote {path}", err=True)
-        except OutputError as error:
-            typer.echo(f"error: {error}", err=True)  # and the walk goes on
-            raise
-
     there: dict[str, Any] = {"host": host, "port": port, "token": token}
-    page = Live(described, engine, seed=seed, strategy=strategy, **there, kept=keep if out is not None else None)
+    kept = None if out is None else partial(_keep, out, force)
+    page = Live(described, engine, seed=seed, strategy=strategy, **there, kept=kept)
     try:
         with _ended_by_signals():
             typer.echo(f"{described.name} walks at {page.address} (Ctrl-C ends it)")
@@ -101,12 +96,30 @@ def live(
                 typer.echo(f"no browser could be started: open {page.address} in one", err=True)
             page.wait(seconds)
     finally:
-        page.close()
-        for recording in page.undelivered:  # better here than nowhere
-            with suppress(OutputError):
-                keep(*recording, folder=Path())
-        if page.gate.refused:
-            typer.echo(f"requests and messages that the page refused: {page.gate.refused}", err=True)
+        _end(page, force)
+
+
+def _keep(folder: Path, replace: bool, name: str, record: bytes, page: str) -> None:
+    from chilopod.errors import OutputError
+    from chilopod.output import write_all
+
+    try:
+        for path in write_all(zip(_files(folder, name), (record, page), strict=True), replace=replace):
+            typer.echo(f"wrote {path}", err=True)
+    except OutputError as error:
+        typer.echo(f"error: {error}", err=True)  # and the walk goes on
+        raise
+
+
+def _end(page: Live, replace: bool) -> None:
+    from chilopod.errors import OutputError
+
+    page.close()
+    for recording in page.undelivered:  # better here than nowhere
+        with suppress(OutputError):
+            _keep(Path(), replace, *recording)
+    if page.gate.refused:
+        typer.echo(f"requests and messages that the page refused: {page.gate.refused}", err=True)
 
 
 def _files(folder: Path, name: str) -> list[Path]:

@@ -54,7 +54,7 @@ def checked_duration(field: str, value: object) -> float:
 def checked_count(field: str, value: object, most: int) -> int:
     """A number of things, of which there are not more than ``most``."""
     try:
-        count = operator.index(value)  # type: ignore[arg-type]
+        count = 0 if isinstance(value, bool) else operator.index(value)  # type: ignore[arg-type]
     except TypeError:
         count = 0
     if not 1 <= count <= most:

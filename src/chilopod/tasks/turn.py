@@ -175,6 +175,13 @@ def turn(
     """
     if spring not in ("auto", "law") and isinstance(spring, str):
         raise ParameterError("is no spring", field="spring", value=spring, allowed="auto, law, or a stiffness")
+    if strategy.springs is None and spring != "auto":
+        raise ParameterError(
+            f"is of no use to {strategy.name}, which leaves the springs alone",
+            field="spring",
+            value=spring,
+            allowed="auto",
+        )
     check_repeats(seed, repeats)
     traits = engine_named(engine).traits
     engine_named(engine).common(robot)

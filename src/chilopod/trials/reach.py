@@ -254,9 +254,9 @@ class Reach:
     # ---------------------------------------------------------------------------------------------------------------
 
     def _named(self, value: Any) -> str:
+        """Name and version of what a package of others has under its own name; empty for all else."""
         module: Any
         name: Any
-        """Name and version of what a package of others has under its own name; empty for all else."""
         if isinstance(value, ModuleType):
             module, name = value.__name__, ""
         elif isinstance(value, np.ufunc):
@@ -312,6 +312,7 @@ _KINDS: dict[type, Callable[[Any], Parts]] = {
     staticmethod: _attributes("__func__"),
     np.vectorize: _attributes("pyfunc", "otypes", "excluded", "signature"),
     functools.cached_property: _attributes("func"),
+    functools.singledispatchmethod: _attributes("dispatcher", "func"),  # without what it remembers
     type(lru_cache(lambda: 0)): _attributes("__wrapped__"),
     MemberDescriptorType: _SLOT,
     GetSetDescriptorType: _SLOT,
