@@ -109,7 +109,8 @@ def _check(client: Any, address: str) -> None:
     python = "{}.{}".format(*sys.version_info)
     # First what dask tells of itself, for which the worker needs nothing of ours.
     for place, told in client.get_versions(packages=PACKAGES)["workers"].items():
-        there = {name: found or "none" for name, found in told["packages"].items()}
+        # Older versions of dask read __version__, which names the checkout too; the digest below says more.
+        there = {name: (found or "none").partition("+")[0] for name, found in told["packages"].items()}
         there["python"] = ".".join(there["python"].split(".")[:2])
         here = {"python": python, **versions(PACKAGES)}
         check_versions({name: here[name] for name in ("python", *PACKAGES)}, there, f"{address}, {place}")
