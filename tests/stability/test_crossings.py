@@ -247,6 +247,18 @@ def test_a_small_multiplier_beside_a_huge_one_keeps_its_digits(order):
     np.testing.assert_allclose(np.log(np.abs(found)), [rates, rates], rtol=0.0, atol=1e-12)
 
 
+def test_tiny_multipliers_say_nothing_of_pairs_on_the_circle():
+    """Whether they are real or a pair, rounding decides; two real ones with product 1 are no pair either way."""
+
+    def matrix(p):
+        tiny = np.diag([1.0, -1.0]) if p < 0.5 else turned(1.0)
+        return block_diag(-np.exp(p), -np.exp(0.1 - p), 1e-17 * tiny)
+
+    spectra = Spectra(family(matrix), 10)
+    spectra.at(np.array([0.1, 0.9]))
+    assert spectra.without_pair(0.1, 0.9)
+
+
 def test_signs_of_subnormal_numbers():
     signs, logs = symmetric(np.array([[1e-310j, -1e-310j, 0.5], [-1e-310, -0.5, -2e300]]), 0)
     np.testing.assert_array_equal(signs, [1.0, -1.0])

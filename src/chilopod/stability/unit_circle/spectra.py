@@ -24,6 +24,7 @@ _ROUNDING = 2.0 * np.finfo(float).eps
 _SMALLEST = -1e300  # logarithm of zero
 _LARGEST = 1e150  # modulus beyond which multipliers are all the same
 _TURNING = 1e-6  # imaginary part of a multiplier that is not real, relative to its size
+_SMALL = 1e-3  # modulus of multipliers that are far inside the circle
 _SPARE = 8  # factors beside the idle ones that take part in the sum over what may be left out
 _FILL = 1e-30  # of the largest entry, in place of zeros, so that a triangular matrix can be balanced
 
@@ -163,7 +164,8 @@ class Spectra:
         if len(values) < 2:
             return False
         nu = self.at(np.array(values))
-        turning = nu.imag > _TURNING * np.abs(nu)
+        # Whether small ones are real or a pair, rounding decides; a pair that grew from them would change the count.
+        turning = (nu.imag > _TURNING * np.abs(nu)) & (np.abs(nu) > _SMALL)
         if (turning.sum(axis=1) != turning[0].sum()).any():
             return False
         found = margins(nu[turning].reshape(len(values), -1))
@@ -325,6 +327,7 @@ def _eigenvalues(balanced: Array) -> ComplexArray:
     their own size (Stewart, Numer. Math. 90, 2001), of another one rounding decides.
     """
     order = np.argsort(-np.abs(balanced).max(axis=-1), axis=-1)
-    graded = np.take_along_axis(np.take_along_axis(balanced, order[..., None], -2), order[..., None, :], -1)
+    each = np.arange(len(balanced))[:, None]
+    graded = balanced[each[..., None], order[:, :, None], order[:, None, :]]
     nu = np.linalg.eigvals(graded).astype(np.complex128)
-    return np.asarray(np.take_along_axis(nu, np.argsort(-np.abs(nu), axis=-1), axis=-1))
+    return np.asarray(nu[each, np.argsort(-np.abs(nu), axis=-1)])
