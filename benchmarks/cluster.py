@@ -15,7 +15,7 @@ from dataclasses import replace
 from chilopod.robot import load_robot
 from chilopod.steering import LegYawController, Target
 from chilopod.trials import Cluster, Here, Trial, run
-from chilopod.trials.netcdf3 import encode
+from chilopod.trials.file import content_of
 from chilopod.trials.on_worker import packed, unpacked
 
 from _timing import duration, machine, median_seconds, table, write_section
@@ -77,7 +77,7 @@ def main() -> None:
         f"{len(packed(batch)) / 1e3:.1f} kB on its way there; a record of 60 s at 100 Hz is "
         f"{len(answer) / len(batch) / 1e6:.2f} MB on its way back, which the client reads in "
         f"{duration(median_seconds(lambda: unpacked(answer)) / len(batch))} and turns into a file's bytes in "
-        f"{duration(median_seconds(lambda: encode(records[0], {})))}. "
+        f"{duration(median_seconds(lambda: content_of(records[0])))}. "
         f"Load average of the machine before: {load:.1f}."
     )
     title = "**Worker processes of one thread each, start-up aside**"

@@ -1,21 +1,28 @@
-"""Datasets as netCDF-4: built in memory, because the library that writes them dies where a disk is full."""
+"""Datasets as netCDF-4, built in memory because the library that writes them dies where a disk is full; and seals."""
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
 import stat
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
-from chilopod.errors import ParameterError
+from chilopod.errors import OutputError
 
 if TYPE_CHECKING:
     import xarray as xr
 
 _SEAL = b"\nchilopod, sha256 of all before this line: "
-_DIGEST = 64
+_LENGTH = len(_SEAL) + 64
+_OUR_FAULT = (errno.EMFILE, errno.ENFILE, errno.ENOMEM)
+
+
+class UnsoundError(ValueError):
+    """A file is not as it was written; says in words what is wrong with it."""
 
 
 def storable(data: xr.Dataset) -> xr.Dataset:
@@ -44,29 +51,58 @@ def netcdf(data: xr.Dataset, unlimited: Iterable[str] = ()) -> bytes:
 
 
 def sealed(content: bytes) -> bytes:
-    """A netCDF-4 file with a checksum behind it, where readers do not look."""
+    """A netCDF file with a checksum behind it, where readers do not look."""
     return content + _SEAL + hashlib.sha256(content).hexdigest().encode()
 
 
-def unsealed(path: Path) -> bytes:
-    """The netCDF-4 file that was :func:`sealed`.
+@contextmanager
+def sealed_file(path: Path) -> Iterator[IO[bytes]]:
+    """A file that ends with a seal, open; the seal is not checked, and nothing is read of what has none.
 
     Raises
     ------
-    ParameterError
-        If there is no such file, or it is not as it was written.
+    FileNotFoundError
+        If there is none.
+    UnsoundError
+        If it is no file, cannot be read, or has no seal.
+    OutputError
+        If this process has no more memory, or too many files open, to read it.
     """
     try:
         # A pipe of this name must not keep us waiting.
         handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
         with os.fdopen(handle, "rb") as file:
             if not stat.S_ISREG(os.fstat(handle).st_mode):
-                raise OSError("no regular file")
-            content = file.read()
-    except (OSError, ValueError, MemoryError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise ParameterError(f"cannot be read ({reason})", source=str(path)) from None
-    data = content[: -len(_SEAL) - _DIGEST]
+                raise UnsoundError("cannot be read (no file)")
+            size = file.seek(0, os.SEEK_END)
+            file.seek(max(size - _LENGTH, 0))
+            if not file.read(_LENGTH).startswith(_SEAL):
+                raise UnsoundError("is damaged or was edited, or chilopod did not write it")
+            file.seek(0)
+            yield file
+    except FileNotFoundError:
+        if path.is_symlink():
+            raise UnsoundError("leads nowhere") from None
+        raise
+    except MemoryError:
+        raise OutputError("cannot be read for want of memory", source=str(path)) from None
+    except OSError as error:
+        if error.errno in _OUR_FAULT:
+            raise OutputError(f"cannot be read ({error.strerror})", source=str(path)) from None
+        raise UnsoundError(f"cannot be read ({error.strerror or error})") from None
+
+
+def unsealed(path: Path) -> bytes:
+    """The netCDF file that was :func:`sealed`.
+
+    Raises
+    ------
+    FileNotFoundError, UnsoundError, OutputError
+        As for :func:`sealed_file`, and if the seal is broken.
+    """
+    with sealed_file(path) as file:
+        content = file.read()
+    data = content[:-_LENGTH]
     if sealed(data) != content:
-        raise ParameterError("is damaged or was edited, or chilopod did not write it", source=str(path))
+        raise UnsoundError("is damaged or was edited, or chilopod did not write it")
     return data

@@ -19,7 +19,7 @@ from chilopod import stability, units
 from chilopod.analysis.straight_walk import WalkBifurcation, bifurcations, family, interval_text
 from chilopod.engine import Status
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.netcdf import unsealed
+from chilopod.netcdf import UnsoundError, unsealed
 from chilopod.planar.along import FollowedModel, walk_means
 from chilopod.planar.stretch import MOST_BENT
 from chilopod.progress import Progress, silent
@@ -213,7 +213,12 @@ def read_walks(path: str | Path) -> xr.Dataset:
         If there is no such file, it is not as it was written, or another version wrote it.
     """
     path = Path(path)
-    data = xr.load_dataset(io.BytesIO(unsealed(path)), engine="h5netcdf")
+    try:
+        data = xr.load_dataset(io.BytesIO(unsealed(path)), engine="h5netcdf")
+    except FileNotFoundError:
+        raise ParameterError("cannot be read (No such file or directory)", source=str(path)) from None
+    except UnsoundError as error:
+        raise ParameterError(str(error), source=str(path)) from None
     if data.attrs.get("version") != VERSION:
         raise ParameterError("holds no branch of curved walks, or that of another version", source=str(path))
     return data

@@ -9,15 +9,16 @@ import tomllib
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from chilopod.engine import ENGINES
 from chilopod.errors import OutputError, ParameterError
+from chilopod.netcdf import UnsoundError
 from chilopod.progress import Progress, silent
 from chilopod.trials.claims import nobody_in
-from chilopod.trials.file import Unsound, read_header, read_whole
-from chilopod.trials.netcdf3 import Header
+from chilopod.trials.file import Header, read_header
 from chilopod.trials.trial import digest_of, versions_of
 
 _TRIAL = re.compile(r".+-[0-9a-f]{20}\.nc")
@@ -115,7 +116,7 @@ def kept(paths: Sequence[Path], progress: Progress = silent) -> tuple[list[Kept]
 
 def checked(paths: Sequence[Path], progress: Progress = silent) -> tuple[list[Kept], list[tuple[Path, str]]]:
     """The same of files that are whole to the last byte, and have the name that their trial has."""
-    return _looked_at(paths, lambda path: read_whole(path)[1], progress)
+    return _looked_at(paths, partial(read_header, whole=True), progress)
 
 
 def clean(folder: Path, *, old: bool = False, dry: bool = False) -> tuple[list[Path], list[tuple[Path, str]]]:
@@ -252,7 +253,7 @@ def _looked_at(
         with suppress(FileNotFoundError):  # somebody was faster
             try:
                 found.append(_kept(path, header_of(path)))
-            except Unsound as error:
+            except UnsoundError as error:
                 wrong.append((path, str(error)))
     if paths:
         progress(1.0, f"{len(paths)} trials")
@@ -263,7 +264,9 @@ def _kept(path: Path, header: Header) -> Kept:
     text = header.attributes.get("trial", "")
     digest = digest_of(text)
     if not path.stem.endswith(f"-{digest}"):
-        raise Unsound(f"holds another trial, whose name ends in {digest}.nc" if text else "is no record of a trial")
+        raise UnsoundError(
+            f"holds another trial, whose name ends in {digest}.nc" if text else "is no record of a trial"
+        )
     try:
         told = json.loads(text)
         # TOML begins with what stands in no section.
@@ -271,7 +274,7 @@ def _kept(path: Path, header: Header) -> Kept:
         here = _versions(told["engine"])
         found = all(told.get(name) == version for name, version in here.items())
     except (LookupError, TypeError, ValueError, AttributeError):
-        raise Unsound("is damaged or was edited") from None
+        raise UnsoundError("is damaged or was edited") from None
     return Kept(path, header.size, robot, told, found)
 
 

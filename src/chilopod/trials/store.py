@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from chilopod.errors import OutputError
+from chilopod.netcdf import UnsoundError
 from chilopod.output import check_folder, made_folder, sync_folder, write_atomic
 from chilopod.trials.batch import NOT_KEPT
 from chilopod.trials.claims import Claims
-from chilopod.trials.file import Unsound, content_of, read_whole, record_of
+from chilopod.trials.file import content_of, read_record
 from chilopod.trials.trial import Trial
 
 if TYPE_CHECKING:
@@ -65,13 +66,13 @@ class Store:
         """
         path = self.folder / trial.file_name
         try:
-            content, header = read_whole(path)
-            if header.attributes.get("trial") != trial.text:
-                raise Unsound("holds another trial")
-            return record_of(content)
+            record = read_record(path)
+            if record.attrs.get("trial") != trial.text:
+                raise UnsoundError("holds another trial")
+            return record
         except FileNotFoundError:
             return None
-        except Unsound as error:
+        except UnsoundError as error:
             self._move_aside(path, str(error))
             return None
 
