@@ -59,11 +59,10 @@ def test_states_of_a_system_of_ones_own_are_refused(method):
 
 
 def test_a_stretch_of_nothing_is_refused(monkeypatch):
-    given = []
-    monkeypatch.setattr(stretch, "walk_alone", lambda *arguments: given.append(arguments))
+    given, alone = [], stretch.walk_alone
+    monkeypatch.setattr(stretch, "walk_alone", lambda *arguments: given.append(arguments) or alone(*arguments))
     planar.start(ROBOT, record=None).advance(0.5)
     rows, pieces, robots, tolerance, *rest = given[0]
-    stretch.carry(rows, pieces, robots, tolerance, *rest)
     nothing, none = np.empty(0), np.empty(0, dtype=np.intp)
     for spoilt in (
         (none, pieces, robots, tolerance, *rest),
@@ -75,4 +74,5 @@ def test_a_stretch_of_nothing_is_refused(monkeypatch):
     ):
         with pytest.raises(ParameterError, match="fit together"):
             stretch.carry(*spoilt)
-    assert len(given) == 2
+        assert not stretch.walk_abreast(*spoilt)
+        assert not stretch.walk(1, *spoilt)

@@ -1,35 +1,34 @@
-"""Whether arrays go together, asked before compiled code, which looks at no index, reads beyond them."""
+"""Shapes of arrays, compared before compiled code, which looks at no index, reads beyond them."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from chilopod.errors import ParameterError
+from chilopod.compiled import njit
 
 
-def check_shapes(rows: Any, pieces: Any, robots: Any, states: Any, step: Any, status: Any, record: Any) -> None:
-    """Refuse arguments of :func:`chilopod.planar.stretch.carry` that do not fit together, or are nothing.
-
-    Raises
-    ------
-    ParameterError
-        If anything does not.
-    """
-    begins, starts, widths, interval, sample, contact, stroke = pieces
-    scalars, feet, damping, friction, profile, lag, torque, yaw = robots
-    (count, joints), (size,) = lag.shape, widths.shape
-    fits = (
+@njit
+def fit(rows: Any, pieces: Any, robots: Any, states: Any, step: Any, status: Any, record: Any) -> bool:
+    """Whether arguments of :func:`chilopod.planar.stretch.carry` have shapes that go together, and are not empty."""
+    (count, joints), size = robots.lag.shape, pieces.widths.size
+    return bool(
         0 < rows.size <= count
         and size > 0
-        and begins.shape == starts.shape == interval.shape == sample.shape == (size,)
-        and contact.shape == stroke.shape == (len(contact), joints + 1, 2)
-        and states.shape == record.shape[1:] == (count, 2 * joints + 6)
-        and step.shape == status.shape == (count,)
-        and scalars.shape == (count, 4)
-        and feet.shape == yaw.shape == (count, 2)
-        and damping.shape == torque.shape == (count, joints)
-        and friction.shape == (count, joints + 1, 2)
-        and profile.shape == (7, count, joints)
+        and pieces.begins.size == size
+        and pieces.starts.size == size
+        and pieces.interval.size == size
+        and pieces.sample.size == size
+        and pieces.contact.shape == (len(pieces.contact), joints + 1, 2)
+        and pieces.stroke.shape == pieces.contact.shape
+        and states.shape == (count, 2 * joints + 6)
+        and record.shape[1:] == states.shape
+        and step.size == count
+        and status.size == count
+        and robots.scalars.shape == (count, 4)
+        and robots.feet.shape == (count, 2)
+        and robots.yaw.shape == (count, 2)
+        and robots.damping.shape == (count, joints)
+        and robots.torque.shape == (count, joints)
+        and robots.friction.shape == (count, joints + 1, 2)
+        and robots.profile.shape == (7, count, joints)
     )
-    if not fits:
-        raise ParameterError("do not fit together", field="states", value=states.shape, allowed="see carry()")

@@ -16,11 +16,12 @@ import numpy as np
 from chilopod.compiled import copy_into, njit, parallel_njit
 from chilopod.engine.actuators import FROM, GOAL, RAMPING, SETTLING, SINCE, UNTIL
 from chilopod.engine.actuators import SLOPE as RAMP
+from chilopod.errors import ParameterError
 from chilopod.integrate import GROW, LANES_WORK, MAX_STEPS, SAFETY, SHRINK, STAGES, lanes_step
 from chilopod.lanes import LANES, as_lanes, choose, room
 from chilopod.planar.contact import MOMENTS, sum_moments
 from chilopod.planar.dynamics import BEHIND, DECAY, LEVEL, ORIGIN, SCRATCH, SLOPE, SPRING, TORQUE, rhs
-from chilopod.planar.shapes import check_shapes
+from chilopod.planar.shapes import fit
 
 WALKING, DIVERGED, OUT_OF_RANGE, HALTED = range(4)
 MOST_BENT = 0.5 * np.pi
@@ -134,16 +135,19 @@ class _Places(NamedTuple):
     last: Any
 
 
-def _carrier(width: int) -> Callable[..., None]:
+def _carrier(width: int) -> Callable[..., bool]:
     """The loop on one thread for a number of lanes.
 
-    It is called as ``carry(rows, pieces, robots, tolerance, states, step, status, record)``, see :func:`carry`.
+    It is called as ``carry(rows, pieces, robots, tolerance, states, step, status, record)``, see :func:`carry`, and
+    returns whether shapes of arrays go together; otherwise it does nothing.
     """
 
     @njit
     def carry(
         rows: Any, pieces: Any, robots: Any, tolerance: float, states: Any, step: Any, status: Any, record: Any
-    ) -> None:
+    ) -> bool:
+        if not fit(rows, pieces, robots, states, step, status, record):
+            return False
         n, size = pieces.contact.shape[1], states.shape[1]
         joints = n - 1
         lanes = _Lanes(
@@ -223,6 +227,7 @@ def _carrier(width: int) -> Callable[..., None]:
                     waiting += 1
                     s = 0
                 _begin(lane, s, begin, pieces, robots, lanes, clock, at)
+        return True
 
     return carry
 
@@ -342,11 +347,14 @@ def walk(
     step: Any,
     status: Any,
     record: Any,
-) -> None:
+) -> bool:
     """As :func:`carry`, parted into groups, those of a group on one thread: the answer hangs on neither."""
+    if not fit(rows, pieces, robots, states, step, status, record):
+        return False
     for group in numba.prange(groups):
         mine = rows[group * rows.size // groups : (group + 1) * rows.size // groups]
         walk_abreast(mine, pieces, robots, tolerance, states, step, status, record)
+    return True
 
 
 def carry(
@@ -370,17 +378,23 @@ def carry(
         Left at WALKING, or DIVERGED or OUT_OF_RANGE where a robot fails, shape (robots,).
     record
         States over (samples, robots, 2N+4); what no robot reached is left alone.
+
+    Raises
+    ------
+    ParameterError
+        If shapes of arrays do not go together, or there are no rows or pieces.
     """
-    check_shapes(rows, pieces, robots, states, step, status, record)
     what = (rows, pieces, robots, tolerance, states, step, status, record)
     threads = numba.get_num_threads()
     groups = min(rows.size // _A_GROUP, _GROUPS * threads)
     if threads > 1 and groups > 1 and _work(rows, pieces, step) > _WORTH_WAKING:
-        walk(groups, *what)
+        fits = walk(groups, *what)
     elif rows.size > 1:
-        walk_abreast(*what)
+        fits = walk_abreast(*what)
     else:
-        walk_alone(*what)
+        fits = walk_alone(*what)
+    if not fits:
+        raise ParameterError("do not fit together", field="states", value=states.shape, allowed="see carry()")
 
 
 def _work(rows: Any, pieces: Pieces, step: Any) -> float:
