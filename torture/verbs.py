@@ -7,7 +7,6 @@ differs with its number; a fault in native code ends the process.
 from __future__ import annotations
 
 import argparse
-import io
 import math
 import subprocess
 import sys
@@ -145,22 +144,6 @@ def _observed(walk: Any) -> bytes:
     )
 
 
-def _saved(walk: Any) -> bytes:
-    """What is saved, but for where MuJoCo has robots that ended: they are stepped on to the end of a stretch."""
-    saved: bytes = walk.save()
-    if walk.to_dataset.__module__ != "chilopod.twin.walk":
-        return saved
-    ended = np.array([status.name != "WALKED" for status in walk.status])
-    if not ended.any():
-        return saved
-    with np.load(io.BytesIO(saved[saved.index(b"PK") :]), allow_pickle=False) as read:
-        arrays = dict(read)
-    for name in arrays:
-        if name.startswith("state_") or name in ("positions", "scan_poses"):
-            arrays[name][ended] = 0.0
-    return b"".join(name.encode() + each.tobytes() for name, each in arrays.items())
-
-
 def _recorded(walk: Any) -> bytes:
     data = walk.to_dataset()
     return b"".join(name.encode() + data[name].values.tobytes() for name in sorted(data.data_vars) if name != "status")
@@ -170,7 +153,7 @@ _LOOKS: dict[str, Callable[[Any], bytes]] = {
     "observe": _observed,
     "pose": lambda walk: walk.pose().tobytes(),
     "states": lambda walk: walk.states().tobytes(),
-    "save": _saved,
+    "save": lambda walk: walk.save(),
     "to_dataset": _recorded,
 }
 _VERB_BYTES = {verb: f"{verb}:".encode() for verb in _LOOKS}

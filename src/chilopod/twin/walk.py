@@ -359,7 +359,12 @@ class TwinWalk:
             for store in kept.values():
                 store.grown(0)[samples[at >= step], walking[row]] = np.nan
         if found:
+            # Where a robot that failed is stepped on to hangs on how time is cut: it is put back to where it is made.
+            ended = walking[list(found)]
             self._walking = np.delete(walking, list(found))
+            batch.reset(ended, stage=mujoco.mjtStage.mjSTAGE_NONE)
+            self._scanner.restart(ended, anew=False)
+            self._put_poles()
 
     def _controls(self, tick: int) -> Array:
         """Of all actuators before every step up to a tick, for the robots that walk, shape (robots, steps, nu)."""
