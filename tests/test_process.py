@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from chilopod import process
+from chilopod.trials.claims import NAME
 
 
 class LeftError(Exception):
@@ -61,6 +62,25 @@ import interrupted_import
 """
     ended = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (ended.returncode, ended.stdout, ended.stderr) == (process.INTERRUPTED, "", "error: interrupted\n")
+
+
+def test_an_end_on_the_spot_leaves_no_claims_behind(tmp_path):
+    (tmp_path / "interrupted_import.py").write_text("import signal\nsignal.raise_signal(signal.SIGINT)\n")
+    script = """
+import os, signal
+from pathlib import Path
+from chilopod.process import answer_interrupts
+from chilopod.trials.store import Store
+signal.signal(signal.SIGINT, signal.default_int_handler)
+answer_interrupts()
+with Store("kept").claims() as claims:
+    print(os.listdir("kept"), flush=True)
+    import interrupted_import
+"""
+    ended = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, check=False)
+    claimed = f"{[NAME]}\n" if sys.platform == "linux" else "[]\n"
+    assert (ended.returncode, ended.stdout, ended.stderr) == (process.INTERRUPTED, claimed, "error: interrupted\n")
+    assert list((tmp_path / "kept").iterdir()) == []
 
 
 def test_an_interrupt_that_nobody_can_raise_is_not_forgotten(answering):

@@ -16,6 +16,7 @@ from contextlib import suppress
 
 TYPE_CHECKING = False  # that of typing, which takes longer to load than all this
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from types import FrameType
     from typing import Any, NoReturn, TextIO
 
@@ -117,6 +118,9 @@ def leave(words: str = "error: interrupted\n") -> NoReturn:
     """End this process now, as interrupted."""
     with suppress(OSError):
         os.write(2, (_SHOW_CURSOR if os.isatty(2) else b"") + words.encode())
+    for clean_up in reversed(on_leave):
+        with suppress(Exception):
+            clean_up()
     # Semaphores that outlive this process are told of on its stderr, by the process that looks after them.
     started = sys.modules.get("multiprocessing.util")
     if started is not None:
@@ -124,6 +128,9 @@ def leave(words: str = "error: interrupted\n") -> NoReturn:
             started._run_finalizers(0)
     os._exit(INTERRUPTED)
 
+
+on_leave: list[Callable[[], object]] = []
+"""Functions to call where this process ends on the spot."""
 
 _pressed: list[int] = []
 

@@ -11,6 +11,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Self
 
+from chilopod.process import on_leave
+
 NAME = ".chilopod-claims"
 """Of the file whose bytes are locked; there while somebody walks, and after one who was killed."""
 
@@ -47,11 +49,17 @@ class Claims:
             with suppress(OSError):
                 for _ in range(_TRIES):
                     if self._entered():
+                        on_leave.append(self._leave)
                         break
                     time.sleep(_PAUSE)
         return self
 
     def __exit__(self, *_: object) -> None:
+        with suppress(ValueError):
+            on_leave.remove(self._leave)
+        self._leave()
+
+    def _leave(self) -> None:
         if self._handle is not None:
             handle, self._handle = self._handle, None
             with suppress(OSError):
