@@ -246,7 +246,12 @@ class Walk(Protocol):
         """Everything that it takes to go on, the record so far included."""
 
     def to_dataset(self) -> xr.Dataset:
-        """The record so far, see :func:`chilopod.record.walk_record`; robots are NaN from where they stopped."""
+        """Record so far, see :func:`chilopod.record.walk_record`.
+
+        Its samples are those of :meth:`chilopod.record.Recording.samples` up to ``time``, at these times or at the
+        nearest of the engine's own within 10 ms; its attribute ``duration`` is ``time``. Robots are NaN from where they
+        stopped.
+        """
 
 
 def missing_parts(walk: object) -> list[str]:

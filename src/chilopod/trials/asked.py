@@ -78,10 +78,12 @@ def _outline(data: xr.Dataset, walk: Walk, first: Trial, robots: int) -> str:
     if not (walk.time == first.duration or (first.course and 0.0 <= walk.time < first.duration)):
         return f"it walked {walk.time:g} s instead of {first.duration:g} s"
     times, wanted = data["time"].values, first.recording.samples(walk.time)
-    if times.ndim != 1 or abs(times.size - wanted.size) > 1:  # by rounding one more or less
+    if times.shape != wanted.shape:
         return f"{times.size} samples instead of {wanted.size}"
-    if not np.all(np.abs(times - np.arange(times.size) / first.rate) <= max(_STEP, 0.5 / first.rate)):
+    if not np.all(np.abs(times - wanted) <= _STEP) or (np.diff(times) <= 0.0).any():
         return f"samples at other times than every {1.0 / first.rate:g} s"
+    if data.attrs.get("duration") != walk.time:
+        return f"its duration is {data.attrs.get('duration')}, not {walk.time:g} s"
     modules = first.robot.body.modules
     motion = _motion(times, robots, modules - 1)
     if first.forces:
@@ -103,13 +105,15 @@ def _content(data: xr.Dataset, walk: Walk, trials: Sequence[Trial], drawn: Seque
     first, status = trials[0], data["status"].values.tolist()
     if status != [each.label for each in walk.status]:
         return f"status is {status}, not that of the walk"
-    angle, heading = (data[name].values[0] for name in ("joint_angle", "heading"))
+    angle, heading, place, yaw = (data[each].values[0] for each in ("joint_angle", "heading", "position", "leg_yaw"))
     places = data["target"].transpose(..., "robot", "axis").values if isinstance(first.target, Target) else None
     springs = data["stiffness"].transpose(..., "robot", "joint").values.reshape(-1, *data["joint_angle"].shape[1:])[0]
     for robot, (trial, told) in enumerate(zip(trials, drawn, strict=True)):
         off = {
             "joint_angle": angle[robot] - told.joint_angles,
             "heading": np.sin(0.5 * (heading[robot] - told.heading)),
+            "position": place[robot],
+            "leg_yaw": yaw[robot] if trial.controller is None else 0.0,
             "stiffness": springs[robot] / np.array(trial.robot.springs.stiffness) - 1.0,
         }
         if places is not None and isinstance(trial.target, Target):
