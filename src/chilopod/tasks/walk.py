@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 import xarray as xr
@@ -17,7 +17,6 @@ from chilopod.errors import ParameterError
 from chilopod.frozen import Short
 from chilopod.notebook import block, table
 from chilopod.progress import Progress, silent
-from chilopod.record import RATE
 from chilopod.robot import Robot
 from chilopod.tasks.shown import paths
 from chilopod.trials import NONE, Disturbance, Trial, WalkSummary, as_now, run, run_each, straight, summaries, together
@@ -114,19 +113,25 @@ class Walks(Ends):
         return block(self._heading, paths(self.record), self._table)
 
 
+class Plan(TypedDict, total=False):
+    """Arguments of :func:`walk` and :func:`planned`, all of which may be left out."""
+
+    seed: int | None
+    repeats: int
+    joint_angles: Sequence[float]
+    rate: float
+    forces: bool
+    engine: str
+    controller: Controller | None
+
+
 def walk(
     robot: Robot,
     duration: float,
     *,
-    seed: int | None = None,
-    repeats: int = 1,
-    joint_angles: Sequence[float] = (),
-    rate: float = RATE,
-    forces: bool = False,
-    engine: str = "planar",
-    controller: Controller | None = None,
     folder: str | Path | None = None,
     progress: Progress = silent,
+    **plan: Unpack[Plan],
 ) -> Walks:
     """Let a robot walk, once or many times.
 
@@ -136,57 +141,29 @@ def walk(
         The robot.
     duration
         s.
-    seed
-        Of the first walk's disturbances, the others count up from it; None for no disturbance at all.
-    repeats
-        How many walks.
-    joint_angles
-        At the start, before disturbance, rad: one a joint, front to rear, one for all, or none for straight.
-    rate
-        Samples per second.
-    forces
-        Whether the record has the force on every foot.
-    engine
-        Of :data:`chilopod.engine.ENGINES`, or one's own as ``package.module:object``.
-    controller
-        What steers, if anything: a frozen dataclass, see :class:`chilopod.trials.Trial`.
     folder
-        Where the trials are kept; without one nothing is kept.
+        Folder where the trials are kept; without one nothing is kept.
     progress
         Called with the part done (0 to 1) and a few words.
+    **plan
+        ``seed`` of the first walk's disturbances, the others count up from it; None (default) for no disturbance at
+        all. ``repeats``, the number of walks, by default 1. ``joint_angles`` at the start, before disturbance, rad: one
+        a joint, front to rear, one for all, or none for straight. ``rate``, samples per second, by default 100.
+        ``forces``: whether the record has the force on every foot. ``engine``: one of
+        :data:`chilopod.engine.ENGINES`, by default planar, or one's own as ``package.module:object``. ``controller``
+        that steers, a frozen dataclass, see :class:`chilopod.trials.Trial`.
 
     Raises
     ------
     ParameterError
         If something is out of range, or memory cannot hold the record: :func:`ends` needs none.
     """
-    trials = planned(
-        robot,
-        duration,
-        seed=seed,
-        repeats=repeats,
-        joint_angles=joint_angles,
-        rate=rate,
-        forces=forces,
-        engine=engine,
-        controller=controller,
-    )
+    trials = planned(robot, duration, **plan)
     record = together(run(trials, folder, progress))
     return Walks(trials, summaries(robot, record), straight(record), record)
 
 
-def planned(
-    robot: Robot,
-    duration: float,
-    *,
-    seed: int | None = None,
-    repeats: int = 1,
-    joint_angles: Sequence[float] = (),
-    rate: float = RATE,
-    forces: bool = False,
-    engine: str = "planar",
-    controller: Controller | None = None,
-) -> tuple[Trial, ...]:
+def planned(robot: Robot, duration: float, **plan: Unpack[Plan]) -> tuple[Trial, ...]:
     """The trials of :func:`walk`, whose arguments these are.
 
     Raises
@@ -194,7 +171,9 @@ def planned(
     ParameterError
         If something is out of range.
     """
-    angles, joints = tuple(joint_angles), robot.body.modules - 1
+    rest: dict[str, Any] = {**plan}
+    angles, joints = tuple(rest.pop("joint_angles", ())), robot.body.modules - 1
+    seed, repeats = rest.pop("seed", None), rest.pop("repeats", 1)
     if len(angles) == 1:
         angles *= joints
     if len(angles) not in (0, joints):
@@ -206,8 +185,7 @@ def planned(
             "are bent too far", field="joint_angles", value=angles, allowed=f"{_MOST_BENT} rad (85 deg) to either side"
         )
     check_repeats(seed, repeats)
-    one = Trial(robot, duration, joint_angles=angles, controller=controller, rate=rate, forces=forces, engine=engine)
-    return repeated(one, seed, repeats)
+    return repeated(Trial(robot, duration, joint_angles=angles, **rest), seed, repeats)
 
 
 def ends(
