@@ -42,15 +42,8 @@ def film(path: Path) -> None:
         for spring in SPRINGS
     ]
     heading = "A softer first spring turns the robot"
-    film_3d(
-        together(run(asked)),
-        path,
-        titles=list(SPRINGS.values()),
-        heading=heading,
-        fps=PER_SECOND,
-        speed=SPEED,
-        size=SIZE,
-    )
+    look = {"titles": list(SPRINGS.values()), "heading": heading, "fps": PER_SECOND, "speed": SPEED, "size": SIZE}
+    write_atomic(path, film_3d(together(run(asked)), **look))
 
 
 def picture(path: Path) -> bytes:

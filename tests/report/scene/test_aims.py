@@ -9,7 +9,7 @@ import pytest
 
 from chilopod import load_robot, planar
 from chilopod.record import Recording
-from chilopod.report.scene.film import movie
+from chilopod.report.scene.film import filmed
 from chilopod.report.scene.frames import scene
 from chilopod.report.scene.replay import replay
 
@@ -49,7 +49,7 @@ def test_a_robot_that_was_halted_stands_there_and_says_how_far_it_came(record):
     np.testing.assert_array_equal(shown.frames.spine[-1, 0], shown.frames.spine[150, 0])
 
 
-def test_replays_and_films_take_them(record, tmp_path):
+def test_replays_and_films_take_them(record):
     told = json.loads(Page(replay(record, titles=["a", "b"], heading="Course")).data)["robots"]
     assert [aim["place"] for aim in told[0]["aims"]] == [list(FIRST), list(SECOND), list(THIRD)]
-    assert movie(record, tmp_path / "course.mp4", titles=["a", "b"], heading="Course", fps=10).stat().st_size > 0
+    assert filmed(record, titles=["a", "b"], heading="Course", fps=10)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -22,7 +21,6 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from chilopod.errors import OutputError, ParameterError
-from chilopod.output import check_folder, write_atomic
 from chilopod.report.kit import style
 from chilopod.report.scene.encoder import ENCODER, encoded, has_encoder
 from chilopod.report.scene.frames import Outcome, Scene, scene
@@ -39,52 +37,6 @@ APART: Final = 28.0  # from column to column: outcome and next title stand side 
 _MARKS: Final = {"arrived": ("✓ ", "#00563f"), "stopped": ("✕ ", "#8f3d00"), "ended": ("", style.BLACK)}
 
 
-def movie(
-    record: xr.Dataset,
-    path: str | Path,
-    *,
-    titles: Mapping[Any, str] | Sequence[str],
-    heading: str,
-    fps: int = 25,
-    speed: float = 1.0,
-    size: tuple[int, int] = (960, 480),
-) -> Path:
-    """Write the record as a film, H.264 in mp4: browsers and presentations play it, before it is loaded whole.
-
-    Parameters
-    ----------
-    record
-        As described in :mod:`chilopod.report.scene.frames`.
-    path
-        Of the file; its folder is created where there is none, and a file of that name is replaced as a whole.
-    titles
-        What to call each robot: by its label in the record, or in the order of the record.
-    heading
-        Stands above all panels.
-    fps
-        Frames per second of the film.
-    speed
-        Seconds of the walk per second of the film.
-    size
-        Width and height, pixels, both even.
-
-    Returns
-    -------
-    Path
-        `path`.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is out of range, the record does not go with its robot, or a robot has no title.
-    OutputError
-        If the file cannot be written, or PyAV was built without its H.264 encoder.
-    """
-    path = Path(path)
-    check_folder(path.parent)
-    return write_atomic(path, filmed(record, titles=titles, heading=heading, fps=fps, speed=speed, size=size))
-
-
 def filmed(
     record: xr.Dataset,
     *,
@@ -94,7 +46,30 @@ def filmed(
     speed: float = 1.0,
     size: tuple[int, int] = (960, 480),
 ) -> bytes:
-    """The film that :func:`movie` writes; parameters and errors are those."""
+    """A record as a film, H.264 in mp4: browsers and presentations play it before it is loaded whole.
+
+    Parameters
+    ----------
+    record
+        As described in :mod:`chilopod.report.scene.frames`.
+    titles
+        Names of the robots: by label in the record, or in the order of the record.
+    heading
+        Text above all panels.
+    fps
+        Frames per second of the film.
+    speed
+        Seconds of the walk per second of the film.
+    size
+        Width and height, pixels, both even.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is out of range, the record does not go with its robot, or a robot has no title.
+    OutputError
+        If PyAV was built without its H.264 encoder.
+    """
     times = frame_times(record, size, fps, speed)
     return encoded(_frames(scene(record, titles, times), heading, size, speed), fps, size)
 

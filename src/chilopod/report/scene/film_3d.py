@@ -2,14 +2,13 @@
 
 Both take a record as described in :mod:`chilopod.report.scene.frames` that has ``pose`` as well, from
 :func:`chilopod.twin.simulate` with ``poses=True``. Both need OpenGL, see :mod:`chilopod.twin.gl`; a caller that gets
-their OutputError without it still has :func:`chilopod.report.scene.film.movie`.
+their OutputError without it still has :func:`chilopod.report.scene.film.filmed`.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -19,7 +18,6 @@ from matplotlib.text import Text
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import ParameterError
-from chilopod.output import check_folder, write_atomic
 from chilopod.report.kit import style
 from chilopod.report.scene.aims import places_of
 from chilopod.report.scene.encoder import encoded
@@ -49,7 +47,6 @@ _NARROWEST, _LOWEST = 120, 80
 
 def film_3d(
     record: xr.Dataset,
-    path: str | Path,
     *,
     titles: Mapping[Any, str] | Sequence[str],
     heading: str,
@@ -57,67 +54,53 @@ def film_3d(
     speed: float = 1.0,
     size: tuple[int, int] = (1440, 400),
     follow: bool = False,
-) -> Path:
-    """Write walks of the twin as a film, side by side, H.264 in mp4.
+) -> bytes:
+    """Walks of the twin as a film, side by side, H.264 in mp4.
 
     Parameters
     ----------
     record
         As described at the top of this module; the film is no smoother.
-    path, titles, heading, fps, speed, size
-        As for :func:`chilopod.report.scene.film.movie`.
+    titles, heading, fps, speed, size
+        As for :func:`chilopod.report.scene.film.filmed`.
     follow
         Whether every panel follows its robot; otherwise all show the same piece of floor, with all of all walks.
-
-    Returns
-    -------
-    Path
-        `path`.
 
     Raises
     ------
     ParameterError
         If an argument is out of range, the record has no poses or does not go with its robot, or a robot has no title.
     OutputError
-        If there is no OpenGL, PyAV was built without its H.264 encoder, or the file cannot be written.
+        If there is no OpenGL, or PyAV was built without its H.264 encoder.
     """
     times = frame_times(record, size, fps, speed)
     walks = _Walks(record, titles, times)
-    path = Path(path)
-    check_folder(path.parent)
     with gl.context(*size), style.house_style():
         stage = _Stage3D(walks, heading, size, speed, follow)
         try:
-            film = encoded((stage.drawn(index) for index in range(len(times))), fps, size)
+            return encoded((stage.drawn(index) for index in range(len(times))), fps, size)
         finally:
             stage.studio.close()
-    return write_atomic(path, film)
 
 
 def stills(
     record: xr.Dataset,
     times: ArrayLike,
-    path: str | Path,
     *,
     titles: Mapping[Any, str] | Sequence[str] | None = None,
     heading: str = "",
     size: tuple[int, int] = _PICTURE,
-) -> Path:
-    """Write moments of walks as pictures in one PNG file, all of the same piece of floor; a row for every robot.
+) -> bytes:
+    """Moments of walks as pictures in one PNG, all of the same piece of floor; a row for every robot.
 
     Parameters
     ----------
-    record, path, titles, heading
+    record, titles, heading
         As for :func:`film_3d`; by default without titles and heading.
     times
         Of the moments, s, shape (T,); the nearest samples are shown.
     size
         Width and height of a picture, pixels.
-
-    Returns
-    -------
-    Path
-        `path`.
 
     Raises
     ------
@@ -125,7 +108,7 @@ def stills(
         If a time is not in the record, there are too many, the record has no poses or does not go with its robot, or a
         robot has no title.
     OutputError
-        If there is no OpenGL, or the file cannot be written.
+        If there is no OpenGL.
     """
     wanted, recorded = np.atleast_1d(np.asarray(times, dtype=np.float64)), record["time"].values
     robots = record.sizes["robot"]
@@ -140,12 +123,10 @@ def stills(
         allowed = f"{_NARROWEST} to {LARGEST} pixels"
         raise ParameterError("is no size of a picture", field="size", value=size, allowed=allowed)
     walks = _Walks(record, [""] * robots if titles is None else titles, wanted)
-    path = Path(path)
-    check_folder(path.parent)
     with gl.context(*size), style.house_style():
         studio = Studio(walks.shown.frames.robot, size, walks.view(size), fine=True)
         try:
-            return write_atomic(path, style.png(_arranged(walks, studio, heading, size), dpi=PIXEL))
+            return style.png(_arranged(walks, studio, heading, size), dpi=PIXEL)
         finally:
             studio.close()
 

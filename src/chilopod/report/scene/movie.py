@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from chilopod.errors import OutputError
+from chilopod.output import write_atomic
 from chilopod.paper.movies import Movie
 from chilopod.report.kit.page import Film
 from chilopod.report.scene.encoder import has_encoder
-from chilopod.report.scene.film import movie
+from chilopod.report.scene.film import filmed
 from chilopod.report.scene.film_3d import film_3d, stills
 from chilopod.report.scene.played import replay
 
@@ -28,19 +29,19 @@ def write_movie(shown: Movie, folder: Path) -> Film:
     replay(shown.record, titles=shown.titles, heading=shown.heading).write(folder / f"{shown.name}.html", replace=True)
     look: dict[str, Any] = {"titles": shown.titles, "heading": shown.heading, "speed": shown.speed}
     file, encoded = folder / f"{shown.name}.mp4", has_encoder()
-    if encoded and not (solid and _rendered(lambda: film_3d(shown.record, file, **look))):
-        movie(shown.record, file, **look, size=shown.size)
+    if encoded and not (solid and _rendered(file, lambda: film_3d(shown.record, **look))):
+        write_atomic(file, filmed(shown.record, **look, size=shown.size))
     picture = folder / f"{shown.name}.png"
     pictured = bool(shown.stills) and _rendered(
-        lambda: stills(shown.record, shown.stills, picture, titles=shown.titles)
+        picture, lambda: stills(shown.record, shown.stills, titles=shown.titles)
     )
     return Film(shown.name, shown.heading, shown.speed, encoded, pictured)
 
 
-def _rendered(render: Callable[[], object]) -> bool:
-    """Render if there are graphics here; the film from above needs none, and `chilopod doctor` says what is missing."""
+def _rendered(path: Path, render: Callable[[], bytes]) -> bool:
+    """Write what graphics here can render. The film from above needs none; `chilopod doctor` says what is missing."""
     try:
-        render()
+        write_atomic(path, render())
     except OutputError:
         return False
     return True
