@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -11,7 +10,6 @@ import typer
 from chilopod.cli.options import (
     OutOption,
     WalkOptions,
-    free,
     print_table,
     reading,
     with_walk_options,
@@ -96,10 +94,7 @@ def course(
     own = options.own
     goals = course_named(targets, patience_of(options.engine) if seconds is None else seconds)
     check_drive(described, goals, **options.repeated)
-    if out:
-        from chilopod.report.figures.course import files_of_course
-
-        free(files_of_course(out), options.force)
+    options.free_files_of("course", out)
 
     with options.walking("course") as show:
         ready = driver(
@@ -119,12 +114,7 @@ def course(
             progress=lambda part, words: show("course", part, words),
         )
 
-    def write() -> list[Path]:
-        from chilopod.report.figures.course import write_course
-
-        return write_course(done, out, replace=options.force) if out else []
-
-    options.deliver(done, write, lambda: _print(done))
+    options.deliver(done, options.files_written("course", done, out), lambda: _print(done))
 
 
 def _print(done: Driven) -> None:

@@ -246,6 +246,23 @@ class WalkOptions:
             path = path or "springs.stiffness"
             return self.described.override(path, k1).get(path)
 
+    def free_files_of(self, what: str, out: Path | None) -> None:
+        """Make sure that the files of a ``turn`` or a ``course`` can be written into the folder, if there is one."""
+        if out:
+            from chilopod.report.walked import files_of_walks
+
+            free(files_of_walks(what, out), self.force)
+
+    def files_written(self, what: str, done: Turn | Driven, out: Path | None) -> Callable[[], Iterable[Path]]:
+        """Function that writes them."""
+
+        def write() -> Iterable[Path]:
+            from chilopod.report.walked import write_walks
+
+            return write_walks(what, done, out, replace=self.force) if out else ()
+
+        return write
+
     def deliver(
         self, done: Turn | Driven | Ends, write: Callable[[], Iterable[Path]], show: Callable[[], None]
     ) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -13,7 +12,6 @@ from chilopod.cli.options import (
     OutOption,
     StrategyOption,
     WalkOptions,
-    free,
     reading,
     with_walk_options,
 )
@@ -68,10 +66,7 @@ def turn(
     spring = k1 if k1 in ("auto", "law") else options.spring(chosen.springs, k1)
     with reading("duration"):
         seconds = None if duration is None else units.parse(duration, "s")
-    if out:
-        from chilopod.report.figures.turn import files_of_turn
-
-        free(files_of_turn(out), options.force)
+    options.free_files_of("turn", out)
     from chilopod.tasks import turn as walk_there
 
     with options.walking("turn") as show:
@@ -87,12 +82,7 @@ def turn(
             progress=lambda part, words: show("turn", part, words),
         )
 
-    def write() -> list[Path]:
-        from chilopod.report.figures.turn import write_turn
-
-        return write_turn(done, out, replace=options.force) if out else []
-
-    options.deliver(done, write, lambda: _print(done, options.seed))
+    options.deliver(done, options.files_written("turn", done, out), lambda: _print(done, options.seed))
 
 
 def _print(done: Turn, seed: int | None) -> None:

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from chilopod.errors import OutputError
-from chilopod.report.figures.course import draw, files_of_course, write_course
+from chilopod.report.figures.course import draw
 from chilopod.report.kit import style
+from chilopod.report.walked import files_of_walks, write_walks
 from chilopod.steering import STRATEGIES
 
 _TESTS = Path(__file__).parents[1]
@@ -57,11 +58,11 @@ def test_a_target_that_stays_or_none_at_all_is_drawn_too(done, targets, lines):
 
 
 def test_its_files(done, tmp_path):
-    assert write_course(done, tmp_path, replace=False) == files_of_course(tmp_path)
+    assert write_walks("course", done, tmp_path, replace=False) == files_of_walks("course", tmp_path)
     page = Page((tmp_path / "course.html").read_text())
     first, second = json.loads(page.data)["robots"]
     assert [aim["reached"] for aim in first["aims"]] == [2.0, None]
     assert second["outcome"]["text"] == "all 3 targets by 6.0 s"
     assert "reached within" in page.text
     with pytest.raises(OutputError):
-        write_course(done, tmp_path, replace=False)
+        write_walks("course", done, tmp_path, replace=False)

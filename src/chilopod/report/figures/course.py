@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -14,61 +11,15 @@ from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 
 from chilopod import units
-from chilopod.netcdf import netcdf
-from chilopod.output import Content, write_all
 from chilopod.report.kit import style
-from chilopod.report.scene.encoder import has_encoder
-from chilopod.report.scene.film import FASTEST, filmed
 from chilopod.report.scene.frames import body_frames
-from chilopod.report.scene.played import SHOWN, replay
 from chilopod.steering import ARRIVAL_RADIUS, Verdict
 from chilopod.tasks.course import Driven
 
 _LAYOUTS = (style.Layout("AB;AC", 4.6, widths=(1.5, 1.0)), style.Layout("A;B;C", 9.0, heights=(2.0, 1.0, 1.0)))
-_LONGEST_FILM = 15.0  # s: it takes half as long to make
-_FILM_SIZE = (960, 640)
 _ON_WHITE = {"fc": "white", "ec": "none", "pad": 0.4}
 _ARRIVED = Verdict.ARRIVED.label
 _WAYS = tuple(each for each in style.CURVES if each != style.GREEN)  # which is for targets that were reached
-
-
-def files_of_course(folder: str | Path) -> list[Path]:
-    """What :func:`write_course` writes; the film, which comes last, only where films can be encoded."""
-    kinds = ("png", "svg", "nc", "html", *(("mp4",) if has_encoder() else ()))
-    return [Path(folder) / f"course.{kind}" for kind in kinds]
-
-
-def write_course(done: Driven, folder: str | Path, *, replace: bool = True) -> list[Path]:
-    """Write a course as a picture (``.png``, ``.svg``), record (``.nc``), replay (``.html``) and film (``.mp4``).
-
-    Parameters
-    ----------
-    done
-        The course.
-    folder, replace
-        As for :func:`chilopod.report.write_branch`, as what is returned and raised.
-    """
-    write_all(_files(done, folder), replace=replace)
-    return files_of_course(folder)
-
-
-def _files(done: Driven, folder: str | Path) -> Iterator[tuple[Path, Content]]:
-    """What cannot be made again comes first."""
-    pixels, vector, record, page, *film = files_of_course(folder)
-    yield record, netcdf(done.record)
-    with style.house_style():
-        drawn = draw(done)
-        files = (pixels, style.png(drawn)), (vector, style.svg(drawn, "course"))
-    yield from files
-    shown = done.record.isel(robot=slice(SHOWN))
-    count = done.record.sizes["robot"]
-    labels = [f"walk {i + 1}" if count > 1 else done.strategy.name for i in range(len(shown.robot))]
-    yield page, replay(shown, titles=labels, heading=_title(done)).html
-    for file in film:
-        # As many times faster as makes it short; from above all of a course is seen.
-        seconds = float(shown.time[-1] - shown.time[0])
-        speed = min(max(1.0, np.ceil(seconds / _LONGEST_FILM)), FASTEST)
-        yield file, filmed(shown, titles=labels, heading=_title(done), speed=speed, size=_FILM_SIZE)
 
 
 def draw(done: Driven, narrow: bool = False) -> Figure:
@@ -76,7 +27,7 @@ def draw(done: Driven, narrow: bool = False) -> Figure:
     figure, axes = style.figure(*_LAYOUTS, narrow)
     record = done.record
     _floor(axes["A"], record)
-    axes["A"].set_title(_title(done))
+    axes["A"].set_title(title(done))
     for robot in reversed(range(record.sizes["robot"])):
         walk, color = record.isel(robot=robot), _WAYS[robot % len(_WAYS)]
         # Of springs that nobody changed the record has one value for all times.
@@ -104,7 +55,8 @@ def draw(done: Driven, narrow: bool = False) -> Figure:
     return figure
 
 
-def _title(done: Driven) -> str:
+def title(done: Driven) -> str:
+    """Title of the picture."""
     reached = (done.record.goal_verdict == _ARRIVED).values
     return f"{done.strategy.name}: {reached.sum()} of {reached.size} targets"
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -12,11 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from chilopod import units
-from chilopod.netcdf import netcdf
-from chilopod.output import Content, write_all
 from chilopod.report.kit import style
 from chilopod.report.scene.frames import body_frames
-from chilopod.report.scene.played import SHOWN, replay
 from chilopod.steering import ARRIVAL_RADIUS
 from chilopod.tasks import Turn
 
@@ -24,46 +18,12 @@ _LAYOUTS = (style.Layout("AB;AC", 4.6, widths=(1.5, 1.0)), style.Layout("A;B;C",
 _STILLS = 5
 
 
-def files_of_turn(folder: str | Path) -> list[Path]:
-    """What :func:`write_turn` writes."""
-    return [Path(folder) / f"turn.{kind}" for kind in ("png", "svg", "nc", "html")]
-
-
-def write_turn(done: Turn, folder: str | Path, *, replace: bool = True) -> list[Path]:
-    """Write a turn as a picture (``.png``, ``.svg``), its record (``.nc``) and a replay (``.html``).
-
-    Parameters
-    ----------
-    done
-        The turn.
-    folder, replace
-        As for :func:`chilopod.report.write_branch`, as what is returned and raised.
-    """
-    write_all(_files(done, folder), replace=replace)
-    return files_of_turn(folder)
-
-
-def _files(done: Turn, folder: str | Path) -> Iterator[tuple[Path, Content]]:
-    """What cannot be made again comes first."""
-    pixels, vector, record, page = files_of_turn(folder)
-    yield record, netcdf(done.record)
-    with style.house_style():
-        drawn = draw(done)
-        files = (pixels, style.png(drawn)), (vector, style.svg(drawn, "turn"))
-    yield from files
-    shown = done.record.isel(robot=slice(SHOWN))
-    labels = [
-        f"walk {i + 1}" if done.record.sizes["robot"] > 1 else done.strategy.name for i in range(len(shown.robot))
-    ]
-    yield page, replay(shown, titles=labels, heading=_title(done)).html
-
-
 def draw(done: Turn, narrow: bool = False) -> Figure:
     """The figure; call it within :func:`chilopod.report.kit.style.house_style`."""
     figure, axes = style.figure(*_LAYOUTS, narrow)
     record, ends = done.record[["distance", "bearing"]], done.criteria.arrival
     _floor(axes["A"], done)
-    axes["A"].set_title(_title(done))
+    axes["A"].set_title(title(done))
     for robot in range(record.sizes["robot"]):
         walk = record.isel(robot=robot)
         walk = walk.where(walk.time <= ends[robot], drop=True) if np.isfinite(ends[robot]) else walk
@@ -87,7 +47,8 @@ def draw(done: Turn, narrow: bool = False) -> Figure:
     return figure
 
 
-def _title(done: Turn) -> str:
+def title(done: Turn) -> str:
+    """Title of the picture."""
     spring = ""
     if done.stiffness is not None:
         which = "k1" if done.strategy.springs and done.strategy.springs.endswith("[0]") else "k"
