@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import time
+from contextlib import suppress
 from functools import partial
 from random import Random
 
@@ -66,7 +67,8 @@ class Kills:
             time.sleep(moment)
             killed[0] = time.time() if process.poll() is None else 0.0
             if number is signal.SIGKILL:
-                os.killpg(process.pid, number)
+                with suppress(ProcessLookupError):  # it may have been done before
+                    os.killpg(process.pid, number)
             else:
                 process.send_signal(number)
 
