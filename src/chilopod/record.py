@@ -27,6 +27,42 @@ LONGEST = 1e5
 MOST_NUMBERS = 5e8
 """Of a record (4 GB)."""
 
+LARGEST = 1e100
+"""No number in a record is larger, in its unit: sums of squares stay finite."""
+
+_MOVING, _TOLD = ("time", "robot"), ("event", "robot")
+MOTION = {
+    "position": ((*_MOVING, "axis"), "m", ""),
+    "heading": (_MOVING, "rad", ""),
+    "velocity": ((*_MOVING, "axis"), "m/s", ""),
+    "heading_rate": (_MOVING, "rad/s", ""),
+    "joint_angle": ((*_MOVING, "joint"), "rad", ""),
+    "joint_rate": ((*_MOVING, "joint"), "rad/s", ""),
+    "leg_yaw": ((*_MOVING, "side"), "rad", ""),
+}
+"""Quantities of :func:`walk_record`, as in :data:`QUANTITIES`."""
+
+QUANTITIES = MOTION | {
+    "time": (("time",), "s", ""),
+    "status": (("robot",), "", ""),
+    "stiffness": ((*_MOVING, "joint"), "N*m/rad", ""),
+    "target": ((*_MOVING, "axis"), "m", "target"),
+    "distance": (_MOVING, "m", "target"),
+    "bearing": (_MOVING, "rad", "target"),
+    "foot_force": ((*_MOVING, "module", "side", "axis"), "N", "forces"),
+    "foot_load": ((*_MOVING, "module", "side"), "N", "forces"),
+    "pose": ((*_MOVING, "coordinate"), "m, 1, rad: MuJoCo's qpos", "poses"),
+    "event": (("event",), "s", "commands"),
+    "within": (("event",), "", "commands"),
+    "command": ((*_TOLD, "side"), "rad", "commands"),
+    "command_stiffness": ((*_TOLD, "joint"), "N*m/rad", "commands"),
+    "command_torque": ((*_TOLD, "joint"), "N*m", "commands"),
+    "seen_bearing": (_TOLD, "rad", "commands"),
+    "seen_distance": (_TOLD, "m", "commands"),
+}
+"""All quantities that an engine can record: dimensions, unit, and what they come with, if not always. Springs that
+cannot be adjusted, and targets that stay, are not over time."""
+
 
 @dataclass(frozen=True)
 class Recording:
@@ -217,16 +253,11 @@ def walk_record(
     """
     import xarray as xr  # takes a third of a second to load, and not all who know of records make any
 
-    over = ("time", "robot")
+    values = position, heading, velocity, heading_rate, joint_angle, joint_rate, leg_yaw
     return xr.Dataset(
         {
-            "position": ((*over, "axis"), position, {"units": "m"}),
-            "heading": (over, heading, {"units": "rad"}),
-            "velocity": ((*over, "axis"), velocity, {"units": "m/s"}),
-            "heading_rate": (over, heading_rate, {"units": "rad/s"}),
-            "joint_angle": ((*over, "joint"), joint_angle, {"units": "rad"}),
-            "joint_rate": ((*over, "joint"), joint_rate, {"units": "rad/s"}),
-            "leg_yaw": ((*over, "side"), leg_yaw, {"units": "rad"}),
+            name: (over, each, {"units": unit})
+            for (name, (over, unit, _)), each in zip(MOTION.items(), values, strict=True)
         },
         coords={
             "time": ("time", time, {"units": "s"}),

@@ -12,6 +12,7 @@ from chilopod.engine.check_referee import BREAKS, aims, halts, places, restarts,
 from chilopod.engine.check_trial import END, TIMES, Broken, Trial, expect, expect_near, expect_refused, expect_same
 from chilopod.engine.contract import Array, Command, Engine, Observation, Status, Traits, Walk, missing_parts
 from chilopod.errors import AnalysisError
+from chilopod.record import MOTION, QUANTITIES
 from chilopod.robot import Robot
 
 _HUGE = 1e4  # N*m: no joint withstands it
@@ -87,21 +88,8 @@ def _sight(trial: Trial) -> None:
 def _records(trial: Trial) -> None:
     data = trial.walked(trial.start())
     count, joints = len(trial.robots), trial.robot.body.modules - 1
-    expected = {
-        "position": (("time", "robot", "axis"), "m"),
-        "velocity": (("time", "robot", "axis"), "m/s"),
-        "heading": (("time", "robot"), "rad"),
-        "heading_rate": (("time", "robot"), "rad/s"),
-        "joint_angle": (("time", "robot", "joint"), "rad"),
-        "joint_rate": (("time", "robot", "joint"), "rad/s"),
-        "leg_yaw": (("time", "robot", "side"), "rad"),
-        "stiffness": (("time", "robot", "joint"), "N*m/rad"),
-        "distance": (("time", "robot"), "m"),
-        "bearing": (("time", "robot"), "rad"),
-        "command": (("event", "robot", "side"), "rad"),
-        "command_stiffness": (("event", "robot", "joint"), "N*m/rad"),
-    }
-    for name, (dims, units) in expected.items():
+    named = *MOTION, "stiffness", "distance", "bearing", "command", "command_stiffness"
+    for name, (dims, units, _) in ((name, QUANTITIES[name]) for name in named):
         expect(name in data, f"{name} is missing")
         expect(data[name].dims == dims, f"{name} is over {data[name].dims}, not {dims}")
         expect(data[name].attrs.get("units") == units, f"{name} is in {data[name].attrs.get('units')}, not {units}")

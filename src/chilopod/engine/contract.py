@@ -246,11 +246,20 @@ class Walk(Protocol):
         """Everything that it takes to go on, the record so far included."""
 
     def to_dataset(self) -> xr.Dataset:
-        """Record so far, see :func:`chilopod.record.walk_record`.
+        """The record so far; robots are NaN from where they stopped.
 
-        Its samples are those of :meth:`chilopod.record.Recording.samples` up to ``time``, at these times or at the
-        nearest of the engine's own within 10 ms; its attribute ``duration`` is ``time``. Robots are NaN from where they
-        stopped.
+        Trials keep a record only if it has all of this, and nothing else:
+
+        - samples as many as, and at the times of, :meth:`chilopod.record.Recording.samples`. Only where the robot's
+          file has a ``twin.timestep`` a sample may be half of it away, at the step that is nearest;
+        - the quantities of :data:`chilopod.record.QUANTITIES` that go with what was asked for, over these dimensions
+          and in these units, as float64 (``status`` is text). ``foot_load``, ``command_stiffness``, ``command_torque``
+          and what is ``seen`` may be missing; the unit of ``pose`` is the engine's affair;
+        - the coordinates of :func:`chilopod.record.walk_record`, ``event`` and ``module``;
+        - at time 0 what the robots started with: position, heading, joint angles, stiffness of the file, straight legs;
+        - no number beyond :data:`chilopod.record.LARGEST`;
+        - the attributes ``engine`` (name of its traits), ``robot`` (file of the first robot) and ``duration``
+          (:attr:`time`), and others that are numbers or text.
         """
 
 

@@ -1,4 +1,7 @@
-"""Whether what an engine gave is what was asked of it: before it is kept, for later nobody looks again."""
+"""Whether what an engine gave is what was asked of it: before it is kept, for later nobody looks again.
+
+The law is that of :meth:`chilopod.engine.Walk.to_dataset`.
+"""
 
 from __future__ import annotations
 
@@ -8,16 +11,17 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from chilopod.engine import Status, Walk, event_times
+from chilopod.engine import Status, Walk, engine_named, event_times
 from chilopod.errors import AnalysisError, in_words
-from chilopod.record import walk_record
+from chilopod.record import LARGEST, MOTION, QUANTITIES
 from chilopod.steering import Target
+from chilopod.trials.description import file_text
 from chilopod.trials.disturbance import Drawn
 from chilopod.trials.trial import Trial
 
-_MOTION = ("position", "heading", "velocity", "heading_rate", "joint_angle", "joint_rate", "leg_yaw")
-_NEAR = 1e-6  # rad, m, s, of stiffness relative
-_STEP = 0.01  # s, that an engine with steps of its own may be off
+_NEAR = 1e-6  # rad, m, of stiffness relative
+_SAME_INSTANT = 1e-9  # s
+_MAY_LACK = ("foot_load", "command_stiffness", "command_torque", "seen_bearing", "seen_distance")
 
 
 def check_asked(data: Any, walk: Walk, trials: Sequence[Trial], drawn: Sequence[Drawn]) -> xr.Dataset:
@@ -57,7 +61,7 @@ def check_finite(values: Mapping[str, Any], engine: str) -> None:
     """
     label, there = str(values["status"][0]), np.isfinite(values["heading"][:, 0])
     count = len(there) if label == Status.WALKED.label else np.count_nonzero(there)
-    for name in _MOTION:
+    for name in MOTION:
         if count == len(there) and np.isfinite(values[name].sum()):  # as nearly always
             continue
         finite = np.isfinite(values[name][:, 0]).reshape(len(there), -1).all(axis=1)
@@ -66,37 +70,63 @@ def check_finite(values: Mapping[str, Any], engine: str) -> None:
             raise AnalysisError(f"gave what was not asked for: {problem}", field=f"engine {engine}")
 
 
-def _motion(times: Any, robots: int, joints: int) -> xr.Dataset:
-    """Like the motion in a record, without its numbers."""
-    over = len(times), robots
-    one, two, many = (np.broadcast_to(0.0, (*over, *more)) for more in ((), (2,), (joints,)))
-    return walk_record(times, two, one, two, one, many, many, two)
-
-
 def _outline(data: xr.Dataset, walk: Walk, first: Trial, robots: int) -> str:
     """What is wrong with times, variables or shapes."""
     if not (walk.time == first.duration or (first.course and 0.0 <= walk.time < first.duration)):
         return f"it walked {walk.time:g} s instead of {first.duration:g} s"
-    times, wanted = data["time"].values, first.recording.samples(walk.time)
+    times, wanted, modules = data["time"].values, first.recording.samples(walk.time), first.robot.body.modules
     if times.shape != wanted.shape:
         return f"{times.size} samples instead of {wanted.size}"
-    if not np.all(np.abs(times - wanted) <= _STEP) or (np.diff(times) <= 0.0).any():
+    off = 0.5 * first.robot.twin.timestep if first.robot.twin else 0.0
+    if not np.all(np.abs(times - wanted) <= off + _SAME_INSTANT):
         return f"samples at other times than every {1.0 / first.rate:g} s"
-    if data.attrs.get("duration") != walk.time:
-        return f"its duration is {data.attrs.get('duration')}, not {walk.time:g} s"
-    modules = first.robot.body.modules
-    motion = _motion(times, robots, modules - 1)
-    if first.forces:
-        over = ("time", "robot", "module", "side", "axis")
-        motion["foot_force"] = over, np.broadcast_to(0.0, (times.size, robots, modules, 2, 2))
-    others = {"status": True, "stiffness": True, "pose": first.poses, "target": isinstance(first.target, Target)}
-    for name in (*motion, *(each for each, asked in others.items() if asked)):
-        if name not in data:
+    told = event_times(first.controller, first.robot.gait, walk.time) if first.controller else ()
+    events = np.array([time for time, _ in told])
+    numbers = {"robot": np.arange(robots), "joint": np.arange(1, modules), "module": np.arange(1, modules + 1)}
+    names = {"side": np.array(["left", "right"]), "axis": np.array(["x", "y"])}
+    coords = {name: each for name, each in {**numbers, **names}.items() if name != "module" or first.forces}
+    for name, values in coords.items():
+        if not np.array_equal(data[name].values, values):
+            return f"{name} is {data[name].values}"
+    found = data["event"].values if "event" in data else np.zeros(0)
+    if found.shape != events.shape or not np.all(np.abs(found - events) <= _NEAR):
+        return f"{found.size} commands instead of {events.size}, or at other times"
+    sizes = {name: len(values) for name, values in coords.items()} | {"time": times.size, "event": events.size}
+    return _quantities(data, first, sizes) or _attributes(data, first, walk)
+
+
+def _quantities(data: xr.Dataset, first: Trial, sizes: Mapping[str, int]) -> str:
+    """What is wrong with variables, in a record of these sizes."""
+    aimed, commands = first.target is not None, sizes["event"] > 0
+    asked = {"": True, "target": aimed, "forces": first.forces, "poses": first.poses, "commands": commands}
+    # Where all targets of a course are out of reach there never is one.
+    may_lack = {*_MAY_LACK, *(("target", "distance", "bearing") if first.course else ())}
+    for name, (_, _, why) in QUANTITIES.items():
+        if asked[why] and name not in may_lack and name not in data:
             return f"{name} is missing"
-    for name, each in motion.items():
+    for name in map(str, data.variables):
+        over, unit, why = QUANTITIES.get(name, ((), "", "coordinate"))
+        if not asked.get(why, name in sizes):
+            return f"{name} is no part of it"
+        if why == "coordinate":
+            continue
         found = data[name]
-        if (found.dims, found.shape, found.dtype) != (each.dims, each.shape, each.dtype):
-            return f"{name} is {found.dtype} over {dict(found.sizes)}, not {each.dtype} over {dict(each.sizes)}"
+        dims = tuple(each for each in over if each in found.dims or name not in ("stiffness", "target"))
+        shape = tuple(sizes.get(each, found.sizes.get(each)) for each in dims)
+        kind, units = np.dtype(np.float64), found.attrs.get("units", "")
+        kind, unit = (found.dtype if name == "status" else kind), (units if name == "pose" else unit)
+        if (found.dims, found.shape, found.dtype, units) != (dims, shape, kind, unit):
+            told = f"{found.dtype} over {dict(found.sizes)} in {units!r}"
+            return f"{name} is {told}, not {kind} over {dict(zip(dims, shape, strict=True))} in {unit!r}"
+    return ""
+
+
+def _attributes(data: xr.Dataset, first: Trial, walk: Walk) -> str:
+    """What is wrong with attributes of the whole."""
+    told = {"engine": engine_named(first.engine).traits.name, "robot": file_text(first.robot), "duration": walk.time}
+    for name, value in told.items():
+        if data.attrs.get(name) != value:
+            return f"its attribute {name} is {str(data.attrs.get(name))[:40]!r}, not {str(value)[:40]!r}"
     return ""
 
 
@@ -105,15 +135,18 @@ def _content(data: xr.Dataset, walk: Walk, trials: Sequence[Trial], drawn: Seque
     first, status = trials[0], data["status"].values.tolist()
     if status != [each.label for each in walk.status]:
         return f"status is {status}, not that of the walk"
-    angle, heading, place, yaw = (data[each].values[0] for each in ("joint_angle", "heading", "position", "leg_yaw"))
+    for name, each in data.data_vars.items():
+        if name != "status" and (np.abs(each.values) > LARGEST).any():
+            return f"{name} has numbers beyond {LARGEST:g}"
+    angle, heading, position, yaw = (data[name].values[0] for name in ("joint_angle", "heading", "position", "leg_yaw"))
     places = data["target"].transpose(..., "robot", "axis").values if isinstance(first.target, Target) else None
     springs = data["stiffness"].transpose(..., "robot", "joint").values.reshape(-1, *data["joint_angle"].shape[1:])[0]
     for robot, (trial, told) in enumerate(zip(trials, drawn, strict=True)):
         off = {
+            "position": position[robot],
+            "leg_yaw": yaw[robot],
             "joint_angle": angle[robot] - told.joint_angles,
             "heading": np.sin(0.5 * (heading[robot] - told.heading)),
-            "position": place[robot],
-            "leg_yaw": yaw[robot] if trial.controller is None else 0.0,
             "stiffness": springs[robot] / np.array(trial.robot.springs.stiffness) - 1.0,
         }
         if places is not None and isinstance(trial.target, Target):
@@ -121,9 +154,4 @@ def _content(data: xr.Dataset, walk: Walk, trials: Sequence[Trial], drawn: Seque
         for name, error in off.items() if np.isfinite(heading[robot]) else ():
             if not np.all(np.abs(error) <= _NEAR):
                 return f"{name} of robot {robot} does not start as asked"
-    if first.controller is not None and first.course is None:
-        asked = np.array([time for time, _ in event_times(first.controller, first.robot.gait, first.duration)])
-        found = data["event"].values if "event" in data else np.zeros(0)
-        if found.shape != asked.shape or not np.all(np.abs(found - asked) <= _NEAR):
-            return f"{found.size} commands instead of {asked.size}, or at other times"
     return ""
