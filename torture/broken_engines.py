@@ -99,11 +99,12 @@ RECORDS = {
     "the last sample missing": "        return data.isel(time=slice(None, -1))\n",
     "a sample more": "        more = data.isel(time=[-1]).assign_coords(time=[data.time.values[-1] + 0.01])\n"
     "        return xr.concat([data, more], 'time', data_vars='minimal')\n",
-    "times a little off": "        return data.assign_coords(time=('time', data.time.values + one_of((1e-6, 1e-3, 9e-3)),"
-    " data.time.attrs))\n",
+    "times a little off": "        times = data.time.values + one_of((1e-6, 1e-3, 9e-3))\n"
+    "        return data.assign_coords(time=('time', times, data.time.attrs))\n",
     "legs turned at the start": "        data.leg_yaw[:, :, one_of((0, 1))] += 0.1\n        return data\n",
     "another duration": "        return data.assign_attrs(duration=one_of((1.0, 2.01, '2 s', np.nan, None)))\n",
-    "another robot's file": "        return data.assign_attrs(robot=one_of(('', 'aoi2022', None, data.attrs['robot'] + 'x')))\n",
+    "another robot's file": "        text = data.attrs['robot']\n"
+    "        return data.assign_attrs(robot=one_of(('', 'aoi2022', None, text + 'x', text[:-1])))\n",
     "another engine's name": "        return data.assign_attrs(engine=one_of(('twin', '', None)))\n",
     "another unit": f"{_VARIABLE}        data[name].attrs = one_of(({{'units': 'deg'}}, {{}}))\n        return data\n",
     "time in another unit": "        data['time'].attrs['units'] = 'ms'\n        return data\n",

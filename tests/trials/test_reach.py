@@ -6,7 +6,6 @@ import subprocess
 import sys
 import textwrap
 import threading
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -81,12 +80,6 @@ COUNT, STATE = [0], [0.0]
 
 
 @dataclass(frozen=True)
-class Random(Attr):
-    def act(self, event, seen):
-        return Command(leg_yaw=[[np.random.uniform(0.0, 0.1), 0.0]])  # noqa: NPY002
-
-
-@dataclass(frozen=True)
 class Counting(Attr):
     def act(self, event, seen):
         COUNT[0] += 1
@@ -100,13 +93,7 @@ class Remembering(Attr):
         return Command(leg_yaw=[[0.1, 0.0]])
 
 
-@dataclass(frozen=True)
-class Clock(Attr):
-    def act(self, event, seen):
-        return Command(leg_yaw=[[time.perf_counter() % 1e-3, 0.0]])
-
-
-@pytest.mark.parametrize("controller", [Random(), Counting(), Remembering(), Clock()])
+@pytest.mark.parametrize("controller", [Counting(), Remembering()])
 def test_a_controller_that_does_not_repeat_itself_is_not_kept(controller, tmp_path, caplog):
     records = run([Trial(PLANAR, 0.7, seed, controller=controller) for seed in range(2)], tmp_path)
     assert [each.status.item() for each in records] == ["walked"] * 2
@@ -132,6 +119,89 @@ def test_a_controller_whose_state_changes_after_the_first_cycle_is_not_kept(tmp_
         run([Trial(PLANAR, 2.0, seed, controller=Late())], tmp_path)
     assert list(tmp_path.iterdir()) == []
     assert {"what its code can reach changes while it steers" in each.message for each in caplog.records} == {True}
+
+
+CHANCE = """
+import datetime, os, random, secrets, sys, time, uuid
+import numpy as np
+from dataclasses import dataclass
+from datetime import datetime as day
+from random import random as drawn
+from time import perf_counter as clock
+from chilopod.engine import Command, Event
+now, TABLE = day.now, {"clock": time.monotonic}
+def helper(): return time.time()
+@dataclass(frozen=True)
+class Own:
+    id: int = 3
+    time: float = 0.5
+    def events(self, gait): return [Event("now", 0.0, 0.1)]
+    def act(self, event, seen):
+        yaw = 0.0
+        if seen.time > 1.0:  # after the first cycle, which is walked twice
+            BODY
+            yaw = 0.1 * (float(yaw) % 1.0)
+        return Command(leg_yaw=[[yaw, 0.0]])
+"""
+BY_CHANCE = {
+    "yaw = np.random.uniform()": "numpy.random.uniform",
+    "np.random.seed(1); yaw = np.random.rand()": "numpy.random.seed",
+    "rng = np.random.default_rng(); yaw = rng.random()": "default_rng without a seed",
+    "yaw = np.random.default_rng(None).random()": "default_rng without a seed",
+    "make = np.random.default_rng; yaw = make().random()": "default_rng without a seed",
+    "yaw = random.random()": "random.random",
+    "yaw = drawn()": "random.random",
+    "yaw = random.Random().random()": "Random without a seed",
+    "yaw = random.SystemRandom().random()": "random.SystemRandom",
+    "yaw = [random.gauss(0, 1) for _ in range(2)][0]": "random.gauss",
+    "yaw = (lambda: random.gauss(0, 1))()": "random.gauss",
+    "yaw = secrets.randbelow(9)": "secrets.randbelow",
+    "yaw = uuid.uuid4().int": "uuid.uuid4",
+    "yaw = time.time()": "time.time",
+    "yaw = clock()": "time.perf_counter",
+    "t = time; yaw = t.time()": "time.time",
+    "yaw = getattr(time, 'time')()": "time",
+    "import time as t; yaw = t.time()": "time.time",
+    "from time import sleep, time; yaw = time()": "time.time",
+    "import numpy.random; yaw = numpy.random.rand()": "numpy.random.rand",
+    "import numpy.random as nr; yaw = nr.rand()": "numpy.random.rand",
+    "yaw = TABLE['clock']()": "time.monotonic",
+    "yaw = helper()": "time.time",
+    "yaw = datetime.datetime.now().second": "datetime.now",
+    "yaw = day.today().second": "datetime.today",
+    "yaw = datetime.date.today().day": "date.today",
+    "yaw = now().second": "datetime.now",
+    "yaw = os.getpid()": "os.getpid",
+    "yaw = os.urandom(1)[0]": "os.urandom",
+    "yaw = hash('abc')": "builtins.hash",
+    "yaw = id(self)": "builtins.id",
+    "yaw = max(map(id, [self]))": "builtins.id",
+}
+DETERMINED = (
+    "yaw = self.id + self.time + seen.time",
+    "yaw = np.random.default_rng(7).random()",
+    "yaw = np.random.default_rng(seed=self.id).random()",
+    "rng = np.random.Generator(np.random.PCG64(self.id)); yaw = rng.random()",
+    "yaw = random.Random(self.id).random()",
+    "yaw = uuid.uuid5(uuid.NAMESPACE_DNS, 'a').int",
+    "time.sleep(0.0); hash = self.id; yaw = hash",
+    "yaw = datetime.datetime(2020, 1, 2).day + len(os.sep)",
+    "yaw = {self: 0.1}[self]",
+)
+
+
+@pytest.mark.parametrize("body", [*BY_CHANCE, *DETERMINED])
+def test_what_answers_otherwise_in_every_process_walks_and_is_not_kept(body, tmp_path, monkeypatch, caplog):
+    (tmp_path / "own_chance.py").write_text(CHANCE.replace("BODY", body))
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "own_chance", raising=False)
+    asked = Trial(PLANAR, 1.5, rate=10.0, controller=importlib.import_module("own_chance").Own())
+    (record,) = run([asked], tmp_path / "kept")
+    sys.modules.pop("own_chance")
+    assert record.status.item() == "walked"
+    assert len(list((tmp_path / "kept").iterdir())) == (body in DETERMINED)
+    (said,) = [each.message for each in caplog.records] or [""]
+    assert (f": {BY_CHANCE[body]}, which answers otherwise every time" in said) if body in BY_CHANCE else said == ""
 
 
 @dataclass(frozen=True)

@@ -39,6 +39,7 @@ import numpy as np
 
 from chilopod.engine.named import path_of
 from chilopod.errors import in_words
+from chilopod.trials.chance import by_chance, chance_in
 
 Parts = Iterator[tuple[str, object]]
 
@@ -67,6 +68,10 @@ _FIELD = ("name", "default", "default_factory", "init", "compare", "kw_only", "m
 
 class UnknownKindError(Exception):
     """Something cannot be described; says in words which, and where it was reached."""
+
+
+class UndeterminedError(UnknownKindError):
+    """Something answers otherwise every time."""
 
 
 class Reach:
@@ -109,6 +114,8 @@ class Reach:
         if kind in _ATOMS:
             return self._put(kind.__name__, hex(value) if isinstance(value, int) else repr(value))
         named = self._named(value)
+        if named and by_chance(value) and not isinstance(value, ModuleType):
+            raise UndeterminedError(f"{path}: {by_chance(value)}")
         if named:
             return self._put("named", named)
         if kind not in _VALUES:
@@ -178,8 +185,12 @@ class Reach:
         space = function.__globals__
         if self._is_own(space.get("__name__", "")):
             imported = self._imported(function.__code__, space, path)
-            names = _named_in(function.__code__) | imported.keys()
-            yield from self._reached(names, {**vars(builtins), **space, **imported}, "", set())
+            known = {**vars(builtins), **space, **imported}
+            cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
+            chance = chance_in(function.__code__, {**known, **{name: _content(cell) for name, cell in cells}})
+            if chance:
+                raise UndeterminedError(f"{path}: {chance}")
+            yield from self._reached(_named_in(function.__code__) | imported.keys(), known, "", set())
             home = sys.modules.get(space.get("__name__", ""))
             if home is not None and vars(home) is space:
                 yield ".__module__", home
@@ -188,7 +199,8 @@ class Reach:
         """Whatever these names may lead to, in modules of one's own also theirs."""
         for name in sorted(names & space.keys()):
             value = space[name]
-            yield f" -> {prefix}{name}", value
+            if isinstance(value, ModuleType) or not by_chance(value):  # a mere name may stand for an attribute
+                yield f" -> {prefix}{name}", value
             if isinstance(value, ModuleType) and id(value) not in inside and self._is_own(value.__name__):
                 yield from self._reached(names, vars(value), f"{prefix}{name}.", inside | {id(value)})
 
@@ -320,6 +332,13 @@ _KINDS: dict[type, Callable[[Any], Parts]] = {
     type(object.__init__): _SLOT,
     type("".__str__): _attributes("__self__", "__name__"),
 }
+
+
+def _content(cell: CellType) -> object:
+    try:
+        return cell.cell_contents
+    except ValueError:  # nothing yet
+        return None
 
 
 def _named_in(code: CodeType) -> set[str]:

@@ -21,7 +21,7 @@ from chilopod.sources import digest
 from chilopod.steering import Course, Target
 from chilopod.trials.description import classes_in, code_of, is_findable, is_ours, plain, robot_text, sources_of
 from chilopod.trials.disturbance import Disturbance
-from chilopod.trials.reach import UnknownKindError
+from chilopod.trials.reach import UndeterminedError, UnknownKindError
 
 _DIGITS = 16
 _ABOVE = ("analysis", "cli", "gym", "live", "paper", "report", "stability", "tasks")
@@ -162,8 +162,13 @@ class Trial:
         try:
             return code_of(self.controller) + sources_of(self.engine), why if known_here else ""
         except UnknownKindError as error:
-            can = "numbers, text, arrays, lists, dictionaries, enums, functions, classes and modules can"
-            return f"of this process {id(self.controller):x}", f"{error}, which cannot be described; {can}"
+            why = (
+                "which cannot be described; numbers, text, arrays, lists, dictionaries, enums, functions, classes and "
+            )
+            why += "modules can"
+            if isinstance(error, UndeterminedError):
+                why = "which answers otherwise every time; chance with a seed, and the time that is seen, do not"
+            return f"of this process {id(self.controller):x}", f"{error}, {why}"
 
     def as_now(self) -> Trial:
         """The same trial, with code and fields of its controller as they are now."""
