@@ -66,9 +66,6 @@ _VALUES = f"{_VARIABLE}        values = data[name].values\n"
 RECORDS = {
     "three samples": "        return data.isel(time=slice(3))\n",
     "half of the samples": "        return data.isel(time=slice(None, None, 2))\n",
-    "one sample less": "        return data.isel(time=slice(-1))\n",
-    "another duration": "        return data.assign_attrs(duration=data.duration + one_of((1.0, -0.5, np.nan)))\n",
-    "another place": "        return data.assign(position=data.position + 0.01)\n",
     "times that stand still": "        data['time'] = data.time.where(data.time != data.time[3], data.time[2])\n"
     "        return data\n",
     "no samples": "        return data.isel(time=slice(0))\n",
