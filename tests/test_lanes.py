@@ -1,8 +1,10 @@
 """Numbers in lanes: the same bits in any number of lanes and beside any others, and the functions of them."""
 
+import json
 import os
 import subprocess
 import sys
+from ctypes.util import find_library
 
 import numpy as np
 import pytest
@@ -91,6 +93,25 @@ def test_a_wish_not_to_compile_is_refused_in_one_line():
     assert done.returncode == 2
     assert done.stderr.startswith("error: NUMBA_DISABLE_JIT = 1: ")
     assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(("name", "value"), [("", "zzz"), ("", "tbb"), ("", "safe"), ("_PRIORITY", "zzz")])
+@pytest.mark.parametrize("command", ["['walk', 'aoi2022-planar', '--duration', '0.1 s']", "['doctor', '--json']"])
+def test_threads_that_cannot_be_had_are_one_line(command, name, value):
+    if value in ("tbb", "safe") and find_library("tbb"):
+        pytest.skip("they can be had")
+    wish = {f"NUMBA_THREADING_LAYER{name}": value}
+    done = _python(f"from chilopod.cli import main; raise SystemExit(main({command}))", **wish)
+    line = f"NUMBA_THREADING_LAYER{name} = '{value}': cannot be loaded; allowed: "
+    if "doctor" in command:
+        assert done.returncode == 3
+        (found,) = [each for each in json.loads(done.stdout)["findings"] if each["mend"] and each["name"] == "numba"]
+        assert line in found["found"]
+        assert found["mend"] == f"unset NUMBA_THREADING_LAYER{name}"
+    else:
+        assert done.returncode == 2
+        assert done.stderr.startswith(f"error: {line}")
+        assert done.stderr.count("\n") == 1
 
 
 def test_threads_that_wait_sleep_unless_the_user_says_otherwise():

@@ -23,7 +23,8 @@ _COMMANDS = {
 }
 _VARIABLES: dict[str, tuple[str, ...]] = {
     "NUMBA_NUM_THREADS": ("0", "1", "7", "64", "-1", "abc", "", "1e9"),
-    "NUMBA_THREADING_LAYER": ("nosuch", "workqueue", "omp", "safe"),
+    "NUMBA_THREADING_LAYER": ("nosuch", "workqueue", "omp", "safe", "tbb", "forksafe", ""),
+    "NUMBA_THREADING_LAYER_PRIORITY": ("nosuch", "omp", "workqueue omp tbb", "omp,tbb,workqueue", ""),
     "NUMBA_CACHE_DIR": ("nowhere/at/all", "/proc", "/dev/null", ""),
     "NUMBA_DISABLE_JIT": ("0", "1", "abc"),
     "NUMBA_DEBUGINFO": ("1",),

@@ -23,6 +23,18 @@ if numba.config.DISABLE_JIT:
         "chilopod does not run without compiling", field="NUMBA_DISABLE_JIT", value=1, allowed="0, or unset"
     )
 
+_LAYERS = {
+    "NUMBA_THREADING_LAYER": "omp, workqueue, threadsafe, forksafe; with the package tbb also tbb, safe; or unset",
+    "NUMBA_THREADING_LAYER_PRIORITY": "tbb, omp and workqueue in any order, or unset",
+}
+if _LAYERS.keys() & os.environ.keys():
+    try:
+        numba.get_num_threads()  # otherwise it is found in the midst of a walk
+    except ValueError as error:
+        _name = "NUMBA_THREADING_LAYER" + "_PRIORITY" * ("PRIORITY" in str(error))
+        _value = os.environ.get(_name)
+        raise ParameterError("cannot be loaded", field=_name, value=_value, allowed=_LAYERS[_name]) from None
+
 
 def _compiled(function: Any = None, **options: Any) -> Any:
     """``numba.njit`` with the compiled code kept on disk where it can be."""

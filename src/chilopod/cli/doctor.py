@@ -101,8 +101,8 @@ def _versions() -> list[Finding]:
         Finding("python", f"{platform.python_version()} ({platform.system()} {platform.machine()})"),
     ]
     for module, package in _PACKAGES.items():
-        # What uses MuJoCo here may be able to import it where it cannot be imported alone.
-        fault = _fault("chilopod.twin" if module == "mujoco" else module)
+        # What uses a package here may be able to import it where it cannot be imported alone, or the other way round.
+        fault = _fault({"mujoco": "chilopod.twin", "numba": "chilopod.compiled"}.get(module, module))
         if fault:
             wishes = [] if "No module" in fault else settings(module)
             mend = f"unset {' '.join(wishes)}" if wishes else _again(package)
