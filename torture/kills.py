@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import time
-from contextlib import suppress
 from functools import partial
 from random import Random
 
@@ -16,7 +15,7 @@ import xarray as xr
 from in_process import Place, snapshot
 from outcomes import Ending, FoundFault, Kind, Outcome, is_temporary, judged
 from processes import commanded
-from studies import content, put, whole
+from studies import Whole, content, put, whole
 
 _PLANAR = ("walk", "aoi2022-planar", "--seed", "1", "--json")
 _SHORT = (*_PLANAR, "--duration", "200 s", "--rate", "2", "--repeats", "600")
@@ -33,6 +32,8 @@ STUDIES = {
 """About a minute each, and how often each is chosen."""
 MOMENTS = 2.0, 12.0
 """s after its start at which a study is killed."""
+CHAINED = 8.0, 12.0
+"""The same, where it is interrupted again and again."""
 LOST = 5.0
 """s of work that may be lost."""
 _LEFT = 3  # trials that are missing when it is asked again to the end
@@ -61,28 +62,14 @@ class Kills:
         put({f"kept/{name}": right.kept[name] for name in had}, place.here)
         words = f"chilopod {' '.join(study)}; {number.name} after {moment:.1f} s, {len(had)} of {len(names)} there"
         place.tried.write_text(words)
-        begun, killed = time.time(), [0.0]
-
-        def kill(process: subprocess.Popen[bytes]) -> None:
-            time.sleep(moment)
-            killed[0] = time.time() if process.poll() is None else 0.0
-            if number is signal.SIGKILL:
-                with suppress(ProcessLookupError):  # it may have been done before
-                    os.killpg(process.pid, number)
-            else:
-                process.send_signal(number)
-
-        _stopped(_by(study, place, kill), number, place)
-        kept = content(place.here / "kept")
-        wrong = [name for name, each in kept.items() if not is_temporary(name) and each != right.kept.get(name)]
-        if wrong:
-            raise FoundFault(Kind.LEFT, f"{wrong[0]} is not whole after {number.name}")
-        new = [name for name in kept if not is_temporary(name) and name not in had]
+        begun = time.time()
+        _, killed = _interrupted(study, number, moment, place)
+        new = _whole_ones(right, place, number) - had
         written = [(place.here / "kept" / name).stat().st_mtime for name in new]
         again = self._again(study, number, place, chance)
         # Until the first trial is there, the process starts, and has no more to do for that than when nothing is left.
-        lost = max(0.0, killed[0] - (max(written) if written else begun + again))
-        if killed[0] and lost > LOST:
+        lost = max(0.0, killed - (max(written) if written else begun + again))
+        if killed and lost > LOST:
             raise FoundFault(Kind.REPEATED, f"{lost:.1f} s of work lost, {len(new)} new after {moment:.1f} s")
         return Outcome(Kind.ENDED, f"{len(new)} new after {moment:.1f} s, {lost:.1f} s lost")
 
@@ -99,18 +86,82 @@ class Kills:
         judged(second, {}, {name: 0 for name in snapshot(place.root) if not name.startswith("tmp/")})
         if second.code != 0 or second.out != right.ending.out:
             raise FoundFault(Kind.WRONG, f"another result after {number.name}: {second.err[-200:]}")
-        now = content(place.here)
-        for name, each in right.files.items():
-            if not _same(name, now.get(name), each):
-                raise FoundFault(Kind.WRONG, f"{name} is another after {number.name}")
         after = snapshot(place.here / "kept")
         twice = [name for name in right.kept if name not in left and before[name] != after[name]]
         if twice:
             raise FoundFault(Kind.REPEATED, f"{len(twice)} files are new, such as {twice[0]}")
-        beside = {*now} - {*right.files}
-        if beside:
-            raise FoundFault(Kind.LEFT, f"{', '.join(sorted(beside))} after {number.name}")
+        _all_there(right, place, number)
         return seconds
+
+
+class KillChains(Kills):
+    """A study from its beginning, interrupted every ten seconds and asked for again, until it ends: it gets on."""
+
+    name = "kill-chains"
+    per_minute = 1
+
+    def attack(self, chance: Random, place: Place) -> Outcome:
+        """One study."""
+        (study,) = chance.choices(tuple(self._studies), tuple(self._studies.values()))
+        right = whole(place, *study, by=_by)
+        place.tried.write_text(f"chilopod {' '.join(study)}; again and again")
+        had, kills, worst = set[str](), 0, 0.0
+        while True:
+            (number,) = chance.choices(tuple(_SIGNALS), tuple(_SIGNALS.values()))
+            ending, killed = _interrupted((*study, "--force"), number, chance.uniform(*CHAINED), place)
+            now = _whole_ones(right, place, number)
+            if ending.code == 0:
+                break
+            if now <= had < right.kept.keys():
+                raise FoundFault(Kind.REPEATED, f"no new trial beside {len(had)}, {number.name} number {kills + 1}")
+            written = [(place.here / "kept" / name).stat().st_mtime for name in now - had]
+            lost = killed - max(written, default=killed)
+            if lost > LOST:
+                raise FoundFault(Kind.REPEATED, f"{lost:.1f} s of work lost, {number.name} number {kills + 1}")
+            had, kills, worst = now, kills + 1, max(worst, lost)
+        if ending.out != right.ending.out:
+            raise FoundFault(Kind.WRONG, f"another result after {kills} kills: {ending.err[-200:]}")
+        _all_there(right, place, number)
+        return Outcome(Kind.ENDED, f"done after {kills} kills, at most {worst:.1f} s lost at each")
+
+
+def _interrupted(study: tuple[str, ...], number: signal.Signals, moment: float, place: Place) -> tuple[Ending, float]:
+    """How a study ends that is sent a signal after some seconds, and when that was; 0 if it was done before."""
+    killed = [0.0]
+
+    def kill(process: subprocess.Popen[bytes]) -> None:
+        try:
+            process.wait(moment)
+        except subprocess.TimeoutExpired:
+            killed[0] = time.time()
+            if number is signal.SIGKILL:
+                os.killpg(process.pid, number)
+            else:
+                process.send_signal(number)
+
+    ending = _by(study, place, kill)
+    _stopped(ending, number, place)
+    return ending, killed[0]
+
+
+def _whole_ones(right: Whole, place: Place, number: signal.Signals) -> set[str]:
+    """Names of the trials that are there; each is the right one."""
+    kept = {name: each for name, each in content(place.here / "kept").items() if not is_temporary(name)}
+    wrong = [name for name, each in kept.items() if each != right.kept.get(name)]
+    if wrong:
+        raise FoundFault(Kind.LEFT, f"{wrong[0]} is not whole after {number.name}")
+    return {*kept}
+
+
+def _all_there(right: Whole, place: Place, number: signal.Signals) -> None:
+    """Make sure that the files are those that should be there, and no others."""
+    now = content(place.here)
+    for name, each in right.files.items():
+        if not _same(name, now.get(name), each):
+            raise FoundFault(Kind.WRONG, f"{name} is another after {number.name}")
+    beside = {*now} - {*right.files}
+    if beside:
+        raise FoundFault(Kind.LEFT, f"{', '.join(sorted(beside))} after {number.name}")
 
 
 def _same(name: str, now: bytes | None, right: bytes) -> bool:
@@ -131,3 +182,5 @@ def _stopped(ending: Ending, number: signal.Signals, place: Place) -> None:
         raise FoundFault(Kind.CODE, f"exit code {ending.code} after {number.name}: {ending.err[-200:]}")
     elif "Traceback" in ending.err:
         raise FoundFault(Kind.TRACEBACK, f"after {number.name}: {ending.err[-200:]}")
+    elif number is signal.SIGTERM and any(map(is_temporary, after)):
+        raise FoundFault(Kind.LEFT, f"{next(filter(is_temporary, after))} after {number.name}")

@@ -25,7 +25,7 @@ from disks import Disks
 from edited_controllers import EditedControllers
 from environments import Environments
 from invariances import Invariances
-from kills import Kills
+from kills import KillChains, Kills
 from live_clients import LiveClients
 from outcomes import FINE, SENTENCES, Kind
 from processors import Processors
@@ -39,7 +39,7 @@ from workers import Attacks, tried
 
 RESULTS = Path(__file__).with_name("results.json")
 _KINDS = (
-    *(RobotFiles, Arguments, SavedTrials, SavedBranches, Kills, Disks, Streams, Environments),
+    *(RobotFiles, Arguments, SavedTrials, SavedBranches, Kills, KillChains, Disks, Streams, Environments),
     *(SameBits, Verbs, Invariances, Processors, LiveClients, EditedControllers, BrokenEngines),
 )
 CLASSES: dict[str, Callable[[], Attacks]] = {each.name: each for each in _KINDS}
