@@ -36,6 +36,7 @@ CHAINED = 8.0, 12.0
 """The same, where it is interrupted again and again."""
 LOST = 5.0
 """s of work that may be lost."""
+_LONGER = 5  # times as many trials, where it is interrupted again and again
 _LEFT = 3  # trials that are missing when it is asked again to the end
 _SIGNALS = {signal.SIGKILL: 5, signal.SIGINT: 3, signal.SIGTERM: 2}
 _PATIENCE = 600.0  # s
@@ -103,6 +104,8 @@ class KillChains(Kills):
     def attack(self, chance: Random, place: Place) -> Outcome:
         """One study."""
         (study,) = chance.choices(tuple(self._studies), tuple(self._studies.values()))
+        at = study.index("--repeats") + 1
+        study = (*study[:at], str(_LONGER * int(study[at])), *study[at + 1 :])
         right = whole(place, *study, by=_by)
         place.tried.write_text(f"chilopod {' '.join(study)}; again and again")
         had, kills, worst = set[str](), 0, 0.0
