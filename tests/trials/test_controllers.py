@@ -311,7 +311,7 @@ def test_equal_trials_have_one_file_whatever_kinds_of_numbers_they_were_given():
 
 
 def test_our_own_controllers_have_the_sources_of_chilopod_instead_of_a_text():
-    assert trial(LegYawController()).code == ("", "")
+    assert trial(LegYawController()).code == ("", "", "")
     assert '"class": "chilopod.steering.leg_yaw:LegYawController"' in trial(LegYawController()).text
 
 

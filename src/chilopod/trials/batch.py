@@ -81,7 +81,7 @@ def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
     """
     first = trials[0]
     # Who steers otherwise when asked the same again is found out before.
-    doubts = first.code[1] or _doubts(first)
+    doubts = first.code[1] or first.code[2] or _doubts(first)
     walk, drawn, referee = _steered(trials, first.duration)
     name = type(first.controller).__name__
     if first.controller is not None and json.dumps(plain(first.controller, name)) != json.dumps(first.steering):

@@ -21,7 +21,7 @@ from chilopod.trials.reach import Reach
 
 _DIGITS = 16
 _LARGEST = 2**63
-_described: ContextVar[dict[object, str] | None] = ContextVar("described", default=None)
+_described: ContextVar[dict[object, tuple[str, str]] | None] = ContextVar("described", default=None)
 
 
 def plain(value: object, field: str) -> Any:
@@ -69,8 +69,9 @@ def plain(value: object, field: str) -> Any:
     )
 
 
-def code_of(value: object) -> str:
-    """A digest of everything that the code of what :func:`plain` takes can reach, as it is now; empty for our own.
+def code_of(value: object) -> tuple[str, str]:
+    """A digest of everything that the code of what :func:`plain` takes can reach, as it is now, and what of that
+    answers otherwise every time; empty for our own.
 
     Raises
     ------
@@ -78,13 +79,18 @@ def code_of(value: object) -> str:
         If it reaches what cannot be described.
     """
     told: list[str] = []
+    chances: list[str] = []
     for each in _parts(value):
         kind, beside = type(each), Reach()
-        told.append(_once(kind, kind.__module__, kind.__qualname__))
+        found, chance = _once(kind, kind.__module__, kind.__qualname__)
+        told.append(found)
+        chances.append(chance)
         for name in sorted(getattr(each, "__dict__", {}).keys() - _declared(each)):
             beside.see(vars(each)[name], f"{kind.__qualname__}.{name}")
             told += [name, beside.digest]
-    return hashlib.sha256(repr(told).encode()).hexdigest()[:_DIGITS] if any(told) else ""
+        chances.append(beside.chance)
+    digest = hashlib.sha256(repr(told).encode()).hexdigest()[:_DIGITS] if any(told) else ""
+    return digest, next(filter(None, chances), "")
 
 
 def sources_of(engine: str) -> str:
@@ -96,17 +102,17 @@ def sources_of(engine: str) -> str:
         If their files cannot be read.
     """
     module = engine.partition(":")[0] if ":" in engine else "chilopod"
-    return _once(sys.modules[module], module, module)
+    return _once(sys.modules[module], module, module)[0]
 
 
-def _once(value: object, module: str, path: str) -> str:
+def _once(value: object, module: str, path: str) -> tuple[str, str]:
     top, known = module.partition(".")[0], _described.get()
     known = {} if known is None else known
     if value not in known:
         reach = Reach(top)
         if top != "chilopod":
             reach.see(value, path)
-        known[value] = reach.digest if top != "chilopod" else ""
+        known[value] = reach.digest if top != "chilopod" else "", reach.chance
     return known[value]
 
 

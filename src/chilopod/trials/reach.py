@@ -70,10 +70,6 @@ class UnknownKindError(Exception):
     """Something cannot be described; says in words which, and where it was reached."""
 
 
-class UndeterminedError(UnknownKindError):
-    """Something answers otherwise every time."""
-
-
 class Reach:
     """A digest of everything that can be reached from the objects that it is shown, in order.
 
@@ -81,10 +77,15 @@ class Reach:
     ----------
     own
         Top-level package that is one's own even where it is installed.
+
+    Attributes
+    ----------
+    chance
+        What was seen first that answers otherwise every time, see :mod:`chilopod.trials.chance`; empty if nothing.
     """
 
     def __init__(self, own: str = "") -> None:
-        self._own = own
+        self._own, self.chance = own, ""
         self._hash = hashlib.sha256()
         self._seen: dict[int, int] = {}
         self._alive: list[object] = []  # so that no other object gets the address of one that was seen
@@ -114,9 +115,8 @@ class Reach:
         if kind in _ATOMS:
             return self._put(kind.__name__, hex(value) if isinstance(value, int) else repr(value))
         named = self._named(value)
-        if named and by_chance(value) and not isinstance(value, ModuleType):
-            raise UndeterminedError(f"{path}: {by_chance(value)}")
         if named:
+            self._found_chance(path, "" if isinstance(value, ModuleType) else by_chance(value))
             return self._put("named", named)
         if kind not in _VALUES:
             if id(value) in self._seen:
@@ -135,6 +135,9 @@ class Reach:
         other = Reach(self._own)
         other.see(value, f"{path}{{}}")
         return other.digest
+
+    def _found_chance(self, path: str, chance: str) -> None:
+        self.chance = self.chance or (chance and f"{path}: {chance}")
 
     def _put(self, *words: object) -> None:
         self._hash.update(repr(words).encode())
@@ -187,9 +190,8 @@ class Reach:
             imported = self._imported(function.__code__, space, path)
             known = {**vars(builtins), **space, **imported}
             cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
-            chance = chance_in(function.__code__, {**known, **{name: _content(cell) for name, cell in cells}})
-            if chance:
-                raise UndeterminedError(f"{path}: {chance}")
+            inner = {name: _content(cell) for name, cell in cells}
+            self._found_chance(path, chance_in(function.__code__, {**known, **inner}))
             yield from self._reached(_named_in(function.__code__) | imported.keys(), known, "", set())
             home = sys.modules.get(space.get("__name__", ""))
             if home is not None and vars(home) is space:

@@ -21,7 +21,7 @@ from chilopod.sources import digest
 from chilopod.steering import Course, Target
 from chilopod.trials.description import classes_in, code_of, is_findable, is_ours, plain, robot_text, sources_of
 from chilopod.trials.disturbance import Disturbance
-from chilopod.trials.reach import UndeterminedError, UnknownKindError
+from chilopod.trials.reach import UnknownKindError
 
 _DIGITS = 16
 _ABOVE = ("analysis", "cli", "gym", "live", "paper", "report", "stability", "tasks")
@@ -155,20 +155,18 @@ class Trial:
         return None if self.controller is None else plain(self.controller, type(self.controller).__name__)
 
     @cached_property
-    def code(self) -> tuple[str, str]:
-        """Digest of what the code of controller and engine is, and why no other process could find that, if so."""
+    def code(self) -> tuple[str, str, str]:
+        """Digest of what the code of controller and engine is; why no other process could find that, if so; and why
+        it could not walk the same, if so."""
         known_here = "__main__:" in self.engine or not all(map(is_findable, classes_in(self.controller)))
         why = "it is known to this process only; put it at the top of a module that can be imported"
         try:
-            return code_of(self.controller) + sources_of(self.engine), why if known_here else ""
+            digest, chance = code_of(self.controller)
+            again = f"{chance}, which answers otherwise every time; chance with a seed does not" if chance else ""
+            return digest + sources_of(self.engine), why if known_here else "", again
         except UnknownKindError as error:
-            why = (
-                "which cannot be described; numbers, text, arrays, lists, dictionaries, enums, functions, classes and "
-            )
-            why += "modules can"
-            if isinstance(error, UndeterminedError):
-                why = "which answers otherwise every time; chance with a seed, and the time that is seen, do not"
-            return f"of this process {id(self.controller):x}", f"{error}, {why}"
+            can = "numbers, text, arrays, lists, dictionaries, enums, functions, classes and modules can"
+            return f"of this process {id(self.controller):x}", f"{error}, which cannot be described; {can}", ""
 
     def as_now(self) -> Trial:
         """The same trial, with code and fields of its controller as they are now."""
