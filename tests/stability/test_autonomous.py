@@ -6,7 +6,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.stability import Kind, PeriodicSystem, exponents, find_orbit, locate, multipliers
+from chilopod.stability import (
+    Kind,
+    PeriodicSystem,
+    exponents,
+    find_orbit,
+    follow,
+    from_rhs,
+    locate,
+    multipliers,
+    switch,
+)
 
 STEP = 1e-30
 
@@ -127,3 +137,28 @@ def test_what_is_no_orbit_is_one_line():
     with pytest.raises(AnalysisError) as error:
         multipliers(drift, [0.0])
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("step", [0.005, 0.01, 0.02])
+def test_a_doubled_branch_has_no_points_that_are_not_there(step):
+    """Beside the period doubling of Rössler's system the doubled orbit's multiplier falls from 1 at a constant rate; a
+    small residual, which is far from an orbit there, made folds and pitchforks of it."""
+
+    def family(c):
+        return from_rhs(
+            lambda t, x, c: [-x[1] - x[2], x[0] + 0.2 * x[1], 0.2 + x[2] * (x[0] - c)],
+            3,
+            None,
+            args=(c,),
+            guess_period=5.8,
+        )
+
+    (doubling,) = locate(family, (2.0, 3.0), orbit=[3.0, 0.0, 0.1])
+    (start,) = switch(family, doubling)
+    branch = follow(family, start, (2.0, 3.0), points=4, step=step)
+    assert [point.value for point in branch.special_points] == [doubling.value]
+    last = branch.points[-1]
+    rate = (1.0 - last.multipliers[0].real) / (last.value - doubling.value)
+    for point in branch.points[1:]:
+        assert point.value > doubling.value
+        assert (1.0 - point.multipliers[0].real) / (point.value - doubling.value) == pytest.approx(rate, rel=2e-3)

@@ -1,5 +1,6 @@
 """Systems from anything that has a flow, and how sure their multipliers are."""
 
+import itertools
 from math import exp, pi
 
 import numpy as np
@@ -253,3 +254,20 @@ def test_a_sweep_in_threads_is_that_of_one_after_the_other():
 def test_a_verdict_within_the_errors_is_undecided(values, bounds, stable):
     found = Multipliers(np.array(values, complex), None, max(bounds), np.array(bounds), np.zeros(1), 1.0)
     assert found.stable is stable
+
+
+@pytest.mark.parametrize("guess", list(itertools.product((-3.0, -1.5, 0.5, 1.0, 3.0), (-3.0, 0.0, 0.6, 3.0))))
+def test_corrections_stay_where_the_motion_is(guess):
+    """Far outside a flow takes any number of steps: some guesses took a minute."""
+    duffing = from_rhs(
+        lambda t, x: [x[1], -0.2 * x[1] - x[0] ** 3 + 2.5 * np.cos(t)], 2, 2.0 * np.pi, symmetry=-np.eye(2)
+    )
+    asked = []
+
+    def flow(x, t0, t1):
+        asked.append(np.abs(x).max())
+        return duffing.flow(x, t0, t1)
+
+    orbit = find_orbit(PeriodicSystem(2, 2.0 * np.pi, flow, symmetry=-np.eye(2)), guess)
+    np.testing.assert_allclose(orbit.state, [1.901458, 0.634591], atol=1e-6)
+    assert max(asked) < 1e3  # it was above 1e6

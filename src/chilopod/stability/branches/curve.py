@@ -38,6 +38,7 @@ PRECISION = 1e-12
 _COUNTED = 1e-10  # residuals above it count as corrections, by which steps grow or shrink
 _SETTLED = 1e-8  # residual below which it may stop falling
 _FALLING = 0.5
+_LOOSE = 1e-6  # of a step: an orbit that may be so far off is corrected with a matrix of its own
 _MOST_CORRECTIONS = 12
 _STRAYS = 0.1  # of a step: so far beyond the interval a curve is sought that ends within it
 _PARAMETER_STEP = 1e-6  # of the difference, in units of the scale
@@ -245,6 +246,7 @@ class Curve:
         largest = np.inf
         move = residual_before = np.zeros(n + 1)
         rounds = corrections = 0
+        exact = False
         while True:
             x = last.orbit + units[:n] * moved[:n]
             if fixed is not None:
@@ -264,11 +266,22 @@ class Curve:
             size = max(1.0, float(np.abs(x / units[:n]).max()))
             # A residual that no longer falls is what the flow is good to, if the matrix can make it fall.
             settled = now <= _SETTLED * size and now >= _FALLING * largest and not singular
-            if now <= self.precision * size or settled:
+            closed = now <= self.precision * size
+            # Where it leaves another curve the matrix is so weak that a small residual is far from an orbit.
+            loose = (
+                anchor.leaving
+                and not exact
+                and float(np.linalg.norm(inverse @ residual)) > _LOOSE * float(np.linalg.norm(moved))
+            )
+            if (closed or settled) and not loose:
                 break
             if rounds == _MOST_CORRECTIONS:
                 raise AnalysisError("corrections do not converge", field="step")
-            if rounds:
+            if closed or settled:
+                jacobian, exact = self.image(x, here, section).jacobian, True
+                here_matrix = self.matrix(jacobian, self._difference(x, here, section, mapped, beside), row)
+                inverse, singular = inverted(within_space(fixed, here_matrix))
+            elif rounds:
                 # Broyden's update keeps the matrix of the last point good enough for the whole step.
                 change = inverse @ (residual - residual_before)
                 along = float(move @ change)

@@ -26,7 +26,8 @@ from chilopod.stability.branches.branch_points import BranchPoint, Step
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.special_points import Place, blocks_along, special_point
 from chilopod.stability.course import TARGETS
-from chilopod.stability.floquet import counts_outside
+from chilopod.stability.floquet import counts_outside, spectrum
+from chilopod.stability.returns import ReturnMap
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.symmetry.orbit_blocks import Blocks, block_of, crossings_in
 from chilopod.stability.unit_circle.crossings import Crossing, Crossings, Status, find_crossings
@@ -51,6 +52,8 @@ _ERROR = 1e-10  # relative, of the return map's derivative at an orbit that was 
 _CLOSE = 1e-9  # of a step: how closely a point is located along the curve
 _SIDE = 1e-3  # of a step: how far beside a crossing the curve's sides are looked at
 _BRANCHING = 1e-4  # smallest singular value of [H' - 1, dH/dp], in units, where branches meet
+_CONFIRMING = 1e-3, 1e-2, 0.1, 0.3  # of a step: how far beside a place its sides are told apart
+_SURE = 3.0  # times its error: so far from the circle a multiplier is on one side of it
 _COMPLEX = 1e-5  # imaginary part from which a multiplier on the circle is one of a pair
 _EVENTS = (Event.MINUS, Event.PLUS, Event.PAIR)
 
@@ -119,8 +122,53 @@ def inspect(curve: Curve, step: Step, closely: bool) -> Found:
     if flipped and not any(place.branching for place in places):
         raise AnalysisError("the step landed on another curve", field="step")
     between = within.low, step.size
+    for place in list(places) if leaving else ():
+        if place.crossing.event is Event.PLUS and not _confirmed(within, place):
+            places.remove(place)
+            remarks += (f"from {step.start.last.value:.9g} on a multiplier is +1 within its error at first",)
     points = [special_point(curve, within.at, place, between, within.blocks) for place in places]
     return Found(tuple(point for point in points if point is not None), remarks)
+
+
+def _confirmed(within: Within, place: Place) -> bool:
+    """Whether what passes at a place is on the other side behind it, by more than the errors of the multipliers.
+
+    Beside a point where branches meet a multiplier is critical within its error, and rounding makes it cross.
+    """
+    crossing = place.crossing
+    if crossing.collision or crossing.change == 0:
+        return True
+    for part in _CONFIRMING:
+        beside = part * within.step.size
+        sides = max(crossing.value - beside, within.low), min(crossing.value + beside, within.step.size)
+        before, after = (_side(within, each, place) for each in sides)
+        if before and after:
+            return before != after
+    return False
+
+
+def _side(within: Within, at: float, place: Place) -> float:
+    """On which side of the circle the critical multiplier is; 0 if its error and that of the orbit do not tell."""
+    curve, step, crossing = within.curve, within.at(at), place.crossing
+    last, section = step.end.last, within.step.start.section
+    units = curve.units(last.orbit.size)
+
+    def off(x: Array, value: float) -> tuple[float, float, ReturnMap]:
+        image = curve.image(x, value, section, with_error=True)
+        spec = spectrum(image)
+        index = int(np.abs(spec.values - crossing.multiplier).argmin())
+        nu = spec.values[index]
+        away = abs(nu) - 1.0 if crossing.event is Event.PAIR else nu.real - TARGETS[crossing.event]
+        return float(away), float(spec.error[index]), image
+
+    away, error, image = off(last.orbit, last.value)
+    # The orbit is least sure in the direction in which the matrix is weakest: along it the margin is asked anew.
+    wrong = np.abs(image.state - last.orbit) + image.error @ units[:-1]
+    left, sizes, right = np.linalg.svd(step.matrix)
+    shift = units * right[-1] * float(np.abs(left[:-1, -1]) @ (wrong / units[:-1])) / sizes[-1]
+    beside, other, _ = off(last.orbit + shift[:-1], last.value + float(shift[-1]))
+    uncertain = _SURE * (max(error, other) + abs(beside - away))
+    return float(np.sign(away)) if abs(away) > uncertain else 0.0
 
 
 def _places(within: Within, brackets: list[Bracket] | None, turned: bool) -> tuple[list[Place], tuple[str, ...]]:
