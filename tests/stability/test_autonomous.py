@@ -157,8 +157,9 @@ def test_a_doubled_branch_has_no_points_that_are_not_there(step):
     (start,) = switch(family, doubling)
     branch = follow(family, start, (2.0, 3.0), points=4, step=step)
     assert [point.value for point in branch.special_points] == [doubling.value]
+    # The first value is known to some 1e-9, which is a hundredth of its distance from the doubling.
     last = branch.points[-1]
     rate = (1.0 - last.multipliers[0].real) / (last.value - doubling.value)
     for point in branch.points[1:]:
         assert point.value > doubling.value
-        assert (1.0 - point.multipliers[0].real) / (point.value - doubling.value) == pytest.approx(rate, rel=2e-3)
+        assert (1.0 - point.multipliers[0].real) / (point.value - doubling.value) == pytest.approx(rate, rel=0.05)

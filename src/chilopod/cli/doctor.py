@@ -102,7 +102,7 @@ def _versions() -> list[Finding]:
     ]
     for module, package in _PACKAGES.items():
         # What uses a package here may be able to import it where it cannot be imported alone, or the other way round.
-        fault = _fault({"mujoco": "chilopod.twin", "numba": "chilopod.compiled"}.get(module, module))
+        fault = _fault({"mujoco": "chilopod.twin", "numba": "chilopod.integrate"}.get(module, module))
         if fault:
             wishes = [] if "No module" in fault else settings(module)
             mend = f"unset {' '.join(wishes)}" if wishes else _again(package)

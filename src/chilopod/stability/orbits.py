@@ -52,6 +52,7 @@ _KNOWN = 1e-4  # of a known orbit: it is one, if not to the last digit
 _SETTLING = 100  # return maps that letting the motion settle is counted as: without derivatives it costs less
 _MOST_PARTS = 8  # of a return: a guess of the period may be so many times too long
 _CLOSES = 1e-8  # of the motion, and of the sizes of the states: an orbit that closes so nearly is solved for once more
+_FARTHEST = 10.0  # times as large as states so far a correction may be
 _FARTHER = 2.0  # times as large a state may count from one correction to the next
 _CHANCE = 1e-13  # of the sizes of the states: two computations of a stiff motion may agree by chance
 _BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
@@ -298,7 +299,7 @@ def _newton(
         best, before = min(best, off), x
         move = _solved(image.jacobian - np.eye(x.size), residual, size, cutoff)
         # Far outside the motion so far a flow may take any number of steps.
-        x = x - move / max(1.0, _relative(move, reach))
+        x = x - move / max(1.0, _relative(move, reach) / _FARTHEST)
         if not np.isfinite(x).all():
             break
         if section is not None:
