@@ -1,6 +1,8 @@
 """Progress on stderr: nothing of what is quick, a sign of life of all else."""
 
+import logging
 import time
+from types import SimpleNamespace
 
 import numba
 import pytest
@@ -43,20 +45,32 @@ def test_a_terminal_gets_bars(capsys, hasty, monkeypatch):
     assert "all of it" in capsys.readouterr().err
 
 
+def test_compiling_is_said_once_without_a_command_line(caplog, monkeypatch):
+    monkeypatch.setattr(logging.getLogger("chilopod.compiling"), "disabled", False)
+    listener = numba_internals._Compiling()
+    monkeypatch.setattr(numba_internals, "NOTICED", 0.0)
+    made = [SimpleNamespace(__module__=name) for name in ("chilopod.x", "mine")]
+    own, other = (SimpleNamespace(data={"dispatcher": each}) for each in made)
+    for each in (own, other, own, own):  # so far nothing has been compiled when the first begins
+        listener.on_start(each)
+        listener.on_end(each)
+    assert [each.message for each in caplog.records] == ["chilopod: compiling, once on this machine"]
+
+
 def test_compiling_is_said_once(capsys, hasty, monkeypatch):
     before = numba_internals.COMPILING.seconds()
     numba.njit(lambda x: x + before)(1.0)  # nothing that is kept
     spent = numba_internals.COMPILING.seconds() - before
     assert spent > 0.0
     assert numba_internals.COMPILING.seconds() == before + spent  # it is over
-    monkeypatch.setattr(progress, "_NOTICED", 0.5 * spent)
+    monkeypatch.setattr(numba_internals, "NOTICED", 0.5 * spent)
     with progress.progress_bar("work"):
         time.sleep(0.2)
     lines = capsys.readouterr().err.splitlines()
     assert lines[0] == "work: compiling, once on this machine"
     assert len(lines) > 2
     assert not any("compiling" in line for line in lines[1:])
-    monkeypatch.setattr(progress, "_NOTICED", 1e9)
+    monkeypatch.setattr(numba_internals, "NOTICED", 1e9)
     with progress.progress_bar("work"):
         time.sleep(0.1)
     assert "compiling" not in capsys.readouterr().err

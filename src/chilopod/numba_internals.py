@@ -6,9 +6,11 @@ So ``pyproject.toml`` caps numba, and ``tests/test_numba_internals.py`` names wh
 from __future__ import annotations
 
 import hashlib
+import logging
 import shutil
 import time
 from contextlib import suppress
+from multiprocessing import parent_process
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +27,9 @@ __all__ = ["COMPILING", "Conversion", "cgutils", "ir", "keep", "pointer_to", "si
 
 ABOVE = ("analysis", "cli", "gym", "live", "paper", "report", "tasks", "trials", "twin")
 """Subpackages that compile nothing, and that nothing compiled can reach: they may change without compiling anew."""
+
+NOTICED = 1.0
+"""Seconds of compiling after which it is said."""
 
 _FOLDER = "chilopod-"
 FOLDERS = 3
@@ -120,9 +125,12 @@ class _Compiling(event.Listener):  # type: ignore[misc]
     """Time that numba has spent compiling in this process, functions that are called by others within them."""
 
     def __init__(self) -> None:
-        self._before, self._begun, self._depth = 0.0, 0.0, 0
+        self._before, self._begun, self._depth, self._said = 0.0, 0.0, 0, parent_process() is not None
 
     def on_start(self, event: Any) -> None:
+        if not self._said and self.seconds() > NOTICED and event.data["dispatcher"].__module__.startswith("chilopod"):
+            self._said = True
+            logging.getLogger("chilopod.compiling").warning("chilopod: compiling, once on this machine")
         self._begun = self._begun if self._depth else time.monotonic()
         self._depth += 1
 

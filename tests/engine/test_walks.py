@@ -1,8 +1,10 @@
 """What outsiders broke in walks of both engines, and its relatives."""
 
+import copy
 import io
 import itertools
 import json
+import pickle
 import threading
 
 import numpy as np
@@ -313,6 +315,29 @@ def test_what_was_saved_and_edited_is_no_walk(engine, robot):
     for wrong in (None, 3, "text", bytearray(b"x"), b""):
         with pytest.raises(ParameterError):
             engine.resume(wrong)
+
+
+@BOTH
+@pytest.mark.parametrize("made", [copy.copy, copy.deepcopy, lambda walk: pickle.loads(pickle.dumps(walk))])
+def test_a_copy_of_a_walk_is_a_walk_of_its_own(engine, robot, made):
+    walk = engine.start(robot, target=(1.0, 0.0), seeds=[3])
+    walk.advance(0.37)
+    other = made(walk)
+    walk.command(Command(leg_yaw=[0.1, 0.1]))
+    walk.advance(0.9)
+    assert other.time == 0.37
+    other.command(Command(leg_yaw=[0.1, 0.1]))
+    other.advance(0.9)
+    assert other.save() == walk.save()
+
+
+@BOTH
+def test_numbers_that_would_overflow_are_named(engine, robot):
+    for wrong in ({"friction": np.full((robot.body.modules, 2), 1e308)}, {"target": (1e200, 0.0)}):
+        with pytest.raises(ParameterError, match=r"must be finite.*1e\+100"):
+            engine.start(robot, **wrong)
+    with pytest.raises(ParameterError, match=r"must be finite.*1e\+100"):
+        engine.initial_states(robot, heading=1e300)
 
 
 @BOTH

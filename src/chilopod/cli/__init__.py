@@ -6,6 +6,7 @@ Results go to stdout, everything else to stderr. An error is one line on stderr 
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 import sys
@@ -77,6 +78,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         something essential is missing, 130 when interrupted.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
+    logging.getLogger("chilopod.compiling").disabled = True  # the progress bar says it
     try:
         _check_completion()
         code = app(arguments, prog_name="chilopod", standalone_mode=False)

@@ -13,7 +13,6 @@ _BETWEEN_LOOKS = 0.1  # s
 _UNTIL_LINE = 2.0  # s: most commands have ended by then
 _BETWEEN_LINES = 5.0  # s
 
-_NOTICED = 1.0  # s of compiling
 _ONCE = "compiling, once on this machine"
 
 _Told = dict[str, tuple[float, str]]
@@ -71,7 +70,7 @@ def _lines(doing: str, told: _Told, over: threading.Event) -> None:
 def _compiling() -> bool:
     """Whether compiling has taken a while; asked of what is loaded, since a command may need no compiled code."""
     numba = sys.modules.get("chilopod.numba_internals")
-    return numba is not None and numba.COMPILING.seconds() > _NOTICED
+    return numba is not None and numba.COMPILING.seconds() > numba.NOTICED
 
 
 def _bars(doing: str, told: _Told, over: threading.Event) -> None:

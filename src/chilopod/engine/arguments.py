@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import ParameterError
-from chilopod.record import LONGEST, Recording
+from chilopod.record import LARGEST, LONGEST, Recording
 from chilopod.record import as_number as as_number  # for all engines
 from chilopod.robot import Robot
 
@@ -139,8 +139,8 @@ def standing(
             raise ParameterError(
                 "has the wrong shape", field=name, value=array.shape, allowed=f"{allowed}, or one each"
             )
-        if not np.isfinite(array).all():
-            raise ParameterError("must be finite", field=name)
+        if not (np.abs(array) <= LARGEST).all():
+            raise ParameterError("must be finite", field=name, allowed=f"numbers up to {LARGEST:g}")
     angles = np.broadcast_to(np.atleast_2d(angles), (len(np.atleast_2d(angles)), joints))
     headings, places = np.atleast_1d(headings), np.atleast_2d(places)
     try:
@@ -189,8 +189,8 @@ def rows_of(
         if array.shape[array.ndim - len(shape) :] != shape or array.ndim > len(shape) + 1 or array.size == 0:
             allowed = f"{shape} or (walks, {', '.join(map(str, shape))})"
             raise ParameterError("has the wrong shape", field=name, value=array.shape, allowed=allowed)
-        if not np.isfinite(array).all():
-            raise ParameterError("must be finite", field=name)
+        if not (np.abs(array) <= LARGEST).all():
+            raise ParameterError("must be finite", field=name, allowed=f"numbers up to {LARGEST:g}")
         if name == "friction" and not (array > 0.0).all():
             raise ParameterError("must be positive", field=name)
         arrays[name] = array if array.ndim > len(shape) else array[None]

@@ -302,6 +302,9 @@ class PlanarWalk:
         }
         return pack(traits, self._robots, settings, arrays)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return resume, (self.save(),)
+
     def restore(self, settings: dict[str, Any], arrays: dict[str, Any]) -> None:
         """Become as the walk was that was saved, of the same robots."""
         self._time = as_number("time", settings["time"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import mujoco
@@ -61,7 +62,7 @@ class TwinWalk:
         expected: float = 0.0,
         edit: Edit | None = None,
     ) -> None:
-        self._traits, self._robots, self._factors = traits, tuple(robots), factors
+        self._traits, self._edit, self._robots, self._factors = traits, edit, tuple(robots), factors
         self._seeds = None if seeds is None else np.array(seeds, dtype=np.object_)
         self._record, self._tolerance = record, tolerance
         self._plan = compiled(without_springs(robots[0]), bool(record and record.forces), edit)
@@ -241,6 +242,11 @@ class TwinWalk:
             "seen": np.array(self._seen).reshape(-1, 2, len(self._robots)),
         }
         return pack(self._traits, self._robots, settings, arrays)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        from chilopod.twin.start import resume  # which imports this module
+
+        return partial(resume, edit=self._edit, traits=self._traits), (self.save(),)
 
     def restore(self, settings: dict[str, Any], arrays: dict[str, Any]) -> None:
         """Become as the walk was that was saved, of the same robots."""
