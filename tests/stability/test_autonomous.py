@@ -7,8 +7,10 @@ from hypothesis import strategies as st
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability import (
+    Ending,
     Kind,
     PeriodicSystem,
+    begin,
     exponents,
     find_orbit,
     follow,
@@ -163,3 +165,27 @@ def test_a_doubled_branch_has_no_points_that_are_not_there(step):
     for point in branch.points[1:]:
         assert point.value > doubling.value
         assert (1.0 - point.multipliers[0].real) / (point.value - doubling.value) == pytest.approx(rate, rel=0.05)
+
+
+def lorenz(r):
+    def rhs(t, x, r):
+        return [10.0 * (x[1] - x[0]), r * x[0] - x[1] - x[0] * x[2], x[0] * x[1] - 8.0 / 3.0 * x[2]]
+
+    return from_rhs(rhs, 3, None, args=(r,), guess_period=0.67)
+
+
+def test_a_cycle_that_shrinks_into_an_equilibrium_ends_there():
+    """The unstable cycle ends in the Hopf point at r = 470/19 (Lorenz 1963): nothing beyond, no fold, no orbit that
+    misses itself."""
+    start = begin(lorenz, 24.0, [5.48239022, 5.89665725, 19.66310346])
+    branch = follow(lorenz, start, (13.0, 26.0), points=400)
+    assert branch.ending is Ending.LOST
+    assert "Hopf" in branch.reason
+    assert branch.special_points == ()
+    assert branch.points[-1].value == pytest.approx(470.0 / 19.0, abs=1e-5)
+    for point in branch.points:
+        assert point.value < 470.0 / 19.0
+        rest = np.sqrt(8.0 / 3.0 * (point.value - 1.0))
+        motion = np.abs(point.orbit - [rest, rest, point.value - 1.0]).max()
+        state, _ = lorenz(point.value).flow(point.orbit, 0.0, point.period)
+        assert np.abs(state - point.orbit).max() <= 1e-8 * motion

@@ -21,6 +21,7 @@ from chilopod.stability.capabilities import (
     given_scale,
     is_autonomous,
     known_orbit,
+    spatial_symmetries,
 )
 from chilopod.stability.krylov.closing import LARGE, closed_orbit
 from chilopod.stability.krylov.tangent_map import TangentMap, tangent_map, tangent_sizes
@@ -37,6 +38,7 @@ from chilopod.stability.returns import (
 )
 from chilopod.stability.scales import sizes
 from chilopod.stability.settling import nearer_states
+from chilopod.stability.symmetry.mirrored import symmetric_states
 
 Array = NDArray[np.float64]
 
@@ -55,6 +57,7 @@ _CLOSES = 1e-8  # of the motion, and of the sizes of the states: an orbit that c
 _FARTHEST = 10.0  # times as large as states so far a correction may be
 _FARTHER = 2.0  # times as large a state may count from one correction to the next
 _CHANCE = 1e-13  # of the sizes of the states: two computations of a stiff motion may agree by chance
+_SYMMETRIC = 1e-12  # of the sizes of the states: a symmetry that holds so closely is one of the orbit's
 _BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
 
 
@@ -271,7 +274,7 @@ def _newton(
             closed, _ = closed_orbit(system, x, section, budget=budget)
             x, best = closed.point, 0.0  # nothing is left to improve
             section = section and replace(section, duration=closed.duration)
-    before, cutoff, reach = x, _SINGULAR, size
+    before, cutoff, reach, shared = x, _SINGULAR, size, _shared(system, x, size)
     for rounds in range(_ROUNDS):
         if budget is not None:
             budget.take()
@@ -297,7 +300,7 @@ def _newton(
         if off < best:  # or all is only getting larger
             reach = np.minimum(size, _FARTHER * reach)
         best, before = min(best, off), x
-        move = _solved(image.jacobian - np.eye(x.size), residual, size, cutoff)
+        move = _solved(image.jacobian - np.eye(x.size), residual, size, cutoff, shared)
         # Far outside the motion so far a flow may take any number of steps.
         x = x - move / max(1.0, _relative(move, reach) / _FARTHEST)
         if not np.isfinite(x).all():
@@ -325,9 +328,24 @@ def _cleared(
     return (cleared, there) if off <= max(_ROUND_OFF, _relative(image.state - x, size)) else (x, image)
 
 
-def _solved(matrix: Array, right: Array, size: Array, cutoff: float) -> Array:
-    """Solution of a linear system in units of the states' sizes; the shortest where orbits come in families."""
+def _shared(system: SystemLike, x: Array, size: Array) -> Array | None:
+    """Basis of the states with the spatial symmetries of one, shape (n, k); None if it has none.
+
+    Among these H - 1 is regular also where a mode that breaks them is critical.
+    """
+    if system.symmetry is not None or not spatial_symmetries(system):
+        return None
+    basis = symmetric_states(system, x, size, _SYMMETRIC)
+    return size[:, None] * basis if basis.shape[1] < x.size else None
+
+
+def _solved(matrix: Array, right: Array, size: Array, cutoff: float, shared: Array | None) -> Array:
+    """Solution of a linear system in units of the states' sizes, among the ``shared`` states if there are such; the
+    shortest where orbits come in families."""
     scaled, right = matrix * size / size[:, None], right / size
+    if shared is not None:
+        basis, one = np.linalg.qr(shared / size[:, None])[0], np.ones(shared.shape[1])
+        return size * (basis @ _solved(basis.T @ scaled @ basis, basis.T @ right, one, cutoff, None))
     if cutoff == _SINGULAR:
         with contextlib.suppress(np.linalg.LinAlgError):
             regular = np.linalg.solve(scaled, right)
@@ -362,6 +380,9 @@ def bounded(system: SystemLike, x: Array, image: ReturnMap, error: Array | None 
         How far off the state may be, shape (n,), if that is known.
     """
     size = sizes(system, x, image.period / image.returns)
+    shared, given = _shared(system, x, size), x
+    basis = np.eye(x.size) if shared is None else shared / size[:, None]
+    x = size * (basis @ (basis.T @ (x / size))) if shared is not None else x
     section = _across(system, x, image)
     image = return_map(system, x, True, section)
     scaled = image.jacobian * size / size[:, None] - np.eye(x.size)
@@ -370,7 +391,8 @@ def bounded(system: SystemLike, x: Array, image: ReturnMap, error: Array | None 
         wrong = np.abs(image.state - x) + (_matrix(image.error, size) @ size)
         if isinstance(system, FlowsFrames) and system.is_stiff():  # whose derivative may be nothing, and err by nothing
             wrong += DRAWN * np.abs(_in_parts(system, x, image.period / image.returns) - image.state) + _CHANCE * size
-        error = size * (np.abs(np.linalg.pinv(scaled, rcond=_SINGULAR)) @ (wrong / size))
+        inverse = basis @ np.linalg.pinv(basis.T @ scaled @ basis, rcond=_SINGULAR) @ basis.T
+        error = size * (np.abs(inverse) @ (wrong / size)) + np.abs(x - given)
     # The derivative is that of a state so far off: along the direction in which the orbit is least sure.
     weakest = size * np.linalg.svd(scaled)[2][-1]
     beside = return_map(system, x + _BESIDE * weakest, with_error=False, section=section)

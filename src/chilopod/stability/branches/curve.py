@@ -27,7 +27,17 @@ from chilopod.stability.capabilities import (
     returns_per_period,
 )
 from chilopod.stability.floquet import return_multipliers
-from chilopod.stability.returns import ReturnMap, Section, return_map, returned_states, section_at, whole_period
+from chilopod.stability.returns import (
+    CUTS,
+    ReturnMap,
+    Section,
+    carried,
+    return_map,
+    returned_states,
+    section_at,
+    turned,
+    whole_period,
+)
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -38,12 +48,13 @@ PRECISION = 1e-12
 _COUNTED = 1e-10  # residuals above it count as corrections, by which steps grow or shrink
 _SETTLED = 1e-8  # residual below which it may stop falling
 _FALLING = 0.5
+_CLEAR = 10.0  # times the difference of two computations: a residual that may be the flow's error
 _LOOSE = 1e-6  # of a step: an orbit that may be so far off is corrected with a matrix of its own
 _MOST_CORRECTIONS = 12
 _STRAYS = 0.1  # of a step: so far beyond the interval a curve is sought that ends within it
 _PARAMETER_STEP = 1e-6  # of the difference, in units of the scale
 _SHARPEST_TURN = 0.5  # cosine between two tangents: beyond it the step may have landed on another curve
-_SHRUNK = 1e-4  # of the largest motion so far: smaller ones are none
+_SHRUNK = 10.0  # cube roots of the precision, of the largest motion so far
 _KEPT = 8  # systems: making one may cost more than a flow
 
 
@@ -264,9 +275,10 @@ class Curve:
             if not np.isfinite(now) or (now > 10.0 * largest and now > _SETTLED):
                 raise AnalysisError("corrections diverge", field="step")
             size = max(1.0, float(np.abs(x / units[:n]).max()))
-            # A residual that no longer falls is what the flow is good to, if the matrix can make it fall.
-            settled = now <= _SETTLED * size and now >= _FALLING * largest and not singular
             closed = now <= self.precision * size
+            # A residual that no longer falls is what the flow is good to, if the matrix can make it fall.
+            settled = not closed and now <= _SETTLED * size and now >= _FALLING * largest and not singular
+            settled = settled and now <= _CLEAR * self._noise(x, here, section)
             # Where it leaves another curve the matrix is so weak that a small residual is far from an orbit.
             loose = (
                 anchor.leaving
@@ -319,8 +331,12 @@ class Curve:
             velocity = np.asarray(system.velocity(x))
             motion = float(np.linalg.norm(velocity / self.units(x.size)[:-1])) * image.period
             self._motion = max(self._motion, motion)
-            # Past an equilibrium come the same orbits again, half a period later.
-            if motion < _SHRUNK * self._motion or not float(anchor.section.normal @ velocity) > 0.0:
+            # Past an equilibrium come the same orbits again, half a period later. Before it, a part f of the largest
+            # motion is a parameter f^2 away from the Hopf point, which the precision leaves uncertain by its f-th part.
+            if (
+                motion < _SHRUNK * np.cbrt(self.precision) * self._motion
+                or not float(anchor.section.normal @ velocity) > 0.0
+            ):
                 raise AnalysisError("the orbit shrinks into an equilibrium: a Hopf point", field="orbit")
             along = self._projection(velocity, section)
             tangent, matrix = np.array(tangent), np.array(matrix)
@@ -367,6 +383,16 @@ class Curve:
                     mapped, moved = own.flow_each(both, np.array([x, x]), 0.0, period)
                     return (mapped, moved) if same else (mapped, None)
             return returned_states(system, x[None], section)[0], None
+
+    def _noise(self, x: Array, value: float, section: Section | None) -> float:
+        """How far apart two computations of a return end, in units: what the flow's error leaves of a residual."""
+        image, system = self.image(x, value, section), self.system(value)
+        duration, passing = image.period / image.returns, x[None]
+        times = [part * duration for part in CUTS] + [duration]
+        with Asking("flow", value):
+            for a, b in zip(times, times[1:], strict=False):
+                passing = carried(system, passing, a, b)
+        return float(np.abs((turned(system, passing)[0] - image.state) / self.units(x.size)[:-1]).max())
 
     def _flows_each(self, system: SystemLike) -> TypeGuard[FlowsEach]:
         """Whether a system flows each; asked once for each class, for the answer takes longer than some flows."""

@@ -25,6 +25,7 @@ from chilopod.errors import AnalysisError
 from chilopod.stability.branches.branch_points import BranchPoint, Step
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.special_points import Place, blocks_along, special_point
+from chilopod.stability.capabilities import flows_with_error
 from chilopod.stability.course import TARGETS
 from chilopod.stability.floquet import counts_outside, spectrum
 from chilopod.stability.returns import ReturnMap
@@ -122,10 +123,12 @@ def inspect(curve: Curve, step: Step, closely: bool) -> Found:
     if flipped and not any(place.branching for place in places):
         raise AnalysisError("the step landed on another curve", field="step")
     between = within.low, step.size
-    for place in list(places) if leaving else ():
-        if place.crossing.event is Event.PLUS and not _confirmed(within, place):
+    sure = flows_with_error(curve.system(step.end.last.value))
+    for place in list(places):
+        if (sure or (leaving and place.crossing.event is Event.PLUS)) and not _confirmed(within, place):
             places.remove(place)
-            remarks += (f"from {step.start.last.value:.9g} on a multiplier is +1 within its error at first",)
+            near, event = within.at(place.crossing.value).end.last.value, place.crossing.event
+            remarks += (f"near {near:.9g}: {event.sentence} by no more than its error, which is no event",)
     points = [special_point(curve, within.at, place, between, within.blocks) for place in places]
     return Found(tuple(point for point in points if point is not None), remarks)
 
@@ -163,8 +166,10 @@ def _side(within: Within, at: float, place: Place) -> float:
 
     away, error, image = off(last.orbit, last.value)
     # The orbit is least sure in the direction in which the matrix is weakest: along it the margin is asked anew.
-    wrong = np.abs(image.state - last.orbit) + image.error @ units[:-1]
+    wrong = np.abs(image.state - last.orbit) + np.broadcast_to(image.error, step.image.jacobian.shape) @ units[:-1]
     left, sizes, right = np.linalg.svd(step.matrix)
+    if not sizes[-1] > 0.0:
+        return 0.0
     shift = units * right[-1] * float(np.abs(left[:-1, -1]) @ (wrong / units[:-1])) / sizes[-1]
     beside, other, _ = off(last.orbit + shift[:-1], last.value + float(shift[-1]))
     uncertain = _SURE * (max(error, other) + abs(beside - away))

@@ -15,13 +15,23 @@ Array = NDArray[np.float64]
 _LOOSE = 1e-6  # relative to the size of the states: how well a symmetry holds for a state that has it
 
 
-def symmetric_states(system: SystemLike, state: Array, size: Array) -> Array:
-    """Orthonormal basis, in units of the states' sizes, of the states with the spatial symmetries of one of them."""
+def symmetric_states(system: SystemLike, state: Array, size: Array, near: float = _LOOSE) -> Array:
+    """Orthonormal basis, in units of the states' sizes, of the states with the spatial symmetries of one of them.
+
+    Parameters
+    ----------
+    system
+        The system, with its ``spatial_symmetry``.
+    state, size
+        The state and the sizes of the states, shape (n,).
+    near
+        Largest change by a symmetry that the state still has, in sizes.
+    """
     n = size.size
     conditions = [np.zeros((0, n))]
     generators = spatial_symmetries(system)
     for matrix in _elements(np.stack(generators).tobytes(), n) if generators else ():
-        if (np.abs(matrix @ state - state) <= _LOOSE * size).all():
+        if (np.abs(matrix @ state - state) <= near * size).all():
             conditions.append(matrix * size / size[:, None] - np.eye(n))
     stacked = np.vstack(conditions)
     _, values, right = np.linalg.svd(stacked) if len(stacked) else (None, np.zeros(0), np.eye(n))
