@@ -18,9 +18,11 @@ if os.environ.get("PYTEST_XDIST_WORKER") == "gw1" and platform.machine() == "x86
 from chilopod.robot import Robot, load_robot  # noqa: E402
 
 # In CI the same examples every time, so that a submission is judged by its own changes, and few, as more would be found
-# once; at a desk new ones each run. No deadlines: how long an example takes is the machine's affair.
+# once; at a desk new ones each run, many with --hypothesis-profile=deep. No deadlines: how long an example takes
+# is the machine's affair.
 settings.register_profile("desk", max_examples=40, deadline=None)
 settings.register_profile("ci", max_examples=15, derandomize=True, deadline=None)
+settings.register_profile("deep", max_examples=1000, deadline=None)
 settings.load_profile("ci" if os.environ.get("CI") else "desk")
 
 

@@ -141,23 +141,21 @@ def test_what_is_no_orbit_is_one_line():
     assert "\n" not in str(error.value)
 
 
+def rossler(c):
+    def rhs(t, x, c):
+        return [-x[1] - x[2], x[0] + 0.2 * x[1], 0.2 + x[2] * (x[0] - c)]
+
+    return from_rhs(rhs, 3, None, args=(c,), guess_period=5.8)
+
+
 @pytest.mark.parametrize("step", [0.005, 0.01, 0.02])
 def test_a_doubled_branch_has_no_points_that_are_not_there(step):
     """Beside the period doubling of Rössler's system the doubled orbit's multiplier falls from 1 at a constant rate; a
     small residual, which is far from an orbit there, made folds and pitchforks of it."""
 
-    def family(c):
-        return from_rhs(
-            lambda t, x, c: [-x[1] - x[2], x[0] + 0.2 * x[1], 0.2 + x[2] * (x[0] - c)],
-            3,
-            None,
-            args=(c,),
-            guess_period=5.8,
-        )
-
-    (doubling,) = locate(family, (2.0, 3.0), orbit=[3.0, 0.0, 0.1])
-    (start,) = switch(family, doubling)
-    branch = follow(family, start, (2.0, 3.0), points=4, step=step)
+    (doubling,) = locate(rossler, (2.0, 3.0), orbit=[3.0, 0.0, 0.1])
+    (start,) = switch(rossler, doubling)
+    branch = follow(rossler, start, (2.0, 3.0), points=4, step=step)
     assert [point.value for point in branch.special_points] == [doubling.value]
     # The first value is known to some 1e-9, which is a hundredth of its distance from the doubling.
     last = branch.points[-1]
@@ -189,3 +187,10 @@ def test_a_cycle_that_shrinks_into_an_equilibrium_ends_there():
         motion = np.abs(point.orbit - [rest, rest, point.value - 1.0]).max()
         state, _ = lorenz(point.value).flow(point.orbit, 0.0, point.period)
         assert np.abs(state - point.orbit).max() <= 1e-8 * motion
+
+
+@pytest.mark.parametrize("state", [[3.0, 0.0, 0.1], [0.0, 3.0, 0.1], [-3.0, 0.0, 0.05]])
+def test_coefficients_do_not_hang_on_where_an_orbit_is_met(state):
+    """Rössler's period doubling, on three sections."""
+    (point,) = locate(rossler, (2.0, 3.3), orbit=state)
+    assert abs(point.coefficient + 0.3705827166) <= point.coefficient_error + 1e-10 < 1e-7

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.stability import Kind, PeriodicSystem, locate
+from chilopod.stability import Kind, PeriodicSystem, find_orbit, from_rhs, locate
 
 PERIOD = 1.3
 
@@ -192,3 +192,35 @@ def test_an_orbit_at_rest_is_followed_from_a_guess_beside_it(unit):
     assert point.kind is Kind.PITCHFORK
     assert abs(point.value - 0.25) <= point.error_bound < 1e-10
     assert not point.orbit.any()
+
+
+def lorenz(r, **more):
+    def rhs(t, x, r):
+        return [10.0 * (x[1] - x[0]), r * x[0] - x[1] - x[0] * x[2], x[0] * x[1] - 8.0 / 3.0 * x[2]]
+
+    return from_rhs(rhs, 3, None, args=(r,), guess_period=0.41, **more)
+
+
+SYMMETRIC = {310.0: [-37.42354634, -94.33277851, 305.61384361], 311.0: [-37.38058567, -94.55590981, 306.15255370]}
+"""States on symmetric orbits."""
+
+
+@pytest.mark.parametrize("between", [(310.0, 316.0), (311.0, 320.0), (310.0, 350.0)])
+def test_a_pitchfork_of_a_symmetry_that_is_not_declared(between):
+    """Lorenz (1963): the symmetric orbit gives way as r falls. With the symmetry in time the return map is another one,
+    with the multiplier -1."""
+    orbit = find_orbit(lorenz(between[0]), SYMMETRIC[between[0]]).state
+    found = locate(lorenz, between, orbit=orbit)
+    half = locate(lambda r: lorenz(r, symmetry=np.diag([-1.0, -1.0, 1.0])), between, orbit=orbit)
+    (point,), (known,) = found, half
+    assert found.complete
+    assert half.complete
+    assert point.kind is known.kind is Kind.PITCHFORK
+    assert abs(point.value - known.value) <= point.error_bound + known.error_bound < 1e-6
+
+
+def test_an_orbit_that_meets_another_one_and_ends_is_not_all():
+    """The asymmetric orbit ends in the pitchfork; beyond it Newton's method finds the symmetric one."""
+    found = locate(lorenz, (305.0, 325.0), orbit=[-13.484487, 37.180551, 286.471177])
+    assert not found.complete
+    assert any("meets another one near 312.973" in remark for remark in found.remarks)

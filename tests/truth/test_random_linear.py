@@ -57,6 +57,8 @@ def rotating(draw):
     return matrix, turns, np.array(exact)
 
 
+@example((np.array([[0.0, -1.25], [1.25, 0.0]]), np.array([-1.0]), np.array([1.25j, -1.25j])))  # two steps suffice
+@example((np.array([[0.0, -1.0], [1.0, 0.0]]), np.array([-1.0]), np.array([1.0j, -1.0j])))
 @given(rotating())
 def test_constant_coefficients_seen_from_a_turning_frame(case):
     matrix, turns, exact = case

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from chilopod.stability.capabilities import SystemLike, is_autonomous
 from chilopod.stability.course import TARGETS, critical_multipliers
 from chilopod.stability.floquet import Spectrum, phased, spectrum
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
@@ -22,12 +23,15 @@ from chilopod.stability.unit_circle.spectra import Event
 ComplexArray = NDArray[np.complex128]
 
 _EPSILON = float(np.finfo(float).eps)
+_FEWEST_PARTS, _MOST_PARTS = 32, 2048  # of a return; the mean of a smooth periodic function converges geometrically
+_SETTLED = 1e-9  # change of the mean from half as many parts: its error is about the square of that
 
 Formed = Callable[[CriticalOrbit, float], NormalForm | None]
 """The normal form at a critical orbit, by the relative error of the return map; None where there is none to be had."""
 
 
 def described(
+    system: SystemLike,
     value: float,
     error_bound: float,
     orbit: Orbit,
@@ -42,6 +46,8 @@ def described(
 
     Parameters
     ----------
+    system
+        The system at the value.
     value, error_bound
         Of the parameter; round-off is added to the bound.
     orbit
@@ -61,6 +67,8 @@ def described(
     critical = critical_multipliers(spec, crossing)
     nu = complex(spec.values[critical[0]])
     mode, left = phased(spec.right[:, critical[0]], spec.left[:, critical[0]])
+    size = _mean_size(system, orbit, mode)
+    mode, left = mode / size, left * size
     frequency, k = 0.0, orbit.image.returns
     if crossing.event is Event.PAIR:
         angle = float(np.angle(np.exp(1j * k * np.angle(nu))))
@@ -93,6 +101,27 @@ def described(
     if not simple:
         return replace(point, modes=_modes(spec, critical, orbit, block, symmetry))
     return with_coefficients(point, form) if form is not None and with_normal_form else point
+
+
+def _mean_size(system: SystemLike, orbit: Orbit, mode: ComplexArray) -> float:
+    """Root of the mean square of a mode over a return, across the motion: it is the same from every state of the orbit.
+
+    1 where the period is known, and with it what is time 0.
+    """
+    if not is_autonomous(system):
+        return 1.0
+    before, parts, duration = 0.0, _FEWEST_PARTS, orbit.period / orbit.image.returns
+    while True:
+        x, v, squares = orbit.state, mode, []
+        for _ in range(parts):
+            x, derivative = system.flow(np.array(x), 0.0, duration / parts)
+            velocity, v = np.asarray(system.velocity(np.array(x))), derivative @ v
+            across = v - velocity * (velocity @ v) / (velocity @ velocity)
+            squares.append(float(np.vdot(across, across).real))
+        mean = float(np.mean(squares))
+        if abs(mean - before) <= _SETTLED * mean or parts >= _MOST_PARTS:
+            return float(np.sqrt(mean))
+        before, parts = mean, 2 * parts
 
 
 def _critical_orbit(

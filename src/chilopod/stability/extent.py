@@ -16,6 +16,9 @@ _BEFORE = 1e-6  # of the interval: so far from a fold other crossings are looked
 _TRIES = 2  # starts of curves round a fold
 _CLEAR_OF_FOLD = 1e-3  # distance of a multiplier from +1 from which a curve that starts there passes the fold
 _COMES, _FARTHER = 1e-5, 100.0  # of the interval before a fold, and times that: where the multiplier is looked at
+_MERGING = (
+    1e-4  # of the interval, before the orbit meets another one: from there on multipliers are within their errors
+)
 _BETWEEN_POWERS = 0.75  # of one half and one
 _AT_REST = 0.03  # of the motion of the first orbit
 _PARTS = 5  # of a return, to see how far the motion goes
@@ -77,7 +80,11 @@ def extent(samples: Samples) -> Extent:
         return Extent(start, last.value, folds, ending, shrinks=True, beside=beside)
     if fold is None:
         ending = "" if last.value == high else f"the orbit cannot be followed beyond {last.value:.9g}"
-        return Extent(start, last.value, folds, ending, beside=beside)
+        end = last.value
+        if samples.merges:
+            ending = f"the orbit meets another one near {end:.9g}, which goes on alone: a pitchfork of that one"
+            end = max(start, end - _MERGING * samples.width)
+        return Extent(start, end, folds, ending, beside=beside)
     # In the fold itself multipliers move as a root of the distance, which no search sees through.
     end = max(first.value, min(last.value, fold.value - beside))
     return Extent(start, end, folds + (fold,) * (fold.value <= high + fold.error_bound), beside=beside)

@@ -164,7 +164,10 @@ def locate(
                 samples.allow(_DESCRIBING)
                 try:
                     with Asking("family", crossing.value):
-                        points.append(_described(samples, crossing, block, normal_form))
+                        point = _described(samples, crossing, block, normal_form)
+                    if not point.error_bound < samples.width:
+                        raise AnalysisError(f"its error bound of {point.error_bound:.1e} tells nothing", field="value")
+                    points.append(point)
                 except AnalysisError as error:
                     status = max(status, Status.INCOMPLETE, key=_GRAVITY.index)
                     remarks.append(f"what crosses at {crossing.value:.9g} could not be described: {error}")
@@ -226,6 +229,7 @@ def _described(samples: Samples, crossing: Crossing, block: Block | None, with_n
     # Where an orbit is lost the point may be the fold that it ends in.
     lost = samples.end < samples.high and value + bound >= samples.end
     return described(
+        samples.family(value),
         value,
         bound,
         orbit,
@@ -243,7 +247,15 @@ def _fold(samples: Samples, fold: Fold, with_normal_form: bool) -> BifurcationPo
     crossing = Crossing(fold.value, (fold.value, fold.value), Event.PLUS, 1, 1, 1.0 + 0.0j)
     formed = _formed(samples, fold.value, orbit)
     return described(
-        fold.value, fold.error_bound, orbit, crossing, None, formed, kind=Kind.FOLD, with_normal_form=with_normal_form
+        samples.family(fold.value),
+        fold.value,
+        fold.error_bound,
+        orbit,
+        crossing,
+        None,
+        formed,
+        kind=Kind.FOLD,
+        with_normal_form=with_normal_form,
     )
 
 

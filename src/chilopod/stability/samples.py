@@ -37,6 +37,8 @@ _HALFWAY = 0.25  # of a change: an orbit halfway between two is as near as that 
 _BEYOND, _APART = 8, 0.1  # samples beyond two to choose from, and how far from these, of the distance of the two
 _BEHIND = 4  # samples by which the next one is foreseen
 _BENT = 0.3  # of the distance of two orbits: how far from the straight line the one between them may be
+_TOUCHING = 0.25  # of a multiplier's distance from +1: straight lines that meet nearer to it may touch it
+_MERGED = 1e-5  # of the interval: a gap in which they still do
 _JUMP = 0.3  # of the orbit between prediction and correction, relative to its size
 
 
@@ -52,6 +54,27 @@ class Sample(ReadOnlyArrays):
     def off_plus_one(self) -> float:
         """Distance of the return map's multipliers from +1, that along the motion left aside."""
         return float(np.abs(return_multipliers(self.image) - 1.0).min(initial=np.inf))
+
+    @property
+    def beside_plus_one(self) -> float:
+        """Signed distance of the nearest real multiplier from +1; NaN if a pair is nearer."""
+        off = return_multipliers(self.image) - 1.0
+        nearest = complex(off[np.abs(off).argmin()]) if off.size else np.nan
+        return nearest.real if nearest.imag == 0.0 else np.nan
+
+
+def _touches(first: Sample, left: Sample, right: Sample, last: Sample) -> bool:
+    """Whether a multiplier on one side of +1 heads for it from both sides of the gap between two of four samples."""
+    places = np.array([each.value for each in (first, left, right, last)])
+    off = np.array([each.beside_plus_one for each in (first, left, right, last)])
+    if not np.isfinite(off).all() or (np.sign(off) != np.sign(off[1])).any():
+        return False
+    off = np.abs(off)
+    into, out = np.diff(off)[[0, 2]] / np.diff(places)[[0, 2]]
+    if not into < 0.0 < out:
+        return False
+    meeting = (off[2] - off[1] + into * places[1] - out * places[2]) / (into - out)
+    return bool(off[1] + into * (meeting - places[1]) < _TOUCHING * off[1:3].min())
 
 
 class Samples:
@@ -89,6 +112,8 @@ class Samples:
         Where the orbit ends, at most ``high``.
     spent
         Whether the path ends because the budget was spent.
+    merges
+        Whether the path ends where the orbit meets another one, which goes on alone.
     """
 
     def __init__(
@@ -115,7 +140,8 @@ class Samples:
         if not (self.known and self.timed):
             self._keep(_sample(low, self.first))
         self.spent = False
-        self.path = [] if guess is None else self._followed(low, high)
+        self.merges = False
+        self.path = [] if guess is None else self._to_merging(self._followed(low, high))
         self.end = self.path[-1].value if self.path else high
         self.allow(self._allowed)
 
@@ -343,6 +369,27 @@ class Samples:
                 break
         return path
 
+    def _to_merging(self, path: list[Sample]) -> list[Sample]:
+        """The path up to where the orbit meets another one at a pitchfork, and what is followed is that one: a
+        multiplier comes to +1 from one side, and goes back to it from there."""
+        for i in range(1, len(path) - 2):
+            behind, ahead, beyond = path[: i + 1], path[i + 1], path[i + 2]
+            while _touches(behind[-2], behind[-1], ahead, beyond):
+                if ahead.value - behind[-1].value <= _MERGED * self.width:
+                    self.merges = True
+                    return behind
+                middle = 0.5 * (behind[-1].value + ahead.value)
+                try:
+                    found = self._sampled(middle, self._foreseen(behind[: -_BEHIND - 1 : -1], middle), behind[-1])
+                except AnalysisError:
+                    break
+                self._keep(found)
+                if _touches(behind[-2], behind[-1], found, ahead):
+                    ahead, beyond = found, ahead
+                else:
+                    behind.append(found)
+        return path
+
     def _follow(self, behind: list[Sample], value: float, attempts: float = np.inf) -> list[Sample]:
         """Samples from the last one behind to ``value``, by smaller steps where Newton's method does not carry that
         far.
@@ -382,7 +429,9 @@ class Samples:
         between them, in a fold at the square root of a half; to another orbit it is a jump at any place."""
         change = found.orbit - last.orbit
         size = self.size * float((np.abs(change) / self.size).max())
-        if (np.abs(found.orbit - guess) <= np.maximum(_FORESEEN * size, _SMALL * self.size)).all():
+        # Where a multiplier passes +1 another orbit may be as near as anything.
+        small = 0.0 if last.beside_plus_one * found.beside_plus_one < 0.0 else _SMALL
+        if (np.abs(found.orbit - guess) <= np.maximum(_FORESEEN * size, small * self.size)).all():
             return True
         try:
             middle = self._sampled(0.5 * (last.value + found.value), last.orbit + 0.5 * change, last)

@@ -81,6 +81,7 @@ def special_point(
         orbit, along = regular.orbit, regular.error_bound
         point = replace(point, value=_reached(curve, at(high), regular.sampled)[1])
     found = described(
+        curve.system(point.value),
         point.value,
         _value_error(curve, at, place, between, along, orbit.image),
         orbit,

@@ -38,6 +38,7 @@ from chilopod.stability.taylor.switching import (
 )
 
 _ROUNDING = 2.0**-53
+_FIRST = 0.37  # of the interval: the first step of the second of two computations is no longer
 _BLOCK = 64
 _AT_ONCE = 1e-13
 """Smallest difference of two instants, relative to the time: an event nearer to the border of an interval is on it."""
@@ -229,7 +230,9 @@ def advance(
             break
         remaining = (t1 - t) / unit
         h = step_size(layout, switches, order, remaining, epsilon, values, tangents, columns)
-        if h < remaining and h > 0.5 * remaining:
+        if shake > 0.0 and steps == 1:  # no step is one of the other computation's, whose rounding would be the same
+            h = min(h, _FIRST * remaining)
+        elif h < remaining and h > 0.5 * remaining:
             h = 0.5 * remaining
         crossing = -1
         direction = 0.0

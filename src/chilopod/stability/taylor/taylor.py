@@ -50,6 +50,7 @@ _LEAST_TOLERANCE = 1.2e-16
 _OTHER_ORDER = 4
 _OWN = 10.0  # two independent errors differ by less than a tenth of them rarely enough
 _COMMON = 20.0  # the usual difference of all entries, for those that agree by chance
+_NOTHING_BESIDE = 1e-6  # of the geometric mean of the largest in its row and in its column
 _SHAKE = 4.0 * 2.0**-53
 _UNDERFLOW = 1e-290  # numbers below have no full precision
 _NOTHING = np.empty((0, 0))
@@ -182,7 +183,9 @@ class TaylorFlow(ReadOnlyArrays):
         events, steps = self._run(x, t0, t1, params, derivative, bound, self.order, 0.0)
         self._run(other_x * self._shaken, t0, t1, params, other, _NOTHING, self.order - _OTHER_ORDER, _SHAKE)
         difference = np.abs(other - derivative)
-        known = bound > _UNDERFLOW
+        # An entry that is zero but for round-off says nothing of how much the others differ.
+        beside = np.sqrt(bound.max(axis=1)[:, None]) * np.sqrt(bound.max(axis=0))
+        known = (bound > _UNDERFLOW) & (bound > _NOTHING_BESIDE * beside)
         ratios = np.sort(difference[known] / bound[known])
         usual = float(ratios[ratios.size // 2]) if ratios.size else 0.0
         bound = bound * (1.0 + _COMMON * usual) + _OWN * difference

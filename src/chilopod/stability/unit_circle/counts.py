@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 from chilopod.stability.unit_circle.critical import LOST, UNKNOWN, Critical, Group, Point, Root
 from chilopod.stability.unit_circle.spectra import Event, Spectra, margins
-from chilopod.stability.unit_circle.zeros import Interval
+from chilopod.stability.unit_circle.zeros import Interval, between
 
 Array = NDArray[np.float64]
 
@@ -205,7 +205,7 @@ class Accounts:
     def _remark(self, remark: str, gap: Interval) -> None:
         self.open = True
         self._settled.add(gap)
-        self.remarks.append(f"{remark}, between {self._parameter(gap[0]):.9g} and {self._parameter(gap[1]):.9g}")
+        self.remarks.append(f"{remark}, {between(*map(self._parameter, gap))}")
 
     # ---- whether a root explains a change ---------------------------------------------------------------------------
 

@@ -14,9 +14,10 @@ Array = NDArray[np.float64]
 UNKNOWN = 1.0
 """Error of a multiplier's margin that reaches from zero to the circle, and so tells nothing of where it is."""
 
-LOST = "multipliers are so large that those near the circle are lost in round-off"
+LOST = "multipliers near the circle are known no better than their distance from it"
 
 _ULPS = 64.0
+_TELLING = 0.01  # error of a margin, which goes from -1 to 1, that tells where the multiplier is
 
 
 @dataclass(frozen=True)
@@ -81,11 +82,22 @@ class Critical:
         left = next((v for v in reversed(values[:here]) if root.place - v >= ulps), root.place)
         right = next((v for v in values[here:] if v - root.place >= ulps), root.place)
         errors = self._spectra.margin_errors(root.place)
-        if left == right:
-            return errors
-        changes = np.abs(self._spectra.margins(right) - self._spectra.margins(left))
-        reach = max(4.0 * float(np.spacing(abs(root.place))), root.right - root.left)
-        return np.asarray(errors + changes * min(reach / (right - left), 1.0))
+        if left != right:
+            changes = np.abs(self._spectra.margins(right) - self._spectra.margins(left))
+            reach = max(4.0 * float(np.spacing(abs(root.place))), root.right - root.left)
+            errors = errors + changes * min(reach / (right - left), 1.0)
+        if errors.max() <= _TELLING:
+            return np.asarray(errors)
+        # Where the orbit itself is uncertain, multipliers are between those of the nearest places where it is not.
+        sides = [next(filter(self._telling, near), None) for near in (values[:here][::-1], values[here:])]
+        if None in sides:
+            return np.asarray(errors)
+        first, last = (self._spectra.margins(side) for side in sides if side is not None)
+        apart = np.maximum(*(self._spectra.margin_errors(side) for side in sides if side is not None))
+        return np.minimum(errors, apart + np.abs(last - first))
+
+    def _telling(self, place: float) -> bool:
+        return float(self._spectra.margin_errors(place).max()) <= _TELLING
 
     def groups(self, root: Root) -> list[Group]:
         """Multipliers that are critical at a root, without those that are so throughout; changes are not known yet."""

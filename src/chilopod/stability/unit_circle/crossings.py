@@ -21,7 +21,7 @@ from chilopod.labels import Labelled
 from chilopod.stability.unit_circle.counts import Accounts
 from chilopod.stability.unit_circle.critical import LOST, Root
 from chilopod.stability.unit_circle.spectra import Event, Matrices, Spectra, margins
-from chilopod.stability.unit_circle.zeros import Interval, Zeros, find_zeros, first_places
+from chilopod.stability.unit_circle.zeros import Interval, Zeros, between, find_zeros, first_places
 
 Array = NDArray[np.float64]
 
@@ -324,7 +324,7 @@ class _Finder:
         return float(brentq(value, left, right, xtol=5e-324, rtol=4 * _EPSILON, maxiter=most, disp=False))
 
     def _between(self, piece: Interval) -> str:
-        return f"between {self.parameter(piece[0]):.9g} and {self.parameter(piece[1]):.9g}"
+        return between(*map(self.parameter, piece))
 
     def _leave(self, remark: str) -> None:
         self.open = True

@@ -72,6 +72,12 @@ class Zeros:
     spent: bool
 
 
+def between(low: float, high: float) -> str:
+    """Words for an interval of the parameter, with as many digits as tell its ends apart."""
+    texts = f"{low:.9g}", f"{high:.9g}"
+    return "between {} and {}".format(*(texts if texts[0] != texts[1] else (repr(float(low)), repr(float(high)))))
+
+
 def first_places(low: float, high: float) -> Array:
     """Where a search begins: the values of the function it asks for first, whatever the function is."""
     return _places(low, high, _POINTS)
