@@ -46,7 +46,7 @@ def test_a_terminal_gets_bars(capsys, hasty, monkeypatch):
 
 
 def test_compiling_is_said_once_without_a_command_line(caplog, monkeypatch):
-    monkeypatch.setattr(logging.getLogger("chilopod.compiling"), "disabled", False)
+    monkeypatch.setattr(logging.getLogger("chilopod"), "disabled", False)
     listener = numba_internals._Compiling()
     monkeypatch.setattr(numba_internals, "NOTICED", 0.0)
     made = [SimpleNamespace(__module__=name) for name in ("chilopod.x", "mine")]

@@ -130,7 +130,7 @@ class _Compiling(event.Listener):  # type: ignore[misc]
     def on_start(self, event: Any) -> None:
         if not self._said and self.seconds() > NOTICED and event.data["dispatcher"].__module__.startswith("chilopod"):
             self._said = True
-            logging.getLogger("chilopod.compiling").warning("chilopod: compiling, once on this machine")
+            logging.getLogger("chilopod").warning("chilopod: compiling, once on this machine")
         self._begun = self._begun if self._depth else time.monotonic()
         self._depth += 1
 

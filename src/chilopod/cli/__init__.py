@@ -78,7 +78,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         something essential is missing, 130 when interrupted.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
-    logging.getLogger("chilopod.compiling").disabled = True  # the progress bar says it
+    logging.getLogger("chilopod").disabled = True  # the progress bar says it
     try:
         _check_completion()
         code = app(arguments, prog_name="chilopod", standalone_mode=False)

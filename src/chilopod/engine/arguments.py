@@ -189,8 +189,9 @@ def rows_of(
         if array.shape[array.ndim - len(shape) :] != shape or array.ndim > len(shape) + 1 or array.size == 0:
             allowed = f"{shape} or (walks, {', '.join(map(str, shape))})"
             raise ParameterError("has the wrong shape", field=name, value=array.shape, allowed=allowed)
-        if not (np.abs(array) <= LARGEST).all():
-            raise ParameterError("must be finite", field=name, allowed=f"numbers up to {LARGEST:g}")
+        largest = np.finfo(float).max if name == "initial" else LARGEST  # a state may be one that diverges
+        if not (np.abs(array) <= largest).all():
+            raise ParameterError("must be finite", field=name, allowed=f"numbers up to {largest:g}")
         if name == "friction" and not (array > 0.0).all():
             raise ParameterError("must be positive", field=name)
         arrays[name] = array if array.ndim > len(shape) else array[None]

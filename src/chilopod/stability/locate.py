@@ -21,6 +21,7 @@ from chilopod.stability.course import Course, place_error
 from chilopod.stability.described import Formed, described
 from chilopod.stability.extent import Extent, extent
 from chilopod.stability.normal_forms.normal_form import normal_form as normal_form_of
+from chilopod.stability.orbit_blocks import crossings_in, orbit_blocks
 from chilopod.stability.orbits import Orbit, bounded, from_known
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import ReturnMap, returned_states
@@ -28,7 +29,6 @@ from chilopod.stability.samples import Samples
 from chilopod.stability.scales import numerical_balance, sizes
 from chilopod.stability.singular import past_singular
 from chilopod.stability.symmetry.isotypic import Block
-from chilopod.stability.symmetry.orbit_blocks import crossings_in, orbit_blocks
 from chilopod.stability.unit_circle.crossings import Crossing, Crossings, Status, find_crossings
 from chilopod.stability.unit_circle.spectra import Event, Matrices
 

@@ -38,6 +38,7 @@ from chilopod.stability.returns import (
 )
 from chilopod.stability.scales import sizes
 from chilopod.stability.settling import nearer_states
+from chilopod.stability.shooting import Nodes, nodes_of, shot
 from chilopod.stability.symmetry.mirrored import symmetric_states
 
 Array = NDArray[np.float64]
@@ -52,6 +53,7 @@ _SINGULAR, _FAMILY = 1e-13, 1e-8  # singular values of H - 1 that count as zero,
 _MAGNIFIED = 1e9  # move over residual beyond which H - 1 may be singular
 _KNOWN = 1e-4  # of a known orbit: it is one, if not to the last digit
 _SETTLING = 100  # return maps that letting the motion settle is counted as: without derivatives it costs less
+_SHOOTING = 30  # return maps that multiple shooting is counted as
 _MOST_PARTS = 8  # of a return: a guess of the period may be so many times too long
 _CLOSES = 1e-8  # of the motion, and of the sizes of the states: an orbit that closes so nearly is solved for once more
 _FARTHEST = 10.0  # times as large as states so far a correction may be
@@ -131,7 +133,9 @@ def find_orbit(
     system
         The system; one that knows its orbit needs no guess.
     guess
-        A state at time 0 near the orbit, shape (n,).
+        A state at time 0 near the orbit, shape (n,); or a whole orbit near it, solved by multiple shooting: states at
+        even times over one period, shape (times, n), or times and states, shapes (times,) and (times, n), as a tuple or
+        an ``xarray.DataArray`` over ``time``. It then takes the period that the guess has.
     with_error
         Whether to bound errors.
     section
@@ -152,6 +156,15 @@ def find_orbit(
     """
     if guess is None:
         return from_known(system, known_state(system), with_error, budget=budget)
+    whole = nodes_of(guess, system)
+    if whole is not None:
+        x = whole.states[0]
+        across = section_at(system, x, duration=whole.duration)
+        if budget is not None:
+            budget.take(_SHOOTING)
+        whole = shot(lambda _: system, whole, _sizes_along(whole), across).nodes
+        x, section = whole.states[0], across and replace(across, duration=whole.duration)
+        return _newton(system, x, with_error, section, budget)
     x = finite_array(guess, (system.dimension,), "orbit")
     shortened = shortest and section is None
     try:
@@ -169,6 +182,12 @@ def find_orbit(
             except AnalysisError:
                 continue
         raise failed
+
+
+def _sizes_along(nodes: Nodes) -> Array:
+    """Sizes of the states on a guessed orbit, shape (n,)."""
+    largest = np.abs(nodes.states).max(axis=0)
+    return np.where(largest > 0.0, largest, float(largest.max()) or 1.0)
 
 
 def find_large_orbit(system: FlowsTangents, guess: ArrayLike | None = None) -> tuple[TangentMap, Array]:

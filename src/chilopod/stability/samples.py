@@ -33,6 +33,7 @@ NEAR_FOLD = 0.02
 _SURE = 1e-4  # singular value of H - 1, in units, above which the orbit is as good as the flow
 _BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
 _FORESEEN, _SMALL = 0.3, 0.01  # of a change of the orbit, and of the sizes: what a prediction may miss
+_SAME = 1e-7  # of the sizes: orbits that are nearer to what was foreseen are solved for no better
 _HALFWAY = 0.25  # of a change: an orbit halfway between two is as near as that to their mean
 _BEYOND, _APART = 8, 0.1  # samples beyond two to choose from, and how far from these, of the distance of the two
 _BEHIND = 4  # samples by which the next one is foreseen
@@ -430,7 +431,7 @@ class Samples:
         change = found.orbit - last.orbit
         size = self.size * float((np.abs(change) / self.size).max())
         # Where a multiplier passes +1 another orbit may be as near as anything.
-        small = 0.0 if last.beside_plus_one * found.beside_plus_one < 0.0 else _SMALL
+        small = _SAME if last.beside_plus_one * found.beside_plus_one < 0.0 else _SMALL
         if (np.abs(found.orbit - guess) <= np.maximum(_FORESEEN * size, small * self.size)).all():
             return True
         try:

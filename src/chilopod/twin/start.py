@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import copyreg
 from collections.abc import Sequence
+from functools import partial
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -149,3 +152,11 @@ def resume(saved: bytes, threads: int = 0, *, edit: Edit | None = None, traits: 
         )
         walk.restore(settings, arrays)
     return walk
+
+
+def _reduced(walk: TwinWalk) -> tuple[Any, ...]:
+    """How a walk is copied and pickled."""
+    return partial(resume, edit=walk.edit, traits=walk.traits), (walk.save(),)
+
+
+copyreg.pickle(TwinWalk, _reduced)

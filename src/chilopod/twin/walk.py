@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
 import mujoco
@@ -62,7 +61,8 @@ class TwinWalk:
         expected: float = 0.0,
         edit: Edit | None = None,
     ) -> None:
-        self._traits, self._edit, self._robots, self._factors = traits, edit, tuple(robots), factors
+        self.traits, self.edit = traits, edit
+        self._robots, self._factors = tuple(robots), factors
         self._seeds = None if seeds is None else np.array(seeds, dtype=np.object_)
         self._record, self._tolerance = record, tolerance
         self._plan = compiled(without_springs(robots[0]), bool(record and record.forces), edit)
@@ -241,12 +241,7 @@ class TwinWalk:
             **{f"scan_{name}": values for name, values in self._scanner.state().items()},
             "seen": np.array(self._seen).reshape(-1, 2, len(self._robots)),
         }
-        return pack(self._traits, self._robots, settings, arrays)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        from chilopod.twin.start import resume  # which imports this module
-
-        return partial(resume, edit=self._edit, traits=self._traits), (self.save(),)
+        return pack(self.traits, self._robots, settings, arrays)
 
     def restore(self, settings: dict[str, Any], arrays: dict[str, Any]) -> None:
         """Become as the walk was that was saved, of the same robots."""
@@ -302,7 +297,7 @@ class TwinWalk:
         if self._record and self._record.poses:
             data["pose"] = (("time", "robot", "coordinate"), positions, {"units": "m, 1, rad: MuJoCo's qpos"})
         add_outcome(data, [each.label for each in self._status], target)
-        data.attrs = {"engine": self._traits.name, "robot": self._robots[0].to_toml(), "duration": self._time}
+        data.attrs = {"engine": self.traits.name, "robot": self._robots[0].to_toml(), "duration": self._time}
         return data
 
     # -- inside

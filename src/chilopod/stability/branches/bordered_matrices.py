@@ -83,4 +83,6 @@ def null_vector(bordered: Array) -> Array:
     if not np.isfinite(bordered).all():
         raise AnalysisError("the return map is not finite", field="flow")
     tangent: Array = np.linalg.lstsq(bordered, np.append(np.zeros(n), 1.0), rcond=_SINGULAR)[0]
+    if not tangent.any():
+        raise AnalysisError("the curve has no direction here", field="step")
     return tangent / np.linalg.norm(tangent)

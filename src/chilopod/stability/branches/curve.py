@@ -9,6 +9,7 @@ has the section across the motion where it starts.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import TypeGuard
 
 import numpy as np
@@ -32,12 +33,14 @@ from chilopod.stability.returns import (
     ReturnMap,
     Section,
     carried,
+    return_duration,
     return_map,
     returned_states,
     section_at,
     turned,
     whole_period,
 )
+from chilopod.stability.shooting import FEW_ROUNDS, Free, node_count, nodes_along, shot
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -51,8 +54,12 @@ _FALLING = 0.5
 _CLEAR = 10.0  # times the difference of two computations: a residual that may be the flow's error
 _LOOSE = 1e-6  # of a step: an orbit that may be so far off is corrected with a matrix of its own
 _MOST_CORRECTIONS = 12
+_FEWEST_NODES, _MANY_NODES = 3, 6  # a return that magnifies less is as good in one; that magnifies more is none
 _STRAYS = 0.1  # of a step: so far beyond the interval a curve is sought that ends within it
 _PARAMETER_STEP = 1e-6  # of the difference, in units of the scale
+_STEEP = 10.0  # times as far, in units, the difference moves the return, about
+_RETRIES, _STEEPER = 1, 100.0  # with a smaller difference, and how much smaller where there is no return
+_SOONER, _LATER = 0.2, 0.5  # of a return: the time of the next one is foreseen to differ by so much at most
 _SHARPEST_TURN = 0.5  # cosine between two tangents: beyond it the step may have landed on another curve
 _SHRUNK = 10.0  # cube roots of the precision, of the largest motion so far
 _KEPT = 8  # systems: making one may cost more than a flow
@@ -106,6 +113,7 @@ class Curve:
         self.left = budget
         self.relative_error: float | None = None
         self._motion = 0.0  # the largest within a period so far
+        self._steepness = 1.0  # of the return map over the parameter, where the step starts, in units
         self._known: dict[float, tuple[SystemLike, SystemLike]] = {}
         self._each: dict[type, bool] = {}
         self._dimension = 0
@@ -243,14 +251,81 @@ class Curve:
     def _stepped(
         self, anchor: Anchor, guess: Array, matrix: Array, row: Array, target: float, value: float | None = None
     ) -> Step:
-        """Correct a guess to H = x and row . moved = target."""
-        last, section = anchor.last, anchor.section
-        n = last.orbit.size
+        """Correct a guess to H = x and row . moved = target; by multiple shooting where a return magnifies so much that
+        the guess is none, or that rounding is magnified to more than an orbit is solved for."""
+        last, n = anchor.last, anchor.last.orbit.size
+        self._steepness = max(1.0, float(np.abs(anchor.matrix[:n, n]).max()))
+        section = self._timed(anchor, float(np.linalg.norm(guess)))
+        mode = last.tangent[:n] if anchor.leaving else None
+        fixed = symmetric_space(self.system(last.value), last.orbit, self.units(n)[:n], mode)
+        where = _Where(anchor, section, fixed, row, target, value)
+        count = node_count(matrix[:n, :n] + np.eye(n), np.ones(n)) if fixed is None and value is None else 0
+        rounds = 0
+        if count >= _MANY_NODES:
+            moved, x, here, image, derivative = self._shot(where, count)
+        else:
+            try:
+                found = self._corrected(where, guess, matrix)
+            except OutsideIntervalError:
+                raise
+            except AnalysisError:
+                if count < _FEWEST_NODES:
+                    raise
+                there = self._shot(where, count)
+                if section is not None:
+                    duration = there[3].period / there[3].returns
+                    where = replace(where, section=replace(section, duration=duration))
+                found = self._corrected(where, there[0], matrix)
+            moved, x, here, rounds = found.moved, found.x, found.value, found.rounds
+            image = self.image(x, here, where.section)
+            derivative = self._difference(x, here, where.section, found.mapped, found.beside)
+        bordered = self.matrix(image.jacobian, derivative, last.tangent)
+        tangent = null_vector(within_space(fixed, bordered))
+        if not tangent @ last.tangent >= _SHARPEST_TURN:
+            raise AnalysisError("the curve turns too sharply", field="step")
+        bordered[n] = tangent
+        end = self._end(anchor, x, here, image, tangent, bordered)
+        missed = float(np.linalg.norm(moved - guess))
+        return Step(anchor, end, float(last.tangent @ moved), moved, tangent, bordered, image, rounds, missed)
+
+    def _shot(self, where: _Where, count: int) -> tuple[Array, Array, float, ReturnMap, Array]:
+        """Displacement in units, state, parameter, return map and its derivative by the parameter, per scale, by
+        multiple shooting from the last point."""
+        last, section = where.anchor.last, where.section
+        system, units = self.system(last.value), self.units(last.orbit.size)
+        duration = return_duration(system) if where.anchor.section is None else where.anchor.section.duration
+        start = np.append(last.orbit, last.value)
+        self.left -= 2 * FEW_ROUNDS  # each in parts
+        with Asking("flow", last.value):
+            nodes = nodes_along(system, last.orbit, duration, count, last.value)
+            free = Free(where.row, where.target, start, self.scale)
+            found = shot(self.system, nodes, units[:-1], where.anchor.section, free)
+        x, value = found.nodes.states[0], found.nodes.value
+        system = self.system(value)
+        if not self.between[0] <= value <= self.between[1]:
+            raise OutsideIntervalError("leaves the interval", field="parameter", value=value)
+        count, velocity, across = returns_per_period(system), None, np.eye(x.size)
+        if section is not None and is_autonomous(system):
+            velocity = np.asarray(system.velocity(x))
+            across -= np.outer(velocity, section.normal) / float(section.normal @ velocity)
+        image = ReturnMap(
+            x,
+            across @ found.jacobian,
+            np.nan,
+            count,
+            count * found.nodes.duration,
+            velocity,
+            None if section is None else section.normal,
+        )
+        return (np.append(x, value) - start) / units, x, value, image, across @ found.by_value * self.scale
+
+    def _corrected(self, where: _Where, guess: Array, matrix: Array) -> _Corrected:
+        """Correct a guess by Broyden's method."""
+        anchor, section, fixed, row = where.anchor, where.section, where.fixed, where.row
+        last, n = anchor.last, anchor.last.orbit.size
         units = self.units(n)
         moved, matrix = np.array(guess), np.array(matrix)
         matrix[-1] = row
-        mode = last.tangent[:n] if anchor.leaving else None
-        fixed = symmetric_space(self.system(last.value), last.orbit, units[:n], mode)
         matrix = within_space(fixed, matrix)
         by_parameter = matrix[:n, n]
         inverse, singular = inverted(matrix)
@@ -262,7 +337,7 @@ class Curve:
             x = last.orbit + units[:n] * moved[:n]
             if fixed is not None:
                 x = units[:n] * (fixed @ (x / units[:n]))
-            wanted = last.value + self.scale * float(moved[n]) if value is None else value
+            wanted = last.value + self.scale * float(moved[n]) if where.value is None else where.value
             here = min(max(wanted, self.between[0]), self.between[1])
             # A curve that turns back at the end of the interval is sought beyond it on the way there.
             strays = (wanted - here) / self.scale
@@ -270,7 +345,9 @@ class Curve:
                 raise OutsideIntervalError("leaves the interval", field="parameter", value=wanted)
             mapped, beside = self._mapped(x, here, section)
             off = (mapped - x) / units[:n]
-            residual = np.append((off if fixed is None else fixed @ off) + strays * by_parameter, row @ moved - target)
+            if fixed is not None:
+                off = fixed @ off
+            residual = np.append(off + strays * by_parameter, row @ moved - where.target)
             now = float(np.abs(residual).max())
             if not np.isfinite(now) or (now > 10.0 * largest and now > _SETTLED):
                 raise AnalysisError("corrections diverge", field="step")
@@ -279,14 +356,11 @@ class Curve:
             # A residual that no longer falls is what the flow is good to, if the matrix can make it fall.
             settled = not closed and now <= _SETTLED * size and now >= _FALLING * largest and not singular
             settled = settled and now <= _CLEAR * self._noise(x, here, section)
-            # Where it leaves another curve the matrix is so weak that a small residual is far from an orbit.
-            loose = (
-                anchor.leaving
-                and not exact
-                and float(np.linalg.norm(inverse @ residual)) > _LOOSE * float(np.linalg.norm(moved))
-            )
-            if (closed or settled) and not loose:
-                break
+            if closed or settled:
+                # Where it leaves another curve the matrix is so weak that a small residual is far from an orbit.
+                far = float(np.linalg.norm(inverse @ residual)) > _LOOSE * float(np.linalg.norm(moved))
+                if exact or not (anchor.leaving and far):
+                    break
             if rounds == _MOST_CORRECTIONS:
                 raise AnalysisError("corrections do not converge", field="step")
             if closed or settled:
@@ -295,11 +369,7 @@ class Curve:
                 inverse, singular = inverted(within_space(fixed, here_matrix))
             elif rounds:
                 # Broyden's update keeps the matrix of the last point good enough for the whole step.
-                change = inverse @ (residual - residual_before)
-                along = float(move @ change)
-                if along == 0.0:
-                    raise AnalysisError("corrections do not converge", field="step")
-                inverse = inverse + np.outer(move - change, move @ inverse) / along
+                inverse = _updated(inverse, move, inverse @ (residual - residual_before))
             move = -inverse @ residual
             residual_before, largest = residual, now
             moved = moved + move
@@ -307,16 +377,7 @@ class Curve:
             corrections += now > _COUNTED * size
         if abs(strays) > self.precision:
             raise OutsideIntervalError("leaves the interval", field="parameter", value=wanted)
-        image = self.image(x, here, section)
-        derivative = self._difference(x, here, section, mapped, beside)
-        bordered = self.matrix(image.jacobian, derivative, last.tangent)
-        tangent = null_vector(within_space(fixed, bordered))
-        if not tangent @ last.tangent >= _SHARPEST_TURN:
-            raise AnalysisError("the curve turns too sharply", field="step")
-        bordered[n] = tangent
-        end = self._end(anchor, x, here, image, tangent, bordered)
-        missed = float(np.linalg.norm(moved - guess))
-        return Step(anchor, end, float(last.tangent @ moved), moved, tangent, bordered, image, corrections, missed)
+        return _Corrected(x, here, moved, mapped, beside, corrections)
 
     def _end(self, anchor: Anchor, x: Array, value: float, image: ReturnMap, tangent: Array, matrix: Array) -> Anchor:
         """Where the next step starts."""
@@ -376,7 +437,11 @@ class Curve:
         with Asking("flow", value):
             period = own.period
             if section is None and period is not None and not self.symmetric and self.periods == 1:
-                beside = self._systems(value + self._parameter_step(value))[0] if self._flows_each(own) else own
+                beside = (
+                    self._systems(value + self._parameter_step(value, self._steepness))[0]
+                    if self._flows_each(own)
+                    else own
+                )
                 same = beside.period == period
                 if self._flows_each(own) and self._flows_each(beside):
                     both: Sequence[FlowsEach] = [own, beside]
@@ -401,21 +466,79 @@ class Curve:
             self._each[kind] = isinstance(system, FlowsEach)
         return self._each[kind]
 
-    def _parameter_step(self, value: float) -> float:
+    def _timed(self, anchor: Anchor, ahead: float) -> Section | None:
+        """The section of a step, with the time of a return so far ahead by those of the last two points."""
+        section = anchor.section
+        if section is None or anchor.before is None:
+            return section
+        last, (before, _) = anchor.last, anchor.before
+        assert last.period is not None
+        assert before.period is not None
+        away = np.append(last.orbit - before.orbit, last.value - before.value) / self.units(last.orbit.size)
+        change = (last.period - before.period) / last.period * ahead / float(np.linalg.norm(away))
+        return replace(section, duration=section.duration * (1.0 + min(max(change, -_SOONER), _LATER)))
+
+    def _parameter_step(self, value: float, steepness: float) -> float:
         """A small change of the parameter that stays within the interval, as the numbers are that differ by it."""
-        step = _PARAMETER_STEP * self.scale
+        step = _PARAMETER_STEP * self.scale / max(1.0, steepness / _STEEP)
         return (value + step) - value if value + step <= self.between[1] else (value - step) - value
 
     def _difference(
         self, x: Array, value: float, section: Section | None, mapped: Array, beside: Array | None
     ) -> Array:
-        step = self._parameter_step(value)
-        if beside is None:
-            self.left -= 1
-            with Asking("flow", value + step):
-                beside = returned_states(self.system(value + step), x[None], section)[0]
-        difference: Array = (beside - mapped) / (step / self.scale)
+        units, steepness = self.units(x.size)[:-1], self._steepness
+        for last in (*[False] * _RETRIES, True):
+            step = self._parameter_step(value, steepness)
+            try:
+                if beside is None:
+                    self.left -= 1
+                    with Asking("flow", value + step):
+                        beside = returned_states(self.system(value + step), x[None], section)[0]
+            except AnalysisError:
+                if last:
+                    raise
+                steepness *= _STEEPER
+                continue
+            difference: Array = (beside - mapped) / (step / self.scale)
+            found = float(np.abs(difference / units).max())
+            # A return that magnifies bends within less of the parameter.
+            if last or not 2.0 * max(_STEEP, steepness) < found < np.inf:
+                break
+            steepness, beside = found, None
         return difference
+
+
+@dataclass(frozen=True)
+class _Where:
+    """Equations of a step: where it starts, the section that returns end in, the projection onto states with the
+    symmetries (or None), ``row . moved = target``, and the parameter's value where that is given."""
+
+    anchor: Anchor
+    section: Section | None
+    fixed: Array | None
+    row: Array
+    target: float
+    value: float | None
+
+
+@dataclass(frozen=True)
+class _Corrected:
+    """A solution: state, parameter, displacement in units, return of the state, that beside it, corrections needed."""
+
+    x: Array
+    value: float
+    moved: Array
+    mapped: Array
+    beside: Array | None
+    rounds: int
+
+
+def _updated(inverse: Array, move: Array, change: Array) -> Array:
+    """Broyden's update of an inverse matrix, from a move and what the inverse makes of the residual's change."""
+    along = float(move @ change)
+    if along == 0.0:
+        raise AnalysisError("corrections do not converge", field="step")
+    return inverse + np.outer(move - change, move @ inverse) / along
 
 
 class OutsideIntervalError(AnalysisError):

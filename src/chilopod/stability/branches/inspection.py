@@ -28,9 +28,9 @@ from chilopod.stability.branches.special_points import Place, blocks_along, spec
 from chilopod.stability.capabilities import flows_with_error
 from chilopod.stability.course import TARGETS
 from chilopod.stability.floquet import counts_outside, spectrum
+from chilopod.stability.orbit_blocks import Blocks, block_of, crossings_in
 from chilopod.stability.returns import ReturnMap
 from chilopod.stability.symmetry.isotypic import Block
-from chilopod.stability.symmetry.orbit_blocks import Blocks, block_of, crossings_in
 from chilopod.stability.unit_circle.crossings import Crossing, Crossings, Status, find_crossings
 from chilopod.stability.unit_circle.spectra import Event, Matrices
 
@@ -330,10 +330,10 @@ def _jacobian_at(within: Within, place: float) -> Array:
     last, n = step.start.last, step.image.state.size
     units = curve.units(n)
     x, value = last.orbit + units[:n] * moved[:n], last.value + curve.scale * float(moved[n])
-    image = curve.image(x, value, step.start.section)
     try:
+        image = curve.image(x, value, step.start.section)
         off = float(np.abs(np.linalg.solve(matrix, np.append((image.state - x) / units[:n], 0.0))).max())
-    except np.linalg.LinAlgError:
+    except (AnalysisError, np.linalg.LinAlgError):  # a return may magnify what the cubic misses
         off = np.inf
     if not off <= _OFF * step.size:
         exact = within.at(place)

@@ -1,0 +1,125 @@
+"""Whole orbits as unknowns: returns that magnify a deviation by thousands, guesses that are orbits."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.stability import begin, find_orbit, follow, from_rhs, locate, multipliers
+from chilopod.stability.shooting import Nodes, shot
+
+RATE, FREQUENCY = np.sqrt(1.0 + 2.0 * np.sqrt(7.0)), np.sqrt(2.0 * np.sqrt(7.0) - 1.0)
+PERIOD = 2.0 * np.pi / FREQUENCY
+
+
+def hill():
+    """Hill's lunar problem, whose point of libration is a saddle and a centre (Szebehely 1967, section 10.3)."""
+
+    def rhs(t, x):
+        cube = (x[0] * x[0] + x[1] * x[1]) ** 1.5
+        return [x[2], x[3], 2.0 * x[3] + 3.0 * x[0] - x[0] / cube, -2.0 * x[2] - x[1] / cube]
+
+    return from_rhs(rhs, 4, None, guess_period=3.0)
+
+
+def linear(size):
+    """Motion about the point of libration, linearised, at even times over a period."""
+    t = np.linspace(0.0, PERIOD, 65)
+    ratio = (FREQUENCY**2 + 9.0) / (2.0 * FREQUENCY)
+    c, s = size * np.cos(FREQUENCY * t), size * np.sin(FREQUENCY * t)
+    states = [3.0 ** (-1.0 / 3.0) + c, -ratio * s, -FREQUENCY * s, -ratio * FREQUENCY * c]
+    return t, np.stack(states, axis=1)
+
+
+def test_an_orbit_that_magnifies_two_thousand_times_from_a_rough_guess():
+    times, states = linear(0.02)
+    off = np.random.default_rng(1).normal(0.0, 0.01, 4)
+    found = multipliers(hill(), (times, states + off))
+    assert found.values[0].real == pytest.approx(np.exp(RATE * PERIOD), rel=0.02)
+    assert (found.values[0] * found.values[-1]).real == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_small_orbit_is_that_of_the_linear_motion():
+    found = multipliers(hill(), linear(1e-4))
+    assert found.period == pytest.approx(PERIOD, rel=1e-7)
+    assert found.values[0].real == pytest.approx(np.exp(RATE * PERIOD), rel=1e-5)
+
+
+def duffing(force=2.5, symmetry=None):
+    def rhs(t, x, force):
+        return [x[1], -0.2 * x[1] - x[0] ** 3 + force * np.cos(t)]
+
+    return from_rhs(rhs, 2, 2.0 * np.pi, args=(force,), symmetry=symmetry)
+
+
+@pytest.mark.parametrize("symmetry", [None, -np.eye(2)])
+@pytest.mark.parametrize("form", ["rows", "times", "record"])
+def test_guesses_that_are_orbits(form, symmetry):
+    system = duffing(symmetry=symmetry)
+    known = find_orbit(system, [1.88, 0.64])
+    times = np.linspace(0.0, 2.0 * np.pi, 33)
+    states = [duffing().flow_with_error(known.state, 0.0, t)[0] if t else known.state for t in times]
+    states = np.array(states) + 0.05
+    guess = {
+        "rows": states[:-1],
+        "times": (times + 3.0, states),
+        "record": xr.DataArray(states, {"time": times}, ("time", "state")),
+    }[form]
+    found = find_orbit(system, guess)
+    assert np.abs(found.state - known.state).max() <= (found.error + known.error).max() + 1e-14
+    (point,) = locate(lambda force: duffing(force, -np.eye(2)), (2.2, 2.6), orbit=guess)
+    assert point.value == pytest.approx(2.403377116057, abs=1e-11)
+
+
+def lorenz(r):
+    def rhs(t, x, r):
+        return [10.0 * (x[1] - x[0]), r * x[0] - x[1] - x[0] * x[2], x[0] * x[1] - 8.0 / 3.0 * x[2]]
+
+    return from_rhs(rhs, 3, None, args=(r,), guess_period=0.67)
+
+
+def test_a_cycle_is_followed_to_where_it_becomes_homoclinic():
+    """Lorenz: at r = 13.9265 (Sparrow 1982, chapter 2) the unstable cycle takes for ever; the closer, the longer by the
+    logarithm, at the rate 8/3 of the origin's slowest stable direction, which is slower than the unstable one."""
+    start = begin(lorenz, 24.0, [5.48239022, 5.89665725, 19.66310346], rising=False)
+    branch = follow(lorenz, start, (13.0, 26.0), points=100)
+    values = np.array([point.value for point in branch.points])
+    assert (np.diff(values) < 0.0).all()
+    assert 13.9265 < values[-1] < 13.93
+    assert len(branch.points) < 60
+    assert branch.special_points == ()
+    near = [point for point in branch.points if point.value < 13.97]
+    assert len(near) > 3
+    for point, after in zip(near, near[1:], strict=False):
+        gone = np.log((point.value - 13.92656) / (after.value - 13.92656)) * 3.0 / 8.0
+        assert after.period - point.period == pytest.approx(gone, rel=0.1)
+        if after.value < 13.929:  # rounding alone is magnified to more than is asked here
+            continue
+        state, _ = lorenz(after.value).flow(after.orbit, 0.0, after.period)
+        assert np.abs(state - after.orbit).max() <= 1e-10 * after.multipliers[0].real
+
+
+def test_what_explodes_between_two_nodes_is_named():
+    system = from_rhs(lambda t, x: [x[0] ** 2 + np.cos(t)], 1, 2.0 * np.pi)
+    nodes = Nodes(np.array([[0.0], [0.0], [50.0], [0.0]]), 2.0 * np.pi)
+    with pytest.raises(AnalysisError, match="node 2 of 4"):
+        shot(lambda _: system, nodes, np.ones(1), None)
+
+
+@pytest.mark.parametrize(
+    "guess",
+    [
+        np.zeros((3, 2)),
+        np.zeros((9, 3)),
+        np.full((9, 2), np.nan),
+        (np.zeros(9), np.zeros((9, 2))),
+        (np.linspace(0.0, 1.0, 9), np.zeros((9, 2))),
+        (np.linspace(0.0, 2.0 * np.pi, 8), np.zeros((9, 2))),
+        np.zeros((2, 2, 2)),
+    ],
+    ids=str,
+)
+def test_orbits_that_are_none_are_one_line(guess):
+    with pytest.raises(ParameterError) as error:
+        find_orbit(duffing(), guess)
+    assert "\n" not in str(error.value)
