@@ -29,7 +29,7 @@ from chilopod.stability.scales import numerical_balance, sizes
 from chilopod.stability.singular import past_singular
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.symmetry.orbit_blocks import crossings_in, orbit_blocks
-from chilopod.stability.unit_circle.crossings import Crossing, Crossings, Status, find_crossings
+from chilopod.stability.unit_circle.crossings import Crossing, Crossings, SearchStatus, find_crossings
 from chilopod.stability.unit_circle.spectra import Event, Matrices
 
 Array = NDArray[np.float64]
@@ -39,7 +39,7 @@ BUDGET = 5000
 
 _DESCRIBING = 400  # return maps to solve for the orbits beside a point
 
-_GRAVITY = (Status.COMPLETE, Status.CONSERVATIVE, Status.INCOMPLETE, Status.BUDGET)
+_GRAVITY = (SearchStatus.COMPLETE, SearchStatus.CONSERVATIVE, SearchStatus.INCOMPLETE, SearchStatus.BUDGET)
 _FOLLOWED = 10.0  # factor on the error of the first orbit for that of those which are followed from it
 _LEAST_ERROR = 1e-15
 _BESIDE = 1e-6  # of the interval: how far beside a crossing rates of change are taken
@@ -62,14 +62,14 @@ class Located(Short, Sequence[BifurcationPoint]):
     """
 
     points: tuple[BifurcationPoint, ...]
-    status: Status
+    status: SearchStatus
     remarks: tuple[str, ...]
     evaluations: int
 
     @property
     def complete(self) -> bool:
         """Whether the numbers of unstable multipliers at the ends and between all points add up."""
-        return self.status in (Status.COMPLETE, Status.CONSERVATIVE)
+        return self.status in (SearchStatus.COMPLETE, SearchStatus.CONSERVATIVE)
 
     @overload
     def __getitem__(self, index: int) -> BifurcationPoint: ...
@@ -150,7 +150,7 @@ def locate(
     samples = Samples(family, orbit, low, high, budget, seconds)
     here = extent(samples)
     remarks = [here.ending] if here.ending else []
-    status = Status.BUDGET if samples.spent else Status.INCOMPLETE if here.ending else Status.COMPLETE
+    status = SearchStatus.BUDGET if samples.spent else SearchStatus.INCOMPLETE if here.ending else SearchStatus.COMPLETE
     points: list[BifurcationPoint] = []
     if here.start < here.end:
         searched, more = _searched(samples, here, budget)
@@ -166,11 +166,11 @@ def locate(
                     with Asking("family", crossing.value):
                         points.append(_described(samples, crossing, block, normal_form))
                 except AnalysisError as error:
-                    status = max(status, Status.INCOMPLETE, key=_GRAVITY.index)
+                    status = max(status, SearchStatus.INCOMPLETE, key=_GRAVITY.index)
                     remarks.append(f"what crosses at {crossing.value:.9g} could not be described: {error}")
     points += [_fold(samples, fold, normal_form) for fold in here.folds]
     if samples.remarks:
-        status = max(status, Status.INCOMPLETE, key=_GRAVITY.index)
+        status = max(status, SearchStatus.INCOMPLETE, key=_GRAVITY.index)
     ordered = tuple(sorted(points, key=lambda point: point.value))
     return Located(ordered, status, tuple(dict.fromkeys([*remarks, *samples.remarks])), samples.count)
 

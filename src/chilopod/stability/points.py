@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.labels import Labelled
 from chilopod.notebook import block, table, words
-from chilopod.stability.normal_forms.amplitude import Status
+from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.normal_form import NormalForm
 from chilopod.stability.symmetry.equivariants import SymmetricCrossing
 
@@ -52,7 +52,7 @@ _NEGLIGIBLE = 0.3  # of the cubic term at the sampled amplitude: what the error 
 def kind_at_plus_one(form: NormalForm) -> Kind:
     """What happens at a real multiplier +1 where the orbit goes on: transcritical with a quadratic term that is clearly
     there, pitchfork without one but with a cubic one, a branch point where the errors leave that open."""
-    if form.status is not Status.FOUND:
+    if form.status is not NormalFormStatus.FOUND:
         return Kind.BRANCH_POINT
     if abs(form.quadratic) > _CLEAR * form.quadratic_error:
         return Kind.TRANSCRITICAL
@@ -64,7 +64,7 @@ def kind_at_plus_one(form: NormalForm) -> Kind:
 
 def criticality(form: NormalForm) -> Criticality | None:
     """The verdict of a cubic coefficient; None where there is no normal form, or where other terms decide too."""
-    if form.status not in (Status.FOUND, Status.LINEAR):
+    if form.status not in (NormalFormStatus.FOUND, NormalFormStatus.LINEAR):
         return None
     if abs(form.cubic) <= form.cubic_error:
         return Criticality.UNDECIDED
