@@ -8,7 +8,7 @@ from chilopod.stability import Kind
 from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import normal_form
-from chilopod.stability.points import criticality, kind_at_plus_one
+from chilopod.stability.points import Criticality, criticality, kind_at_plus_one
 
 
 def at_origin(jacobian, multiplier, right=None, left=None, returns=1):
@@ -138,7 +138,7 @@ def test_a_map_without_values_has_no_normal_form():
     form = normal_form(nowhere, at_origin([[1.0]], 1.0))
     assert form.status is NormalFormStatus.OUT_OF_REACH
     assert np.isnan(form.cubic)
-    assert criticality(form) is None
+    assert criticality(form) is Criticality.NOT_COMPUTED
     assert kind_at_plus_one(form) is Kind.BRANCH_POINT
 
 
@@ -167,7 +167,7 @@ def test_a_second_critical_multiplier(other):
     jacobian = np.diag([1.0, other, 0.3])
     form = normal_form(lambda x: x @ jacobian - x**3, at_origin(jacobian, 1.0))
     assert form.status is NormalFormStatus.SEVERAL_CRITICAL
-    assert criticality(form) is None
+    assert criticality(form) is Criticality.NOT_COMPUTED
 
 
 @pytest.mark.parametrize("k", [3, 4])
@@ -179,7 +179,7 @@ def test_strong_resonances_claim_no_verdict(k):
         in_plane(lambda z: nu * (z + c * z * np.abs(z) ** 2) + d * z.conj() ** (k - 1)), pair(2 * np.pi / k)
     )
     assert (form.status, form.resonance) == (NormalFormStatus.STRONG_RESONANCE, k)
-    assert criticality(form) is None
+    assert criticality(form) is Criticality.NOT_COMPUTED
     assert abs(form.resonant - d * np.sqrt(2) ** (k - 2)) <= form.resonant_error < 1e-6
     assert abs(form.cubic - 2 * c.real) <= form.cubic_error < 1e-6
     if k == 4:
@@ -196,7 +196,7 @@ def test_at_one_to_one_and_one_to_two_there_is_no_cubic_coefficient(k, sign):
     form = normal_form(lambda x: x @ jacobian.T - x**3, at)
     assert (form.status, form.resonance) == (NormalFormStatus.STRONG_RESONANCE, k)
     assert np.isnan(form.cubic)
-    assert criticality(form) is None
+    assert criticality(form) is Criticality.NOT_COMPUTED
 
 
 @pytest.mark.parametrize("distance", [1e-1, 1e-2, 1e-3, 1e-4, 1e-6])

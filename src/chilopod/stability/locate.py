@@ -90,7 +90,7 @@ class Located(Short, Sequence[BifurcationPoint]):
                 point.kind.label,
                 f"{point.value:.12g}",
                 f"{point.error_bound:.1e}",
-                point.criticality.label if point.criticality else "",
+                point.criticality.label if point.criticality.known else "",
             )
             for point in self.points
         ]

@@ -31,7 +31,7 @@ class Kind(Labelled):
 
 
 class Criticality(Labelled):
-    """Which way the new orbits go."""
+    """Which way the new orbits go, or why that is not known; each member's ``sentence`` says it in words."""
 
     SUPERCRITICAL = (
         "supercritical",
@@ -42,6 +42,17 @@ class Criticality(Labelled):
         "the new orbits lie before the point and are less stable than the old one: past it the motion jumps away",
     )
     UNDECIDED = "undecided", "the coefficient is zero within its error"
+    NOT_DEFINED = "not defined", "a point of this kind has none: no cubic coefficient decides what happens"
+    NOT_COMPUTED = "not computed", "the normal form was not asked for, or its status says why there is none"
+
+    @property
+    def known(self) -> bool:
+        """Whether it is the verdict of a coefficient."""
+        return self not in (Criticality.NOT_DEFINED, Criticality.NOT_COMPUTED)
+
+
+WITHOUT_CRITICALITY = (Kind.FOLD, Kind.TRANSCRITICAL, Kind.BRANCH_POINT, Kind.COLLISION, Kind.KREIN_COLLISION)
+"""Kinds of points at which no cubic coefficient decides."""
 
 
 _CLEAR = 3.0  # of its error, for a quadratic coefficient that makes a crossing of two orbits
@@ -62,10 +73,10 @@ def kind_at_plus_one(form: NormalForm) -> Kind:
     return Kind.BRANCH_POINT
 
 
-def criticality(form: NormalForm) -> Criticality | None:
-    """The verdict of a cubic coefficient; None where there is no normal form, or where other terms decide too."""
+def criticality(form: NormalForm) -> Criticality:
+    """The verdict of a cubic coefficient, if there is one and no other terms decide too."""
     if form.status not in (NormalFormStatus.FOUND, NormalFormStatus.LINEAR):
-        return None
+        return Criticality.NOT_COMPUTED
     if abs(form.cubic) <= form.cubic_error:
         return Criticality.UNDECIDED
     return Criticality.SUPERCRITICAL if form.cubic < 0 else Criticality.SUBCRITICAL
@@ -92,10 +103,12 @@ class BifurcationPoint(ReadOnlyArrays):
     frequency
         Angular frequency (1/s) of the critical mode: 0 for a real multiplier +1 of the period; the principal value
         otherwise.
-    criticality, coefficient, coefficient_error
-        Verdict and cubic coefficient a -> a + coefficient a^3 of the map over one period of the orbit, at a period
-        doubling over two; a is the amplitude along the unit ``mode`` (Neimark-Sacker: state = 2 Re(a mode)). None where
-        it has no meaning (fold, transcritical, branch point) or where there is no normal form.
+    criticality
+        Verdict of the coefficient, or why there is none.
+    coefficient, coefficient_error
+        Cubic coefficient a -> a + coefficient a^3 of the map over one period of the orbit, at a period doubling over
+        two; a is the amplitude along the unit ``mode`` (Neimark-Sacker: state = 2 Re(a mode)). None where it has no
+        meaning (fold, transcritical, branch point) or where there is no normal form.
     rotation, rotation_error
         Where the mode turns (Neimark-Sacker), the phase per period that an amplitude adds, rad per amplitude^2.
     period
@@ -119,7 +132,7 @@ class BifurcationPoint(ReadOnlyArrays):
     mode: NDArray[np.complex128]
     multiplier: complex
     frequency: float
-    criticality: Criticality | None = None
+    criticality: Criticality = Criticality.NOT_COMPUTED
     coefficient: float | None = None
     coefficient_error: float | None = None
     rotation: float | None = None
@@ -134,7 +147,7 @@ class BifurcationPoint(ReadOnlyArrays):
     def sentences(self) -> str:
         """What happens here and which way the new orbits go, in words."""
         said = [f"{self.kind.sentence}."]
-        if self.criticality is not None:
+        if self.criticality.known:
             said.append(f"{self.criticality.label}: {self.criticality.sentence}.")
         if self.multiplicity > 1:
             said.append(f"{self.multiplicity} multipliers are critical at once.")
@@ -162,10 +175,8 @@ class BifurcationPoint(ReadOnlyArrays):
 def with_coefficients(point: BifurcationPoint, form: NormalForm) -> BifurcationPoint:
     """A point with what its normal form says, where that means something."""
     point = replace(point, normal_form=form)
-    if point.kind in (Kind.FOLD, Kind.TRANSCRITICAL, Kind.BRANCH_POINT):
-        return point
     verdict = criticality(form)
-    if verdict is None:
+    if point.kind in WITHOUT_CRITICALITY or not verdict.known:
         return point
     point = replace(point, criticality=verdict, coefficient=form.cubic, coefficient_error=form.cubic_error)
     if point.kind is Kind.NEIMARK_SACKER:
