@@ -9,6 +9,8 @@ depends on.
 from __future__ import annotations
 
 import enum
+import itertools
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -18,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.frozen import Short
 from chilopod.notebook import Line, Mark, block, plot, table, words
+from chilopod.stability.arguments import checked_count
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, Step
 from chilopod.stability.branches.branch_starts import IN_FOLD, Start, anchored, begin, branch_sizes, switch
 from chilopod.stability.branches.closure import closes
@@ -154,7 +157,7 @@ def follow(
     start: Start | BranchPoint | Orbit | ArrayLike,
     between: tuple[float, float],
     *,
-    points: int = 100,
+    points: int | None = None,
     step: float = 0.02,
     longest: float = LONGEST,
     closely: bool = True,
@@ -176,7 +179,8 @@ def follow(
         Interval of the parameter; the branch ends where it reaches an end of it, and the family is asked for no value
         outside. Its width becomes the branch's scale.
     points
-        At most so many ordinary points.
+        Number of ordinary points after which the branch ends; by default it goes on to an end of the interval, or until
+        it is closed, lost, or has spent its budget.
     step, longest
         First and largest step along the curve, in units of the states' sizes and of the scale.
     closely
@@ -195,8 +199,8 @@ def follow(
     Raises
     ------
     ParameterError
-        If the interval is no interval, or ``points`` or a step is not positive; or if ``start`` is a bifurcation point,
-        which :func:`switch` is for.
+        If the interval is no interval, ``points`` is no positive whole number, or a step is not positive; or if
+        ``start`` is a bifurcation point, which :func:`switch` is for.
     AnalysisError
         If there is no orbit to start with.
     """
@@ -216,7 +220,7 @@ def proceed(
     branch: Branch,
     between: tuple[float, float],
     *,
-    points: int = 100,
+    points: int | None = None,
     longest: float = LONGEST,
     closely: bool = True,
     precision: float = PRECISION,
@@ -269,15 +273,16 @@ def proceed(
     return _followed(curve, branch, anchor, points, longest, closely, progress)
 
 
-def _checked(between: tuple[float, float], points: int, longest: float) -> tuple[float, float]:
+def _checked(between: tuple[float, float], points: int | None, longest: float) -> tuple[float, float]:
     low, high = between
     if not (np.isfinite(low) and np.isfinite(high) and low < high and np.isfinite(high - low)):
         raise ParameterError("must rise from a lower to a higher finite value", field="between", value=between)
     if not high - low > _NARROWEST * max(abs(low), abs(high)) + 1e9 * np.finfo(float).smallest_subnormal:
         raise ParameterError("is too narrow for the numbers in it", field="between", value=between)
-    for name, value in (("points", points), ("longest", longest)):
-        if not value > 0:
-            raise ParameterError("must be positive", field=name, value=value)
+    if points is not None:
+        checked_count("points", points, sys.maxsize)
+    if not longest > 0:
+        raise ParameterError("must be positive", field="longest", value=longest)
     return float(low), float(high)
 
 
@@ -314,7 +319,7 @@ def _outward(point: BranchPoint, between: tuple[float, float]) -> bool:
 
 
 def _followed(
-    curve: Curve, branch: Branch, anchor: Anchor, points: int, longest: float, closely: bool, progress: Progress
+    curve: Curve, branch: Branch, anchor: Anchor, points: int | None, longest: float, closely: bool, progress: Progress
 ) -> Branch:
     size, found, remarks = branch.step, list(branch.points), list(branch.remarks)
 
@@ -325,7 +330,7 @@ def _followed(
     _take_error(curve, found)
     if _outward(found[-1], curve.between):
         return ended(Ending.LEFT_INTERVAL)
-    for count in range(1, points + 1):
+    for count in itertools.count(1) if points is None else range(1, points + 1):
         shortened = False
         while True:
             if curve.left <= 0:
