@@ -37,6 +37,7 @@ from chilopod.stability.orbits import Orbit, find_orbit
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
 from chilopod.stability.returns import ReturnMap, Section
 from chilopod.stability.rhs import from_rhs
+from chilopod.stability.shown import Result
 from chilopod.stability.symmetry.equivariants import AxialBranch, SymmetricCrossing, SymmetricKind
 from chilopod.stability.system import PeriodicSystem
 from chilopod.stability.unit_circle.crossings import SearchStatus
@@ -71,6 +72,7 @@ __all__ = [
     "Orbit",
     "PeriodicSystem",
     "Point2",
+    "Result",
     "ReturnBudget",
     "ReturnMap",
     "Scaled",

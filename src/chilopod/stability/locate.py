@@ -6,14 +6,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import overload
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.frozen import Short
-from chilopod.notebook import block, table, words
 from chilopod.stability.asked import Asking
 from chilopod.stability.branches.fold import Fold
 from chilopod.stability.capabilities import Family
@@ -26,11 +24,16 @@ from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import ReturnMap, returned_states
 from chilopod.stability.samples import Samples
 from chilopod.stability.scales import numerical_balance, sizes
+from chilopod.stability.shown import Result, axes_for, columns, dataset, rows, said
 from chilopod.stability.singular import past_singular
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.symmetry.orbit_blocks import crossings_in, orbit_blocks
 from chilopod.stability.unit_circle.crossings import Crossing, Crossings, SearchStatus, find_crossings
 from chilopod.stability.unit_circle.spectra import Event, Matrices
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
 
@@ -46,7 +49,7 @@ _BESIDE = 1e-6  # of the interval: how far beside a crossing rates of change are
 
 
 @dataclass(frozen=True)
-class Located(Short, Sequence[BifurcationPoint]):
+class Located(Result, Sequence[BifurcationPoint]):
     """The bifurcations that :func:`locate` found: a sequence of points by rising parameter, and how the search ended.
 
     Attributes
@@ -84,21 +87,29 @@ class Located(Short, Sequence[BifurcationPoint]):
     def __iter__(self) -> Iterator[BifurcationPoint]:
         return iter(self.points)
 
-    def _repr_html_(self) -> str:
-        rows = [
-            (
-                point.kind.label,
-                f"{point.value:.12g}",
-                f"{point.error_bound:.1e}",
-                point.criticality.label if point.criticality.known else "",
-            )
-            for point in self.points
-        ]
-        return block(
-            f"{len(self.points)} bifurcation{'' if len(self.points) == 1 else 's'}: {self.status.sentence}",
-            *(words(remark) for remark in self.remarks),
-            table(("kind", "at", "±", ""), rows),
-        )
+    def _lines(self) -> list[str]:
+        many = f"{len(self)} bifurcation{'' if len(self) == 1 else 's'}"
+        table = rows(point.row for point in self.points)
+        return [f"Located: {many}, {self.status.label}: {self.status.sentence}", *table, *said(self.remarks)]
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw which kind of bifurcation is where, over the parameter, on axes of matplotlib or on new ones."""
+        axes = axes_for(axes)
+        for point in self.points:
+            axes.plot([point.value], [point.kind.label], "o", color="C0")
+            text = f"{point.value:.6g}\n{point.row[2]}".strip()
+            at = point.value, point.kind.label
+            axes.annotate(text, at, (0, 6), ha="center", textcoords="offset points")
+        axes.margins(x=0.2, y=0.5)
+        axes.set(xlabel="parameter")
+        return axes
+
+    def to_dataset(self) -> xr.Dataset:
+        """The points as a dataset over ``point``. The multiplier is the critical one of the return map."""
+        names = ("value", "error_bound", "kind", "criticality", "coefficient", "coefficient_error")
+        more = ("multiplier", "multiplicity", "frequency", "period", "orbit", "mode")
+        said, status = "; ".join(self.remarks), self.status.label
+        return dataset("point", columns(self.points, *names, *more), status=status, remarks=said)
 
 
 def locate(

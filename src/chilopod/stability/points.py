@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import ReadOnlyArrays, in_one_line
 from chilopod.labels import Labelled
-from chilopod.notebook import block, table, words
 from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.normal_form import NormalForm
+from chilopod.stability.shown import Shown, bounded, number
 from chilopod.stability.symmetry.equivariants import SymmetricCrossing
 
 Array = NDArray[np.float64]
@@ -83,7 +83,7 @@ def criticality(form: NormalForm) -> Criticality:
 
 
 @dataclass(frozen=True)
-class BifurcationPoint(ReadOnlyArrays):
+class BifurcationPoint(Shown, ReadOnlyArrays):
     """A located bifurcation.
 
     Attributes
@@ -153,23 +153,27 @@ class BifurcationPoint(ReadOnlyArrays):
             said.append(f"{self.multiplicity} multipliers are critical at once.")
         return " ".join(each[0].upper() + each[1:] for each in said)
 
-    def _repr_html_(self) -> str:
-        rows = [("multiplier of the return map", f"{self.multiplier:.6g}"), ("period", f"{self.period:.10g}")]
+    @property
+    def row(self) -> tuple[str, str, str]:
+        """Kind, value with bound, and which way the new orbits go, for tables in text."""
+        way = self.criticality.label if self.criticality.known else ""
+        return self.kind.label, bounded(self.value, self.error_bound), way
+
+    def _lines(self) -> list[str]:
+        lines = [
+            f"BifurcationPoint: {self.kind.label} at {bounded(self.value, self.error_bound)}",
+            self.sentences,
+            f"multiplier of the return map: {number(self.multiplier, 6)}; period of the orbit: {self.period:.10g}",
+        ]
+        if self.symmetry is not None:
+            lines.append(f"spatial symmetries: {self.symmetry.kind.label}: {self.symmetry.kind.sentence}")
         if self.frequency:
-            rows.append(("frequency of the mode (1/s)", f"{self.frequency:.10g}"))
-        if self.coefficient is not None:
-            rows.append(("cubic coefficient", f"{self.coefficient:.6g} ± {self.coefficient_error:.1e}"))
+            lines.append(f"frequency of the mode: {self.frequency:.10g} rad per unit of time")
+        if self.coefficient is not None and self.coefficient_error is not None:
+            lines.append(f"cubic coefficient: {self.coefficient:.6g} ± {self.coefficient_error:.1e}")
         real = np.abs(self.mode.imag).max() < _REAL
-        mode = (
-            (f"{x:.6g}", f"{share:.4g}")
-            for x, share in zip(self.orbit, self.mode.real if real else self.mode, strict=True)
-        )
-        return block(
-            f"{self.kind.label} at {self.value:.12g} (± {self.error_bound:.1e})",
-            words(self.sentences),
-            table(("", ""), rows),
-            table(("orbit at time 0", "critical mode"), mode),
-        )
+        mode = in_one_line(self.mode.real if real else self.mode)
+        return [*lines, f"orbit at time 0: {in_one_line(self.orbit)}", f"critical mode: {mode}"]
 
 
 def with_coefficients(point: BifurcationPoint, form: NormalForm) -> BifurcationPoint:
