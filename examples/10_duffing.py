@@ -43,16 +43,11 @@ for each in (symmetric, *lopsided):
 lopsided[0]
 
 # %%
-# A motion is drawn by where x is at time 0; solid where it lasts, dotted where it does not.
+# A motion is drawn by where x is at time 0; solid where it lasts, dashed where it does not.
 
 figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained")
-for branch, color in zip((symmetric, *lopsided), ("C0", "C1", "C2"), strict=True):
-    force = np.array([each.value for each in branch.points])
-    x = np.array([each.orbit[0] for each in branch.points])
-    lasts = np.array([each.stable or each.special is not None for each in branch.points])
-    left.plot(force, x, ":", color=color)
-    left.plot(force, np.where(lasts, x, np.nan), color=color)
-left.plot(point.value, point.orbit[0], "o", color="black")
+for branch in (symmetric, *lopsided):
+    branch.plot(left)
 left.set(xlabel="force F", ylabel="x at time 0", title="one motion, and two more")
 
 times = np.linspace(0.0, 2.0 * np.pi, 200)

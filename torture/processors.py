@@ -97,7 +97,7 @@ def _said(verdict: Any, number: complex = 0.0, bound: float = 0.0) -> list[Any]:
 
 def _points(found: Any) -> list[Any]:
     """Status and points; places are compared in the order in which they come."""
-    points = [_said(f"{p.kind.name} {getattr(p.criticality, 'name', None)}", p.value, p.error_bound) for p in found]
+    points = [_said(f"{p.kind.name} {p.criticality.name}", p.value, p.error_bound) for p in found]
     return [_said(found.status.name), *points]
 
 

@@ -45,14 +45,14 @@ class Short:
 
 def _short(result: Any) -> str:
     shown = [each.name for each in fields(result) if each.repr]
-    lines = [f"    {name}={_part(getattr(result, name))}" for name in shown[:_MOST_SHOWN]]
+    lines = [f"    {name}={in_one_line(getattr(result, name))}" for name in shown[:_MOST_SHOWN]]
     if len(shown) > _MOST_SHOWN:
         lines.append(f"    and {', '.join(shown[_MOST_SHOWN:])}"[: _WIDEST + 20])
     return "\n".join([f"{type(result).__name__}(", *lines, ")"])
 
 
-def _part(value: Any) -> str:
-    """A field in one line."""
+def in_one_line(value: Any) -> str:
+    """A field in one line: large parts are named with their size."""
     kind = type(value).__name__
     if isinstance(value, np.ndarray):
         if value.size > _FEW or value.dtype == object:

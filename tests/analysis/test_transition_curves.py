@@ -4,6 +4,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from chilopod.analysis import bifurcations, transition_curve
 from chilopod.analysis.parameters import ALL, K1, stiffness
@@ -34,6 +35,11 @@ def test_pitchfork_turns_along_its_curve():
     np.testing.assert_allclose(point.values[0], np.mean([each.point.value for each in beside]), rtol=1e-6)
     for each, walk in zip(found.curve.points, found.as_json()["points"], strict=True):
         assert walk["values"][1] == pytest.approx(found.shown(each.values)[1])
+    axes = found.plot(Figure().add_subplot())
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("springs.stiffness[0] (N·mm/deg)", "legs.forward_offset (m)")
+    line, mark = (each.get_xydata() for each in axes.lines)
+    np.testing.assert_array_equal(line, found.values)
+    np.testing.assert_array_equal(mark, [found.shown(point.values)])
     shown = ElementTree.fromstring(found._repr_html_())
     cells = [cell.text for row in shown.iter("tr") for cell in row]
     assert cells[:4] == ["on it", "springs.stiffness[0] (N·mm/deg)", "legs.forward_offset (m)", "degenerate pitchfork"]

@@ -9,7 +9,7 @@ import pytest
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability import Ending, PeriodicSystem, follow, from_rhs, locate
-from chilopod.stability.unit_circle.crossings import Status
+from chilopod.stability.unit_circle.crossings import SearchStatus
 
 BUDGET = 150
 FLOWS_PER_RETURN = 12  # of a system without a period: to the section, and Newton's method for when it is there
@@ -60,7 +60,7 @@ def test_a_search_costs_no_more_than_its_budget(shape, knows):
         return replace(system, flow=counted, orbit=[1.0, 0.0, 0.0] if knows else None)
 
     found = locate(family, (0.0, 1.0), None if knows else [1.0, 0.0, 0.0], normal_form=False, budget=BUDGET)
-    assert found.status is Status.BUDGET
+    assert found.status is SearchStatus.BUDGET
     # Twice the budget to follow, twice to search; the first orbit; and what was found.
     first = 500 + 3 * 30 * FLOWS_PER_RETURN
     points = len(found) + sum("could not be described" in remark for remark in found.remarks)
@@ -74,7 +74,7 @@ def test_a_larger_budget_finds_more():
         return stuart_landau(1.0, 1.0 + 0.3 * math.sin(20.0 * k), math.sin(20.0 * k))
 
     few, many = (locate(family, (0.01, 1.0), [1.0, 0.0, 0.0], False, budget) for budget in (40, 3000))
-    assert few.status is Status.BUDGET
+    assert few.status is SearchStatus.BUDGET
     assert len(few) < len(many) == 6
     np.testing.assert_allclose([point.value for point in many], np.pi / 20.0 * np.arange(1, 7), rtol=1e-9)
 
@@ -91,7 +91,7 @@ def test_exceptions_of_the_family(raised):
     """They are islands without an orbit: what lies outside is found, on both sides where the orbit is known."""
     found = locate(lambda p: line(p - 0.6, raised, (-0.25, -0.15)), (-1.0, 1.0))
     assert [point.value for point in found] == [pytest.approx(0.6, abs=1e-12)]
-    assert found.status is Status.INCOMPLETE
+    assert found.status is SearchStatus.INCOMPLETE
     said = next(remark for remark in found.remarks if type(raised).__name__ in remark)
     assert "the family raised" in said
     assert "\n" not in said
@@ -155,7 +155,7 @@ def test_a_dimension_that_changes():
     for guess in (None, [0.0, 0.0]):
         found = locate(family, (-1.0, 1.0), guess)
         assert [point.value for point in found] == [pytest.approx(0.0, abs=1e-12)]
-        assert found.status is Status.INCOMPLETE
+        assert found.status is SearchStatus.INCOMPLETE
         assert any("changes its dimension" in remark for remark in found.remarks)
     branch = follow(family, [0.0, 0.0], (-1.0, 1.0), points=40)
     assert branch.ending is Ending.LOST

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from scipy.special import mathieu_a, mathieu_b
 
 from chilopod.errors import ParameterError
-from chilopod.stability.unit_circle.crossings import Status, find_crossings
+from chilopod.stability.unit_circle.crossings import SearchStatus, find_crossings
 from chilopod.stability.unit_circle.spectra import Event, Spectra, symmetric
 
 MINUS, PLUS, PAIR = Event.MINUS, Event.PLUS, Event.PAIR
@@ -68,7 +68,7 @@ def places(found):
 @pytest.mark.parametrize("slope", [2.0, -2.0])
 def test_a_root_on_a_node_does_not_hide_its_neighbour(gap, slope):
     found = find_crossings(diagonal(lambda p: 2.0 * p, lambda p: 2.0 * slope * (p - gap)), -0.5, 0.5)
-    assert found.status is Status.COMPLETE
+    assert found.status is SearchStatus.COMPLETE
     assert summary(found) == [(PLUS, 1, 1), (PLUS, 1, int(np.sign(slope)))]
     assert places(found) == pytest.approx([0.0, gap], abs=1e-15)
 
@@ -89,7 +89,7 @@ def test_a_root_on_a_node_does_not_hide_its_neighbour(gap, slope):
 )
 def test_crossings_of_any_multiplicity(matrix, event, number):
     found = find_crossings(family(matrix), -0.6, 1.1)
-    assert (found.status, summary(found)) == (Status.COMPLETE, [(event, number, number)])
+    assert (found.status, summary(found)) == (SearchStatus.COMPLETE, [(event, number, number)])
     assert places(found) == pytest.approx([0.3], abs=1e-8)  # of a defective pair only the square root is known
 
 
@@ -100,25 +100,25 @@ def test_a_ring_loses_stability_in_pairs(size):
     found = find_crossings(family(lambda p: expm(p * np.eye(size) + coupling)), -1.0, 3.7)
     rates = 2.0 - 2.0 * np.cos(2.0 * np.pi * np.arange(size // 2 + 1) / size)
     expected = [(rate, 1 if k in (0, size / 2) else 2) for k, rate in enumerate(rates) if rate < 3.7]
-    assert found.status is Status.COMPLETE
+    assert found.status is SearchStatus.COMPLETE
     assert places(found) == pytest.approx([rate for rate, _ in expected], abs=1e-12)
     assert summary(found) == [(PLUS, number, number) for _, number in expected]
 
 
 def test_a_touch_and_an_exchange():
     found = find_crossings(diagonal(lambda p: -((p - 0.3) ** 2), lambda p: -1.0), 0.0, 1.0)
-    assert (found.status, summary(found)) == (Status.COMPLETE, [(PLUS, 1, 0)])
+    assert (found.status, summary(found)) == (SearchStatus.COMPLETE, [(PLUS, 1, 0)])
     assert places(found) == pytest.approx([0.3], abs=1e-7)
     found = find_crossings(diagonal(lambda p: p - 0.3, lambda p: 0.6 - 2.0 * p), 0.0, 1.0)
-    assert (found.status, summary(found)) == (Status.COMPLETE, [(PLUS, 2, 0)])
+    assert (found.status, summary(found)) == (SearchStatus.COMPLETE, [(PLUS, 2, 0)])
 
 
 def test_real_multipliers_with_product_one_and_collisions_outside_are_no_crossings():
     found = find_crossings(diagonal(lambda p: 0.5 + p, lambda p: -0.8), 0.0, 1.0)
-    assert (found.status, found.crossings) == (Status.COMPLETE, ())
+    assert (found.status, found.crossings) == (SearchStatus.COMPLETE, ())
     # Two real ones outside meet and become a pair.
     found = find_crossings(family(lambda p: expm(np.array([[0.3, 1.0], [0.4 - p, 0.3]]))), 0.38, 1.0)
-    assert (found.status, found.crossings) == (Status.COMPLETE, ())
+    assert (found.status, found.crossings) == (SearchStatus.COMPLETE, ())
 
 
 @pytest.mark.parametrize("seed", range(30))
@@ -156,7 +156,7 @@ def test_known_multipliers_in_a_slanted_basis_of_any_units(seed):
             expected.append((brentq(rate, grid[i], grid[i + 1]), (event, number, change)))
     expected.sort(key=lambda crossing: crossing[0])
     found = find_crossings(matrices, 0.0, scale)
-    assert found.status is Status.COMPLETE
+    assert found.status is SearchStatus.COMPLETE
     assert summary(found) == [what for _, what in expected]
     assert np.array(places(found)) / scale == pytest.approx([where for where, _ in expected], abs=1e-9)
 
@@ -177,7 +177,7 @@ def test_random_families_against_counting_everywhere(seed):
     explained = np.zeros(grid.size, dtype=int)
     for crossing in found.crossings:
         explained[grid > crossing.value] += crossing.change
-    assert found.status is Status.COMPLETE
+    assert found.status is SearchStatus.COMPLETE
     np.testing.assert_array_equal(counts - counts[0], explained)
 
 
@@ -185,7 +185,7 @@ def test_the_borders_of_the_mathieu_equation():
     found = find_crossings(mathieu(0.5), -0.5, 5.0)
     known = [(PLUS, mathieu_a(0, 0.5)), (MINUS, mathieu_b(1, 0.5)), (MINUS, mathieu_a(1, 0.5))]
     known += [(PLUS, mathieu_b(2, 0.5)), (PLUS, mathieu_a(2, 0.5))]
-    assert found.status is Status.CONSERVATIVE
+    assert found.status is SearchStatus.CONSERVATIVE
     assert found.evaluations < 300
     assert places(found) == pytest.approx([float(value) for _, value in known], abs=1e-9)
     assert summary(found) == [(event, 2, (-1) ** (i + 1)) for i, (event, _) in enumerate(known)]
@@ -194,7 +194,7 @@ def test_the_borders_of_the_mathieu_equation():
 
 def test_a_little_damping_is_no_conservative_family():
     found = find_crossings(mathieu(0.5, 0.01), 0.2, 0.7)
-    assert (found.status, summary(found)) == (Status.COMPLETE, [(MINUS, 1, 1)])
+    assert (found.status, summary(found)) == (SearchStatus.COMPLETE, [(MINUS, 1, 1)])
     assert found.evaluations < 60
 
 
@@ -211,14 +211,14 @@ def test_krein_collisions():
     # (J H)^2 in the positions is [[-1, -c], [p c, -p^2]].
     ends = sorted(brentq(lambda p: (1.0 - p * p) ** 2 - 4.0 * coupling**2 * p, *ab) for ab in ((0.8, 1.0), (1.0, 1.2)))
     found = find_crossings(symplectic(hamiltonian), 0.7, 1.2)
-    assert found.status is Status.CONSERVATIVE
+    assert found.status is SearchStatus.CONSERVATIVE
     assert summary(found) == [(PAIR, 4, 2), (PAIR, 4, -2)]
     assert places(found) == pytest.approx(ends, abs=1e-9)
 
 
 def test_modes_of_one_signature_pass_through_each_other():
     found = find_crossings(symplectic(lambda p: np.diag([1.0, p, 1.0, p])), 0.7, 1.2)
-    assert (found.status, found.crossings) == (Status.CONSERVATIVE, ())
+    assert (found.status, found.crossings) == (SearchStatus.CONSERVATIVE, ())
 
 
 def test_first_integrals_are_left_aside():
@@ -226,14 +226,14 @@ def test_first_integrals_are_left_aside():
     basis = np.random.default_rng(1).normal(size=(5, 5))
     inside = lambda p: block_diag(jordan, np.exp(p - 0.33), np.exp(p - 0.6) * turned(2.0))  # noqa: E731
     found = find_crossings(family(lambda p: basis @ inside(p) @ np.linalg.inv(basis), 1e-14), 0.0, 1.0)
-    assert (found.status, summary(found)) == (Status.COMPLETE, [(PLUS, 1, 1), (PAIR, 2, 2)])
+    assert (found.status, summary(found)) == (SearchStatus.COMPLETE, [(PLUS, 1, 1), (PAIR, 2, 2)])
     assert places(found) == pytest.approx([0.33, 0.6], abs=1e-8)
     assert any("+1 throughout" in remark for remark in found.remarks)
 
 
 def test_multipliers_sixty_orders_apart():
     found = find_crossings(diagonal(lambda p: 70.0, lambda p: p - 70.0, lambda p: p - 0.3), 0.0, 1.0)
-    assert (found.status, summary(found)) == (Status.COMPLETE, [(PLUS, 1, 1)])
+    assert (found.status, summary(found)) == (SearchStatus.COMPLETE, [(PLUS, 1, 1)])
     assert places(found) == pytest.approx([0.3], rel=1e-14)
 
 
@@ -269,7 +269,7 @@ def test_signs_of_subnormal_numbers():
 def test_parameters_of_any_scale(low, width):
     middle = low + 0.37 * width
     found = find_crossings(diagonal(lambda p: p / width - middle / width), low, low + width)
-    assert (found.status, summary(found)) == (Status.COMPLETE, [(PLUS, 1, 1)])
+    assert (found.status, summary(found)) == (SearchStatus.COMPLETE, [(PLUS, 1, 1)])
     assert places(found) == pytest.approx([middle], rel=1e-15)
 
 
@@ -278,7 +278,7 @@ def test_many_multipliers_are_counted():
     a, b = rng.normal(size=(2, 60, 60)) / np.sqrt(60.0) * np.array([0.7, 0.3])[:, None, None]
     found = find_crossings(lambda p: (a + p[:, None, None] * b, np.full(p.size, 1e-15)), 0.0, 2.5)
     counts = [(np.abs(np.linalg.eigvals(a + p * b)) > 1.0).sum() for p in (0.0, 2.5)]
-    assert found.status is Status.COMPLETE
+    assert found.status is SearchStatus.COMPLETE
     assert len(found.crossings) > 1
     assert sum(crossing.change for crossing in found.crossings) == counts[1] - counts[0]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chilopod.errors import AnalysisError
-from chilopod.stability.unit_circle.crossings import Status, find_crossings
+from chilopod.stability.unit_circle.crossings import SearchStatus, find_crossings
 
 BUDGET = 600
 HARM = ("rough", "jumps", "holes", "noise", "refused", "spike", "constant", "ever faster", "infinite", "flat", "huge")
@@ -71,7 +71,7 @@ def scalar(function):
 
 def test_a_jump_across_the_circle_is_no_crossing():
     found = find_crossings(scalar(lambda p: np.where(p < 0.3, 0.9, 1.2) + 0.0 * p), 0.0, 1.0)
-    assert (found.status, found.crossings) == (Status.INCOMPLETE, ())
+    assert (found.status, found.crossings) == (SearchStatus.INCOMPLETE, ())
     assert any("jumps across the circle at 0.3" in remark for remark in found.remarks)
 
 
@@ -82,19 +82,19 @@ def test_what_lies_in_a_hole_is_not_claimed():
         return np.exp((values - 0.45) * (values - 0.8))[:, None, None], np.full(values.size, 1e-16)
 
     found = find_crossings(matrices, 0.0, 1.0)
-    assert found.status is Status.INCOMPLETE
+    assert found.status is SearchStatus.INCOMPLETE
     assert [(c.value, c.change) for c in found.crossings] == [(pytest.approx(0.8), 1)]
     assert any("-1 multipliers outside, and no matrices in between" in remark for remark in found.remarks)
 
 
 def test_nothing_anywhere_is_said():
     found = find_crossings(scalar(lambda p: np.full(p.size, np.nan)), 0.0, 1.0)
-    assert (found.status, found.remarks) == (Status.INCOMPLETE, ("there is no matrix anywhere",))
+    assert (found.status, found.remarks) == (SearchStatus.INCOMPLETE, ("there is no matrix anywhere",))
 
 
 def test_a_spent_budget_keeps_what_was_found():
     found = find_crossings(scalar(lambda p: 1.0 + np.sin(300.0 * p)), 0.0, 1.0, budget=300)
-    assert found.status is Status.BUDGET
+    assert found.status is SearchStatus.BUDGET
     assert found.evaluations <= 300
     assert found.crossings
     assert np.sin([300.0 * c.value for c in found.crossings]) == pytest.approx(0.0, abs=1e-12)

@@ -333,7 +333,7 @@ def stands(branch):
 @pytest.mark.parametrize(
     ("generators", "kind", "quadratic", "axial"),
     [
-        (np.eye(2)[None], SymmetricKind.FOLD_OR_TRANSCRITICAL, 1, {(1, False)}),
+        (np.eye(2)[None], SymmetricKind.SYMMETRY_KEPT, 1, {(1, False)}),
         (-np.eye(1)[None], SymmetricKind.PITCHFORK, 0, {(1, True)}),
         (dihedral(3), SymmetricKind.EQUIVARIANT_TRANSCRITICAL, 1, {(2, False)}),
         (dihedral(4), SymmetricKind.EQUIVARIANT_PITCHFORK, 0, {(2, True)}),

@@ -5,10 +5,10 @@ import pytest
 
 from chilopod.errors import AnalysisError
 from chilopod.stability import Kind
-from chilopod.stability.normal_forms.amplitude import Status
+from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import normal_form
-from chilopod.stability.points import criticality, kind_at_plus_one
+from chilopod.stability.points import Criticality, criticality, kind_at_plus_one
 
 
 def at_origin(jacobian, multiplier, right=None, left=None, returns=1):
@@ -48,7 +48,7 @@ def assert_holds(found, error, expected, within):
 @pytest.mark.parametrize("size", [1e-12, 1e-3, 1.0, 1e9])
 def test_the_amplitude_is_found_on_every_scale(size):
     form = normal_form(lambda x: x / np.sqrt(1.0 + 2.0 * (x / size) ** 2), at_origin([[1.0]], 1.0))
-    assert form.status is Status.FOUND
+    assert form.status is NormalFormStatus.FOUND
     assert_holds(form.cubic, form.cubic_error, -1.0 / size**2, 1e-7)
     assert kind_at_plus_one(form) is Kind.PITCHFORK
 
@@ -136,9 +136,9 @@ def noisy(x):
 
 def test_a_map_without_values_has_no_normal_form():
     form = normal_form(nowhere, at_origin([[1.0]], 1.0))
-    assert form.status is Status.OUT_OF_REACH
+    assert form.status is NormalFormStatus.OUT_OF_REACH
     assert np.isnan(form.cubic)
-    assert criticality(form) is None
+    assert criticality(form) is Criticality.NOT_COMPUTED
     assert kind_at_plus_one(form) is Kind.BRANCH_POINT
 
 
@@ -157,7 +157,7 @@ def test_a_linear_map_is_called_so():
         return -x
 
     form = normal_form(mapped, at_origin([[-1.0]], -1.0))
-    assert form.status is Status.LINEAR
+    assert form.status is NormalFormStatus.LINEAR
     assert abs(form.cubic) <= form.cubic_error
     assert sum(calls) <= 32
 
@@ -166,8 +166,8 @@ def test_a_linear_map_is_called_so():
 def test_a_second_critical_multiplier(other):
     jacobian = np.diag([1.0, other, 0.3])
     form = normal_form(lambda x: x @ jacobian - x**3, at_origin(jacobian, 1.0))
-    assert form.status is Status.SEVERAL_CRITICAL
-    assert criticality(form) is None
+    assert form.status is NormalFormStatus.SEVERAL_CRITICAL
+    assert criticality(form) is Criticality.NOT_COMPUTED
 
 
 @pytest.mark.parametrize("k", [3, 4])
@@ -178,8 +178,8 @@ def test_strong_resonances_claim_no_verdict(k):
     form = normal_form(
         in_plane(lambda z: nu * (z + c * z * np.abs(z) ** 2) + d * z.conj() ** (k - 1)), pair(2 * np.pi / k)
     )
-    assert (form.status, form.resonance) == (Status.STRONG_RESONANCE, k)
-    assert criticality(form) is None
+    assert (form.status, form.resonance) == (NormalFormStatus.STRONG_RESONANCE, k)
+    assert criticality(form) is Criticality.NOT_COMPUTED
     assert abs(form.resonant - d * np.sqrt(2) ** (k - 2)) <= form.resonant_error < 1e-6
     assert abs(form.cubic - 2 * c.real) <= form.cubic_error < 1e-6
     if k == 4:
@@ -194,9 +194,9 @@ def test_at_one_to_one_and_one_to_two_there_is_no_cubic_coefficient(k, sign):
     left = np.linalg.inv(right).conj().T
     at = at_origin(jacobian, values[0] / abs(values[0]), right[:, 0], left[:, 0])
     form = normal_form(lambda x: x @ jacobian.T - x**3, at)
-    assert (form.status, form.resonance) == (Status.STRONG_RESONANCE, k)
+    assert (form.status, form.resonance) == (NormalFormStatus.STRONG_RESONANCE, k)
     assert np.isnan(form.cubic)
-    assert criticality(form) is None
+    assert criticality(form) is Criticality.NOT_COMPUTED
 
 
 @pytest.mark.parametrize("distance", [1e-1, 1e-2, 1e-3, 1e-4, 1e-6])

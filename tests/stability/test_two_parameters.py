@@ -8,7 +8,7 @@ import pytest
 from chilopod.errors import ParameterError
 from chilopod.stability import BifurcationPoint, CodimensionTwo, CurveEnd, Kind, PeriodicSystem, follow2
 from chilopod.stability.codimension_two import detection
-from chilopod.stability.normal_forms.amplitude import Status
+from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 
 BOX = ((-2.0, 2.0), (-2.0, 2.0))
 
@@ -165,7 +165,7 @@ def test_a_coefficient_that_is_not_found_near_its_zero_is_bracketed(monkeypatch)
 
     def shy(*arguments, **named):
         form = detection_normal_form(*arguments, **named)
-        return replace(form, status=Status.OUT_OF_REACH, cubic=np.nan) if abs(form.cubic) < 0.004 else form
+        return replace(form, status=NormalFormStatus.OUT_OF_REACH, cubic=np.nan) if abs(form.cubic) < 0.004 else form
 
     detection_normal_form = detection.normal_form
     monkeypatch.setattr(detection, "normal_form", shy)

@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 from chilopod.stability import exponents, from_rhs, locate, multipliers
-from chilopod.stability.unit_circle.crossings import Status
+from chilopod.stability.unit_circle.crossings import SearchStatus
 
 
 def pendulum(guess_period, length=1.0, time=1.0):
@@ -79,6 +79,6 @@ def test_searches_end():
     found = locate(
         lambda strength: henon_heiles(6.5, strength), (0.5, 1.5), orbit=[0.0, 0.4, 0.0, 0.0], normal_form=False
     )
-    assert found.status is Status.CONSERVATIVE
+    assert found.status is SearchStatus.CONSERVATIVE
     assert len(found) == 0
     assert any("+1 throughout" in remark for remark in found.remarks)

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, ellipeinc, ellipj, ellipk, mathieu_a, mathieu_b
 
 from chilopod.stability import Kind, from_rhs, locate
-from chilopod.stability.unit_circle.crossings import Status
+from chilopod.stability.unit_circle.crossings import SearchStatus
 
 ORIGIN = [0.0, 0.0]
 
@@ -25,7 +25,7 @@ def mathieu(q, damping=0.0):
 
 
 def check(found, expected, closest=1e-12):
-    assert found.status is Status.CONSERVATIVE
+    assert found.status is SearchStatus.CONSERVATIVE
     assert [point.kind for point in found] == [Kind.COLLISION] * len(expected)
     for point, value in zip(found, expected, strict=True):
         assert abs(point.value - value) <= point.error_bound + 4e-15 * abs(value)
@@ -70,7 +70,7 @@ def test_tongues_of_mathieu_in_q():
         signs = np.sign([value(q) for q in grid])
         edges += [brentq(value, *grid[i : i + 2], xtol=1e-14) for i in np.flatnonzero(signs[1:] != signs[:-1])]
     found = locate(lambda q: mathieu(q)(10.0), (0.1, 30.0))
-    assert found.status is Status.CONSERVATIVE
+    assert found.status is SearchStatus.CONSERVATIVE
     assert [point.value for point in found] == pytest.approx(sorted(edges), rel=1e-10)
 
 
@@ -223,7 +223,7 @@ def exact_map(p, period):
 @pytest.mark.parametrize(("period", "expected"), KREIN)
 def test_krein_collisions(period, expected):
     found = locate(lambda p: two_springs(p, period), (0.2, 3.0))
-    assert found.status is Status.CONSERVATIVE
+    assert found.status is SearchStatus.CONSERVATIVE
     assert [point.kind for point in found] == [Kind.KREIN_COLLISION] * len(expected)
     for point, value in zip(found, expected, strict=True):
         assert abs(point.value - value) <= point.error_bound < 1e-10

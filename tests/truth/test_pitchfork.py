@@ -76,7 +76,7 @@ def test_coefficient_can_be_left_out():
     (point,) = locate(family(1.0, -1.0, spatial_symmetry=[[-1.0]]), (-0.31, 0.4), normal_form=False)
     assert point.kind is Kind.PITCHFORK
     assert point.coefficient is None
-    assert point.criticality is None
+    assert point.criticality is Criticality.NOT_COMPUTED
 
 
 @pytest.mark.parametrize("eps", [0.0, 1.0])
@@ -90,7 +90,7 @@ def test_transcritical(eps):
     assert point.kind is Kind.TRANSCRITICAL
     assert abs(point.value) <= point.error_bound < 1e-10
     assert point.coefficient is None
-    assert point.criticality is None
+    assert point.criticality is Criticality.NOT_DEFINED
 
 
 def test_a_quintic_term_alone_is_no_pitchfork_with_a_verdict():

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from chilopod.stability.normal_forms.amplitude import Status
+from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import normal_form
 
@@ -116,7 +116,7 @@ def test_errors_hold(kind):
     for case in range(CASES):
         mapped, at, quadratic, cubic = random_map(kind, np.random.default_rng([7, case]))
         form = normal_form(mapped, at, orbit_error=0.0)
-        if form.status is not Status.FOUND:
+        if form.status is not NormalFormStatus.FOUND:
             continue
         found += 1
         pairs = [(form.cubic, form.cubic_error, (-2.0 if kind == "flip" else 1.0) * cubic.real)]

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from chilopod.stability import Kind, PeriodicSystem, from_rhs, locate, multipliers
+from chilopod.stability import Criticality, Kind, PeriodicSystem, from_rhs, locate, multipliers
 
 FORCE, RATE = 0.4, 1.3
 PERIOD = 2.0 * math.pi / RATE
@@ -121,6 +121,6 @@ def test_strong_resonances_have_no_verdict(order):
     (point,) = locate(family, (-0.5, 0.6))
     assert point.kind is Kind.NEIMARK_SACKER
     assert abs(point.value) <= point.error_bound < 1e-12
-    assert point.criticality is None
+    assert point.criticality is Criticality.NOT_COMPUTED
     assert point.normal_form is not None
     assert "resonance" in point.normal_form.status.name.lower()

@@ -284,7 +284,7 @@ def _verdict(robot: Robot, parameter: str, fork: WalkBifurcation, branch: Branch
     direction = Criticality.SUPERCRITICAL if beyond else Criticality.SUBCRITICAL
     verdict = fork.point.criticality
     return {
-        "criticality": verdict.label if verdict else "",
+        "criticality": verdict.label if verdict.known else "",
         "coefficient": np.nan if fork.coefficient is None else fork.coefficient,
         "direction": direction.label if gone != critical else "",
         "direction_confirms": "yes" if gone != critical and verdict is direction else "no",

@@ -137,7 +137,7 @@ class WalkBifurcation(ReadOnlyArrays):
             "error_bound_si": point.error_bound,
             "joint_components": _numbers(self.joint_components),
             "frequency_rad_s": point.frequency,
-            "criticality": None if point.criticality is None else point.criticality.label,
+            "criticality": point.criticality.label if point.criticality.known else None,
             "coefficient": self.coefficient,
         }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +13,15 @@ from chilopod import units
 from chilopod.analysis.straight_walk import bifurcations
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import Short
-from chilopod.notebook import Line, Mark, block, plot, table
+from chilopod.notebook import block, picture, table
 from chilopod.planar import PlanarModel
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import Curve2, Kind, follow2
+from chilopod.stability.shown import axes_for, bounded, mark
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
 
@@ -75,24 +79,26 @@ class TransitionCurve(Short):
             ],
         }
 
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the curve in ``units``, points of codimension two marked, on axes of matplotlib or on new ones."""
+        axes = axes_for(axes)
+        axes.plot(*self.values.T, label=self.curve.kind.label)
+        mark(axes, [(point.kind.label, *self.shown(point.values)) for point in self.curve.special])
+        axes.set(xlabel=self._names[0], ylabel=self._names[1])
+        return axes
+
+    @property
+    def _names(self) -> list[str]:
+        pairs = zip(self.parameters, self.units, strict=True)
+        return [f"{path} ({unit.replace('*', '·')})" for path, unit in pairs]
+
     def _repr_html_(self) -> str:
         heading = f"{self.curve.kind.label} in two parameters: {len(self.curve.points)} points"
-        axes = [f"{path} ({unit.replace('*', '·')})" for path, unit in zip(self.parameters, self.units, strict=True)]
-        special = [
-            (point.kind.label, self.shown(point.values), self.shown(point.error_bound)) for point in self.curve.special
-        ]
-        picture = plot(
-            [Line([(float(first), float(second)) for first, second in self.values])],
-            [Mark(float(place[0]), float(place[1])) for _, place, _ in special],
-            x=axes[0],
-            y=axes[1],
-            alt=heading,
-        )
         rows = [
-            (kind, *(f"{value:.8g} ± {abs(error):.1e}" for value, error in zip(place, off, strict=True)))
-            for kind, place, off in special
+            (each.kind.label, *map(bounded, self.shown(each.values), np.abs(self.shown(each.error_bound))))
+            for each in self.curve.special
         ]
-        return block(heading, picture, table(("on it", *axes), rows) if rows else "")
+        return block(heading, picture(self.plot, heading), table(("on it", *self._names), rows) if rows else "")
 
 
 def family2(robot: Robot, parameters: tuple[str, str]) -> Callable[[float, float], PlanarModel]:

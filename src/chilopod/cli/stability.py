@@ -125,7 +125,7 @@ def _print_bifurcations(
         point = each.point
         typer.echo(f"{point.kind.label} at {parameter} = {each.value:.12g} {each.unit} (± {each.error_bound:.1e})")
         typer.echo(f"  {point.kind.sentence}")
-        if point.criticality is not None:
+        if point.criticality.known:
             typer.echo(
                 f"  {point.criticality.label}: {point.criticality.sentence} (coefficient {each.coefficient:.6g} /rad^2)"
             )

@@ -7,6 +7,7 @@
 False
 """
 
+from chilopod.stability.asked import ReturnBudget
 from chilopod.stability.branches.branch import Branch, BranchPoint, Ending, Start, begin, follow, proceed, switch
 from chilopod.stability.called import NotAnalytic
 from chilopod.stability.capabilities import (
@@ -20,6 +21,7 @@ from chilopod.stability.capabilities import (
     KnowsOrbit,
     Scaled,
     SpatiallySymmetric,
+    Stretched,
     SystemLike,
 )
 from chilopod.stability.codimension_two.codimension2 import Codimension2, CodimensionTwo
@@ -29,14 +31,20 @@ from chilopod.stability.events import Event
 from chilopod.stability.floquet import Exponents, Multipliers, exponents, multipliers, sweep
 from chilopod.stability.jumps import UndeclaredSwitch
 from chilopod.stability.locate import Located, locate
+from chilopod.stability.normal_forms.amplitude import NormalFormStatus
+from chilopod.stability.normal_forms.normal_form import NormalForm
 from chilopod.stability.orbits import Orbit, find_orbit
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
-from chilopod.stability.returns import ReturnMap
+from chilopod.stability.returns import ReturnMap, Section
 from chilopod.stability.rhs import from_rhs
+from chilopod.stability.shown import Result
+from chilopod.stability.symmetry.equivariants import AxialBranch, SymmetricCrossing, SymmetricKind
 from chilopod.stability.system import PeriodicSystem
+from chilopod.stability.unit_circle.crossings import SearchStatus
 
 __all__ = [
     "Autonomous",
+    "AxialBranch",
     "BifurcationPoint",
     "Branch",
     "BranchPoint",
@@ -58,14 +66,23 @@ __all__ = [
     "KnowsOrbit",
     "Located",
     "Multipliers",
+    "NormalForm",
+    "NormalFormStatus",
     "NotAnalytic",
     "Orbit",
     "PeriodicSystem",
     "Point2",
+    "Result",
+    "ReturnBudget",
     "ReturnMap",
     "Scaled",
+    "SearchStatus",
+    "Section",
     "SpatiallySymmetric",
     "Start",
+    "Stretched",
+    "SymmetricCrossing",
+    "SymmetricKind",
     "SystemLike",
     "UndeclaredSwitch",
     "begin",

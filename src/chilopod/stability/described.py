@@ -14,7 +14,14 @@ from chilopod.stability.floquet import Spectrum, phased, spectrum
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import NormalForm
 from chilopod.stability.orbits import Orbit
-from chilopod.stability.points import BifurcationPoint, Kind, kind_at_plus_one, with_coefficients
+from chilopod.stability.points import (
+    WITHOUT_CRITICALITY,
+    BifurcationPoint,
+    Criticality,
+    Kind,
+    kind_at_plus_one,
+    with_coefficients,
+)
 from chilopod.stability.symmetry.equivariants import SymmetricCrossing, symmetric_crossing
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.crossings import Crossing
@@ -85,15 +92,19 @@ def described(
     asked = with_normal_form or (crossing.event is Event.PLUS and not breaking and kind is None)
     if simple and asked and not crossing.collision:
         form = formed(*_critical_orbit(orbit, crossing.event, nu, mode, left))
-    symmetry = None if block is None else symmetric_crossing(block, crossing.event)
+    # From a Krein collision no orbits branch off, with whatever symmetries.
+    branching = block is not None and not (crossing.collision and crossing.event is Event.PAIR)
+    symmetry = symmetric_crossing(block, crossing.event, k) if block is not None and branching else None
+    kind = _kind(crossing, k, form, symmetry if breaking else None) if kind is None else kind
     point = BifurcationPoint(
-        _kind(crossing, k, form, symmetry if breaking else None) if kind is None else kind,
+        kind,
         value,
         error_bound + 4.0 * _EPSILON * abs(value),
         orbit.state,
         mode,
         nu,
         frequency,
+        criticality=Criticality.NOT_DEFINED if kind in WITHOUT_CRITICALITY else Criticality.NOT_COMPUTED,
         period=orbit.period,
         multiplicity=critical.size,
         symmetry=symmetry,

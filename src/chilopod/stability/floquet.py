@@ -7,6 +7,7 @@ import itertools
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,13 +19,18 @@ from chilopod.stability.arguments import checked_count
 from chilopod.stability.capabilities import FlowsFrames, SystemLike, flows_tangents, is_autonomous
 from chilopod.stability.krylov.closing import LARGE
 from chilopod.stability.krylov.leading import leading_multipliers, whole_pairs
-from chilopod.stability.matrix_errors import DRAWN, FIRST_ORDER, eigenvalues_moved, stable_within
+from chilopod.stability.matrix_errors import DRAWN, FIRST_ORDER, VERDICTS, eigenvalues_moved, stable_within
 from chilopod.stability.orbits import Orbit, find_large_orbit, find_orbit, from_known, known_state
 from chilopod.stability.returns import ReturnMap, flow_with_error, return_maps
 from chilopod.stability.scales import numerical_balance, sizes
+from chilopod.stability.shown import Result, Shown, axes_for, dataset, number, rows, said
 from chilopod.stability.splitting import split_product
 from chilopod.stability.stiff import disturbed, split_stiff
 from chilopod.stability.system import PeriodicSystem
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -41,7 +47,7 @@ _EPSILON = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
-class Multipliers(ReadOnlyArrays):
+class Multipliers(Result, ReadOnlyArrays):
     """Floquet multipliers of a periodic orbit.
 
     Attributes
@@ -80,9 +86,36 @@ class Multipliers(ReadOnlyArrays):
         these leave it undecided."""
         return stable_within(self.values, self.error_bound, self.error_bounds)
 
+    def _lines(self) -> list[str]:
+        table = rows(
+            (number(value), f"± {bound:.1e}", f"modulus {abs(value):.10g}")
+            for value, bound in zip(self.values, self.error_bounds, strict=True)
+        )
+        heading = f"Multipliers: {self.values.size} of an orbit of period {self.period:.10g}, {VERDICTS[self.stable]}"
+        return [heading, *table, *said(self.remarks)]
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the multipliers of the full period beside the unit circle, on axes of matplotlib or on new ones."""
+        axes, outside = axes_for(axes), np.abs(self.values) > 1.0
+        around = np.linspace(0.0, 2.0 * np.pi, 361)
+        axes.plot(np.cos(around), np.sin(around), color="grey", linewidth=1.0)
+        for style, chosen in (("C0o", ~outside), ("C3X", outside)):
+            axes.plot(self.values.real[chosen], self.values.imag[chosen], style)
+        title = f"{VERDICTS[self.stable]}: {outside.sum()} of {outside.size} outside"
+        axes.set(xlabel="real part", ylabel="imaginary part", aspect="equal", title=title)
+        return axes
+
+    def to_dataset(self) -> xr.Dataset:
+        """The multipliers of the full period, and of the return map as ``half_period``, as a dataset over
+        ``multiplier``."""
+        half = self.values if self.half_period is None else self.half_period
+        values = {"multipliers": self.values, "modulus": np.abs(self.values), "error_bounds": self.error_bounds}
+        about = {"period": self.period, "verdict": VERDICTS[self.stable], "remarks": "; ".join(self.remarks)}
+        return dataset("multiplier", {**values, "half_period": half}, **about)
+
 
 @dataclass(frozen=True)
-class Exponents(ReadOnlyArrays):
+class Exponents(Shown, ReadOnlyArrays):
     """Floquet exponents and modes.
 
     Attributes
@@ -105,6 +138,12 @@ class Exponents(ReadOnlyArrays):
     modes: ComplexArray
     multipliers: Multipliers
     error_bound: Array
+
+    def _lines(self) -> list[str]:
+        pairs = zip(self.values, self.error_bound, strict=True)
+        table = rows((number(value), f"± {bound:.1e} / unit of time") for value, bound in pairs)
+        period, stable = self.multipliers.period, self.multipliers.stable
+        return [f"Exponents: {self.values.size} of an orbit of period {period:.10g}, {VERDICTS[stable]}", *table]
 
 
 @dataclass(frozen=True)

@@ -6,14 +6,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import overload
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.frozen import Short
-from chilopod.notebook import block, table, words
 from chilopod.stability.asked import Asking
 from chilopod.stability.branches.fold import Fold
 from chilopod.stability.capabilities import Family
@@ -27,10 +25,15 @@ from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import ReturnMap, returned_states
 from chilopod.stability.samples import Samples
 from chilopod.stability.scales import numerical_balance, sizes
+from chilopod.stability.shown import Result, axes_for, columns, dataset, rows, said
 from chilopod.stability.singular import past_singular
 from chilopod.stability.symmetry.isotypic import Block
-from chilopod.stability.unit_circle.crossings import Crossing, Crossings, Status, find_crossings
+from chilopod.stability.unit_circle.crossings import Crossing, Crossings, SearchStatus, find_crossings
 from chilopod.stability.unit_circle.spectra import Event, Matrices
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
 
@@ -39,14 +42,14 @@ BUDGET = 5000
 
 _DESCRIBING = 400  # return maps to solve for the orbits beside a point
 
-_GRAVITY = (Status.COMPLETE, Status.CONSERVATIVE, Status.INCOMPLETE, Status.BUDGET)
+_GRAVITY = (SearchStatus.COMPLETE, SearchStatus.CONSERVATIVE, SearchStatus.INCOMPLETE, SearchStatus.BUDGET)
 _FOLLOWED = 10.0  # factor on the error of the first orbit for that of those which are followed from it
 _LEAST_ERROR = 1e-15
 _BESIDE = 1e-6  # of the interval: how far beside a crossing rates of change are taken
 
 
 @dataclass(frozen=True)
-class Located(Short, Sequence[BifurcationPoint]):
+class Located(Result, Sequence[BifurcationPoint]):
     """The bifurcations that :func:`locate` found: a sequence of points by rising parameter, and how the search ended.
 
     Attributes
@@ -62,14 +65,14 @@ class Located(Short, Sequence[BifurcationPoint]):
     """
 
     points: tuple[BifurcationPoint, ...]
-    status: Status
+    status: SearchStatus
     remarks: tuple[str, ...]
     evaluations: int
 
     @property
     def complete(self) -> bool:
         """Whether the numbers of unstable multipliers at the ends and between all points add up."""
-        return self.status in (Status.COMPLETE, Status.CONSERVATIVE)
+        return self.status in (SearchStatus.COMPLETE, SearchStatus.CONSERVATIVE)
 
     @overload
     def __getitem__(self, index: int) -> BifurcationPoint: ...
@@ -84,21 +87,29 @@ class Located(Short, Sequence[BifurcationPoint]):
     def __iter__(self) -> Iterator[BifurcationPoint]:
         return iter(self.points)
 
-    def _repr_html_(self) -> str:
-        rows = [
-            (
-                point.kind.label,
-                f"{point.value:.12g}",
-                f"{point.error_bound:.1e}",
-                point.criticality.label if point.criticality else "",
-            )
-            for point in self.points
-        ]
-        return block(
-            f"{len(self.points)} bifurcation{'' if len(self.points) == 1 else 's'}: {self.status.sentence}",
-            *(words(remark) for remark in self.remarks),
-            table(("kind", "at", "±", ""), rows),
-        )
+    def _lines(self) -> list[str]:
+        many = f"{len(self)} bifurcation{'' if len(self) == 1 else 's'}"
+        table = rows(point.row for point in self.points)
+        return [f"Located: {many}, {self.status.label}: {self.status.sentence}", *table, *said(self.remarks)]
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw which kind of bifurcation is where, over the parameter, on axes of matplotlib or on new ones."""
+        axes = axes_for(axes)
+        for point in self.points:
+            axes.plot([point.value], [point.kind.label], "o", color="C0")
+            text = f"{point.value:.6g}\n{point.row[2]}".strip()
+            at = point.value, point.kind.label
+            axes.annotate(text, at, (0, 6), ha="center", textcoords="offset points")
+        axes.margins(x=0.2, y=0.5)
+        axes.set(xlabel="parameter")
+        return axes
+
+    def to_dataset(self) -> xr.Dataset:
+        """The points as a dataset over ``point``. The multiplier is the critical one of the return map."""
+        names = ("value", "error_bound", "kind", "criticality", "coefficient", "coefficient_error")
+        more = ("multiplier", "multiplicity", "frequency", "period", "orbit", "mode")
+        said, status = "; ".join(self.remarks), self.status.label
+        return dataset("point", columns(self.points, *names, *more), status=status, remarks=said)
 
 
 def locate(
@@ -150,7 +161,7 @@ def locate(
     samples = Samples(family, orbit, low, high, budget, seconds)
     here = extent(samples)
     remarks = [here.ending] if here.ending else []
-    status = Status.BUDGET if samples.spent else Status.INCOMPLETE if here.ending else Status.COMPLETE
+    status = SearchStatus.BUDGET if samples.spent else SearchStatus.INCOMPLETE if here.ending else SearchStatus.COMPLETE
     points: list[BifurcationPoint] = []
     if here.start < here.end:
         searched, more = _searched(samples, here, budget)
@@ -169,11 +180,11 @@ def locate(
                         raise AnalysisError(f"its error bound of {point.error_bound:.1e} tells nothing", field="value")
                     points.append(point)
                 except AnalysisError as error:
-                    status = max(status, Status.INCOMPLETE, key=_GRAVITY.index)
+                    status = max(status, SearchStatus.INCOMPLETE, key=_GRAVITY.index)
                     remarks.append(f"what crosses at {crossing.value:.9g} could not be described: {error}")
     points += [_fold(samples, fold, normal_form) for fold in here.folds]
     if samples.remarks:
-        status = max(status, Status.INCOMPLETE, key=_GRAVITY.index)
+        status = max(status, SearchStatus.INCOMPLETE, key=_GRAVITY.index)
     ordered = tuple(sorted(points, key=lambda point: point.value))
     return Located(ordered, status, tuple(dict.fromkeys([*remarks, *samples.remarks])), samples.count)
 

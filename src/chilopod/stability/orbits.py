@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import ReadOnlyArrays, in_one_line
 from chilopod.stability.arguments import finite_array
 from chilopod.stability.asked import ReturnBudget, SpentError
 from chilopod.stability.capabilities import (
@@ -39,6 +39,7 @@ from chilopod.stability.returns import (
 from chilopod.stability.scales import sizes
 from chilopod.stability.settling import nearer_states
 from chilopod.stability.shooting import Nodes, nodes_of, shot
+from chilopod.stability.shown import Shown
 from chilopod.stability.symmetry.mirrored import symmetric_states
 
 Array = NDArray[np.float64]
@@ -64,7 +65,7 @@ _BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once
 
 
 @dataclass(frozen=True)
-class Orbit(ReadOnlyArrays):
+class Orbit(Shown, ReadOnlyArrays):
     """A periodic orbit.
 
     Attributes
@@ -92,6 +93,13 @@ class Orbit(ReadOnlyArrays):
         if self.image.normal is None:
             return None
         return Section(self.state, self.image.normal, self.image.period / self.image.returns)
+
+    def _lines(self) -> list[str]:
+        return [
+            f"Orbit: period {self.period:.10g}, {self.image.returns} return{'s' * (self.image.returns > 1)} in it",
+            f"state at time 0: {in_one_line(self.state)}",
+            f"bounds on its error: {in_one_line(self.error)}",
+        ]
 
 
 def known_state(system: SystemLike) -> Array:

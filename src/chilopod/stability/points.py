@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.frozen import ReadOnlyArrays, in_one_line
 from chilopod.labels import Labelled
-from chilopod.notebook import block, table, words
-from chilopod.stability.normal_forms.amplitude import Status
+from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.normal_form import NormalForm
+from chilopod.stability.shown import Shown, bounded, number
 from chilopod.stability.symmetry.equivariants import SymmetricCrossing
 
 Array = NDArray[np.float64]
@@ -31,7 +31,7 @@ class Kind(Labelled):
 
 
 class Criticality(Labelled):
-    """Which way the new orbits go."""
+    """Which way the new orbits go, or why that is not known; each member's ``sentence`` says it in words."""
 
     SUPERCRITICAL = (
         "supercritical",
@@ -42,6 +42,17 @@ class Criticality(Labelled):
         "the new orbits lie before the point and are less stable than the old one: past it the motion jumps away",
     )
     UNDECIDED = "undecided", "the coefficient is zero within its error"
+    NOT_DEFINED = "not defined", "a point of this kind has none: no cubic coefficient decides what happens"
+    NOT_COMPUTED = "not computed", "the normal form was not asked for, or its status says why there is none"
+
+    @property
+    def known(self) -> bool:
+        """Whether it is the verdict of a coefficient."""
+        return self not in (Criticality.NOT_DEFINED, Criticality.NOT_COMPUTED)
+
+
+WITHOUT_CRITICALITY = (Kind.FOLD, Kind.TRANSCRITICAL, Kind.BRANCH_POINT, Kind.COLLISION, Kind.KREIN_COLLISION)
+"""Kinds of points at which no cubic coefficient decides."""
 
 
 _CLEAR = 3.0  # of its error, for a quadratic coefficient that makes a crossing of two orbits
@@ -52,7 +63,7 @@ _NEGLIGIBLE = 0.3  # of the cubic term at the sampled amplitude: what the error 
 def kind_at_plus_one(form: NormalForm) -> Kind:
     """What happens at a real multiplier +1 where the orbit goes on: transcritical with a quadratic term that is clearly
     there, pitchfork without one but with a cubic one, a branch point where the errors leave that open."""
-    if form.status is not Status.FOUND:
+    if form.status is not NormalFormStatus.FOUND:
         return Kind.BRANCH_POINT
     if abs(form.quadratic) > _CLEAR * form.quadratic_error:
         return Kind.TRANSCRITICAL
@@ -62,17 +73,17 @@ def kind_at_plus_one(form: NormalForm) -> Kind:
     return Kind.BRANCH_POINT
 
 
-def criticality(form: NormalForm) -> Criticality | None:
-    """The verdict of a cubic coefficient; None where there is no normal form, or where other terms decide too."""
-    if form.status not in (Status.FOUND, Status.LINEAR):
-        return None
+def criticality(form: NormalForm) -> Criticality:
+    """The verdict of a cubic coefficient, if there is one and no other terms decide too."""
+    if form.status not in (NormalFormStatus.FOUND, NormalFormStatus.LINEAR):
+        return Criticality.NOT_COMPUTED
     if abs(form.cubic) <= form.cubic_error:
         return Criticality.UNDECIDED
     return Criticality.SUPERCRITICAL if form.cubic < 0 else Criticality.SUBCRITICAL
 
 
 @dataclass(frozen=True)
-class BifurcationPoint(ReadOnlyArrays):
+class BifurcationPoint(Shown, ReadOnlyArrays):
     """A located bifurcation.
 
     Attributes
@@ -92,10 +103,12 @@ class BifurcationPoint(ReadOnlyArrays):
     frequency
         Angular frequency (1/s) of the critical mode: 0 for a real multiplier +1 of the period; the principal value
         otherwise.
-    criticality, coefficient, coefficient_error
-        Verdict and cubic coefficient a -> a + coefficient a^3 of the map over one period of the orbit, at a period
-        doubling over two; a is the amplitude along the unit ``mode`` (Neimark-Sacker: state = 2 Re(a mode)). None where
-        it has no meaning (fold, transcritical, branch point) or where there is no normal form.
+    criticality
+        Verdict of the coefficient, or why there is none.
+    coefficient, coefficient_error
+        Cubic coefficient a -> a + coefficient a^3 of the map over one period of the orbit, at a period doubling over
+        two; a is the amplitude along the unit ``mode`` (Neimark-Sacker: state = 2 Re(a mode)). None where it has no
+        meaning (fold, transcritical, branch point) or where there is no normal form.
     rotation, rotation_error
         Where the mode turns (Neimark-Sacker), the phase per period that an amplitude adds, rad per amplitude^2.
     period
@@ -119,7 +132,7 @@ class BifurcationPoint(ReadOnlyArrays):
     mode: NDArray[np.complex128]
     multiplier: complex
     frequency: float
-    criticality: Criticality | None = None
+    criticality: Criticality = Criticality.NOT_COMPUTED
     coefficient: float | None = None
     coefficient_error: float | None = None
     rotation: float | None = None
@@ -134,38 +147,40 @@ class BifurcationPoint(ReadOnlyArrays):
     def sentences(self) -> str:
         """What happens here and which way the new orbits go, in words."""
         said = [f"{self.kind.sentence}."]
-        if self.criticality is not None:
+        if self.criticality.known:
             said.append(f"{self.criticality.label}: {self.criticality.sentence}.")
         if self.multiplicity > 1:
             said.append(f"{self.multiplicity} multipliers are critical at once.")
         return " ".join(each[0].upper() + each[1:] for each in said)
 
-    def _repr_html_(self) -> str:
-        rows = [("multiplier of the return map", f"{self.multiplier:.6g}"), ("period", f"{self.period:.10g}")]
+    @property
+    def row(self) -> tuple[str, str, str]:
+        """Kind, value with bound, and which way the new orbits go, for tables in text."""
+        way = self.criticality.label if self.criticality.known else ""
+        return self.kind.label, bounded(self.value, self.error_bound), way
+
+    def _lines(self) -> list[str]:
+        lines = [
+            f"BifurcationPoint: {self.kind.label} at {bounded(self.value, self.error_bound)}",
+            self.sentences,
+            f"multiplier of the return map: {number(self.multiplier, 6)}; period of the orbit: {self.period:.10g}",
+        ]
+        if self.symmetry is not None:
+            lines.append(f"spatial symmetries: {self.symmetry.kind.label}: {self.symmetry.kind.sentence}")
         if self.frequency:
-            rows.append(("frequency of the mode (1/s)", f"{self.frequency:.10g}"))
-        if self.coefficient is not None:
-            rows.append(("cubic coefficient", f"{self.coefficient:.6g} ± {self.coefficient_error:.1e}"))
+            lines.append(f"frequency of the mode: {self.frequency:.10g} rad per unit of time")
+        if self.coefficient is not None and self.coefficient_error is not None:
+            lines.append(f"cubic coefficient: {self.coefficient:.6g} ± {self.coefficient_error:.1e}")
         real = np.abs(self.mode.imag).max() < _REAL
-        mode = (
-            (f"{x:.6g}", f"{share:.4g}")
-            for x, share in zip(self.orbit, self.mode.real if real else self.mode, strict=True)
-        )
-        return block(
-            f"{self.kind.label} at {self.value:.12g} (± {self.error_bound:.1e})",
-            words(self.sentences),
-            table(("", ""), rows),
-            table(("orbit at time 0", "critical mode"), mode),
-        )
+        mode = in_one_line(self.mode.real if real else self.mode)
+        return [*lines, f"orbit at time 0: {in_one_line(self.orbit)}", f"critical mode: {mode}"]
 
 
 def with_coefficients(point: BifurcationPoint, form: NormalForm) -> BifurcationPoint:
     """A point with what its normal form says, where that means something."""
     point = replace(point, normal_form=form)
-    if point.kind in (Kind.FOLD, Kind.TRANSCRITICAL, Kind.BRANCH_POINT):
-        return point
     verdict = criticality(form)
-    if verdict is None:
+    if point.kind in WITHOUT_CRITICALITY or not verdict.known:
         return point
     point = replace(point, criticality=verdict, coefficient=form.cubic, coefficient_error=form.cubic_error)
     if point.kind is Kind.NEIMARK_SACKER:

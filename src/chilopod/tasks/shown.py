@@ -2,29 +2,40 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import xarray as xr
 
-from chilopod.notebook import COLORS, Line, Mark, plot
+from chilopod.notebook import picture
 from chilopod.steering import ARRIVAL_RADIUS
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 _MOST = 12  # walks that are drawn
-_SIZE = (560.0, 340.0)  # px
 
 
 def paths(record: xr.Dataset) -> str:
-    """SVG: the way of module 1 in every walk of a record, the first dozen of them, and its targets."""
-    drawn = record.isel(robot=slice(_MOST))
-    lines = [
-        Line([(float(x), float(y)) for x, y in way], COLORS[index % len(COLORS)])
-        for index, way in enumerate(drawn.position.transpose("robot", "time", "axis").values)
-    ]
-    marks = [Mark(float(x), float(y), ARRIVAL_RADIUS) for x, y in _targets(drawn) if np.isfinite(x + y)]
+    """SVG of the paths of the walks in a record."""
     count = record.sizes["robot"]
     alt = f"paths of {'a walk' if count == 1 else f'{count} walks'} from above"
     if count > _MOST:
         alt += f", the first {_MOST} drawn"
-    return plot(lines, marks, x="x (m)", y="y (m)", alt=alt, size=_SIZE, equal=True)
+    return picture(lambda axes: draw_paths(axes, record), alt)
+
+
+def draw_paths(axes: Axes, record: xr.Dataset) -> None:
+    """Draw the path of module 1 in every walk of a record, the first dozen of them, and the targets."""
+    from matplotlib.patches import Circle
+
+    drawn = record.isel(robot=slice(_MOST))
+    for way in drawn.position.transpose("robot", "time", "axis").values:
+        axes.plot(*way.T)
+    for x, y in _targets(drawn):
+        if np.isfinite(x + y):
+            axes.add_patch(Circle((x, y), ARRIVAL_RADIUS, color="C2", alpha=0.35))
+    axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
 
 
 def _targets(record: xr.Dataset) -> np.ndarray:

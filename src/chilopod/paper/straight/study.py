@@ -134,7 +134,7 @@ def module_counts(robot: Robot, counts: range = range(3, 21), progress: Progress
             point = pitchfork(with_modules(robot, count))
             values.append(point.value)
             bounds.append(point.error_bound)
-            says.append(str(point.point.criticality.label if point.point.criticality else ""))
+            says.append(str(point.point.criticality.label if point.point.criticality.known else ""))
         except AnalysisError as error:
             values.append(np.nan)
             bounds.append(np.nan)
@@ -184,6 +184,6 @@ def _described(point: WalkBifurcation) -> dict[str, object]:
         "value": point.value,
         "unit": point.unit,
         "error_bound": point.error_bound,
-        "criticality": point.point.criticality.label if point.point.criticality else "",
+        "criticality": point.point.criticality.label if point.point.criticality.known else "",
         "coefficient": point.coefficient if point.coefficient is not None else np.nan,
     }

@@ -9,15 +9,18 @@ depends on.
 from __future__ import annotations
 
 import enum
+import itertools
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
-from chilopod.frozen import Short
-from chilopod.notebook import Line, Mark, block, plot, table, words
+from chilopod.notebook import picture
+from chilopod.stability.arguments import checked_count
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, Step
 from chilopod.stability.branches.branch_starts import IN_FOLD, Start, anchored, begin, branch_sizes, switch
 from chilopod.stability.branches.closure import closes
@@ -25,8 +28,14 @@ from chilopod.stability.branches.curve import PRECISION, Curve
 from chilopod.stability.branches.inspection import Found, inspect
 from chilopod.stability.branches.stepping import taken
 from chilopod.stability.capabilities import Family
+from chilopod.stability.matrix_errors import VERDICTS
 from chilopod.stability.orbits import Orbit
-from chilopod.stability.points import BifurcationPoint
+from chilopod.stability.points import BifurcationPoint, Kind
+from chilopod.stability.shown import Result, axes_for, columns, dataset, mark, rows, said
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
 
 __all__ = ["Branch", "BranchPoint", "Ending", "Start", "begin", "follow", "proceed", "switch"]
 
@@ -40,6 +49,7 @@ BUDGET = 200_000
 
 _SHORTEST = 1e-5  # step at which a curve is lost, relative to the longest
 _FEW, _MANY = 4, 7  # corrections after which steps grow, and shrink
+_STYLES = {True: "-", False: "--", None: ":"}  # of lines, by stability
 _NARROWEST = 1e-9  # width of an interval, relative to the values in it
 
 Progress = Callable[[int, BranchPoint], None]
@@ -64,7 +74,7 @@ class Ending(enum.Enum):
 
 
 @dataclass(frozen=True)
-class Branch(Short):
+class Branch(Result):
     """A followed branch.
 
     Attributes
@@ -114,39 +124,72 @@ class Branch(Short):
         """Folds and secondary bifurcations."""
         return tuple(point for point in self.points if point.special is not None)
 
-    def _repr_html_(self) -> str:
-        heading = f"a branch of {len(self.points)} points"
-        # The state that moves most, in its size along the curve, tells the branch from others.
-        orbits = np.array([point.orbit for point in self.points])
-        state = int((np.ptp(orbits, axis=0) / self.sizes).argmax())
-        places = [(point.value, float(point.orbit[state])) for point in self.points]
-        # A special point ends the line of what is stable beside it.
-        lasts = [point.stable or point.special is not None for point in self.points]
-        stable = [place if last else (np.nan, np.nan) for place, last in zip(places, lasts, strict=True)]
+    def _stretches(self) -> list[tuple[bool | None, int, int]]:
+        """Stretches that are stable, unstable or undecided, each with its first and last point; none goes round a
+        fold."""
+        folds = itertools.accumulate(point.special is Kind.FOLD for point in self.points)
+        # At a special point a multiplier is critical: the points beside it decide.
+        beside = [{each.stable for each in pair if each.special is None} for pair in itertools.pairwise(self.points)]
+        verdicts = [told.pop() if len(told) == 1 else None for told in beside]
+        found, first = [], 0
+        for (_, verdict), group in itertools.groupby(zip(folds, verdicts, strict=False)):
+            last = first + len(list(group))
+            found.append((verdict, first, last))
+            first = last
+        return found or [(self.points[0].stable, 0, 0)]
+
+    def _lines(self) -> list[str]:
+        values = [point.value for point in self.points]
         special = [
-            (
-                point.special.label,
-                f"{point.value:.12g}",
-                f"{point.bifurcation.error_bound:.1e}" if point.bifurcation else "",
-            )
-            for point in self.points
-            if point.special is not None
+            each.bifurcation.row if each.bifurcation else (each.special.label, f"{each.value:.12g}", "")
+            for each in self.points
+            if each.special is not None
         ]
-        picture = plot(
-            [Line(places, dotted=True), Line(stable)],
-            [Mark(point.value, float(point.orbit[state])) for point in self.special_points],
-            x="parameter",
-            y=f"state {state} at time 0",
-            alt=f"{heading}, stable ones in a solid line",
-        )
-        said = f"Orbits of {self.periods} period{'s' if self.periods > 1 else ''}. Why it ends: {self.ending.sentence}."
-        return block(
-            heading,
-            picture,
-            words(f"{said} {self.reason}".strip()),
-            *(words(remark) for remark in self.remarks),
-            table(("on it", "at", "±"), special) if special else "",
-        )
+        return [
+            f"Branch: {len(values)} points between {min(values):.9g} and {max(values):.9g}, periods: {self.periods}",
+            f"ends: {self.ending.sentence}{f' ({self.reason})' if self.reason else ''}",
+            *(["special points:", *rows(special)] if special else ["special points: none"]),
+            "stability along it:",
+            *rows((VERDICTS[v], f"{values[a]:.9g} to {values[b]:.9g}") for v, a, b in self._stretches()),
+            *said(self.remarks),
+        ]
+
+    def _picture(self) -> str:
+        # The state that moves most, in its size along the curve, tells the branch from others.
+        moved = np.ptp([point.orbit for point in self.points], axis=0) / self.sizes
+        return picture(lambda axes: self.plot(axes, int(moved.argmax())), "branch of periodic orbits")
+
+    def plot(self, axes: Axes | None = None, state: int = 0) -> Axes:
+        """Draw a state at time 0 over the parameter: stable stretches solid, unstable ones dashed, undecided ones
+        dotted, special points marked.
+
+        Parameters
+        ----------
+        axes
+            Axes of matplotlib; those of a new figure by default.
+        state
+            Number of the state, from 0.
+        """
+        values, orbits = map(np.array, columns(self.points, "value", "orbit").values())
+        if state not in range(orbits.shape[1]):
+            raise ParameterError("is no state", field="state", value=state, allowed=f"0 to {orbits.shape[1] - 1}")
+        axes, color, state = axes_for(axes), None, int(state)
+        for verdict, first, last in self._stretches():
+            part = slice(first, last + 1)
+            shown = axes.plot(values[part], orbits[part, state], _STYLES[verdict], color=color, label=VERDICTS[verdict])
+            color = shown[0].get_color()
+        mark(axes, [(each.special.label, each.value, each.orbit[state]) for each in self.points if each.special])
+        axes.set(xlabel="parameter", ylabel=f"state {state} at time 0")
+        return axes
+
+    def to_dataset(self) -> xr.Dataset:
+        """The points as a dataset over ``point``, in their order along the curve; ``special`` is empty at ordinary
+        ones. Multipliers are those of the full period."""
+        verdicts = [VERDICTS[None if point.special else point.stable] for point in self.points]
+        values = columns(self.points, "value", "special", "period", "orbit", "multipliers")
+        about = columns((each.bifurcation for each in self.points), "error_bound", "criticality", "coefficient")
+        end = {"ending": self.ending.label, "reason": self.reason, "remarks": "; ".join(self.remarks)}
+        return dataset("point", {**values, **about, "verdict": verdicts}, periods=self.periods, **end)
 
 
 def follow(
@@ -154,7 +197,7 @@ def follow(
     start: Start | BranchPoint | Orbit | ArrayLike,
     between: tuple[float, float],
     *,
-    points: int = 100,
+    points: int | None = None,
     step: float = 0.02,
     longest: float = LONGEST,
     closely: bool = True,
@@ -176,7 +219,8 @@ def follow(
         Interval of the parameter; the branch ends where it reaches an end of it, and the family is asked for no value
         outside. Its width becomes the branch's scale.
     points
-        At most so many ordinary points.
+        Number of ordinary points after which the branch ends; by default it goes on to an end of the interval, or until
+        it is closed, lost, or has spent its budget.
     step, longest
         First and largest step along the curve, in units of the states' sizes and of the scale.
     closely
@@ -195,8 +239,8 @@ def follow(
     Raises
     ------
     ParameterError
-        If the interval is no interval, or ``points`` or a step is not positive; or if ``start`` is a bifurcation point,
-        which :func:`switch` is for.
+        If the interval is no interval, ``points`` is no positive whole number, or a step is not positive; or if
+        ``start`` is a bifurcation point, which :func:`switch` is for.
     AnalysisError
         If there is no orbit to start with.
     """
@@ -216,7 +260,7 @@ def proceed(
     branch: Branch,
     between: tuple[float, float],
     *,
-    points: int = 100,
+    points: int | None = None,
     longest: float = LONGEST,
     closely: bool = True,
     precision: float = PRECISION,
@@ -269,15 +313,16 @@ def proceed(
     return _followed(curve, branch, anchor, points, longest, closely, progress)
 
 
-def _checked(between: tuple[float, float], points: int, longest: float) -> tuple[float, float]:
+def _checked(between: tuple[float, float], points: int | None, longest: float) -> tuple[float, float]:
     low, high = between
     if not (np.isfinite(low) and np.isfinite(high) and low < high and np.isfinite(high - low)):
         raise ParameterError("must rise from a lower to a higher finite value", field="between", value=between)
     if not high - low > _NARROWEST * max(abs(low), abs(high)) + 1e9 * np.finfo(float).smallest_subnormal:
         raise ParameterError("is too narrow for the numbers in it", field="between", value=between)
-    for name, value in (("points", points), ("longest", longest)):
-        if not value > 0:
-            raise ParameterError("must be positive", field=name, value=value)
+    if points is not None:
+        checked_count("points", points, sys.maxsize)
+    if not longest > 0:
+        raise ParameterError("must be positive", field="longest", value=longest)
     return float(low), float(high)
 
 
@@ -314,7 +359,7 @@ def _outward(point: BranchPoint, between: tuple[float, float]) -> bool:
 
 
 def _followed(
-    curve: Curve, branch: Branch, anchor: Anchor, points: int, longest: float, closely: bool, progress: Progress
+    curve: Curve, branch: Branch, anchor: Anchor, points: int | None, longest: float, closely: bool, progress: Progress
 ) -> Branch:
     size, found, remarks = branch.step, list(branch.points), list(branch.remarks)
 
@@ -325,7 +370,7 @@ def _followed(
     _take_error(curve, found)
     if _outward(found[-1], curve.between):
         return ended(Ending.LEFT_INTERVAL)
-    for count in range(1, points + 1):
+    for count in itertools.count(1) if points is None else range(1, points + 1):
         shortened = False
         while True:
             if curve.left <= 0:

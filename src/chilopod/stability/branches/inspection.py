@@ -31,7 +31,7 @@ from chilopod.stability.floquet import counts_outside, spectrum
 from chilopod.stability.orbit_blocks import Blocks, block_of, crossings_in
 from chilopod.stability.returns import ReturnMap
 from chilopod.stability.symmetry.isotypic import Block
-from chilopod.stability.unit_circle.crossings import Crossing, Crossings, Status, find_crossings
+from chilopod.stability.unit_circle.crossings import Crossing, Crossings, SearchStatus, find_crossings
 from chilopod.stability.unit_circle.spectra import Event, Matrices
 
 Array = NDArray[np.float64]
@@ -184,7 +184,7 @@ def _places(within: Within, brackets: list[Bracket] | None, turned: bool) -> tup
     single = None if brackets is None else [_root(within, *bracket) for bracket in brackets]
     if single is None or None in single:
         for block, found in _searched(within):
-            if found.status in (Status.BUDGET, Status.INCOMPLETE):
+            if found.status in (SearchStatus.BUDGET, SearchStatus.INCOMPLETE):
                 remarks += tuple(f"near {step.end.last.value:.6g}: {remark}" for remark in found.remarks)
             roots += [(crossing, block) for crossing in found.crossings]
     else:
@@ -240,9 +240,12 @@ def _searched(within: Within) -> list[tuple[Block | None, Crossings]]:
         found = [_start_jacobian(within) if place == 0.0 else within.at(place).image.jacobian for place in places]
         return np.array(found), np.full(places.size, _ERROR)
 
+    def parameter(place: float) -> float:
+        return step.start.last.value + curve.scale * float(step.between(place)[0][-1])
+
     def search(matrices: Matrices) -> Crossings:
         budget = int(min(_BUDGET, max(curve.left, 0.0)))
-        return find_crossings(matrices, within.low, step.size, budget=max(budget, 30))
+        return find_crossings(matrices, within.low, step.size, budget=max(budget, 30), shown=parameter)
 
     return [(block, crossings_in(block, matrices, search)) for block in within.blocks]
 

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chilopod.frozen import ReadOnlyArrays, Short
+from chilopod.frozen import ReadOnlyArrays
 from chilopod.labels import Labelled
-from chilopod.notebook import Line, Mark, block, plot, table
 from chilopod.stability.codimension_two.codimension2 import Codimension2
 from chilopod.stability.points import Kind
+from chilopod.stability.shown import Result, axes_for, bounded, columns, dataset, mark, rows
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -67,7 +72,7 @@ class Point2(ReadOnlyArrays):
 
 
 @dataclass(frozen=True)
-class Curve2(Short):
+class Curve2(Result):
     """A curve of bifurcation points.
 
     Attributes
@@ -95,20 +100,40 @@ class Curve2(Short):
         """Of both parameters at all points, shape (points, 2)."""
         return np.array([point.values for point in self.points])
 
-    def _repr_html_(self) -> str:
-        heading = f"{self.kind.label} in two parameters: {len(self.points)} points"
-        picture = plot(
-            [Line([(float(first), float(second)) for first, second in self.values])],
-            [Mark(float(point.values[0]), float(point.values[1])) for point in self.special],
-            x="first parameter",
-            y="second parameter",
-            alt=heading,
-        )
+    def _lines(self) -> list[str]:
+        (p, q), (p_end, q_end) = self.values[0], self.values[-1]
         special = [
-            (
-                point.kind.label,
-                *(f"{value:.10g} ± {off:.1e}" for value, off in zip(point.values, point.error_bound, strict=True)),
-            )
-            for point in self.special
+            (each.kind.label, *(bounded(*pair) for pair in zip(each.values, each.error_bound, strict=True)))
+            for each in self.special
         ]
-        return block(heading, picture, table(("on it", "first", "second"), special) if special else "")
+        ends = [" ".join((end.sentence, why)).strip() for end, why in zip(self.endings, self.reasons, strict=True)]
+        return [
+            f"Curve2: {self.kind.label}, {len(self.points)} points",
+            f"from ({p:.9g}, {q:.9g}): {ends[0]}",
+            f"to ({p_end:.9g}, {q_end:.9g}): {ends[1]}",
+            *(["points of codimension two:", *rows(special)] if special else ["points of codimension two: none"]),
+        ]
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the curve over both parameters, points of codimension two marked, on axes of matplotlib or on new
+        ones."""
+        axes = axes_for(axes)
+        axes.plot(*self.values.T, label=self.kind.label)
+        mark(axes, [(each.kind.label, each.values[0], each.values[1]) for each in self.special])
+        axes.set(xlabel="first parameter", ylabel="second parameter")
+        return axes
+
+    def to_dataset(self) -> xr.Dataset:
+        """The points as a dataset over ``point``, in their order along the curve, those of codimension two among them;
+        ``special`` is empty at ordinary ones. Multipliers are those of the return map."""
+        points, scale = list[Point2 | Codimension2](self.points), np.ptp(self.values, axis=0)
+        scale[scale == 0.0] = 1.0
+        for each in self.special:
+            places = np.array([point.values for point in points]) / scale
+            away = np.linalg.norm(places - each.values / scale, axis=1)
+            detours = away[:-1] + away[1:] - np.linalg.norm(np.diff(places, axis=0), axis=1)
+            points.insert(int(detours.argmin()) + 1 if detours.size else 1, each)
+        kinds = {"special": [getattr(point, "kind", None) for point in points]}
+        names = ("values", "error_bound", "coefficient", "coefficient_error", "frequency", "orbit", "multipliers")
+        first, last = (end.label for end in self.endings)
+        return dataset("point", columns(points, *names) | kinds, kind=self.kind.label, first_end=first, last_end=last)

@@ -20,7 +20,7 @@ from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.codimension_two.bordered import Equations, Evaluated, Frame, Spot
 from chilopod.stability.codimension_two.codimension2 import DEGENERATE, Codimension2, CodimensionTwo, together
 from chilopod.stability.floquet import Spectrum, spectrum
-from chilopod.stability.normal_forms.amplitude import Status
+from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import NormalForm, normal_form
 from chilopod.stability.points import Kind
@@ -166,7 +166,7 @@ class Detector:
 
     def coefficient(self, form: NormalForm) -> tuple[float, float]:
         """The coefficient that decides what happens on a curve of this kind, and its error; NaN where there is none."""
-        if form.status not in (Status.FOUND, Status.LINEAR):
+        if form.status not in (NormalFormStatus.FOUND, NormalFormStatus.LINEAR):
             return np.nan, np.nan
         if self._kind in (Kind.FOLD, Kind.TRANSCRITICAL, Kind.BRANCH_POINT):
             return form.quadratic, form.quadratic_error

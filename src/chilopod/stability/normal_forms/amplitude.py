@@ -51,7 +51,7 @@ _SURE = 2.0  # for the worst of which
 _WRONG = 0.3  # how far off they are, of what the states move
 
 
-class Status(Labelled):
+class NormalFormStatus(Labelled):
     """What became of a normal form; each member's ``sentence`` says it in words."""
 
     FOUND = "found", "the coefficients hold within their errors"
@@ -78,7 +78,7 @@ class Fit:
         Coefficient of the resonant cubic term.
     """
 
-    status: Status
+    status: NormalFormStatus
     sampled: Sampled
     cubic: complex
     cubic_error: float
@@ -105,7 +105,7 @@ class Search:
         """Search on from an amplitude; None if there is none that serves."""
         low, high = 0.0, np.inf  # amplitudes at which nothing is seen, and that are too large
         best: tuple[Sampled, dict[Powers, ComplexArray]] | None = None
-        best_error, status = np.inf, Status.LINEAR
+        best_error, status = np.inf, NormalFormStatus.LINEAR
         bends = ups = downs = turned = 0
         growing = 0.0
         for _ in range(_TRIALS):
@@ -115,7 +115,13 @@ class Search:
                 low, factor = radius, _UP
             elif found is None or share > _TOO_FAR:
                 high, factor = radius, _FIRST_DOWN if found is None else _toward(share, order)
-            elif seen and status is Status.LINEAR and downs < _DOWNS and found.falling and found.shrink < _RESOLVED:
+            elif (
+                seen
+                and status is NormalFormStatus.LINEAR
+                and downs < _DOWNS
+                and found.falling
+                and found.shrink < _RESOLVED
+            ):
                 high, factor, downs = radius, max(found.shrink, _FIRST_DOWN), downs + 1
             elif bends < _BENDS and self._bend(found):
                 bends += 1
@@ -127,7 +133,7 @@ class Search:
                 value, error = (float(np.abs(one[-1])) for one in found.taylor(self._third))
                 better = error < _BETTER * best_error
                 if error < best_error:
-                    best, best_error, status = (found, dict(self._curve)), error, Status.FOUND
+                    best, best_error, status = (found, dict(self._curve)), error, NormalFormStatus.FOUND
                 full = _highest(found) > _FULL
                 if error <= _ENOUGH * value or (full and found.shrink > _RESOLVED):
                     break
@@ -144,7 +150,7 @@ class Search:
             if nearer is None:
                 break
             radius = nearer
-        if best is None or (status is Status.LINEAR and np.isfinite(high)):
+        if best is None or (status is NormalFormStatus.LINEAR and np.isfinite(high)):
             return None
         found, self._curve = best
         return self._described(found, status)
@@ -187,7 +193,7 @@ class Search:
                 self._curve[powers] = self._curve[powers] + solve_homological(self._at, powers, excess, resonant)
         return bent
 
-    def _described(self, found: Sampled, status: Status) -> Fit:
+    def _described(self, found: Sampled, status: NormalFormStatus) -> Fit:
         value, error = found.taylor(self._third)
         off = {}
         for powers in self._second:

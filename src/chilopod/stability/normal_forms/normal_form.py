@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.stability.normal_forms.amplitude import Fit, Search, Status
+from chilopod.stability.normal_forms.amplitude import Fit, NormalFormStatus, Search
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, ReturnedStates, images
 from chilopod.stability.normal_forms.resonances import strong_resonance, uncertainties
 
@@ -59,7 +59,7 @@ class NormalForm:
         At 1:4: A = -i C / |D| of Kuznetsov, section 9.5.3, with C and D the coefficients of a |a|^2 and conj(a)^3.
     """
 
-    status: Status
+    status: NormalFormStatus
     quadratic: float = np.nan
     quadratic_error: float = np.inf
     cubic: float = np.nan
@@ -110,15 +110,15 @@ def normal_form(
     own = [int(np.abs(values - one).argmin()) for one in (at.multiplier, at.multiplier.conjugate())]
     others = np.delete(np.arange(values.size), own)
     if (np.abs(np.abs(values[others]) - 1.0) <= errors[others]).any():
-        return NormalForm(Status.SEVERAL_CRITICAL)
+        return NormalForm(NormalFormStatus.SEVERAL_CRITICAL)
     resonance = None if at.real else strong_resonance(at.multiplier, float(errors[own[0]]))
     if resonance in (1, 2):
-        return NormalForm(Status.STRONG_RESONANCE, resonance=resonance)
+        return NormalForm(NormalFormStatus.STRONG_RESONANCE, resonance=resonance)
     # Far out, where nobody knows what is there, an overflow is an answer.
     with np.errstate(all="ignore"):
         fit = Search(mapped, at, noise, resonance).run(_start(at, scale))
     if fit is None:
-        return NormalForm(Status.OUT_OF_REACH, resonance=resonance)
+        return NormalForm(NormalFormStatus.OUT_OF_REACH, resonance=resonance)
     if at.real:
         return _of_full_period(fit, mapped, at, noise, orbit_error)
     cubic = at.returns * np.conj(at.multiplier) * fit.cubic
@@ -202,7 +202,7 @@ def _with_resonant_terms(form: NormalForm, fit: Fit, at: CriticalOrbit, resonanc
         ratio = complex(-1j * fit.cubic / abs(resonant))
     return replace(
         form,
-        status=Status.STRONG_RESONANCE,
+        status=NormalFormStatus.STRONG_RESONANCE,
         resonant=complex(resonant),
         resonant_error=float(error),
         ratio=ratio,

@@ -44,9 +44,9 @@ _IRRATIONAL = 0.5 * (np.sqrt(5.0) - 1.0)
 class SymmetricKind(Labelled):
     """What happens in a block; each member's ``sentence`` says it in words."""
 
-    FOLD_OR_TRANSCRITICAL = (
-        "fold or transcritical",
-        "no symmetry is broken: two orbits meet and vanish, or cross and exchange stability",
+    SYMMETRY_KEPT = (
+        "symmetry kept",
+        "no spatial symmetry is broken: the kind of the point says what happens",
     )
     PITCHFORK = (
         "pitchfork",
@@ -86,7 +86,7 @@ class AxialBranch(ReadOnlyArrays):
         Numbers of the elements with rho(P) w = exp(i phase) w, shape (k,): what the new orbits keep, where there
         is a phase together with a shift in time.
     phases
-        Their phases, rad in (-pi, pi], shape (k,): 0 at +1; 0 or pi, a shift by the old period, at -1. At a pair, P
+        Their phases, rad in (-pi, pi], shape (k,): 0 at +1; 0 or pi, a shift by one return, at -1. At a pair, P
         shifts the new oscillation forward by phase / (2 pi) of its period.
     reversed
         Whether an element, or at -1 and at a pair a shift in time, takes w to -w: both halves of the branch are then
@@ -129,7 +129,7 @@ class SymmetricCrossing:
     complete: bool
 
 
-def symmetric_crossing(block: Block, critical: Event) -> SymmetricCrossing:
+def symmetric_crossing(block: Block, critical: Event, returns: int = 1) -> SymmetricCrossing:
     """What happens where an eigenvalue of a block's reduced matrix, simple there, crosses the unit circle.
 
     Parameters
@@ -138,13 +138,16 @@ def symmetric_crossing(block: Block, critical: Event) -> SymmetricCrossing:
         The block; :func:`chilopod.stability.symmetry.isotypic.isotypic` makes them.
     critical
         Where it crosses.
+    returns
+        Number of returns in a period. Where it is even, -1 breaks the symmetry in time: the new orbits have the same
+        period, not twice of it.
     """
     if critical is Event.PAIR:
         space: Matrices = block.half_space
         rho: Matrices = space.conj().T @ block.representation @ space
     else:
         space, rho = np.eye(block.dimension), block.representation
-    # At -1 all is odd by the shift by one period.
+    # At -1 all is odd by the shift by one return.
     quadratic = _quadratics(rho) if critical is Event.PLUS else 0
     lines, complete = _fixed_lines(rho, critical)
     branches = [_branch(space @ line, block, critical) for line in lines]
@@ -153,17 +156,17 @@ def symmetric_crossing(block: Block, critical: Event) -> SymmetricCrossing:
     multipliers = 2 * block.repeated if critical is Event.PAIR else block.dimension
     codimension = 1 if critical is Event.PAIR or block.type is Type.REAL else 2
     return SymmetricCrossing(
-        _kind(block, critical, quadratic), multipliers, codimension, quadratic, tuple(branches), complete
+        _kind(block, critical, quadratic, returns), multipliers, codimension, quadratic, tuple(branches), complete
     )
 
 
-def _kind(block: Block, critical: Event, quadratic: int) -> SymmetricKind:
+def _kind(block: Block, critical: Event, quadratic: int, returns: int) -> SymmetricKind:
     if critical is Event.PAIR:
         return SymmetricKind.NEIMARK_SACKER if block.trivial else SymmetricKind.SYMMETRIC_NEIMARK_SACKER
-    if critical is Event.MINUS:
+    if critical is Event.MINUS and returns % 2:
         return SymmetricKind.PERIOD_DOUBLING if block.trivial else SymmetricKind.SYMMETRIC_PERIOD_DOUBLING
-    if block.trivial:
-        return SymmetricKind.FOLD_OR_TRANSCRITICAL
+    if block.trivial and critical is Event.PLUS:
+        return SymmetricKind.SYMMETRY_KEPT
     if block.dimension == 1:
         return SymmetricKind.PITCHFORK
     return SymmetricKind.EQUIVARIANT_TRANSCRITICAL if quadratic else SymmetricKind.EQUIVARIANT_PITCHFORK

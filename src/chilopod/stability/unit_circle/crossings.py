@@ -41,8 +41,10 @@ _FINEST_PROBE = 1e-6  # of the interval
 _CLOSE = 0.25  # of the nearer end: so far towards the circle a multiplier must be heading
 _EPSILON = float(np.finfo(float).eps)
 
+_Place = Callable[[float], float]
 
-class Status(Labelled):
+
+class SearchStatus(Labelled):
     """How a search ended; each member's ``sentence`` says it in words."""
 
     COMPLETE = "complete", "the counts at both ends and between all points add up"
@@ -100,7 +102,7 @@ class Crossings:
     """
 
     crossings: tuple[Crossing, ...]
-    status: Status
+    status: SearchStatus
     remarks: tuple[str, ...]
     evaluations: int
 
@@ -112,6 +114,7 @@ def find_crossings(
     *,
     budget: int = BUDGET,
     affordable: Callable[[], int] | None = None,
+    shown: Callable[[float], float] = float,
 ) -> Crossings:
     """Find every value of a parameter at which eigenvalues of real matrices cross the unit circle.
 
@@ -127,6 +130,8 @@ def find_crossings(
         At how many values matrices may be asked for.
     affordable
         How many more matrices can be had, where that is for their cost to say: the search ends when it says none.
+    shown
+        ``shown(value)`` is what remarks say of a value.
 
     Raises
     ------
@@ -148,7 +153,7 @@ def find_crossings(
         return np.where(places <= a, low, np.where(places >= b, high, inner))
 
     spectra = Spectra(lambda places: matrices(parameter(places)), budget, affordable)
-    return _Finder(spectra, a, b, lambda place: float(parameter(place))).found()
+    return _Finder(spectra, a, b, lambda place: float(parameter(place)), shown).found()
 
 
 def _same(values: Any) -> Any:
@@ -158,10 +163,11 @@ def _same(values: Any) -> Any:
 class _Finder:
     """The search, in a coordinate in which the parameter acts evenly."""
 
-    def __init__(self, spectra: Spectra, a: float, b: float, parameter: Callable[[float], float]) -> None:
+    def __init__(self, spectra: Spectra, a: float, b: float, parameter: _Place, shown: _Place) -> None:
         self.spectra = spectra
         self.a, self.b = a, b
         self.parameter = parameter
+        self.shown: _Place = lambda place: shown(parameter(place))
         self.remarks: list[str] = []
         self.spent = False
         self.conservative = False
@@ -172,8 +178,8 @@ class _Finder:
         self.spectra.at(first)
         if not self.spectra.values:
             if self.spectra.left <= 0:
-                return Crossings((), Status.BUDGET, (), self.spectra.evaluations)
-            return Crossings((), Status.INCOMPLETE, ("there is no matrix anywhere",), self.spectra.evaluations)
+                return Crossings((), SearchStatus.BUDGET, (), self.spectra.evaluations)
+            return Crossings((), SearchStatus.INCOMPLETE, ("there is no matrix anywhere",), self.spectra.evaluations)
         idle = {event: self._idle(first, event) for event in Event}
         resting = idle[Event.PLUS] + idle[Event.MINUS]
         trivial = sum(idle[event] * (idle[event] - 1) // 2 for event in (Event.PLUS, Event.MINUS))
@@ -184,7 +190,7 @@ class _Finder:
             self._probe()
         found = self._searched(events, idle)
         roots = [root for event in events for root in self._roots(event, idle[event], found[event])]
-        accounts = Accounts(self.spectra, (self.a, self.b), idle, resting, conservative, self.parameter)
+        accounts = Accounts(self.spectra, (self.a, self.b), idle, resting, conservative, self.shown)
         points = accounts.balance(roots)
         self.remarks += accounts.remarks
         crossings = tuple(
@@ -201,11 +207,11 @@ class _Finder:
             for group in point.groups
         )
         if self.spent or accounts.spent:
-            status = Status.BUDGET
+            status = SearchStatus.BUDGET
         elif self.open or accounts.open:
-            status = Status.INCOMPLETE
+            status = SearchStatus.INCOMPLETE
         else:
-            status = Status.CONSERVATIVE if conservative else Status.COMPLETE
+            status = SearchStatus.CONSERVATIVE if conservative else SearchStatus.COMPLETE
         return Crossings(crossings, status, tuple(dict.fromkeys(self.remarks)), self.spectra.evaluations)
 
     def _factors(self, event: Event) -> int:
@@ -306,7 +312,7 @@ class _Finder:
             if left == right and self.spectra.distances(left, event)[1][0] > _TELLING:
                 if self.spectra.clear(left):
                     continue  # two real multipliers with product 1
-                self._leave(f"{LOST}, at {self.parameter(left):.9g}")  # zero only by rounding
+                self._leave(f"{LOST}, at {self.shown(left):.9g}")  # zero only by rounding
                 continue
             place = left if left == right else self._root(event, idle, left, right)
             reach = 4.0 * _EPSILON * abs(place)
@@ -324,7 +330,7 @@ class _Finder:
         return float(brentq(value, left, right, xtol=5e-324, rtol=4 * _EPSILON, maxiter=most, disp=False))
 
     def _between(self, piece: Interval) -> str:
-        return between(*map(self.parameter, piece))
+        return between(*map(self.shown, piece))
 
     def _leave(self, remark: str) -> None:
         self.open = True

@@ -250,7 +250,7 @@ def _predictions(robot: Robot, variants: Mapping[str, Sequence[str]]) -> dict[st
     try:
         point = pitchfork(robot)
         found["coefficient"] = point.coefficient if point.coefficient is not None else float("nan")
-        found["verdict"] = point.point.criticality.label if point.point.criticality else ""
+        found["verdict"] = point.point.criticality.label if point.point.criticality.known else ""
     except AnalysisError:
         found["coefficient"], found["verdict"] = float("nan"), ""
     return found
