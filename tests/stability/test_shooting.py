@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.stability import begin, find_orbit, follow, from_rhs, locate, multipliers
+from chilopod.stability import Ending, begin, find_orbit, follow, from_rhs, locate, multipliers
 from chilopod.stability.shooting import Nodes, shot
 
 RATE, FREQUENCY = np.sqrt(1.0 + 2.0 * np.sqrt(7.0)), np.sqrt(2.0 * np.sqrt(7.0) - 1.0)
@@ -97,6 +97,21 @@ def test_a_cycle_is_followed_to_where_it_becomes_homoclinic():
             continue
         state, _ = lorenz(after.value).flow(after.orbit, 0.0, after.period)
         assert np.abs(state - after.orbit).max() <= 1e-10 * after.multipliers[0].real
+
+
+def test_an_end_of_the_interval_is_reached_where_a_return_magnifies():
+    asked = []
+
+    def family(r):
+        asked.append(r)
+        return lorenz(r)
+
+    start = begin(family, 24.0, [5.48239022, 5.89665725, 19.66310346], rising=False)
+    asked.clear()
+    branch = follow(family, start, (13.94, 26.0))
+    assert branch.ending is Ending.LEFT_INTERVAL
+    assert branch.points[-1].value == min(asked) == 13.94
+    assert branch.points[-1].multipliers[0].real > 5000.0
 
 
 def test_what_explodes_between_two_nodes_is_named():

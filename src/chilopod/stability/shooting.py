@@ -224,7 +224,13 @@ class _Linear:
         # Derivatives by the time of a return and by the parameter.
         self._by_time, self._by_value = np.zeros((m, n)), np.zeros((m, n))
         step = 0.0 if free is None else _DIFFERENCE * free.scale
-        beside = None if free is None else system_at(nodes.value + step)
+        beside = None
+        if free is not None:
+            try:
+                beside = system_at(nodes.value + step)
+            except AnalysisError:  # the end of what there is
+                step = -step
+                beside = system_at(nodes.value + step)
         for i, x in enumerate(nodes.states):
             a, b = (i * part, (i + 1) * part) if timed else (0.0, part)
             try:

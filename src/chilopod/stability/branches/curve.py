@@ -259,7 +259,7 @@ class Curve:
         mode = last.tangent[:n] if anchor.leaving else None
         fixed = symmetric_space(self.system(last.value), last.orbit, self.units(n)[:n], mode)
         where = _Where(anchor, section, fixed, row, target, value)
-        count = node_count(matrix[:n, :n] + np.eye(n), np.ones(n)) if fixed is None and value is None else 0
+        count = node_count(matrix[:n, :n] + np.eye(n), np.ones(n)) if fixed is None else 0
         rounds = 0
         if count >= _MANY_NODES:
             moved, x, here, image, derivative = self._shot(where, count)
@@ -299,11 +299,9 @@ class Curve:
         with Asking("flow", last.value):
             nodes = nodes_along(system, last.orbit, duration, count, last.value)
             free = Free(where.row, where.target, start, self.scale)
-            found = shot(self.system, nodes, units[:-1], where.anchor.section, free)
-        x, value = found.nodes.states[0], found.nodes.value
+            found = shot(lambda value: self.system(self._inside(value)), nodes, units[:-1], where.anchor.section, free)
+        x, value = found.nodes.states[0], self._inside(found.nodes.value) if where.value is None else where.value
         system = self.system(value)
-        if not self.between[0] <= value <= self.between[1]:
-            raise OutsideIntervalError("leaves the interval", field="parameter", value=value)
         count, velocity, across = returns_per_period(system), None, np.eye(x.size)
         if section is not None and is_autonomous(system):
             velocity = np.asarray(system.velocity(x))
@@ -318,6 +316,13 @@ class Curve:
             None if section is None else section.normal,
         )
         return (np.append(x, value) - start) / units, x, value, image, across @ found.by_value * self.scale
+
+    def _inside(self, value: float) -> float:
+        """A value of the parameter that the family may be asked for; on the interval's end but for rounding, that."""
+        inside = min(max(value, self.between[0]), self.between[1])
+        if not abs(value - inside) <= self.precision * self.scale:
+            raise OutsideIntervalError("leaves the interval", field="parameter", value=value)
+        return inside
 
     def _corrected(self, where: _Where, guess: Array, matrix: Array) -> _Corrected:
         """Correct a guess by Broyden's method."""
