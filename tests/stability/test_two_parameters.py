@@ -160,6 +160,25 @@ def test_a_krein_collision_is_named():
         follow2(circle(), point, BOX, second=second)
 
 
+def turning(p, q):
+    """x -> -(1 + p) x + (q - 0.1) x^3, whose period doubling turns at q = 0.1."""
+
+    def image(x):
+        return -(1.0 + p) * x + (q - 0.1) * x**3, np.array([[-(1.0 + p) + 3.0 * (q - 0.1) * x[0] ** 2]])
+
+    return PeriodicSystem(
+        1,
+        1.0,
+        lambda x, t0, t1: image(x),
+        orbit=np.zeros(1),
+        flow_with_error=lambda x, t0, t1: (*image(x), 1e-15),
+        flow_states=lambda states, t0, t1: -(1.0 + p) * states + (q - 0.1) * states**3,
+    )
+
+
+TURNS = BifurcationPoint(Kind.PERIOD_DOUBLING, 0.0, 0.0, np.zeros(1), np.ones(1, complex), -1.0 + 0j, np.pi)
+
+
 def test_a_coefficient_that_is_not_found_near_its_zero_is_bracketed(monkeypatch):
     """x -> -(1 + p) x + (q - 0.1) x^3 turns at q = 0.1, where here no normal form is found."""
 
@@ -170,22 +189,16 @@ def test_a_coefficient_that_is_not_found_near_its_zero_is_bracketed(monkeypatch)
     detection_normal_form = detection.normal_form
     monkeypatch.setattr(detection, "normal_form", shy)
 
-    def family2(p, q):
-        def image(x):
-            return -(1.0 + p) * x + (q - 0.1) * x**3, np.array([[-(1.0 + p) + 3.0 * (q - 0.1) * x[0] ** 2]])
-
-        return PeriodicSystem(
-            1,
-            1.0,
-            lambda x, t0, t1: image(x),
-            orbit=np.zeros(1),
-            flow_with_error=lambda x, t0, t1: (*image(x), 1e-15),
-            flow_states=lambda states, t0, t1: -(1.0 + p) * states + (q - 0.1) * states**3,
-        )
-
-    start = BifurcationPoint(Kind.PERIOD_DOUBLING, 0.0, 0.0, np.zeros(1), np.ones(1, complex), -1.0 + 0j, np.pi)
-    curve = follow2(family2, start, ((-1.0, 1.0), (-1.0, 1.0)), second=-0.3)
+    curve = follow2(turning, TURNS, ((-1.0, 1.0), (-1.0, 1.0)), second=-0.3)
     (found,) = curve.special
     assert found.kind is CodimensionTwo.GENERALISED_PERIOD_DOUBLING
     assert abs(found.values[1] - 0.1) <= found.error_bound[1] < 0.03
+    assert curve.endings == (CurveEnd.LEFT_BOX, CurveEnd.LEFT_BOX)
+
+
+def test_a_point_that_may_be_anywhere_is_none(monkeypatch):
+    assert follow2(turning, TURNS, ((-1.0, 1.0), (-1.0, 1.0)), second=-0.3).special
+    monkeypatch.setattr(detection, "_along", lambda *arguments: np.inf)
+    curve = follow2(turning, TURNS, ((-1.0, 1.0), (-1.0, 1.0)), second=-0.3)
+    assert not curve.special
     assert curve.endings == (CurveEnd.LEFT_BOX, CurveEnd.LEFT_BOX)

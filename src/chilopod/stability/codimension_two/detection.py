@@ -281,6 +281,8 @@ class Detector:
         along = _along(test, at, root, beside, abs(value) + error + unsure)
         off = _SAFETY * spot.frame.widths * spot.shift[spot.frame.parameters]
         bound = off + along + 4.0 * np.finfo(float).eps * np.abs(spot.place.values)
+        if not (bound < np.ptp(equations.box, axis=1)).all():  # which tells nothing
+            return None
         found = Codimension2(kind, spot.place.values, bound, spot.place.state, own.spectrum.values)
         return root, spot, found
 
