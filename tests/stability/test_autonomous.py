@@ -194,3 +194,19 @@ def test_coefficients_do_not_hang_on_where_an_orbit_is_met(state):
     """Rössler's period doubling, on three sections."""
     (point,) = locate(rossler, (2.0, 3.3), orbit=state)
     assert abs(point.coefficient + 0.3705827166) <= point.coefficient_error + 1e-10 < 1e-7
+
+
+@pytest.mark.parametrize("state", [[1.0, 0.0, -0.3], [1.0, 0.0, 0.3], [1.2, 0.0, 0.0], [0.54, 0.84, 0.0]])
+def test_a_fold_of_an_orbit_with_twist(state):
+    """The cycles r^2 = 1 +- sqrt(1/4 - l^2) turn at rates that differ, and meet at l = 1/2."""
+
+    def rhs(t, x, level):
+        square = x[0] * x[0] + x[1] * x[1]
+        grow, turn = 0.25 - level * level - (square - 1.0) ** 2, 1.0 + square
+        return [grow * x[0] - turn * x[1], turn * x[0] + grow * x[1], -0.5 * x[2] + x[0] * x[1]]
+
+    found = locate(lambda level: from_rhs(rhs, 3, None, args=(level,), guess_period=3.0), (0.3, 1.0), orbit=state)
+    (point,) = found
+    assert found.complete
+    assert point.kind is Kind.FOLD
+    assert abs(point.value - 0.5) <= point.error_bound < 1e-10
