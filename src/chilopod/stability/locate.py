@@ -146,7 +146,7 @@ def locate(
         If there is no orbit at the lower end of the interval, or ``family`` raises an exception there. At any other
         value that is as if there were no orbit, and a remark.
     """
-    low, high = _interval(between)
+    low, high = checked_interval(between)
     samples = Samples(family, orbit, low, high, budget, seconds)
     here = extent(samples)
     remarks = [here.ending] if here.ending else []
@@ -175,7 +175,8 @@ def locate(
     return Located(ordered, status, tuple(dict.fromkeys([*remarks, *samples.remarks])), samples.count)
 
 
-def _interval(between: tuple[float, float]) -> tuple[float, float]:
+def checked_interval(between: tuple[float, float]) -> tuple[float, float]:
+    """An interval as two finite numbers, the second of which is larger."""
     try:
         low, high = (float(value) for value in between)
     except (TypeError, ValueError):

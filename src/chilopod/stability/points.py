@@ -28,6 +28,7 @@ class Kind(Labelled):
     BRANCH_POINT = "branch point", "another orbit branches off; the coefficients do not tell how"
     COLLISION = "collision", "of a conservative system, two multipliers meet at +1 or -1 and leave the unit circle"
     KREIN_COLLISION = "Krein collision", "of a conservative system, two pairs meet on the unit circle and leave it"
+    HOPF = "Hopf", "an equilibrium changes stability and a cycle branches off"
 
 
 class Criticality(Labelled):
@@ -84,18 +85,20 @@ class BifurcationPoint(ReadOnlyArrays):
     error_bound
         Bound on the error of ``value``: that of the critical multiplier over its rate of change, and the root finder's.
     orbit
-        State on the critical orbit at time 0, shape (n,).
+        State on the critical orbit at time 0, or the equilibrium, shape (n,).
     mode
-        Unit critical eigenvector, shape (n,), complex for Neimark-Sacker.
+        Unit critical eigenvector, shape (n,), complex for Neimark-Sacker and Hopf.
     multiplier
-        Critical multiplier of the return map (of the half period where that symmetry exists).
+        Critical multiplier of the return map (of the half period where that symmetry exists); of a Hopf point the
+        eigenvalue i omega.
     frequency
         Angular frequency (1/s) of the critical mode: 0 for a real multiplier +1 of the period; the principal value
         otherwise.
     criticality, coefficient, coefficient_error
         Verdict and cubic coefficient a -> a + coefficient a^3 of the map over one period of the orbit, at a period
         doubling over two; a is the amplitude along the unit ``mode`` (Neimark-Sacker: state = 2 Re(a mode)). None where
-        it has no meaning (fold, transcritical, branch point) or where there is no normal form.
+        it has no meaning (fold, transcritical, branch point) or where there is no normal form. At a Hopf point the
+        first Lyapunov coefficient l1 (Kuznetsov, section 3.5), with |a| -> |a| + 2 pi l1 |a|^3 over one period.
     rotation, rotation_error
         Where the mode turns (Neimark-Sacker), the phase per period that an amplitude adds, rad per amplitude^2.
     period
@@ -107,6 +110,8 @@ class BifurcationPoint(ReadOnlyArrays):
         along which new orbits branch off; else of the critical space some basis.
     symmetry
         What the spatial symmetries make of it, where the orbit has some.
+    rate
+        Of a Hopf point: how fast its eigenvalue moves, in 1/s per unit of the parameter.
     normal_form
         All that is known of the normal form, with a status that says why where it has no numbers; None where it was
         not asked for, and at folds.
@@ -129,6 +134,7 @@ class BifurcationPoint(ReadOnlyArrays):
     multiplicity: int = 1
     modes: NDArray[np.complex128] | None = None
     symmetry: SymmetricCrossing | None = None
+    rate: complex | None = None
 
     @property
     def sentences(self) -> str:
@@ -141,11 +147,14 @@ class BifurcationPoint(ReadOnlyArrays):
         return " ".join(each[0].upper() + each[1:] for each in said)
 
     def _repr_html_(self) -> str:
-        rows = [("multiplier of the return map", f"{self.multiplier:.6g}"), ("period", f"{self.period:.10g}")]
+        hopf = self.kind is Kind.HOPF
+        critical = "eigenvalue" if hopf else "multiplier of the return map"
+        rows = [(critical, f"{self.multiplier:.6g}"), ("period", f"{self.period:.10g}")]
         if self.frequency:
             rows.append(("frequency of the mode (1/s)", f"{self.frequency:.10g}"))
         if self.coefficient is not None:
-            rows.append(("cubic coefficient", f"{self.coefficient:.6g} ± {self.coefficient_error:.1e}"))
+            name = "first Lyapunov coefficient" if hopf else "cubic coefficient"
+            rows.append((name, f"{self.coefficient:.6g} ± {self.coefficient_error:.1e}"))
         real = np.abs(self.mode.imag).max() < _REAL
         mode = (
             (f"{x:.6g}", f"{share:.4g}")
@@ -155,7 +164,7 @@ class BifurcationPoint(ReadOnlyArrays):
             f"{self.kind.label} at {self.value:.12g} (± {self.error_bound:.1e})",
             words(self.sentences),
             table(("", ""), rows),
-            table(("orbit at time 0", "critical mode"), mode),
+            table(("equilibrium" if hopf else "orbit at time 0", "critical mode"), mode),
         )
 
 
