@@ -17,7 +17,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.stability.asked import Asking
-from chilopod.stability.capabilities import Family, SystemLike, given_scale, spatial_symmetries
+from chilopod.stability.capabilities import (
+    Autonomous,
+    Family,
+    SystemLike,
+    expands_velocity,
+    given_scale,
+    spatial_symmetries,
+)
 from chilopod.stability.equilibria import Equilibrium, autonomous, find_equilibrium, hopf_form, linear_part
 from chilopod.stability.locate import BUDGET, Located, checked_interval, locate
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
@@ -77,9 +84,9 @@ def locate_hopf(
     with Asking("family", low):
         system = autonomous(family(low))
         start = find_equilibrium(system, equilibrium)
-    duration = _duration(start, system.guess_period)
+    duration, scale = _duration(start, system.guess_period), _scale(system, start)
     found = locate(
-        lambda value: _resting(family(value), duration),
+        lambda value: _resting(family(value), duration, scale),
         (low, high),
         start.state,
         normal_form=False,
@@ -113,7 +120,24 @@ def _duration(start: Equilibrium, guess_period: float) -> float:
     return float(np.exp(-np.log(sizes).mean())) if sizes.size else guess_period / (2.0 * np.pi)
 
 
-def _resting(system: SystemLike, duration: float) -> PeriodicSystem:
+def _scale(system: Autonomous, start: Equilibrium) -> Array | None:
+    """Sizes of the states, shape (n,), where an equilibrium at zero does not tell them: those at which terms of second
+    or third order of the right-hand side are as large as the linear ones along some directions."""
+    given = given_scale(system)
+    if given is not None or start.state.any() or not expands_velocity(system):
+        return given
+    n = start.state.size
+    units = numerical_balance(start.jacobian)
+    curves = np.zeros((n, 4, n))
+    curves[:, 1] = units * np.cos(np.outer(np.arange(1.0, n + 1.0), np.arange(n)))
+    with np.errstate(all="ignore"):
+        linear, *others = np.linalg.norm(system.velocity_series(curves) / units, axis=2).T[1:]
+        reaches = np.array([(linear / other) ** (1.0 / order) for order, other in enumerate(others, 1)])
+    reaches = reaches[np.isfinite(reaches) & (reaches > 0.0)]
+    return units * float(reaches.min()) if reaches.size else None
+
+
+def _resting(system: SystemLike, duration: float, scale: Array | None) -> PeriodicSystem:
     """The map of which the equilibria of a system are the fixed points."""
     checked = autonomous(system)
     n = checked.dimension
@@ -137,7 +161,7 @@ def _resting(system: SystemLike, duration: float) -> PeriodicSystem:
         duration,
         lambda x, t0, t1: flow_with_error(x, t0, t1)[:2],
         spatial_symmetry=np.stack(symmetries) if symmetries else None,
-        scale=given_scale(checked),
+        scale=scale,
         flow_with_error=flow_with_error,
     )
 
