@@ -37,7 +37,9 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 _EPSILON = float(np.finfo(float).eps)
-_ROUNDING = 16.0 * _EPSILON  # of the terms of f: a few roundings in each
+ROUNDING = 16.0 * _EPSILON
+"""Of the terms of a right-hand side: a few roundings in each."""
+
 _ROUNDS = 60
 _HALVINGS = 12  # of a step of Newton's method
 _SETTLED = 1e-9  # of the sizes of the states: a step that short may stop falling
@@ -46,8 +48,7 @@ _SINGULAR = 1e-13  # singular value that counts as zero, the largest being one, 
 _DRAWS = 4  # of what is off by its error at random
 _ANGLES = 8  # on a circle: harmonics up to the third stay apart
 _SPANS = 10.0 ** -np.arange(0.0, 4.5, 0.5)  # of the sizes of the states: where f is sampled for differences
-_FIRST = 1e-4  # share of the frequency that the cubic term of the first cycle has: an amplitude of about a hundredth
-_BENT = 0.02  # of the first cycle, how much of it is not its linear part
+_FIRST = 1e-4, 1e-6  # of the frequency, the cubic term of the first cycle: amplitudes of a hundredth and a thousandth
 _MISSED = 0.3  # of its amplitude, by which the first cycle may be elsewhere than foreseen
 
 
@@ -133,7 +134,7 @@ def find_equilibrium(system: SystemLike, guess: ArrayLike) -> Equilibrium:
     checked = autonomous(system)
     x = finite_array(guess, (checked.dimension,), "guess")
     x, velocity, matrix = _newton(checked, x)
-    rounding = np.abs(velocity) + _ROUNDING * (np.abs(matrix) @ np.abs(x))
+    rounding = np.abs(velocity) + ROUNDING * (np.abs(matrix) @ np.abs(x))
     units = numerical_balance(matrix)
     scaled = matrix * units / units[:, None]
     singular = np.linalg.cond(scaled) > 1.0 / _SINGULAR
@@ -161,7 +162,7 @@ def _newton(system: Autonomous, x: Array) -> tuple[Array, Array, Array]:
         for each in (small, x) if (small != x).any() else (x,):
             velocity, matrix, _ = linear_part(system, each)
             # Solves equations whose terms are off by their rounding (Oettli & Prager, Numer. Math. 6, 1964).
-            if (np.abs(velocity) <= _ROUNDING * (np.abs(matrix) @ np.abs(each))).all():
+            if (np.abs(velocity) <= ROUNDING * (np.abs(matrix) @ np.abs(each))).all():
                 return each, velocity, matrix
         units = numerical_balance(matrix)
         step = -_solved(matrix, velocity, units)
@@ -222,10 +223,13 @@ def linear_part(system: Autonomous, x: Array) -> tuple[Array, Array, Array]:
 
 
 def matrix_error(system: Autonomous, x: Array, matrix: Array, error: Array) -> Array:
-    """How far the derivative may be off, shape (n, n), in a state that is off by its error and by rounding."""
+    """How far the derivative may be off, shape (n, n), in a state that is off by its error and by rounding. Where terms
+    of f cancel, an entry may be nothing but the rounding of entries as large as the others, in units that balance."""
     others = [linear_part(system, other)[1:] for other in _disturbed(x, error)]
     moved = np.max([np.abs(other - matrix) + wrong for other, wrong in others], axis=0)
-    return np.asarray(moved + _ROUNDING * np.abs(matrix))
+    units = numerical_balance(matrix)
+    ratios = units / units[:, None]
+    return np.asarray(moved + 4.0 * _EPSILON * float(np.abs(matrix * ratios).max()) / ratios)
 
 
 def _disturbed(x: Array, error: Array) -> list[Array]:
@@ -308,7 +312,7 @@ def _hopf_form(system: Autonomous, x: Array, matrix: Array, frequency: float) ->
         curves = np.stack([still, along, mean + 2.0 * (second * turns**2).real, none], axis=1)
         found, off = _expanded(system, curves)
         third = np.fft.fft(found[:, 3], axis=0)[1] / _ANGLES
-        off = off[:, 3].max(axis=0) + _ROUNDING * np.abs(found[:, 3]).max(axis=0)
+        off = off[:, 3].max(axis=0) + ROUNDING * np.abs(found[:, 3]).max(axis=0)
         return second, mean, complex(left.conj() @ third), off
 
     second, mean, cubic, off = bent(quadratic[:, 2])
@@ -321,8 +325,9 @@ def _hopf_form(system: Autonomous, x: Array, matrix: Array, frequency: float) ->
     )
 
 
-def hopf_cycle(family: Family, point: BifurcationPoint) -> tuple[float, Orbit, bool]:
-    """A small cycle beside a Hopf point, with the parameter that it is at, and whether that rises as cycles grow.
+def hopf_cycle(family: Family, point: BifurcationPoint) -> tuple[float, Orbit, Array]:
+    """A small cycle beside a Hopf point, with the parameter that it is at, and the direction of its state in which
+    cycles grow, shape (n,).
 
     Raises
     ------
@@ -342,22 +347,33 @@ def hopf_cycle(family: Family, point: BifurcationPoint) -> tuple[float, Orbit, b
         here = autonomous(family(point.value))
     form = hopf_form(here, point.orbit, np.zeros(point.orbit.size), point.frequency)
     units = numerical_balance(linear_part(here, point.orbit)[1])
+    for share in _FIRST:
+        try:
+            return _cycle(family, point, form, units, share)
+        except AnalysisError as error:
+            reason = error.problem
+    raise AnalysisError(f"no cycle was found beside the Hopf point: {reason}", field="point", value=point.value)
+
+
+def _cycle(
+    family: Family, point: BifurcationPoint, form: HopfForm, units: Array, share: float
+) -> tuple[float, Orbit, Array]:
+    """The cycle whose cubic term is such a share of the frequency, or a smaller one where the manifold is bent."""
+    assert point.rate is not None
     mode, *bends = (float(np.linalg.norm(each / units)) for each in (form.mode, form.second, form.mean))
-    bend = max(bends)
-    square = _FIRST * point.frequency / abs(form.cubic)
-    square = min(square, (_BENT * mode / bend) ** 2) if bend > 0.0 else square
-    value = point.value - form.cubic.real / rate.real * square
-    frequency = point.frequency + (form.cubic.imag - rate.imag * form.cubic.real / rate.real) * square
+    square = point.frequency / abs(form.cubic)
+    square = share * (min(square, (mode / max(bends)) ** 2) if max(bends) > 0.0 else square)
+    shift = -form.cubic.real / point.rate.real * square
+    value = point.value + shift
+    duration = 2.0 * np.pi / (point.frequency + form.cubic.imag * square + point.rate.imag * shift)
     with Asking("family", value):
         system = autonomous(family(value))
-        rest = find_equilibrium(system, point.orbit)
+        rest = find_equilibrium(system, point.orbit).state
         moved = 2.0 * (np.sqrt(square) * form.mode + square * form.second).real + square * form.mean
-        duration = 2.0 * np.pi / frequency
-        start = rest.state + moved
-        size = np.maximum(np.abs(start), np.sqrt(square) * mode * units)
-        section = section_at(system, start, size, duration)
-        found = find_orbit(system, start, with_error=False, section=section, settle=False)
-    reached = float(np.linalg.norm((found.state - start) / units))
-    if not reached <= _MISSED * float(np.linalg.norm(moved / units)):
-        raise AnalysisError("no cycle where it is foreseen beside the Hopf point", field="point", value=point.value)
-    return value, found, value > point.value
+        size = np.maximum(np.abs(rest + moved), np.sqrt(square) * mode * units)
+        section = section_at(system, rest + moved, size, duration)
+        found = find_orbit(system, rest + moved, with_error=False, section=section, settle=False)
+    missed = float(np.linalg.norm((found.state - rest - moved) / units))
+    if not missed <= _MISSED * float(np.linalg.norm(moved / units)):
+        raise AnalysisError("the orbit that is found is another one", field="orbit")
+    return value, found, found.state - rest

@@ -2,13 +2,15 @@
 
 Equilibria are fixed points of the map x -> x + h phi(h A) f(x), phi(z) = (e^z - 1)/z, with A the derivative of f at x:
 a step of the exponential Euler method (Hochbruck & Ostermann, Acta Numerica 19, 2010). Its derivative there is e^(h A),
-so an eigenvalue on the imaginary axis is a multiplier on the unit circle, and :func:`chilopod.stability.locate` finds
-all of them. Values, errors and coefficients are then computed from f itself.
+so an eigenvalue on the imaginary axis is a multiplier on the unit circle, and what follows orbits and finds the
+crossings of their multipliers does that for equilibria. Values, errors and coefficients are then computed from f.
 """
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -17,33 +19,44 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.stability.asked import Asking
-from chilopod.stability.capabilities import (
-    Autonomous,
-    Family,
-    SystemLike,
-    expands_velocity,
-    given_scale,
-    spatial_symmetries,
+from chilopod.stability.capabilities import Autonomous, Family, SystemLike, expands_velocity, given_scale
+from chilopod.stability.course import Course, place_error
+from chilopod.stability.equilibria import (
+    ROUNDING,
+    Equilibrium,
+    autonomous,
+    find_equilibrium,
+    hopf_form,
+    linear_part,
 )
-from chilopod.stability.equilibria import Equilibrium, autonomous, find_equilibrium, hopf_form, linear_part
-from chilopod.stability.locate import BUDGET, Located, checked_interval, locate
+from chilopod.stability.extent import extent
+from chilopod.stability.locate import BUDGET, GRAVITY, Located, checked_interval
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
+from chilopod.stability.samples import Samples
 from chilopod.stability.scales import numerical_balance
 from chilopod.stability.system import PeriodicSystem
+from chilopod.stability.unit_circle.crossings import Crossing, Status, find_crossings
+from chilopod.stability.unit_circle.spectra import Event
 
 Array = NDArray[np.float64]
 
 _EPSILON = float(np.finfo(float).eps)
+_POINTS = 2000  # return maps for what is looked at beside a point: of the map they cost next to nothing
 _BESIDE = 1e-5  # of the interval: where the rate of an eigenvalue is taken, by central differences
 _KNOWN = 1e-3  # of the interval: how sure a value has to be for a coefficient
+_KEPT = 64  # systems
 _WORDS = (
     ("a multiplier is +1", "an eigenvalue is 0"),
     ("multipliers come in pairs with product 1", "eigenvalues come in pairs with sum 0"),
+    ("clear of the circle", "clear of the imaginary axis"),
+    ("are on the circle", "are on the imaginary axis"),
+    ("outside", "to the right of it"),
     ("multiplier", "eigenvalue"),
     ("an orbit", "an equilibrium"),
     ("orbits", "equilibria"),
     ("orbit", "equilibrium"),
 )
+"""What is said of orbits and multipliers, in words of equilibria and eigenvalues."""
 
 
 def locate_hopf(
@@ -81,32 +94,101 @@ def locate_hopf(
         If there is no equilibrium at the lower end of the interval, or ``family`` raises an exception there.
     """
     low, high = checked_interval(between)
+    family = functools.lru_cache(_KEPT)(family)
     with Asking("family", low):
         system = autonomous(family(low))
         start = find_equilibrium(system, equilibrium)
     duration, scale = _duration(start, system.guess_period), _scale(system, start)
-    found = locate(
-        lambda value: _resting(family(value), duration, scale),
-        (low, high),
-        start.state,
-        normal_form=False,
-        budget=budget,
-        seconds=seconds,
+    samples = Samples(lambda v: _resting(family(v), duration, scale), start.state, low, high, budget, seconds)
+    here = extent(samples)
+    remarks = [here.ending] if here.ending else []
+    status = Status.BUDGET if samples.spent else Status.INCOMPLETE if here.ending else Status.COMPLETE
+    points: list[BifurcationPoint] = []
+    if here.start < here.end:
+
+        def matrices(values: Array) -> tuple[Array, Array]:
+            found = samples.at(values)
+            errors = [_error(autonomous(family(each.value)), each.orbit, samples.size, duration) for each in found]
+            return np.stack([each.image.jacobian for each in found]), np.array(errors)
+
+        found = find_crossings(matrices, here.start, here.end, budget=budget, affordable=samples.affordable)
+        status = max(status, found.status, key=GRAVITY.index)
+        remarks += found.remarks
+        for crossing in found.crossings:
+            if crossing.event is Event.PLUS:
+                if not here.explains(crossing.value):
+                    remarks.append(f"an eigenvalue is zero at {crossing.value:.9g}: another equilibrium meets this one")
+            elif crossing.collision:
+                remarks.append(f"two pairs meet on the imaginary axis and leave it at {crossing.value:.9g}")
+            else:
+                samples.allow(_POINTS)
+                point = _of_map(samples, crossing, matrices, duration)
+                points.append(_described(family, (low, high), point, duration, remarks))
+    remarks += [
+        f"the equilibrium ends in a fold at {fold.value:.12g} (± {fold.error_bound:.1e}): it meets another one there"
+        for fold in here.folds
+    ]
+    if samples.remarks:
+        status = max(status, Status.INCOMPLETE, key=GRAVITY.index)
+    said = [_of_equilibria(remark) for remark in [*remarks, *samples.remarks]]
+    return Located(tuple(points), status, tuple(dict.fromkeys(said)), samples.count)
+
+
+def _of_map(
+    samples: Samples, crossing: Crossing, matrices: Callable[[Array], tuple[Array, Array]], duration: float
+) -> BifurcationPoint:
+    """A Hopf point as far as the map tells."""
+    (sample,) = samples.at(np.array([crossing.value]))
+    relative = float(matrices(np.array([crossing.value]))[1][0])
+    units = numerical_balance(sample.image.jacobian)
+    ratios = units / units[:, None]
+    largest = float(np.abs(sample.image.jacobian * ratios).max())
+    image = replace(sample.image, error=relative * largest / ratios)
+    course = Course(samples.at, samples.low, samples.end, samples.width, _BESIDE * samples.width)
+    frequency = abs(float(np.angle(crossing.multiplier))) / duration
+    return BifurcationPoint(
+        Kind.HOPF,
+        crossing.value,
+        place_error(course, crossing, image) + 4.0 * _EPSILON * abs(crossing.value),
+        sample.orbit,
+        np.zeros(sample.orbit.size, dtype=np.complex128),
+        crossing.multiplier,
+        frequency,
+        period=2.0 * np.pi / frequency,
+        multiplicity=crossing.multiplicity,
     )
-    points, remarks = [], [_of_equilibria(remark) for remark in found.remarks]
-    for point in found:
-        if point.kind is not Kind.NEIMARK_SACKER:
-            remarks.append(_remark(point))
-        elif point.multiplicity > 2:
-            remarks.append(f"{point.multiplicity // 2} pairs are critical at once at {point.value:.9g}: no coefficient")
-            points.append(_plain(point, duration))
-        else:
-            try:
-                points.append(_hopf_point(family, (low, high), point, duration))
-            except AnalysisError as reason:
-                remarks.append(f"no coefficient at {point.value:.9g}: {reason.problem}")
-                points.append(_plain(point, duration))
-    return Located(tuple(points), found.status, tuple(dict.fromkeys(remarks)), found.evaluations)
+
+
+def _described(
+    family: Family, between: tuple[float, float], point: BifurcationPoint, duration: float, remarks: list[str]
+) -> BifurcationPoint:
+    """A Hopf point with all that f itself tells, or a remark on why there is no more than the map tells."""
+    reason = f"{point.multiplicity // 2} pairs are critical at once"
+    if point.multiplicity <= 2:
+        try:
+            return _hopf_point(family, between, point, duration)
+        except AnalysisError as error:
+            reason = error.problem
+    remarks.append(f"no coefficient at {point.value:.9g}: {reason}")
+    return replace(point, multiplier=1j * point.frequency)
+
+
+def _error(system: Autonomous, x: Array, size: Array, duration: float) -> float:
+    """Relative error of the derivative of the map, the states being in units that balance it: of the exponential (of
+    the norm of the exponent, as Higham, *Functions of Matrices*, chapter 10), and of a state that is off by rounding,
+    magnified where the derivative of f is nearly singular."""
+    velocity, matrix, wrong = linear_part(system, x)
+    units = numerical_balance(matrix)
+    ratios = units / units[:, None]
+    rounding = (np.abs(velocity) + ROUNDING * (np.abs(matrix) @ np.abs(x))) / units
+    _, values, rows = np.linalg.svd(matrix * ratios)
+    most = float((size / units).max())
+    reach, steepest = float(np.linalg.norm(rounding)), max(float(values[0]), 1e-300)
+    # Where it is singular, terms of second or third order keep the state where it is.
+    off = min(reach / max(float(values[-1]), 1e-300), most * float(np.cbrt(reach / (steepest * most))))
+    beside = linear_part(system, x + off * units * rows[-1])[1]
+    moved = float(np.linalg.norm((np.abs(beside - matrix) + wrong) * ratios))
+    return 4.0 * _EPSILON * (1.0 + duration * float(np.linalg.norm(matrix * ratios))) + duration * moved
 
 
 def _duration(start: Equilibrium, guess_period: float) -> float:
@@ -155,12 +237,10 @@ def _resting(system: SystemLike, duration: float, scale: Array | None) -> Period
         ratios = units[:, None] / units
         return x + units * power[:n, n], power[:n, :n] * ratios, error * ratios
 
-    symmetries = spatial_symmetries(checked)
     return PeriodicSystem(
         n,
         duration,
         lambda x, t0, t1: flow_with_error(x, t0, t1)[:2],
-        spatial_symmetry=np.stack(symmetries) if symmetries else None,
         scale=scale,
         flow_with_error=flow_with_error,
     )
@@ -202,7 +282,6 @@ def _hopf_point(
         coefficient_error=error,
         period=2.0 * np.pi / frequency,
         multiplicity=2,
-        symmetry=point.symmetry,
         rate=rate,
     )
 
@@ -245,25 +324,6 @@ def _change(family: Family, between: tuple[float, float], value: float, eigenval
             here = find_equilibrium(system, state)
             found.append(hopf_form(system, here.state, here.error, eigenvalue.imag).cubic.real)
     return abs(found[1] - found[0]) / float(values[1] - values[0])
-
-
-def _plain(point: BifurcationPoint, duration: float) -> BifurcationPoint:
-    """A Hopf point of which no more is known than the map tells."""
-    frequency = float(np.angle(point.multiplier)) / duration
-    return replace(
-        point, kind=Kind.HOPF, multiplier=1j * frequency, frequency=frequency, period=2.0 * np.pi / frequency
-    )
-
-
-def _remark(point: BifurcationPoint) -> str:
-    """What happens to an equilibrium where it has no Hopf point."""
-    if point.kind is Kind.FOLD:
-        what = "the equilibrium ends in a fold: it meets another one and both vanish"
-    elif point.kind is Kind.KREIN_COLLISION:
-        what = "two pairs of eigenvalues meet on the imaginary axis and leave it"
-    else:
-        what = f"an eigenvalue is zero ({point.kind.label}): another equilibrium meets this one"
-    return f"{what}, at {point.value:.9g} (± {point.error_bound:.1e})"
 
 
 def _of_equilibria(remark: str) -> str:

@@ -39,7 +39,9 @@ BUDGET = 5000
 
 _DESCRIBING = 400  # return maps to solve for the orbits beside a point
 
-_GRAVITY = (Status.COMPLETE, Status.CONSERVATIVE, Status.INCOMPLETE, Status.BUDGET)
+GRAVITY = (Status.COMPLETE, Status.CONSERVATIVE, Status.INCOMPLETE, Status.BUDGET)
+"""Ways in which a search ends, from the best to the worst."""
+
 _FOLLOWED = 10.0  # factor on the error of the first orbit for that of those which are followed from it
 _LEAST_ERROR = 1e-15
 _BESIDE = 1e-6  # of the interval: how far beside a crossing rates of change are taken
@@ -156,7 +158,7 @@ def locate(
         searched, more = _searched(samples, here, budget)
         remarks += more
         for block, found in searched:
-            status = max(status, found.status, key=_GRAVITY.index)
+            status = max(status, found.status, key=GRAVITY.index)
             remarks += found.remarks
             for crossing in found.crossings:
                 if crossing.event is Event.PLUS and here.explains(crossing.value):
@@ -166,11 +168,11 @@ def locate(
                     with Asking("family", crossing.value):
                         points.append(_described(samples, crossing, block, normal_form))
                 except AnalysisError as error:
-                    status = max(status, Status.INCOMPLETE, key=_GRAVITY.index)
+                    status = max(status, Status.INCOMPLETE, key=GRAVITY.index)
                     remarks.append(f"what crosses at {crossing.value:.9g} could not be described: {error}")
     points += [_fold(samples, fold, normal_form) for fold in here.folds]
     if samples.remarks:
-        status = max(status, Status.INCOMPLETE, key=_GRAVITY.index)
+        status = max(status, Status.INCOMPLETE, key=GRAVITY.index)
     ordered = tuple(sorted(points, key=lambda point: point.value))
     return Located(ordered, status, tuple(dict.fromkeys([*remarks, *samples.remarks])), samples.count)
 

@@ -55,6 +55,9 @@ class Start(ReadOnlyArrays):
         The full period of the orbit that is left, where the system does not depend on time.
     bifurcation
         The point that is left, if it is one.
+    outward
+        If not None: a direction of the state, shape (n,), with which the branch goes from an orbit of its own beside
+        the point that it leaves; ``rising`` then only says the same of the parameter.
     """
 
     value: float
@@ -66,6 +69,7 @@ class Start(ReadOnlyArrays):
     periods: int = 1
     period: float | None = None
     bifurcation: BifurcationPoint | None = None
+    outward: Array | None = None
 
 
 def begin(
@@ -159,8 +163,8 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
         point = point.bifurcation
     kind = point.kind
     if kind is Kind.HOPF:
-        value, cycle, rising = hopf_cycle(family, point)
-        return (Start(value, cycle.state, rising, period=cycle.period),)
+        value, cycle, outward = hopf_cycle(family, point)
+        return (Start(value, cycle.state, value > point.value, period=cycle.period, outward=outward),)
     if kind is Kind.FOLD:
         raise ParameterError(
             "is a fold: the branch itself goes round it", field="point", value=point.value, allowed="follow"
@@ -267,6 +271,8 @@ def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
         )
     if start.mode is None:
         tangent = _along(matrix, start.rising)
+        if start.outward is not None and float(tangent[:-1] @ (start.outward / units[:-1])) < 0.0:
+            tangent = -tangent
     elif start.crossing:
         # Where a symmetry makes several modes critical, it is a crossing of two among the orbits that have the mode's.
         space = symmetric_space(curve.system(start.value), start.orbit, units[:-1], start.mode / units[:-1])
