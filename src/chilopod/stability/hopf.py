@@ -29,7 +29,7 @@ from chilopod.stability.equilibria import (
     hopf_form,
     linear_part,
 )
-from chilopod.stability.extent import extent
+from chilopod.stability.extent import Extent, extent
 from chilopod.stability.locate import BUDGET, GRAVITY, Located, checked_interval
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
 from chilopod.stability.samples import Samples
@@ -105,25 +105,8 @@ def locate_hopf(
     status = Status.BUDGET if samples.spent else Status.INCOMPLETE if here.ending else Status.COMPLETE
     points: list[BifurcationPoint] = []
     if here.start < here.end:
-
-        def matrices(values: Array) -> tuple[Array, Array]:
-            found = samples.at(values)
-            errors = [_error(autonomous(family(each.value)), each.orbit, samples.size, duration) for each in found]
-            return np.stack([each.image.jacobian for each in found]), np.array(errors)
-
-        found = find_crossings(matrices, here.start, here.end, budget=budget, affordable=samples.affordable)
-        status = max(status, found.status, key=GRAVITY.index)
-        remarks += found.remarks
-        for crossing in found.crossings:
-            if crossing.event is Event.PLUS:
-                if not here.explains(crossing.value):
-                    remarks.append(f"an eigenvalue is zero at {crossing.value:.9g}: another equilibrium meets this one")
-            elif crossing.collision:
-                remarks.append(f"two pairs meet on the imaginary axis and leave it at {crossing.value:.9g}")
-            else:
-                samples.allow(_POINTS)
-                point = _of_map(samples, crossing, matrices, duration)
-                points.append(_described(family, (low, high), point, duration, remarks))
+        points, ended, more = _searched(family, samples, here, duration, budget)
+        status, remarks = max(status, ended, key=GRAVITY.index), remarks + more
     remarks += [
         f"the equilibrium ends in a fold at {fold.value:.12g} (± {fold.error_bound:.1e}): it meets another one there"
         for fold in here.folds
@@ -132,6 +115,36 @@ def locate_hopf(
         status = max(status, Status.INCOMPLETE, key=GRAVITY.index)
     said = [_of_equilibria(remark) for remark in [*remarks, *samples.remarks]]
     return Located(tuple(points), status, tuple(dict.fromkeys(said)), samples.count)
+
+
+def _searched(
+    family: Family, samples: Samples, here: Extent, duration: float, budget: int
+) -> tuple[list[BifurcationPoint], Status, list[str]]:
+    """The Hopf points of an equilibrium, how the search for them ended, and what else is to be said."""
+
+    def matrices(values: Array) -> tuple[Array, Array]:
+        found = samples.at(values)
+        errors = [_error(autonomous(family(each.value)), each.orbit, samples.size, duration) for each in found]
+        return np.stack([each.image.jacobian for each in found]), np.array(errors)
+
+    found = find_crossings(matrices, here.start, here.end, budget=budget, affordable=samples.affordable)
+    points, status, remarks = [], found.status, list(found.remarks)
+    for crossing in found.crossings:
+        if crossing.event is Event.PLUS:
+            if not here.explains(crossing.value):
+                remarks.append(f"an eigenvalue is zero at {crossing.value:.9g}: another equilibrium meets this one")
+        elif crossing.collision:
+            remarks.append(f"two pairs meet on the imaginary axis and leave it at {crossing.value:.9g}")
+        else:
+            samples.allow(_POINTS)
+            try:
+                point = _of_map(samples, crossing, matrices, duration)
+            except AnalysisError as error:
+                status = max(status, Status.INCOMPLETE, key=GRAVITY.index)
+                remarks.append(f"what crosses at {crossing.value:.9g} could not be described: {error}")
+            else:
+                points.append(_described(family, (samples.low, samples.high), point, duration, remarks))
+    return points, status, remarks
 
 
 def _of_map(
@@ -144,6 +157,7 @@ def _of_map(
     ratios = units / units[:, None]
     largest = float(np.abs(sample.image.jacobian * ratios).max())
     image = replace(sample.image, error=relative * largest / ratios)
+    values, vectors = np.linalg.eig(image.jacobian)
     course = Course(samples.at, samples.low, samples.end, samples.width, _BESIDE * samples.width)
     frequency = abs(float(np.angle(crossing.multiplier))) / duration
     return BifurcationPoint(
@@ -151,7 +165,7 @@ def _of_map(
         crossing.value,
         place_error(course, crossing, image) + 4.0 * _EPSILON * abs(crossing.value),
         sample.orbit,
-        np.zeros(sample.orbit.size, dtype=np.complex128),
+        vectors[:, np.abs(values - crossing.multiplier).argmin()].astype(np.complex128),
         crossing.multiplier,
         frequency,
         period=2.0 * np.pi / frequency,
