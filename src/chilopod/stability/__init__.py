@@ -13,6 +13,7 @@ from chilopod.stability.called import NotAnalytic
 from chilopod.stability.capabilities import (
     Autonomous,
     CyclicallySymmetric,
+    ExpandsVelocity,
     FlowsEach,
     FlowsMany,
     FlowsStates,
@@ -27,8 +28,10 @@ from chilopod.stability.capabilities import (
 from chilopod.stability.codimension_two.codimension2 import Codimension2, CodimensionTwo
 from chilopod.stability.codimension_two.curve2 import Curve2, CurveEnd, Point2
 from chilopod.stability.codimension_two.two_parameters import follow2
+from chilopod.stability.equilibria import Equilibrium, find_equilibrium
 from chilopod.stability.events import Event
 from chilopod.stability.floquet import Exponents, Multipliers, exponents, multipliers, sweep
+from chilopod.stability.hopf import locate_hopf
 from chilopod.stability.jumps import UndeclaredSwitch
 from chilopod.stability.locate import Located, locate
 from chilopod.stability.normal_forms.amplitude import NormalFormStatus
@@ -55,7 +58,9 @@ __all__ = [
     "CurveEnd",
     "CyclicallySymmetric",
     "Ending",
+    "Equilibrium",
     "Event",
+    "ExpandsVelocity",
     "Exponents",
     "FlowsEach",
     "FlowsMany",
@@ -87,11 +92,13 @@ __all__ = [
     "UndeclaredSwitch",
     "begin",
     "exponents",
+    "find_equilibrium",
     "find_orbit",
     "follow",
     "follow2",
     "from_rhs",
     "locate",
+    "locate_hopf",
     "multipliers",
     "proceed",
     "sweep",

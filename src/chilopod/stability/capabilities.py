@@ -71,6 +71,16 @@ class Autonomous(SystemLike, Protocol):
 
 
 @runtime_checkable
+class ExpandsVelocity(Autonomous, Protocol):
+    """Knows its right-hand side f with all derivatives; of other systems they are taken by differences."""
+
+    def velocity_series(self, curves: Array, /) -> Array:
+        """Taylor coefficients in s of f(x(s)), shape (curves, orders, n), along curves x(s) = c0 + c1 s + ... with
+        these coefficients, of the same shape."""
+        ...
+
+
+@runtime_checkable
 class CyclicallySymmetric(Protocol):
     """Has a symmetry of another order than 2, such as the shift along a ring of oscillators."""
 
@@ -215,6 +225,11 @@ def is_autonomous(system: SystemLike) -> TypeGuard[Autonomous]:
 def flows_with_error(system: SystemLike) -> TypeGuard[FlowsWithError]:
     """Whether a system bounds the error of its flow."""
     return getattr(system, "flow_with_error", None) is not None
+
+
+def expands_velocity(system: SystemLike) -> TypeGuard[ExpandsVelocity]:
+    """Whether a system knows its right-hand side with all derivatives."""
+    return getattr(system, "velocity_series", None) is not None
 
 
 def flows_states(system: SystemLike) -> TypeGuard[FlowsStates]:

@@ -42,7 +42,9 @@ BUDGET = 5000
 
 _DESCRIBING = 400  # return maps to solve for the orbits beside a point
 
-_GRAVITY = (SearchStatus.COMPLETE, SearchStatus.CONSERVATIVE, SearchStatus.INCOMPLETE, SearchStatus.BUDGET)
+GRAVITY = (SearchStatus.COMPLETE, SearchStatus.CONSERVATIVE, SearchStatus.INCOMPLETE, SearchStatus.BUDGET)
+"""Ways in which a search ends, from the best to the worst."""
+
 _FOLLOWED = 10.0  # factor on the error of the first orbit for that of those which are followed from it
 _LEAST_ERROR = 1e-15
 _BESIDE = 1e-6  # of the interval: how far beside a crossing rates of change are taken
@@ -157,7 +159,7 @@ def locate(
         If there is no orbit at the lower end of the interval, or ``family`` raises an exception there. At any other
         value that is as if there were no orbit, and a remark.
     """
-    low, high = _interval(between)
+    low, high = checked_interval(between)
     samples = Samples(family, orbit, low, high, budget, seconds)
     here = extent(samples)
     remarks = [here.ending] if here.ending else []
@@ -167,7 +169,7 @@ def locate(
         searched, more = _searched(samples, here, budget)
         remarks += more
         for block, found in searched:
-            status = max(status, found.status, key=_GRAVITY.index)
+            status = max(status, found.status, key=GRAVITY.index)
             remarks += found.remarks
             for crossing in found.crossings:
                 if crossing.event is Event.PLUS and here.explains(crossing.value):
@@ -180,16 +182,17 @@ def locate(
                         raise AnalysisError(f"its error bound of {point.error_bound:.1e} tells nothing", field="value")
                     points.append(point)
                 except AnalysisError as error:
-                    status = max(status, SearchStatus.INCOMPLETE, key=_GRAVITY.index)
+                    status = max(status, SearchStatus.INCOMPLETE, key=GRAVITY.index)
                     remarks.append(f"what crosses at {crossing.value:.9g} could not be described: {error}")
     points += [_fold(samples, fold, normal_form) for fold in here.folds]
     if samples.remarks:
-        status = max(status, SearchStatus.INCOMPLETE, key=_GRAVITY.index)
+        status = max(status, SearchStatus.INCOMPLETE, key=GRAVITY.index)
     ordered = tuple(sorted(points, key=lambda point: point.value))
     return Located(ordered, status, tuple(dict.fromkeys([*remarks, *samples.remarks])), samples.count)
 
 
-def _interval(between: tuple[float, float]) -> tuple[float, float]:
+def checked_interval(between: tuple[float, float]) -> tuple[float, float]:
+    """An interval as two finite numbers, the second of which is larger."""
     try:
         low, high = (float(value) for value in between)
     except (TypeError, ValueError):

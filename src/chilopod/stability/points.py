@@ -28,6 +28,7 @@ class Kind(Labelled):
     BRANCH_POINT = "branch point", "another orbit branches off; the coefficients do not tell how"
     COLLISION = "collision", "of a conservative system, two multipliers meet at +1 or -1 and leave the unit circle"
     KREIN_COLLISION = "Krein collision", "of a conservative system, two pairs meet on the unit circle and leave it"
+    HOPF = "Hopf", "an equilibrium changes stability and a cycle branches off"
 
 
 class Criticality(Labelled):
@@ -95,11 +96,12 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
     error_bound
         Bound on the error of ``value``: that of the critical multiplier over its rate of change, and the root finder's.
     orbit
-        State on the critical orbit at time 0, shape (n,).
+        State on the critical orbit at time 0, or the equilibrium, shape (n,).
     mode
-        Unit critical eigenvector, shape (n,), complex for Neimark-Sacker.
+        Unit critical eigenvector, shape (n,), complex for Neimark-Sacker and Hopf.
     multiplier
-        Critical multiplier of the return map (of the half period where that symmetry exists).
+        Critical multiplier of the return map (of the half period where that symmetry exists); of a Hopf point the
+        eigenvalue i omega.
     frequency
         Angular frequency (1/s) of the critical mode: 0 for a real multiplier +1 of the period; the principal value
         otherwise.
@@ -108,7 +110,8 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
     coefficient, coefficient_error
         Cubic coefficient a -> a + coefficient a^3 of the map over one period of the orbit, at a period doubling over
         two; a is the amplitude along the unit ``mode`` (Neimark-Sacker: state = 2 Re(a mode)). None where it has no
-        meaning (fold, transcritical, branch point) or where there is no normal form.
+        meaning (fold, transcritical, branch point) or where there is no normal form. At a Hopf point
+        the first Lyapunov coefficient l1 (Kuznetsov, section 3.5), with |a| -> |a| + 2 pi l1 |a|^3 over one period.
     rotation, rotation_error
         Where the mode turns (Neimark-Sacker), the phase per period that an amplitude adds, rad per amplitude^2.
     period
@@ -120,6 +123,8 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
         along which new orbits branch off; else of the critical space some basis.
     symmetry
         What the spatial symmetries make of it, where the orbit has some.
+    rate
+        Of a Hopf point: how fast its eigenvalue moves, in 1/s per unit of the parameter.
     normal_form
         All that is known of the normal form, with a status that says why where it has no numbers; None where it was
         not asked for, and at folds.
@@ -142,6 +147,7 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
     multiplicity: int = 1
     modes: NDArray[np.complex128] | None = None
     symmetry: SymmetricCrossing | None = None
+    rate: complex | None = None
 
     @property
     def sentences(self) -> str:
@@ -160,20 +166,27 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
         return self.kind.label, bounded(self.value, self.error_bound), way
 
     def _lines(self) -> list[str]:
+        hopf = self.kind is Kind.HOPF
+        critical, of = ("eigenvalue", "cycles") if hopf else ("multiplier of the return map", "orbit")
+        name, state = ("first Lyapunov", "equilibrium") if hopf else ("cubic", "orbit at time 0")
         lines = [
             f"BifurcationPoint: {self.kind.label} at {bounded(self.value, self.error_bound)}",
             self.sentences,
-            f"multiplier of the return map: {number(self.multiplier, 6)}; period of the orbit: {self.period:.10g}",
+            f"{critical}: {number(self.multiplier, 6)}; period of the {of}: {self.period:.10g}",
         ]
         if self.symmetry is not None:
             lines.append(f"spatial symmetries: {self.symmetry.kind.label}: {self.symmetry.kind.sentence}")
         if self.frequency:
             lines.append(f"frequency of the mode: {self.frequency:.10g} rad per unit of time")
         if self.coefficient is not None and self.coefficient_error is not None:
-            lines.append(f"cubic coefficient: {self.coefficient:.6g} ± {self.coefficient_error:.1e}")
+            lines.append(f"{name} coefficient: {self.coefficient:.6g} ± {self.coefficient_error:.1e}")
         real = np.abs(self.mode.imag).max() < _REAL
         mode = in_one_line(self.mode.real if real else self.mode)
-        return [*lines, f"orbit at time 0: {in_one_line(self.orbit)}", f"critical mode: {mode}"]
+        return [
+            *lines,
+            f"{state}: {in_one_line(self.orbit)}",
+            f"critical mode: {mode}",
+        ]
 
 
 def with_coefficients(point: BifurcationPoint, form: NormalForm) -> BifurcationPoint:

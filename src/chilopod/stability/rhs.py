@@ -26,7 +26,7 @@ from chilopod.stability.events import Event, check_events, checked_events
 from chilopod.stability.implicit.implicit import ImplicitFlow, can_be_implicit
 from chilopod.stability.jumps import fast_parts, warn_of_jumps
 from chilopod.stability.system import PeriodicSystem
-from chilopod.stability.taylor.evaluation import evaluate, evaluate_jacobian
+from chilopod.stability.taylor.evaluation import evaluate, evaluate_jacobian, evaluate_series
 from chilopod.stability.taylor.taylor import TaylorFlow, TooManySteps
 from chilopod.stability.taylor.trace import Trace, trace
 from chilopod.stability.taylor.traced import Untraceable
@@ -167,6 +167,8 @@ def from_rhs(
             return evaluate(traced.tape, t, x, traced.params)[traced.tape.slopes]
 
         flows = _traced_flows(traced, edges, tolerance, happening, method, lambda: fast_parts(slopes, base, edges))
+        if autonomous:
+            flows["velocity_series"] = lambda curves: evaluate_series(traced.tape, curves, traced.params)
 
     system = PeriodicSystem(
         dimension=dimension,

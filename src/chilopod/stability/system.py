@@ -58,7 +58,7 @@ class PeriodicSystem(ReadOnlyArrays):
     guess_period
         About how long an orbit of such a system takes; orbits have their own, shortest period, also where this is
         nearer to a multiple of it.
-    flow_with_error, flow_states, flow_tangents, flow_frame, is_stiff
+    flow_with_error, flow_states, flow_tangents, flow_frame, is_stiff, velocity_series
         See :mod:`chilopod.stability.capabilities`.
     concurrent
         Whether flows may run in several threads at once, which :func:`chilopod.stability.sweep` then does.
@@ -80,6 +80,7 @@ class PeriodicSystem(ReadOnlyArrays):
     flow_tangents: Callable[[Array, Array, float, float], tuple[Array, Array]] | None = field(default=None, repr=False)
     flow_frame: Callable[[Array, Array, Array, float, float], Stretched] | None = field(default=None, repr=False)
     is_stiff: Callable[[], bool] | None = field(default=None, repr=False)
+    velocity_series: Callable[[Array], Array] | None = field(default=None, repr=False)
     concurrent: bool = field(default=False, repr=False)
     symmetry_order: int = field(init=False, default=1, repr=False)
 

@@ -13,7 +13,8 @@ from chilopod.stability.asked import Asking
 from chilopod.stability.branches.bordered_matrices import symmetric_space, within_space
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint
 from chilopod.stability.branches.curve import Curve
-from chilopod.stability.capabilities import Family, given_scale, is_autonomous, known_orbit
+from chilopod.stability.capabilities import Family, SystemLike, given_scale, is_autonomous, known_orbit
+from chilopod.stability.equilibria import find_equilibrium, hopf_cycle
 from chilopod.stability.orbits import find_orbit, known_state
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import Section, returned_states, whole_period
@@ -24,6 +25,7 @@ Array = NDArray[np.float64]
 IN_FOLD = 1e-6
 """Part of a unit tangent along the parameter below which a curve starts in a fold, as closely as its start is known."""
 
+_RESTS = 0.01  # of each state: a guess that near an equilibrium, from which no orbit is found, is meant to be it
 _BESIDE = 1e-3  # in units: where second differences are taken
 _SINGULAR = 1e-9  # of the largest singular value: below it another curve passes
 _BENT = 0.3  # of a change of state: by so much a map departs from its linear part at the size of a state
@@ -53,6 +55,9 @@ class Start(ReadOnlyArrays):
         The full period of the orbit that is left, where the system does not depend on time.
     bifurcation
         The point that is left, if it is one.
+    outward
+        If not None: a direction of the state, shape (n,), with which the branch goes from an orbit of its own beside
+        the point that it leaves; ``rising`` then only says the same of the parameter.
     """
 
     value: float
@@ -64,6 +69,7 @@ class Start(ReadOnlyArrays):
     periods: int = 1
     period: float | None = None
     bifurcation: BifurcationPoint | None = None
+    outward: Array | None = None
 
 
 def begin(
@@ -99,9 +105,30 @@ def begin(
         system = family(value)
         guess = known_state(system) if orbit is None else orbit
         studied = system if symmetric else whole_period(system, periods)
-        found = find_orbit(studied, guess, with_error=False, shortest=periods == 1)
+        try:
+            found = find_orbit(studied, guess, with_error=False, shortest=periods == 1)
+        except AnalysisError:
+            _check_moving(system, guess)
+            raise
     period = found.period if is_autonomous(system) else None
     return Start(float(value), found.state, rising, periods=periods, period=period)
+
+
+def _check_moving(system: SystemLike, guess: ArrayLike) -> None:
+    """See that a guess of an orbit is no equilibrium, which is one often enough."""
+    if not is_autonomous(system):
+        return
+    x = np.asarray(guess, dtype=np.float64)
+    try:
+        rest = find_equilibrium(system, x).state
+    except AnalysisError:
+        return
+    if (np.abs(x - rest) <= _RESTS * np.maximum(np.abs(x), np.abs(rest))).all():
+        raise AnalysisError(
+            "is an equilibrium, not an orbit",
+            field="orbit",
+            allowed="a state on an orbit; of equilibria locate_hopf, then switch, find the cycles",
+        )
 
 
 def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: int = 1) -> tuple[Start, ...]:
@@ -112,15 +139,16 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
     family
         As it was given to :func:`chilopod.stability.locate` or :func:`chilopod.stability.follow`.
     point
-        The located point, or a special point on a branch.
+        The located point, or a special point on a branch; or a Hopf point from :func:`chilopod.stability.locate_hopf`.
     periods
         How many periods the orbits of the branch take that is left.
 
     Returns
     -------
     Of a pitchfork two: along the critical mode and against it. Of a transcritical point and a branch point two: the two
-    directions of the other branch. Of a period doubling one: the two sides are the same orbits, a period later. Where
-    there are several critical modes, as a symmetry makes them, so many for each of ``point.modes``.
+    directions of the other branch. Of a period doubling one: the two sides are the same orbits, a period later. Of a
+    Hopf point one, at a small cycle beside it, on the side where there are cycles, towards larger ones. Where there are
+    several critical modes, as a symmetry makes them, so many for each of ``point.modes``.
 
     Raises
     ------
@@ -134,6 +162,9 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
         old = None if point.units is None else point.tangent * point.units
         point = point.bifurcation
     kind = point.kind
+    if kind is Kind.HOPF:
+        value, cycle, outward = hopf_cycle(family, point)
+        return (Start(value, cycle.state, value > point.value, period=cycle.period, outward=outward),)
     if kind is Kind.FOLD:
         raise ParameterError(
             "is a fold: the branch itself goes round it", field="point", value=point.value, allowed="follow"
@@ -240,6 +271,8 @@ def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
         )
     if start.mode is None:
         tangent = _along(matrix, start.rising)
+        if start.outward is not None and float(tangent[:-1] @ (start.outward / units[:-1])) < 0.0:
+            tangent = -tangent
     elif start.crossing:
         # Where a symmetry makes several modes critical, it is a crossing of two among the orbits that have the mode's.
         space = symmetric_space(curve.system(start.value), start.orbit, units[:-1], start.mode / units[:-1])

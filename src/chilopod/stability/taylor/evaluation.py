@@ -1,4 +1,5 @@
-"""Values of a tape at many times and states at once, without compiled code: for checks, not for integration."""
+"""Values of a tape at many times and states at once, and its Taylor coefficients along curves: for checks and for
+equilibria, not for integration."""
 
 from __future__ import annotations
 
@@ -8,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from chilopod.errors import AnalysisError
 from chilopod.stability.taylor import tape as ops
 from chilopod.stability.taylor.tape import Tape
 
@@ -80,3 +82,45 @@ def evaluate_jacobian(tape: Tape, t: float, x: Array, params: Array) -> tuple[Ar
             elif code != ops.STATE:
                 tangents[i] = (-values[c] if code == ops.COS else values[c]) * tangents[a]
     return values[tape.slopes], tangents[tape.slopes]
+
+
+def evaluate_series(tape: Tape, curves: Array, params: Array) -> Array:
+    """Taylor coefficients in s of f(x(s)) at time 0, shape (curves, orders, n), along the curves x(s) = c0 + c1 s + ...
+    with these coefficients, of the same shape.
+
+    Raises
+    ------
+    AnalysisError
+        If a curve starts on a switching surface, where f has no series.
+    """
+    from chilopod.stability.taylor import series  # numba takes half a second to import
+
+    # Copies, because compiled code is compiled anew for arrays that are read-only.
+    program, terms, numbers, layout = (np.array(part) for part in (tape.program, tape.terms, tape.numbers, tape.layout))
+    n, first, last = (int(layout[i]) for i in (0, 3, 4))
+    branches = np.zeros(tape.switches.shape[1])
+    values = np.zeros((program.shape[1], curves.shape[1]))
+    result = np.empty_like(curves)
+    with np.errstate(all="ignore"):
+        series.load(program, terms, numbers, layout, np.array(params, dtype=np.float64), values)
+        for curve, out in zip(curves, result, strict=True):
+            if branches.size:
+                branches = _branches(tape, curve[0], params)
+            values[:n] = curve.T
+            for k in range(curves.shape[1]):
+                series.values_at(program, terms, first, last, k, values, branches)
+            out[:] = values[tape.slopes].T
+    return result
+
+
+def _branches(tape: Tape, x: Array, params: Array) -> Array:
+    """The branch of every switch of f at a state."""
+    kinds, nodes = tape.switches[:2]
+    functions = evaluate(tape, 0.0, x, params)[nodes]
+    floors = kinds == ops.FLOOR
+    branches = np.where(floors, np.floor(functions), np.where(functions >= 0.0, 1.0, -1.0))
+    if ((functions == np.where(floors, branches, 0.0)) & (kinds != ops.GUARD)).any():
+        raise AnalysisError(
+            "has no derivatives in a state on a switching surface", field="rhs", allowed="an equilibrium away from it"
+        )
+    return np.asarray(branches)

@@ -1,0 +1,379 @@
+"""Equilibria of systems that do not depend on time: where they are, whether they are stable, and the cycle that leaves
+one at a Hopf point.
+
+Derivatives of the right-hand side f come exactly from the Taylor coefficients of f along curves through a state, where
+a system has them (those of :func:`chilopod.stability.from_rhs` do); of other systems by Chebyshev series of samples
+along the same curves, with errors.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import ArrayLike, NDArray
+
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.arguments import finite_array
+from chilopod.stability.asked import Asking
+from chilopod.stability.capabilities import (
+    Autonomous,
+    Family,
+    SystemLike,
+    expands_velocity,
+    given_scale,
+    is_autonomous,
+)
+from chilopod.stability.matrix_errors import DRAWN, eigenvalues_moved
+from chilopod.stability.normal_forms.extrapolation import radii, series
+from chilopod.stability.orbits import Orbit, find_orbit
+from chilopod.stability.points import BifurcationPoint, Criticality
+from chilopod.stability.returns import section_at
+from chilopod.stability.scales import numerical_balance
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+_EPSILON = float(np.finfo(float).eps)
+ROUNDING = 16.0 * _EPSILON
+"""Of the terms of a right-hand side: a few roundings in each."""
+
+_ROUNDS = 60
+_HALVINGS = 12  # of a step of Newton's method
+_SETTLED = 1e-9  # of the sizes of the states: a step that short may stop falling
+_NOTHING = 1e-13  # of the sizes of the states on the way: a state that small may be zero
+_SINGULAR = 1e-13  # singular value that counts as zero, the largest being one, in units that balance the matrix
+_DRAWS = 4  # of what is off by its error at random
+_ANGLES = 8  # on a circle: harmonics up to the third stay apart
+_SPANS = 10.0 ** -np.arange(0.0, 4.5, 0.5)  # of the sizes of the states: where f is sampled for differences
+_FIRST = 1e-4, 1e-6  # of the frequency, the cubic term of the first cycle: amplitudes of a hundredth and a thousandth
+_MISSED = 0.3  # of its amplitude, by which the first cycle may be elsewhere than foreseen
+
+
+@dataclass(frozen=True)
+class Equilibrium(ReadOnlyArrays):
+    """A state in which a system that does not depend on time rests.
+
+    Attributes
+    ----------
+    state
+        The state, shape (n,).
+    error
+        How far it may be off, shape (n,); infinite where the derivative is singular.
+    jacobian
+        Derivative of the right-hand side there, shape (n, n).
+    eigenvalues
+        Of the derivative, by falling real part, shape (n,), in 1/s.
+    error_bounds
+        On the error of each eigenvalue, shape (n,).
+    """
+
+    state: Array
+    error: Array
+    jacobian: Array
+    eigenvalues: ComplexArray
+    error_bounds: Array
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether all eigenvalues lie left of the imaginary axis: True or False by more than their errors, None where
+        these leave it undecided."""
+        if (self.eigenvalues.real < -self.error_bounds).all():
+            return True
+        return False if (self.eigenvalues.real > self.error_bounds).any() else None
+
+
+@dataclass(frozen=True)
+class HopfForm:
+    """The motion on the centre manifold of a Hopf point, z' = lambda z + cubic z |z|^2, and that manifold, the state
+    x + 2 Re(z mode + z^2 second) + mean |z|^2 (Kuznetsov, *Elements of Applied Bifurcation Theory*, section 8.7).
+
+    Attributes
+    ----------
+    eigenvalue
+        lambda, with a positive imaginary part.
+    mode, left
+        Unit eigenvector and the left one, shape (n,), left^H mode = 1.
+    second, mean
+        Shape (n,).
+    cubic, error
+        Coefficient, and a bound on the error of its real part.
+    """
+
+    eigenvalue: complex
+    mode: ComplexArray
+    left: ComplexArray
+    second: ComplexArray
+    mean: Array
+    cubic: complex
+    error: float
+
+
+def find_equilibrium(system: SystemLike, guess: ArrayLike) -> Equilibrium:
+    """An equilibrium, by damped Newton's method from a guess.
+
+    A step is shortened until the next one, by the same derivative, would be shorter (Deuflhard, *Newton Methods for
+    Nonlinear Problems*, section 3.3): no units enter.
+
+    Parameters
+    ----------
+    system
+        A system that does not depend on time.
+    guess
+        A state near the equilibrium, shape (n,).
+
+    Raises
+    ------
+    ParameterError
+        If the system depends on time, or the guess is no state of it.
+    AnalysisError
+        If there is no equilibrium near the guess.
+    """
+    checked = autonomous(system)
+    x = finite_array(guess, (checked.dimension,), "guess")
+    x, velocity, matrix = _newton(checked, x)
+    rounding = np.abs(velocity) + ROUNDING * (np.abs(matrix) @ np.abs(x))
+    units = numerical_balance(matrix)
+    scaled = matrix * units / units[:, None]
+    singular = np.linalg.cond(scaled) > 1.0 / _SINGULAR
+    error = np.full(x.size, np.inf) if singular else units * (np.abs(np.linalg.inv(scaled)) @ (rounding / units))
+    values = np.linalg.eigvals(matrix).astype(np.complex128)
+    values = values[np.lexsort((-values.imag, -values.real))]
+    off = np.inf if singular else matrix_error(checked, x, matrix, error)
+    return Equilibrium(x, error, matrix, values, eigenvalues_moved(values, matrix, np.zeros_like(matrix) + off))
+
+
+def autonomous(system: SystemLike) -> Autonomous:
+    """A system that is seen not to depend on time."""
+    if not is_autonomous(system):
+        raise ParameterError(
+            "depends on time: it has no equilibria", field="system", allowed="period=None, and no t in the function"
+        )
+    return system
+
+
+def _newton(system: Autonomous, x: Array) -> tuple[Array, Array, Array]:
+    """An equilibrium with velocity and derivative there."""
+    largest = np.abs(x)
+    for _ in range(_ROUNDS):
+        small = np.where(np.abs(x) <= _NOTHING * largest, 0.0, x)
+        for each in (small, x) if (small != x).any() else (x,):
+            velocity, matrix, _ = linear_part(system, each)
+            # Solves equations whose terms are off by their rounding (Oettli & Prager, Numer. Math. 6, 1964).
+            if (np.abs(velocity) <= ROUNDING * (np.abs(matrix) @ np.abs(each))).all():
+                return each, velocity, matrix
+        units = numerical_balance(matrix)
+        step = -_solved(matrix, velocity, units)
+        coupled = units * float((largest / units).max()) if largest.any() else units
+        size = np.where(largest > 0.0, largest, coupled)
+        share = _damped(system, x, step, matrix, units, size)
+        if share is None:
+            if (np.abs(step) <= _SETTLED * size).all():
+                return x, velocity, matrix
+            break
+        x = x + share * step
+        largest = np.maximum(largest, np.abs(x))
+    raise AnalysisError("no equilibrium found near the guess", field="guess", allowed="a guess closer to it")
+
+
+def _damped(system: Autonomous, x: Array, step: Array, matrix: Array, units: Array, size: Array) -> float | None:
+    """The largest power of one half of a step that brings the equilibrium nearer; None if there is none."""
+    length = float(np.linalg.norm(step / size))
+    share = 1.0
+    for _ in range(_HALVINGS):
+        velocity = _velocity(system, x + share * step)
+        if np.isfinite(velocity).all():
+            following = float(np.linalg.norm(_solved(matrix, velocity, units) / size))
+            if following <= (1.0 - 0.25 * share) * length:
+                return share
+        share *= 0.5
+    return None
+
+
+def _solved(matrix: Array, right: Array, units: Array) -> Array:
+    scaled, right = matrix * units / units[:, None], right / units
+    if not np.linalg.cond(scaled) > 1.0 / _SINGULAR:
+        return np.asarray(units * np.linalg.solve(scaled, right))
+    return np.asarray(units * np.linalg.lstsq(scaled, right, rcond=_SINGULAR)[0])
+
+
+def _velocity(system: Autonomous, x: Array) -> Array:
+    with np.errstate(all="ignore"):
+        return np.asarray(system.velocity(np.array(x)), dtype=np.float64)
+
+
+def linear_part(system: Autonomous, x: Array) -> tuple[Array, Array, Array]:
+    """dx/dt in a state, shape (n,), its derivative, shape (n, n), and bounds on what differences make that err by.
+
+    Raises
+    ------
+    AnalysisError
+        If they are not finite.
+    """
+    size = np.where(x == 0.0, float(np.abs(x).max()) or 1.0, np.abs(x))
+    size = size if given_scale(system) is None else np.asarray(given_scale(system))
+    curves = np.stack([np.broadcast_to(x, (x.size, x.size)), np.diag(size)], axis=1)
+    found, wrong = _expanded(system, curves)
+    velocity, matrix = found[0, 0], found[:, 1].T / size
+    if not (np.isfinite(velocity).all() and np.isfinite(matrix).all()):
+        raise AnalysisError("the right-hand side is not finite", field="rhs", allowed="another guess")
+    return velocity, matrix, wrong[:, 1].T / size
+
+
+def matrix_error(system: Autonomous, x: Array, matrix: Array, error: Array) -> Array:
+    """How far the derivative may be off, shape (n, n), in a state that is off by its error and by rounding. Where terms
+    of f cancel, an entry may be nothing but the rounding of entries as large as the others, in units that balance."""
+    others = [linear_part(system, other)[1:] for other in _disturbed(x, error)]
+    moved = np.max([np.abs(other - matrix) + wrong for other, wrong in others], axis=0)
+    units = numerical_balance(matrix)
+    ratios = units / units[:, None]
+    return np.asarray(moved + 4.0 * _EPSILON * float(np.abs(matrix * ratios).max()) / ratios)
+
+
+def _disturbed(x: Array, error: Array) -> list[Array]:
+    random = np.random.default_rng(0)
+    reach = error + 4.0 * _EPSILON * np.abs(x)
+    return [x + random.choice([-1.0, 1.0], x.size) * reach for _ in range(_DRAWS)]
+
+
+def _expanded(system: Autonomous, curves: Array) -> tuple[Array, Array]:
+    """Taylor coefficients in s of f(x(s)) along curves x(s) = c0 + c1 s + ..., shape (curves, orders, n), and bounds on
+    their errors; s = 1 is where a state has moved by about its size."""
+    if expands_velocity(system):
+        found = system.velocity_series(curves)
+        return found, np.zeros_like(found)
+    orders = curves.shape[1]
+    best, error = np.full(curves.shape, np.nan), np.full(curves.shape, np.inf)
+    for curve, value, bound in zip(curves, best, error, strict=True):
+        value[0], bound[0] = _velocity(system, curve[0]), 0.0
+        for span in _SPANS:
+            powers = (span * np.concatenate([radii(), -radii()]))[:, None] ** np.arange(orders)
+            samples = np.array([_velocity(system, x) for x in powers @ curve])
+            ahead, back = np.split(samples, 2)
+            for order in range(1, orders) if np.isfinite(samples).all() else ():
+                part = 0.5 * (ahead + (-1.0) ** order * back)
+                noise = _EPSILON * np.abs(samples).max(axis=0)
+                term, wrong = series(part.astype(np.complex128), order % 2).taylor(order, noise)
+                wrong = wrong / span**order
+                value[order] = np.where(wrong < bound[order], term.real / span**order, value[order])
+                bound[order] = np.minimum(wrong, bound[order])
+    return best, error
+
+
+def hopf_form(system: Autonomous, x: Array, error: Array, frequency: float) -> HopfForm:
+    """The normal form at a Hopf point, with its error by what the state's and the derivative's make of it.
+
+    Parameters
+    ----------
+    system
+        At the point.
+    x, error
+        The equilibrium and how far it may be off, shape (n,).
+    frequency
+        Near that of the critical pair.
+    """
+    matrix = linear_part(system, x)[1]
+    off = matrix_error(system, x, matrix, error)
+    random = np.random.default_rng(1)
+    form = _hopf_form(system, x, matrix, frequency)
+    scatter = [
+        _hopf_form(system, other, matrix + off * random.choice([-1.0, 1.0], off.shape), frequency).cubic
+        for other in _disturbed(x, error)
+    ]
+    moved = float(np.abs(np.array(scatter).real - form.cubic.real).max())
+    return replace(form, error=form.error + DRAWN * moved)
+
+
+def _hopf_form(system: Autonomous, x: Array, matrix: Array, frequency: float) -> HopfForm:
+    """The normal form with a given derivative; of errors, those of rounding and of differences."""
+    units = numerical_balance(matrix)
+    values, lefts, rights = scipy.linalg.eig(matrix * units / units[:, None], left=True)
+    index = int(np.abs(values - 1j * frequency).argmin())
+    mode, left = rights[:, index] * units, lefts[:, index] / units
+    mode = mode * np.abs(mode).max() / mode[np.abs(mode).argmax()]
+    mode = mode / np.linalg.norm(mode)
+    left = left / np.conj(left.conj() @ mode)
+    turns = np.exp(2j * np.pi * np.arange(_ANGLES) / _ANGLES)[:, None]
+    # Along the mode at the size of the states, for where differences have to be taken.
+    size = np.where(x == 0.0, units * float((np.abs(x) / units).max() or 1.0), np.abs(x))
+    reach = 0.1 * float((size / np.maximum(np.abs(mode), _EPSILON * np.abs(mode).max())).min())
+    along = 2.0 * (reach * mode * turns).real
+    still, none = np.broadcast_to(x, along.shape), np.zeros_like(along)
+    quadratic, wrong = _expanded(system, np.stack([still, along, none], axis=1))
+    ratios, one = units / units[:, None], np.eye(x.size)
+
+    def bent(terms: Array) -> tuple[ComplexArray, Array, complex, Array]:
+        """The manifold for the terms of second order on the circle, the cubic term on it, and errors of that."""
+        harmonics: ComplexArray = np.fft.fft(terms, axis=0) / _ANGLES / units
+        second: ComplexArray = units * np.linalg.solve((2j * frequency * one - matrix) * ratios, harmonics[2])
+        mean: Array = units * np.linalg.solve(-matrix * ratios, harmonics[0].real)
+        curves = np.stack([still, along, mean + 2.0 * (second * turns**2).real, none], axis=1)
+        found, off = _expanded(system, curves)
+        third = np.fft.fft(found[:, 3], axis=0)[1] / _ANGLES
+        off = off[:, 3].max(axis=0) + ROUNDING * np.abs(found[:, 3]).max(axis=0)
+        return second, mean, complex(left.conj() @ third), off
+
+    second, mean, cubic, off = bent(quadratic[:, 2])
+    error = float(np.abs(left) @ off)
+    if wrong.any():
+        drawn = np.random.default_rng(0).choice([-1.0, 1.0], along.shape)
+        error += DRAWN * abs(bent(quadratic[:, 2] + wrong[:, 2] * drawn)[2] - cubic)
+    return HopfForm(
+        complex(values[index]), mode, left, second / reach**2, mean / reach**2, cubic / reach**3, error / reach**3
+    )
+
+
+def hopf_cycle(family: Family, point: BifurcationPoint) -> tuple[float, Orbit, Array]:
+    """A small cycle beside a Hopf point, with the parameter that it is at, and the direction of its state in which
+    cycles grow, shape (n,).
+
+    Raises
+    ------
+    ParameterError
+        If it is not known on which side the cycles are.
+    AnalysisError
+        If there is no cycle where it is foreseen.
+    """
+    rate = point.rate
+    if rate is None or point.criticality in (None, Criticality.UNDECIDED):
+        raise ParameterError(
+            "is a Hopf point of which the coefficients do not tell on which side its cycles are",
+            field="point",
+            value=point.value,
+        )
+    with Asking("family", point.value):
+        here = autonomous(family(point.value))
+    form = hopf_form(here, point.orbit, np.zeros(point.orbit.size), point.frequency)
+    units = numerical_balance(linear_part(here, point.orbit)[1])
+    for share in _FIRST:
+        try:
+            return _cycle(family, point, form, units, share)
+        except AnalysisError as error:
+            reason = error.problem
+    raise AnalysisError(f"no cycle was found beside the Hopf point: {reason}", field="point", value=point.value)
+
+
+def _cycle(
+    family: Family, point: BifurcationPoint, form: HopfForm, units: Array, share: float
+) -> tuple[float, Orbit, Array]:
+    """The cycle whose cubic term is such a share of the frequency, or a smaller one where the manifold is bent."""
+    assert point.rate is not None
+    mode, *bends = (float(np.linalg.norm(each / units)) for each in (form.mode, form.second, form.mean))
+    square = point.frequency / abs(form.cubic)
+    square = share * (min(square, (mode / max(bends)) ** 2) if max(bends) > 0.0 else square)
+    shift = -form.cubic.real / point.rate.real * square
+    value = point.value + shift
+    duration = 2.0 * np.pi / (point.frequency + form.cubic.imag * square + point.rate.imag * shift)
+    with Asking("family", value):
+        system = autonomous(family(value))
+        rest = find_equilibrium(system, point.orbit).state
+        moved = 2.0 * (np.sqrt(square) * form.mode + square * form.second).real + square * form.mean
+        size = np.maximum(np.abs(rest + moved), np.sqrt(square) * mode * units)
+        section = section_at(system, rest + moved, size, duration)
+        found = find_orbit(system, rest + moved, with_error=False, section=section, settle=False)
+    missed = float(np.linalg.norm((found.state - rest - moved) / units))
+    if not missed <= _MISSED * float(np.linalg.norm(moved / units)):
+        raise AnalysisError("the orbit that is found is another one", field="orbit")
+    return value, found, found.state - rest

@@ -1,0 +1,347 @@
+"""Hopf points: where an equilibrium changes stability by a pair of eigenvalues, and a cycle leaves it.
+
+Equilibria are fixed points of the map x -> x + h phi(h A) f(x), phi(z) = (e^z - 1)/z, with A the derivative of f at x:
+a step of the exponential Euler method (Hochbruck & Ostermann, Acta Numerica 19, 2010). Its derivative there is e^(h A),
+so an eigenvalue on the imaginary axis is a multiplier on the unit circle, and what follows orbits and finds the
+crossings of their multipliers does that for equilibria. Values, errors and coefficients are then computed from f.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import ArrayLike, NDArray
+
+from chilopod.errors import AnalysisError
+from chilopod.stability.asked import Asking
+from chilopod.stability.capabilities import Autonomous, Family, SystemLike, expands_velocity, given_scale
+from chilopod.stability.course import Course, place_error
+from chilopod.stability.equilibria import (
+    ROUNDING,
+    Equilibrium,
+    autonomous,
+    find_equilibrium,
+    hopf_form,
+    linear_part,
+)
+from chilopod.stability.extent import Extent, extent
+from chilopod.stability.locate import BUDGET, GRAVITY, Located, checked_interval
+from chilopod.stability.points import BifurcationPoint, Criticality, Kind
+from chilopod.stability.samples import Samples
+from chilopod.stability.scales import numerical_balance
+from chilopod.stability.system import PeriodicSystem
+from chilopod.stability.unit_circle.crossings import Crossing, SearchStatus, find_crossings
+from chilopod.stability.unit_circle.spectra import Event
+
+Array = NDArray[np.float64]
+
+_EPSILON = float(np.finfo(float).eps)
+_POINTS = 2000  # return maps for what is looked at beside a point: of the map they cost next to nothing
+_BESIDE = 1e-5  # of the interval: where the rate of an eigenvalue is taken, by central differences
+_KNOWN = 1e-3  # of the interval: how sure a value has to be for a coefficient
+_KEPT = 64  # systems
+_WORDS = (
+    ("a multiplier is +1", "an eigenvalue is 0"),
+    ("multipliers come in pairs with product 1", "eigenvalues come in pairs with sum 0"),
+    ("clear of the circle", "clear of the imaginary axis"),
+    ("are on the circle", "are on the imaginary axis"),
+    ("outside", "to the right of it"),
+    ("multiplier", "eigenvalue"),
+    ("an orbit", "an equilibrium"),
+    ("orbits", "equilibria"),
+    ("orbit", "equilibrium"),
+)
+"""What is said of orbits and multipliers, in words of equilibria and eigenvalues."""
+
+
+def locate_hopf(
+    family: Family,
+    between: tuple[float, float],
+    equilibrium: ArrayLike,
+    budget: int = BUDGET,
+    seconds: float = math.inf,
+) -> Located:
+    """Find every Hopf point of an equilibrium in an interval of a parameter.
+
+    Parameters
+    ----------
+    family
+        ``family(value)`` is the system at a value of the parameter, which must not depend on time.
+    between
+        The interval, ``low < high``.
+    equilibrium
+        A guess of the equilibrium for ``low``, shape (n,); it is then followed through the interval. A fold ends the
+        search, with a remark.
+    budget, seconds
+        As for :func:`chilopod.stability.locate`, of equilibria.
+
+    Returns
+    -------
+    Hopf points by rising parameter, ``orbit`` the equilibrium, ``multiplier`` the eigenvalue i ``frequency``,
+    ``coefficient`` the first Lyapunov coefficient along the unit ``mode``; other bifurcations of the equilibrium are
+    remarks. :func:`chilopod.stability.switch` starts the cycles.
+
+    Raises
+    ------
+    ParameterError
+        If the interval or the guess is none, or the systems depend on time.
+    AnalysisError
+        If there is no equilibrium at the lower end of the interval, or ``family`` raises an exception there.
+    """
+    low, high = checked_interval(between)
+    family = functools.lru_cache(_KEPT)(family)
+    with Asking("family", low):
+        system = autonomous(family(low))
+        start = find_equilibrium(system, equilibrium)
+    duration, scale = _duration(start, system.guess_period), _scale(system, start)
+    samples = Samples(lambda v: _resting(family(v), duration, scale), start.state, low, high, budget, seconds)
+    here = extent(samples)
+    remarks = [here.ending] if here.ending else []
+    status = SearchStatus.BUDGET if samples.spent else SearchStatus.INCOMPLETE if here.ending else SearchStatus.COMPLETE
+    points: list[BifurcationPoint] = []
+    if here.start < here.end:
+        points, ended, more = _searched(family, samples, here, duration, budget)
+        status, remarks = max(status, ended, key=GRAVITY.index), remarks + more
+    remarks += [
+        f"the equilibrium ends in a fold at {fold.value:.12g} (± {fold.error_bound:.1e}): it meets another one there"
+        for fold in here.folds
+    ]
+    if samples.remarks:
+        status = max(status, SearchStatus.INCOMPLETE, key=GRAVITY.index)
+    said = [_of_equilibria(remark) for remark in [*remarks, *samples.remarks]]
+    return Located(tuple(points), status, tuple(dict.fromkeys(said)), samples.count)
+
+
+def _searched(
+    family: Family, samples: Samples, here: Extent, duration: float, budget: int
+) -> tuple[list[BifurcationPoint], SearchStatus, list[str]]:
+    """The Hopf points of an equilibrium, how the search for them ended, and what else is to be said."""
+
+    def matrices(values: Array) -> tuple[Array, Array]:
+        found = samples.at(values)
+        errors = [_error(autonomous(family(each.value)), each.orbit, samples.size, duration) for each in found]
+        return np.stack([each.image.jacobian for each in found]), np.array(errors)
+
+    found = find_crossings(matrices, here.start, here.end, budget=budget, affordable=samples.affordable)
+    points, status, remarks = [], found.status, list(found.remarks)
+    for crossing in found.crossings:
+        if crossing.event is Event.PLUS:
+            if not here.explains(crossing.value):
+                remarks.append(f"an eigenvalue is zero at {crossing.value:.9g}: another equilibrium meets this one")
+        elif crossing.collision:
+            remarks.append(f"two pairs meet on the imaginary axis and leave it at {crossing.value:.9g}")
+        else:
+            samples.allow(_POINTS)
+            try:
+                point = _of_map(samples, crossing, matrices, duration)
+            except AnalysisError as error:
+                status = max(status, SearchStatus.INCOMPLETE, key=GRAVITY.index)
+                remarks.append(f"what crosses at {crossing.value:.9g} could not be described: {error}")
+            else:
+                points.append(_described(family, (samples.low, samples.high), point, duration, remarks))
+    return points, status, remarks
+
+
+def _of_map(
+    samples: Samples, crossing: Crossing, matrices: Callable[[Array], tuple[Array, Array]], duration: float
+) -> BifurcationPoint:
+    """A Hopf point as far as the map tells."""
+    (sample,) = samples.at(np.array([crossing.value]))
+    relative = float(matrices(np.array([crossing.value]))[1][0])
+    units = numerical_balance(sample.image.jacobian)
+    ratios = units / units[:, None]
+    largest = float(np.abs(sample.image.jacobian * ratios).max())
+    image = replace(sample.image, error=relative * largest / ratios)
+    values, vectors = np.linalg.eig(image.jacobian)
+    course = Course(samples.at, samples.low, samples.end, samples.width, _BESIDE * samples.width)
+    frequency = abs(float(np.angle(crossing.multiplier))) / duration
+    return BifurcationPoint(
+        Kind.HOPF,
+        crossing.value,
+        place_error(course, crossing, image) + 4.0 * _EPSILON * abs(crossing.value),
+        sample.orbit,
+        vectors[:, np.abs(values - crossing.multiplier).argmin()].astype(np.complex128),
+        crossing.multiplier,
+        frequency,
+        period=2.0 * np.pi / frequency,
+        multiplicity=crossing.multiplicity,
+    )
+
+
+def _described(
+    family: Family, between: tuple[float, float], point: BifurcationPoint, duration: float, remarks: list[str]
+) -> BifurcationPoint:
+    """A Hopf point with all that f itself tells, or a remark on why there is no more than the map tells."""
+    reason = f"{point.multiplicity // 2} pairs are critical at once"
+    if point.multiplicity <= 2:
+        try:
+            return _hopf_point(family, between, point, duration)
+        except AnalysisError as error:
+            reason = error.problem
+    remarks.append(f"no coefficient at {point.value:.9g}: {reason}")
+    return replace(point, multiplier=1j * point.frequency)
+
+
+def _error(system: Autonomous, x: Array, size: Array, duration: float) -> float:
+    """Relative error of the derivative of the map, the states being in units that balance it: of the exponential (of
+    the norm of the exponent, as Higham, *Functions of Matrices*, chapter 10), and of a state that is off by rounding,
+    magnified where the derivative of f is nearly singular."""
+    velocity, matrix, wrong = linear_part(system, x)
+    units = numerical_balance(matrix)
+    ratios = units / units[:, None]
+    rounding = (np.abs(velocity) + ROUNDING * (np.abs(matrix) @ np.abs(x))) / units
+    _, values, rows = np.linalg.svd(matrix * ratios)
+    most = float((size / units).max())
+    reach, steepest = float(np.linalg.norm(rounding)), max(float(values[0]), 1e-300)
+    # Where it is singular, terms of second or third order keep the state where it is.
+    off = min(reach / max(float(values[-1]), 1e-300), most * float(np.cbrt(reach / (steepest * most))))
+    beside = linear_part(system, x + off * units * rows[-1])[1]
+    moved = float(np.linalg.norm((np.abs(beside - matrix) + wrong) * ratios))
+    return 4.0 * _EPSILON * (1.0 + duration * float(np.linalg.norm(matrix * ratios))) + duration * moved
+
+
+def _duration(start: Equilibrium, guess_period: float) -> float:
+    """The step h of the map: a radian of the fastest oscillation or growth, so that no multiplier is lost, or about the
+    time of the decays."""
+    values = start.eigenvalues
+    fastest = float(np.maximum(np.abs(values.imag), values.real).max())
+    if fastest > 0.0:
+        return 1.0 / fastest
+    sizes = np.abs(values[values != 0.0])
+    return float(np.exp(-np.log(sizes).mean())) if sizes.size else guess_period / (2.0 * np.pi)
+
+
+def _scale(system: Autonomous, start: Equilibrium) -> Array | None:
+    """Sizes of the states, shape (n,), where an equilibrium at zero does not tell them: those at which terms of second
+    or third order of the right-hand side are as large as the linear ones along some directions."""
+    given = given_scale(system)
+    if given is not None or start.state.any() or not expands_velocity(system):
+        return given
+    n = start.state.size
+    units = numerical_balance(start.jacobian)
+    curves = np.zeros((n, 4, n))
+    curves[:, 1] = units * np.cos(np.outer(np.arange(1.0, n + 1.0), np.arange(n)))
+    with np.errstate(all="ignore"):
+        linear, *others = np.linalg.norm(system.velocity_series(curves) / units, axis=2).T[1:]
+        reaches = np.array([(linear / other) ** (1.0 / order) for order, other in enumerate(others, 1)])
+    reaches = reaches[np.isfinite(reaches) & (reaches > 0.0)]
+    return units * float(reaches.min()) if reaches.size else None
+
+
+def _resting(system: SystemLike, duration: float, scale: Array | None) -> PeriodicSystem:
+    """The map of which the equilibria of a system are the fixed points."""
+    checked = autonomous(system)
+    n = checked.dimension
+
+    def flow_with_error(x: Array, t0: float, t1: float) -> tuple[Array, Array, Array]:
+        velocity, matrix, _ = linear_part(checked, x)
+        units = numerical_balance(matrix)
+        scaled = (t1 - t0) * matrix * units / units[:, None]
+        both = np.zeros((n + 1, n + 1))
+        both[:n, :n], both[:n, n] = scaled, (t1 - t0) * velocity / units
+        with np.errstate(all="ignore"):
+            power = scipy.linalg.expm(both)
+        # A relative error of the exponent is one of its norm times as much (Higham, Functions of Matrices, ch. 10).
+        error = 16.0 * _EPSILON * (1.0 + float(np.abs(scaled).sum(axis=1).max())) * float(np.abs(power[:n, :n]).max())
+        ratios = units[:, None] / units
+        return x + units * power[:n, n], power[:n, :n] * ratios, error * ratios
+
+    return PeriodicSystem(
+        n,
+        duration,
+        lambda x, t0, t1: flow_with_error(x, t0, t1)[:2],
+        scale=scale,
+        flow_with_error=flow_with_error,
+    )
+
+
+def _hopf_point(
+    family: Family, between: tuple[float, float], point: BifurcationPoint, duration: float
+) -> BifurcationPoint:
+    """A Hopf point from that of the map: its value by f itself, its error, its rate and coefficient."""
+    low, high = between
+    value, state = point.value, point.orbit
+    rate, frequency = _rate(family, between, point, duration)
+    for correcting in (True, True, False):  # the search has found it almost to the last digit
+        with Asking("family", value):
+            system = autonomous(family(value))
+            here = find_equilibrium(system, state)
+        index = int(np.abs(here.eigenvalues - 1j * frequency).argmin())
+        state, frequency = here.state, float(here.eigenvalues[index].imag)
+        off = float(here.eigenvalues[index].real)
+        if correcting:
+            value = min(max(value - off / rate.real, low), high)
+    bound = (abs(off) + float(here.error_bounds[index])) / abs(rate.real) + 4.0 * _EPSILON * abs(value)
+    if not bound <= _KNOWN * (high - low):
+        raise AnalysisError("its eigenvalues are not known well enough", field="family", value=value)
+    form = hopf_form(system, here.state, here.error, frequency)
+    wrong = form.error + bound * _change(family, between, value, form.eigenvalue, here.state)
+    coefficient, error = form.cubic.real / frequency, wrong / frequency
+    decided = Criticality.SUPERCRITICAL if coefficient < 0.0 else Criticality.SUBCRITICAL
+    return BifurcationPoint(
+        Kind.HOPF,
+        value,
+        bound,
+        here.state,
+        form.mode,
+        1j * frequency,
+        frequency,
+        criticality=decided if abs(coefficient) > error else Criticality.UNDECIDED,
+        coefficient=coefficient,
+        coefficient_error=error,
+        period=2.0 * np.pi / frequency,
+        multiplicity=2,
+        rate=rate,
+    )
+
+
+def _rate(
+    family: Family, between: tuple[float, float], point: BifurcationPoint, duration: float
+) -> tuple[complex, float]:
+    """How fast the critical eigenvalue moves, left^H dA mode, which holds however near others are, and its imaginary
+    part."""
+    low, high = between
+    beside = _BESIDE * (high - low)
+    values = np.clip([point.value - beside, point.value + beside], low, high)
+    found = []
+    for each in values.tolist():
+        with Asking("family", each):
+            found.append(find_equilibrium(family(each), point.orbit))
+    matrices = [each.jacobian for each in found]
+    matrix = 0.5 * (matrices[0] + matrices[1])
+    units = numerical_balance(matrix)
+    ratios = units / units[:, None]
+    eigenvalues, lefts, rights = scipy.linalg.eig(matrix * ratios, left=True)
+    upper = np.where(eigenvalues.imag > 0.0, np.abs(np.exp(duration * eigenvalues) - point.multiplier), np.inf)
+    index = int(upper.argmin())
+    frequency = float(eigenvalues[index].imag)
+    sides = [float(each.eigenvalues[np.abs(each.eigenvalues - 1j * frequency).argmin()].real) for each in found]
+    if low < values[0] and values[1] < high and sides[0] * sides[1] > 0.0:
+        raise AnalysisError("the pair only touches the imaginary axis", field="family", value=point.value)
+    left, right = lefts[:, index].conj(), rights[:, index]
+    change = left @ ((matrices[1] - matrices[0]) * ratios) @ right / (left @ right)
+    return complex(change / (values[1] - values[0])), frequency
+
+
+def _change(family: Family, between: tuple[float, float], value: float, eigenvalue: complex, state: Array) -> float:
+    """How fast the real part of the cubic coefficient changes with the parameter."""
+    values = np.clip(value + _BESIDE * (between[1] - between[0]) * np.array([-1.0, 1.0]), *between)
+    found = []
+    for each in values.tolist():
+        with Asking("family", each):
+            system = autonomous(family(each))
+            here = find_equilibrium(system, state)
+            found.append(hopf_form(system, here.state, here.error, eigenvalue.imag).cubic.real)
+    return abs(found[1] - found[0]) / float(values[1] - values[0])
+
+
+def _of_equilibria(remark: str) -> str:
+    """A remark of a search for orbits, of equilibria."""
+    for word, other in _WORDS:
+        remark = remark.replace(word, other)
+    return remark

@@ -1,0 +1,456 @@
+"""Equilibria, their Hopf points and the cycles that leave these, against closed forms and plain second computations."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.stability import (
+    Criticality,
+    Kind,
+    PeriodicSystem,
+    begin,
+    find_equilibrium,
+    follow,
+    from_rhs,
+    locate,
+    locate_hopf,
+    switch,
+)
+
+LORENZ_HOPF = 470.0 / 19.0
+SUPER, SUB, UNDECIDED = Criticality.SUPERCRITICAL, Criticality.SUBCRITICAL, Criticality.UNDECIDED
+
+
+def lorenz_rhs(t, x, r):
+    return [10.0 * (x[1] - x[0]), r * x[0] - x[1] - x[0] * x[2], x[0] * x[1] - 8.0 / 3.0 * x[2]]
+
+
+def lorenz(r):
+    return from_rhs(lorenz_rhs, 3, None, args=(r,), guess_period=0.65)
+
+
+def lorenz_state(r):
+    side = np.sqrt(8.0 / 3.0 * (r - 1.0))
+    return np.array([side, side, r - 1.0])
+
+
+def brusselator(b, states=(1.0, 1.0), time=1.0):
+    u, v = states
+
+    def rhs(t, x):
+        p, q = x[0] / u, x[1] / v
+        return [u / time * (1.0 + p * p * q - (b + 1.0) * p), v / time * (b * p - p * p * q)]
+
+    return from_rhs(rhs, 2, None, guess_period=6.0 * time)
+
+
+def oscillator(mu, cubic=-1.0, linear=0.0):
+    """x'' = -x + (mu + cubic x^2) x': l1 = cubic / 4 at mu = 0 (Guckenheimer & Holmes, 3.4.11)."""
+    return from_rhs(
+        lambda t, x: [x[1], -x[0] + (mu + linear * mu * x[0] + cubic * x[0] ** 2) * x[1]], 2, None, guess_period=6.0
+    )
+
+
+def tensor_l1(a, b, c):
+    """l1 of x' = a x + b(x, x) / 2 + c(x, x, x) / 6 at a Hopf point, by Kuznetsov's formula 5.39 on full tensors."""
+    values, vectors = np.linalg.eig(a)
+    index = int(np.argmin(np.abs(values.real) + 1e9 * (values.imag <= 0.0)))
+    omega, q = values[index].imag, vectors[:, index]
+    values, vectors = np.linalg.eig(a.T)
+    p = vectors[:, int(np.argmin(np.abs(values + 1j * omega)))]
+    p = p / np.conj(np.vdot(p, q))
+
+    def two(u, v):
+        return np.einsum("ijk,j,k", b, u, v)
+
+    three = np.einsum("ijkl,j,k,l", c, q, q, q.conj())
+    mean = np.linalg.solve(a, two(q, q.conj()))
+    second = np.linalg.solve(2j * omega * np.eye(len(a)) - a, two(q, q))
+    return float((np.vdot(p, three) - 2.0 * np.vdot(p, two(q, mean)) + np.vdot(p, two(q.conj(), second))).real) / (
+        2.0 * omega
+    )
+
+
+def lorenz_tensors(r):
+    x, y, z = lorenz_state(r)
+    b = np.zeros((3, 3, 3))
+    b[1, 0, 2] = b[1, 2, 0] = -1.0
+    b[2, 0, 1] = b[2, 1, 0] = 1.0
+    return np.array([[-10.0, 10.0, 0.0], [r - z, -1.0, -x], [y, x, -8.0 / 3.0]]), b, np.zeros((3, 3, 3, 3))
+
+
+def brusselator_tensors():
+    b, c = np.zeros((2, 2, 2)), np.zeros((2, 2, 2, 2))
+    b[0, 0, 0], b[0, 0, 1], b[0, 1, 0] = 4.0, 2.0, 2.0  # of x^2 y at (1, 2)
+    c[0, 0, 0, 1] = c[0, 0, 1, 0] = c[0, 1, 0, 0] = 2.0
+    b[1], c[1] = -b[0], -c[0]
+    return np.array([[1.0, 1.0], [-2.0, -1.0]]), b, c
+
+
+def roessler(a):
+    return from_rhs(lambda t, x: [-x[1] - x[2], x[0] + a * x[1], 0.2 + x[2] * (x[0] - 5.7)], 3, None, guess_period=6.0)
+
+
+def langford(b):
+    def rhs(t, x):
+        r = x[0] ** 2 + x[1] ** 2
+        return [
+            (x[2] - b) * x[0] - 3.5 * x[1],
+            3.5 * x[0] + (x[2] - b) * x[1],
+            0.6 + 0.95 * x[2] - x[2] ** 3 / 3.0 - r * (1.0 + 0.25 * x[2]) + 0.1 * x[2] * x[0] ** 3,
+        ]
+
+    return from_rhs(rhs, 3, None, guess_period=1.8)
+
+
+class TestEquilibrium:
+    @pytest.mark.parametrize("r", [2.0, 20.0, 28.0])
+    def test_lorenz_is_at_the_closed_form_with_the_eigenvalues_of_the_plain_matrix(self, r):
+        found = find_equilibrium(lorenz(r), lorenz_state(r) * [1.2, 0.9, 1.1])
+        assert (np.abs(found.state - lorenz_state(r)) <= found.error).all()
+        assert (found.error <= 1e-12 * r).all()
+        plain = np.linalg.eigvals(lorenz_tensors(r)[0])
+        for value, bound in zip(found.eigenvalues, found.error_bounds, strict=True):
+            assert np.abs(plain - value).min() <= bound <= 1e-10
+        assert found.stable is (r < LORENZ_HOPF)
+
+    def test_from_afar_newton_is_damped(self):
+        # Undamped from 3 the arctangent throws Newton's method farther out at every step.
+        found = find_equilibrium(from_rhs(lambda t, x: [-np.arctan(x[0] - 0.5)], 1, None, guess_period=1.0), [3.5])
+        assert found.state == pytest.approx([0.5], abs=1e-15)
+        assert found.stable
+
+    def test_at_the_origin_it_is_exactly_zero(self):
+        found = find_equilibrium(oscillator(-0.3), [0.3, -0.2])
+        assert (found.state == 0.0).all()
+        assert found.stable
+
+    def test_on_the_axis_nothing_is_claimed(self):
+        assert find_equilibrium(oscillator(0.0), [0.1, 0.0]).stable is None
+        assert find_equilibrium(lorenz(LORENZ_HOPF), lorenz_state(24.7)).stable is None
+
+    def test_a_singular_one_is_undecided(self):
+        found = find_equilibrium(from_rhs(lambda t, x: [x[1], -x[1]], 2, None, guess_period=1.0), [0.1, 0.2])
+        assert found.stable is None
+        assert np.isinf(found.error).all()
+
+    @pytest.mark.parametrize("units", [(1e6, 1e-6), (1e-6, 1e6)])
+    @pytest.mark.parametrize("time", [1e-6, 1e6])
+    def test_units_do_not_matter(self, units, time):
+        found = find_equilibrium(brusselator(1.5, units, time), np.array([1.3, 1.0]) * units)
+        assert found.state / units == pytest.approx([1.0, 1.5], rel=1e-14)
+        assert found.eigenvalues * time == pytest.approx(np.roots([1.0, 0.5, 1.0]), rel=1e-12)
+
+    def test_without_a_trace_derivatives_are_differences_with_errors(self):
+        def velocity(x):
+            return np.array(lorenz_rhs(0.0, x, 20.0))
+
+        system = PeriodicSystem(3, None, lambda x, t0, t1: (x, np.eye(3)), velocity=velocity, guess_period=0.65)
+        found, traced = (find_equilibrium(each, [7.0, 7.0, 18.0]) for each in (system, lorenz(20.0)))
+        assert (np.abs(found.state - lorenz_state(20.0)) <= found.error).all()
+        assert (np.abs(found.eigenvalues - traced.eigenvalues) <= found.error_bounds).all()
+        assert (found.error_bounds < 1e-9).all()
+
+
+class TestHopf:
+    def test_lorenz(self):
+        found = locate_hopf(lorenz, (20.0, 30.0), [7.0, 7.0, 19.0])
+        assert found.complete
+        (point,) = found
+        assert point.kind is Kind.HOPF
+        assert abs(point.value - LORENZ_HOPF) <= point.error_bound <= 1e-9
+        assert abs(point.value - LORENZ_HOPF) <= 2e-12
+        assert point.criticality is SUB
+        # Of the characteristic polynomial at the point omega^2 = b (sigma + r).
+        assert point.frequency == pytest.approx(np.sqrt(8.0 / 3.0 * (10.0 + LORENZ_HOPF)), rel=1e-12)
+        assert abs(point.coefficient - tensor_l1(*lorenz_tensors(LORENZ_HOPF))) <= max(
+            point.coefficient_error, 1e-11 * point.coefficient
+        )
+
+    def test_brusselator(self):
+        (point,) = locate_hopf(brusselator, (1.0, 3.0), [1.0, 1.0])
+        assert abs(point.value - 2.0) <= min(point.error_bound, 1e-13)
+        assert point.frequency == pytest.approx(1.0, rel=1e-13)
+        assert point.rate.real == pytest.approx(0.5, rel=1e-8)
+        assert point.coefficient == pytest.approx(tensor_l1(*brusselator_tensors()), rel=1e-12)
+        assert point.criticality is SUPER
+
+    def test_roessler(self):
+        # The coefficients c of s^3 + c2 s^2 + c1 s + c0 have c2 c1 = c0 at the point: by bisection.
+        def equilibrium(a):
+            x = (5.7 - np.sqrt(5.7**2 - 0.8 * a)) / 2.0
+            return x, -x / a, x / a
+
+        def matrix(a):
+            x, _, z = equilibrium(a)
+            return np.array([[0.0, -1.0, -1.0], [1.0, a, 0.0], [z, 0.0, x - 5.7]])
+
+        def routh(a):
+            _, c2, c1, c0 = np.poly(matrix(a))
+            return c2 * c1 - c0
+
+        low, high = 1e-3, 0.05
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if routh(low) * routh(middle) > 0.0 else (low, middle)
+        (point,) = locate_hopf(roessler, (-0.4, 0.5), [0.0, 0.1, 0.1])
+        assert point.value == pytest.approx(low, abs=1e-11)
+        assert point.frequency == pytest.approx(np.abs(np.linalg.eigvals(matrix(low)).imag).max(), rel=1e-11)
+        b = np.zeros((3, 3, 3))
+        b[2, 0, 2] = b[2, 2, 0] = 1.0
+        assert point.coefficient == pytest.approx(tensor_l1(matrix(low), b, np.zeros((3, 3, 3, 3))), rel=1e-8)
+        assert point.criticality is SUPER
+
+    def test_langford(self):
+        # On the axis z = b, a root of 0.6 + 0.95 z - z^3 / 3; s = 0.95 - b^2. Radius: r' = (z - b) r, and with
+        # z - b = w r^2 where s w = 1 + b / 4 it is r' = w r^3 for slow r; r^2 = 2 |amplitude|^2.
+        (b,) = [root.real for root in np.roots([-1.0 / 3.0, 0.0, 0.95, 0.6]) if root.real > 1.0]
+        (point,) = locate_hopf(langford, (0.5, 3.0), [0.0, 0.0, 2.0])
+        assert point.value == pytest.approx(b, abs=1e-12)
+        assert point.frequency == pytest.approx(3.5, rel=1e-13)
+        assert point.coefficient == pytest.approx(2.0 * (1.0 + 0.25 * b) / (0.95 - b * b) / 3.5, rel=1e-11)
+        assert point.rate == pytest.approx(-1.0, abs=1e-9)
+
+    @pytest.mark.parametrize("cubic", [-1.0, 1.0])
+    def test_van_der_pol_either_way(self, cubic):
+        (point,) = locate_hopf(lambda mu: oscillator(mu, cubic), (-1.0, 1.5), [0.1, 0.0])
+        assert abs(point.value) <= point.error_bound <= 1e-12
+        assert abs(point.coefficient - cubic / 4.0) <= point.coefficient_error <= 1e-12
+        assert point.criticality is (SUPER if cubic < 0.0 else SUB)
+
+    @pytest.mark.parametrize("between", [(-1.0, 1.5), (-0.7, 0.3), (-0.123, 2.0)])
+    def test_a_coefficient_that_vanishes_there_is_undecided(self, between):
+        def classic(mu):
+            return from_rhs(lambda t, x: [x[1], -x[0] + mu * (1.0 - x[0] ** 2) * x[1]], 2, None, guess_period=6.0)
+
+        (point,) = locate_hopf(classic, between, [0.1, 0.0])
+        assert point.criticality is UNDECIDED
+        with pytest.raises(ParameterError, match="on which side"):
+            switch(classic, point)
+
+    @settings(max_examples=12, deadline=None)
+    @given(
+        alpha=st.sampled_from([-2.0, -0.3, 0.7, 5.0]),
+        beta=st.floats(-5.0, 5.0),
+        omega=st.sampled_from([0.01, 1.0, 37.0]),
+        angle=st.floats(0.0, 3.0),
+        scale=st.sampled_from([1e-6, 1.0, 1e6]),
+        time=st.sampled_from([1e-6, 1.0, 1e6]),
+    )
+    def test_a_normal_form_in_other_coordinates(self, alpha, beta, omega, angle, scale, time):
+        """z' = (p + i omega) z + (alpha + i beta) z |z|^2, y = S R (x + a quadratic change): l1 by the length of q."""
+        c, s = np.cos(angle), np.sin(angle)
+        stretch = np.array([1.0, 3.0]) * scale
+        turn = np.array([[c, -s], [s, c]])
+
+        def family(p):
+            def rhs(t, y):
+                u, v = y[0] / stretch[0], y[1] / stretch[1]
+                a, b = c * u + s * v, -s * u + c * v
+                # a = h - 0.4 k^2, b = k undo the change h = a + 0.4 b^2
+                h = a + 0.4 * b * b
+                r = h * h + b * b
+                dh = p * h - omega * b + (alpha * h - beta * b) * r
+                db = p * b + omega * h + (alpha * b + beta * h) * r
+                da = dh - 0.8 * b * db
+                return [stretch[0] * (c * da - s * db) / time, stretch[1] * (s * da + c * db) / time]
+
+            return from_rhs(rhs, 2, None, guess_period=6.0 * time / omega)
+
+        (point,) = locate_hopf(family, (-0.3 * omega, 0.4 * omega), np.zeros(2))
+        mode = stretch[:, None] * turn @ np.array([1.0, -1.0j]) / 2.0  # state = 2 Re(z mode)
+        exact = alpha / omega / float(np.linalg.norm(mode) ** 2)
+        assert abs(point.value) <= point.error_bound <= 1e-10 * omega
+        assert point.frequency == pytest.approx(omega / time, rel=1e-12)
+        assert abs(point.coefficient - exact) <= point.coefficient_error + 1e-13 * abs(exact)
+        assert point.coefficient == pytest.approx(exact, rel=1e-8)
+
+    def test_the_map_over_some_time_says_the_same(self):
+        # The same function as one with a period: a Neimark-Sacker point of the flow over that time.
+        time = 0.11
+        (point,) = locate_hopf(lorenz, (20.0, 30.0), [7.0, 7.0, 19.0])
+        (other,) = locate(lambda r: from_rhs(lorenz_rhs, 3, time, args=(r,)), (20.0, 30.0), lorenz_state(20.0))
+        assert other.value == pytest.approx(point.value, abs=other.error_bound + point.error_bound)
+        assert other.frequency == pytest.approx(point.frequency, rel=1e-11)
+        assert other.coefficient == pytest.approx(point.coefficient * point.frequency * time, rel=1e-5)
+
+    def test_two_of_them_and_one_that_only_touches(self):
+        def both(mu):
+            def rhs(t, x):
+                first = -x[0] + mu * x[1] - x[0] ** 2 * x[1]
+                return [x[1], first, x[3], -4.0 * x[2] + (mu - 0.3) * x[3] + x[2] ** 2 * x[3] + x[0] * x[1]]
+
+            return from_rhs(rhs, 4, None, guess_period=6.0)
+
+        found = locate_hopf(both, (-1.0, 1.5), [0.1, 0.0, 0.0, 0.0])
+        assert found.complete
+        assert [point.value for point in found] == pytest.approx([0.0, 0.3], abs=1e-12)
+        assert [point.criticality for point in found] == [SUPER, SUB]
+        (touch,) = touching = locate_hopf(lambda mu: oscillator(-mu * mu), (-1.0, 1.5), [0.1, 0.0])
+        assert touch.criticality is None
+        assert any("touches" in remark for remark in touching.remarks)
+
+    def test_a_double_pair_has_no_coefficient(self):
+        def twice(mu):
+            return from_rhs(
+                lambda t, x: [
+                    x[1], -x[0] + mu * x[1] - x[0] ** 2 * x[1], x[3], -x[2] + mu * x[3] - x[2] ** 2 * x[3]
+                ], 4, None, guess_period=6.0,
+            )  # fmt: skip
+
+        found = locate_hopf(twice, (-1.0, 1.5), [0.1, 0.0, 0.0, 0.0])
+        (point,) = found
+        assert point.multiplicity == 4
+        assert not point.criticality.known
+        assert any("2 pairs" in remark for remark in found.remarks)
+
+    def test_a_fold_ends_the_search_in_words(self):
+        def folding(mu):
+            return from_rhs(
+                lambda t, x: [x[1], -x[0] + (mu + 0.5) * x[1] - x[0] ** 2 * x[1], 0.8 - mu - x[2] ** 2], 3, None,
+                guess_period=6.0,
+            )  # fmt: skip
+
+        found = locate_hopf(folding, (-1.0, 1.5), [0.1, 0.0, 1.0])
+        assert [point.value for point in found] == pytest.approx([-0.5], abs=1e-12)
+        assert any("fold" in remark and "0.8" in remark for remark in found.remarks)
+
+    def test_where_another_equilibrium_meets_this_one_is_said(self):
+        found = locate_hopf(lorenz, (0.5, 3.0), np.zeros(3))
+        assert len(found) == 0
+        assert any("an eigenvalue is zero at 1:" in remark for remark in found.remarks)
+
+    def test_an_eigenvalue_that_is_zero_throughout_is_said(self):
+        found = locate_hopf(
+            lambda m: from_rhs(lambda t, x: [x[1], m * x[1]], 2, None, guess_period=1.0), (-2.0, -1.0), [0.1, 0.2]
+        )
+        assert len(found) == 0
+        assert any("an eigenvalue is 0 throughout" in remark for remark in found.remarks)
+
+    def test_without_a_trace(self):
+        def family(r):
+            def rhs(t, x, r):
+                return np.array(lorenz_rhs(t, x, r)) if x[0] < 1e9 else np.zeros(3)
+
+            return from_rhs(rhs, 3, None, args=(r,), guess_period=0.65)
+
+        (point,) = locate_hopf(family, (24.0, 25.0), lorenz_state(24.0))
+        assert abs(point.value - LORENZ_HOPF) <= point.error_bound <= 1e-8
+        exact = tensor_l1(*lorenz_tensors(LORENZ_HOPF))
+        assert abs(point.coefficient - exact) <= point.coefficient_error <= 1e-4 * exact
+
+
+class TestCycles:
+    @pytest.mark.parametrize("cubic", [-1.0, 1.0])
+    def test_amplitude_and_period_near_the_point(self, cubic):
+        def family(mu):
+            return oscillator(mu, cubic)
+
+        (point,) = locate_hopf(family, (-1.0, 1.5), [0.1, 0.0])
+        (start,) = switch(family, point)
+        assert start.rising is (cubic < 0.0)
+        assert (start.value > 0.0) is (cubic < 0.0)
+        branch = follow(family, start, (-1.0, 1.5), points=8, longest=0.03)
+        for each in branch.points:
+            # x = A cos t: A^2 = 4 mu / -cubic to leading order, in x and y alike.
+            assert float(each.orbit @ each.orbit) == pytest.approx(
+                -4.0 * each.value / cubic, rel=abs(each.value) + 1e-6
+            )
+            assert each.period == pytest.approx(2.0 * np.pi, rel=each.value**2 / 8.0 + 1e-9)
+            assert each.stable is (cubic < 0.0)
+        assert abs(branch.points[-1].value) > 2.0 * abs(branch.points[0].value)
+
+    def test_lorenz_goes_down_and_unstable(self):
+        (point,) = locate_hopf(lorenz, (20.0, 30.0), [7.0, 7.0, 19.0])
+        (start,) = switch(lorenz, point)
+        branch = follow(lorenz, start, (20.0, 30.0), points=6)
+        values = np.array([each.value for each in branch.points])
+        assert (np.diff(values) < 0.0).all()
+        assert (values < LORENZ_HOPF).all()
+        assert all(each.stable is False for each in branch.points)
+        # The multiplier leaves 1 by twice the growth rate of the equilibrium the other way: 1 + 2 rate T (rH - r).
+        first = branch.points[0]
+        growth = 2.0 * point.rate.real * (LORENZ_HOPF - first.value) * first.period
+        assert first.multipliers[0].real - 1.0 == pytest.approx(growth, rel=0.02)
+        assert first.period == pytest.approx(point.period, rel=1e-3)
+
+    @pytest.mark.parametrize("units", [(1e6, 1e-6), (1e-6, 1e6), (1.0, 1.0)])
+    @pytest.mark.parametrize("time", [1e-6, 1.0, 1e6])
+    def test_units_do_not_matter(self, units, time):
+        def family(b):
+            return brusselator(b, units, time)
+
+        (point,) = locate_hopf(family, (1.0, 3.0), np.array([1.0, 1.0]) * units)
+        assert abs(point.value - 2.0) <= point.error_bound <= 1e-10
+        (start,) = switch(family, point)
+        assert start.rising
+        assert 2.0 + 1e-6 < start.value < 2.001
+        # The same cycle in plain units, by the value of the parameter alone.
+        plain = begin(brusselator, start.value, start.orbit / units)
+        assert start.period / time == pytest.approx(plain.period, rel=1e-9)
+        branch = follow(family, start, (1.0, 3.0), points=4)
+        assert branch.points[-1].value > start.value
+        assert branch.points[-1].stable
+
+    def test_langford_falls(self):
+        (point,) = locate_hopf(langford, (0.5, 3.0), [0.0, 0.0, 2.0])
+        (start,) = switch(langford, point)
+        assert start.rising is False
+        assert start.value < point.value
+        branch = follow(langford, start, (0.5, 3.0), points=4)
+        assert branch.points[-1].value < start.value
+        assert branch.points[-1].stable
+
+
+class TestRefusals:
+    @pytest.mark.parametrize(
+        ("family", "guess", "kind", "said"),
+        [
+            (lambda m: from_rhs(lambda t, x: [x[1] ** 2 + 1.0, x[0]], 2, None, guess_period=1.0), [0.1, 0.0],
+             AnalysisError, "no equilibrium found"),
+            (lambda m: from_rhs(lambda t, x: [x[1], -x[0] + np.cos(t)], 2, 6.0), [0.1, 0.0],
+             ParameterError, "depends on time"),
+            (oscillator, [np.nan, 0.0], ParameterError, "must be finite"),
+            (oscillator, [0.0], ParameterError, "wrong shape"),
+            (oscillator, "here", ParameterError, "must be numbers"),
+            (lambda m: from_rhs(lambda t, x: [x[1], -x[0] + m * x[1] - abs(x[1]) * x[1]], 2, None, guess_period=6.0),
+             [0.1, 0.0], AnalysisError, "switching surface"),
+            (lambda m: from_rhs(lambda t, x: [np.log(x[0])], 1, None, guess_period=1.0), [-1.0],
+             AnalysisError, "not finite"),
+            (lambda m: 1 / 0, [0.0], AnalysisError, "ZeroDivisionError"),
+        ],
+    )  # fmt: skip
+    def test_bad_input_is_one_line(self, family, guess, kind, said):
+        with pytest.raises(kind, match=said) as raised:
+            locate_hopf(family, (-1.0, 1.0), guess)
+        assert "\n" not in str(raised.value)
+
+    @pytest.mark.parametrize("between", [(1.0, -1.0), (0.0, np.nan), (1.0,)])
+    def test_no_interval(self, between):
+        with pytest.raises(ParameterError, match="between"):
+            locate_hopf(oscillator, between, [0.0, 0.0])
+
+    def test_a_family_that_fails_on_the_way_is_a_remark(self):
+        def failing(mu):
+            if mu > 0.5:
+                raise ValueError("too much")
+            return oscillator(mu)
+
+        found = locate_hopf(failing, (-1.0, 1.5), [0.0, 0.0])
+        assert not found.complete
+        assert len(found) == 1
+        assert any("too much" in remark for remark in found.remarks)
+
+    @pytest.mark.parametrize("off", [0.0, 1e-9, 1e-3])
+    @pytest.mark.parametrize("r", [20.0, 24.0])
+    def test_an_orbit_is_not_begun_at_an_equilibrium(self, r, off):
+        with pytest.raises(AnalysisError, match=r"is an equilibrium, not an orbit.*locate_hopf") as raised:
+            begin(lorenz, r, lorenz_state(r) * (1.0 + off * np.array([1.0, -0.5, 0.3])))
+        assert "\n" not in str(raised.value)
+
+    def test_other_failures_to_begin_are_said_as_before(self):
+        with pytest.raises(AnalysisError) as raised:
+            begin(lorenz, 20.0, [1.0, 30.0, -40.0])
+        assert "equilibrium, not" not in str(raised.value)
