@@ -289,7 +289,7 @@ class TestHopf:
         assert [point.value for point in found] == pytest.approx([0.0, 0.3], abs=1e-12)
         assert [point.criticality for point in found] == [SUPER, SUB]
         (touch,) = touching = locate_hopf(lambda mu: oscillator(-mu * mu), (-1.0, 1.5), [0.1, 0.0])
-        assert touch.criticality is None
+        assert not touch.criticality.known
         assert any("touches" in remark for remark in touching.remarks)
 
     def test_a_double_pair_has_no_coefficient(self):
