@@ -1,5 +1,7 @@
 """Equilibria, their Hopf points and the cycles that leave these, against closed forms and plain second computations."""
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -266,6 +268,41 @@ class TestHopf:
         assert point.frequency == pytest.approx(omega / time, rel=1e-12)
         assert abs(point.coefficient - exact) <= point.coefficient_error + 1e-13 * abs(exact)
         assert point.coefficient == pytest.approx(exact, rel=1e-8)
+
+    @pytest.mark.parametrize("seed", [0, 2, 9, 37, 43])
+    def test_random_systems_have_the_points_of_a_fine_sweep(self, seed):
+        """x' = (A + p A') x + cubic polynomial, in units of 1e-6 to 1e6: none more, none less, l1 by tensors."""
+        random = np.random.default_rng(seed)
+        n = int(random.integers(2, 6))
+        a, slope = random.normal(size=(n, n)), 0.5 * random.normal(size=(n, n))
+        b, c = random.normal(size=(n, n, n)), random.normal(size=(n, n, n, n))
+        b = (b + b.transpose(0, 2, 1)) / 2.0
+        c = sum(c.transpose(0, *(1 + np.array(order))) for order in itertools.permutations(range(3))) / 6.0
+        units = 10.0 ** random.integers(-6, 7, size=n)
+
+        def family(p):
+            def rhs(t, x):
+                y = x / units
+                two = (y[:, None] * y).ravel()
+                three = (two[:, None] * y).ravel()
+                return units * ((a + p * slope) @ y + b.reshape(n, -1) @ two / 2.0 + c.reshape(n, -1) @ three / 6.0)
+
+            return from_rhs(rhs, n, None, guess_period=6.0)
+
+        found = locate_hopf(family, (-1.0, 1.3), np.zeros(n))
+        assert found.complete
+        values = np.linspace(-1.0, 1.3, 20001)
+        unstable = (np.linalg.eigvals(a + values[:, None, None] * slope).real > 0.0).sum(axis=1)
+        swept = values[:-1][np.abs(np.diff(unstable)) == 2]
+        assert [point.value for point in found] == pytest.approx(swept, abs=2e-4)
+        for point in found:
+            matrix = a + point.value * slope
+            here, modes = np.linalg.eig(matrix)
+            critical = int(np.abs(here - 1j * point.frequency).argmin())
+            assert abs(here[critical].real) <= abs(point.rate.real) * point.error_bound
+            length = np.linalg.norm(units * modes[:, critical]) / np.linalg.norm(modes[:, critical])
+            exact = tensor_l1(matrix, b, c) / length**2
+            assert abs(point.coefficient - exact) <= point.coefficient_error + 1e-9 * abs(exact)
 
     def test_the_map_over_some_time_says_the_same(self):
         # The same function as one with a period: a Neimark-Sacker point of the flow over that time.
