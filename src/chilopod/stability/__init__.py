@@ -7,9 +7,12 @@
 False
 """
 
+from chilopod.flows.called import NotAnalytic
+from chilopod.flows.events import Event
+from chilopod.flows.implicit.flow import Stretched
+from chilopod.flows.jumps import UndeclaredSwitch
 from chilopod.stability.asked import ReturnBudget
 from chilopod.stability.branches.branch import Branch, BranchPoint, Ending, Start, begin, follow, proceed, switch
-from chilopod.stability.called import NotAnalytic
 from chilopod.stability.capabilities import (
     Autonomous,
     CyclicallySymmetric,
@@ -22,17 +25,14 @@ from chilopod.stability.capabilities import (
     KnowsOrbit,
     Scaled,
     SpatiallySymmetric,
-    Stretched,
     SystemLike,
 )
 from chilopod.stability.codimension_two.codimension2 import Codimension2, CodimensionTwo
 from chilopod.stability.codimension_two.curve2 import Curve2, CurveEnd, Point2
 from chilopod.stability.codimension_two.two_parameters import follow2
 from chilopod.stability.equilibria import Equilibrium, find_equilibrium
-from chilopod.stability.events import Event
 from chilopod.stability.floquet import Exponents, Multipliers, exponents, multipliers, sweep
 from chilopod.stability.hopf import locate_hopf
-from chilopod.stability.jumps import UndeclaredSwitch
 from chilopod.stability.locate import Located, locate
 from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.normal_form import NormalForm

@@ -13,13 +13,12 @@ derivative has the derivative of state i with respect to state j at the start in
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Protocol, Self, TypeGuard, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chilopod.frozen import ReadOnlyArrays
+from chilopod.flows.implicit.flow import Stretched
 
 Array = NDArray[np.float64]
 
@@ -175,38 +174,12 @@ class FlowsMany(KnowsOrbit, Protocol):
         ...
 
 
-@dataclass(frozen=True)
-class Stretched(ReadOnlyArrays):
-    """What a flow makes of a frame.
-
-    Attributes
-    ----------
-    state
-        At the end, shape (n,).
-    frame
-        Orthonormal, shape (n, n): for every k its first k columns span what the flow made of those at the start.
-    stretch
-        Logarithms of the growth of the columns, shape (n,): of the volume of the first k, less that of the first k-1.
-    other
-        The logarithms by another computation, which tells their error.
-    turned
-        The smallest cosine of the angles between a column and itself a step later, shape (n,): the sign of a column
-        is carried along where it is clearly positive.
-    """
-
-    state: Array
-    frame: Array
-    stretch: Array
-    other: Array
-    turned: Array
-
-
 @runtime_checkable
 class FlowsFrames(SystemLike, Protocol):
     """Knows how fast directions decay of which nothing is left within a step of its integration."""
 
-    def is_stiff(self) -> bool:
-        """Whether derivatives of the flow have nothing to say of such directions."""
+    def is_stiff(self, x: Array, t0: float, t1: float, /) -> bool:
+        """Whether the derivative of the flow from state x at t0 to t1 has nothing to say of such directions."""
         ...
 
     def flow_frame(self, x: Array, units: Array, frame: Array, t0: float, t1: float, /) -> Stretched:
@@ -230,6 +203,11 @@ def flows_with_error(system: SystemLike) -> TypeGuard[FlowsWithError]:
 def expands_velocity(system: SystemLike) -> TypeGuard[ExpandsVelocity]:
     """Whether a system knows its right-hand side with all derivatives."""
     return getattr(system, "velocity_series", None) is not None
+
+
+def is_stiff(system: SystemLike, x: Array, duration: float) -> TypeGuard[FlowsFrames]:
+    """Whether a return from state x at time 0 contracts some directions beyond what its derivative retains."""
+    return getattr(system, "flow_frame", None) is not None and system.is_stiff(x, 0.0, duration)  # type: ignore[attr-defined]
 
 
 def flows_states(system: SystemLike) -> TypeGuard[FlowsStates]:

@@ -15,8 +15,9 @@ import scipy.linalg
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.flows.arguments import finite_array
+from chilopod.flows.balance import numerical_balance
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.arguments import finite_array
 from chilopod.stability.asked import Asking
 from chilopod.stability.capabilities import (
     Autonomous,
@@ -31,7 +32,6 @@ from chilopod.stability.normal_forms.extrapolation import radii, series
 from chilopod.stability.orbits import Orbit, find_orbit
 from chilopod.stability.points import BifurcationPoint, Criticality
 from chilopod.stability.returns import section_at
-from chilopod.stability.scales import numerical_balance
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

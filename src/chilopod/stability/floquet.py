@@ -14,15 +14,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.cores import cores
 from chilopod.errors import AnalysisError
+from chilopod.flows.arguments import checked_count
+from chilopod.flows.balance import numerical_balance
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.arguments import checked_count
-from chilopod.stability.capabilities import FlowsFrames, SystemLike, flows_tangents, is_autonomous
+from chilopod.stability.capabilities import SystemLike, flows_tangents, is_autonomous, is_stiff
 from chilopod.stability.krylov.closing import LARGE
 from chilopod.stability.krylov.leading import leading_multipliers, whole_pairs
 from chilopod.stability.matrix_errors import DRAWN, FIRST_ORDER, VERDICTS, eigenvalues_moved, stable_within
 from chilopod.stability.orbits import Orbit, find_large_orbit, find_orbit, from_known, known_state
 from chilopod.stability.returns import ReturnMap, flow_with_error, return_maps
-from chilopod.stability.scales import numerical_balance, sizes
+from chilopod.stability.scales import sizes
 from chilopod.stability.shown import Result, Shown, axes_for, dataset, number, rows, said
 from chilopod.stability.splitting import split_product
 from chilopod.stability.stiff import disturbed, split_stiff
@@ -340,7 +341,7 @@ def exponents(system: SystemLike, orbit: ArrayLike | None = None) -> Exponents:
     """
     found = find_orbit(system, orbit)
     image = found.image
-    if isinstance(system, FlowsFrames) and system.is_stiff():
+    if is_stiff(system, found.state, image.period / image.returns):
         log_nu, modes, units, moved = split_stiff(system, found)
     else:
         factors, errors, units = _factors(system, found)

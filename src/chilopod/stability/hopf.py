@@ -18,6 +18,7 @@ import scipy.linalg
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError
+from chilopod.flows.balance import numerical_balance
 from chilopod.stability.asked import Asking
 from chilopod.stability.capabilities import Autonomous, Family, SystemLike, expands_velocity, given_scale
 from chilopod.stability.course import Course, place_error
@@ -33,7 +34,6 @@ from chilopod.stability.extent import Extent, extent
 from chilopod.stability.locate import BUDGET, GRAVITY, Located, checked_interval
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
 from chilopod.stability.samples import Samples
-from chilopod.stability.scales import numerical_balance
 from chilopod.stability.system import PeriodicSystem
 from chilopod.stability.unit_circle.crossings import Crossing, SearchStatus, find_crossings
 from chilopod.stability.unit_circle.spectra import Event

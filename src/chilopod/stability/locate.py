@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.flows.balance import numerical_balance
 from chilopod.stability.asked import Asking
 from chilopod.stability.branches.fold import Fold
 from chilopod.stability.capabilities import Family
@@ -24,7 +25,7 @@ from chilopod.stability.orbits import Orbit, bounded, from_known
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import ReturnMap, returned_states
 from chilopod.stability.samples import Samples
-from chilopod.stability.scales import numerical_balance, sizes
+from chilopod.stability.scales import sizes
 from chilopod.stability.shown import Result, axes_for, columns, dataset, rows, said
 from chilopod.stability.singular import past_singular
 from chilopod.stability.symmetry.isotypic import Block

@@ -10,16 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError
+from chilopod.flows.arguments import finite_array
 from chilopod.frozen import ReadOnlyArrays, in_one_line
-from chilopod.stability.arguments import finite_array
 from chilopod.stability.asked import ReturnBudget, SpentError
 from chilopod.stability.capabilities import (
-    FlowsFrames,
     FlowsTangents,
     SystemLike,
     flows_tangents,
     given_scale,
     is_autonomous,
+    is_stiff,
     known_orbit,
     spatial_symmetries,
 )
@@ -416,8 +416,9 @@ def bounded(system: SystemLike, x: Array, image: ReturnMap, error: Array | None 
     if error is None:
         # The state is as uncertain as the flow, of which the derivative's error tells, times what H - 1 makes of it.
         wrong = np.abs(image.state - x) + (_matrix(image.error, size) @ size)
-        if isinstance(system, FlowsFrames) and system.is_stiff():  # whose derivative may be nothing, and err by nothing
-            wrong += DRAWN * np.abs(_in_parts(system, x, image.period / image.returns) - image.state) + _CHANCE * size
+        duration = image.period / image.returns
+        if is_stiff(system, x, duration):  # its derivative may be nothing, and err by nothing
+            wrong += DRAWN * np.abs(_in_parts(system, x, duration) - image.state) + _CHANCE * size
         inverse = basis @ np.linalg.pinv(basis.T @ scaled @ basis, rcond=_SINGULAR) @ basis.T
         error = size * (np.abs(inverse) @ (wrong / size)) + np.abs(x - given)
     # The derivative is that of a state so far off: along the direction in which the orbit is least sure.

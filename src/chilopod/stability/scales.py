@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dgebal
 
 from chilopod.errors import AnalysisError
+from chilopod.flows.balance import numerical_balance
 from chilopod.stability.capabilities import SystemLike, given_scale
 
 Array = NDArray[np.float64]
@@ -53,10 +53,3 @@ def sizes(system: SystemLike, x: Array, duration: float) -> Array:
     for _ in range(_SWEEPS):
         size = np.maximum(size, (coupling * size).max(axis=1))
     return np.where(size > 0.0, size, size[size > 0.0].min())
-
-
-def numerical_balance(matrix: Array) -> Array:
-    """Sizes d of the states for which the rows and columns of ``matrix[i, j] * d[j] / d[i]`` are about alike, by
-    LAPACK: for bounds on round-off."""
-    d: Array = dgebal(matrix, scale=1, permute=0)[3]
-    return d

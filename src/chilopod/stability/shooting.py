@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.flows.arguments import finite_array
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.arguments import finite_array
 from chilopod.stability.capabilities import SystemLike, is_autonomous, returns_per_period
 from chilopod.stability.returns import Section, carried, return_duration
 

@@ -16,11 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
+from chilopod.flows.balance import numerical_balance
+from chilopod.flows.implicit.flow import Stretched
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.capabilities import FlowsFrames, Stretched, SystemLike, is_autonomous
+from chilopod.stability.capabilities import FlowsFrames, SystemLike, is_autonomous
 from chilopod.stability.orbits import Orbit
 from chilopod.stability.returns import flow_with_error
-from chilopod.stability.scales import numerical_balance, sizes
+from chilopod.stability.scales import sizes
 from chilopod.stability.splitting import intersection, split_leading
 
 Array = NDArray[np.float64]

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import ParameterError
+from chilopod.flows.arguments import finite_array
+from chilopod.flows.balance import numerical_balance
+from chilopod.flows.implicit.flow import Stretched
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.arguments import finite_array
-from chilopod.stability.capabilities import Stretched
-from chilopod.stability.scales import numerical_balance
 
 Array = NDArray[np.float64]
 
@@ -79,7 +79,7 @@ class PeriodicSystem(ReadOnlyArrays):
     flow_states: Callable[[Array, float, float], Array] | None = field(default=None, repr=False)
     flow_tangents: Callable[[Array, Array, float, float], tuple[Array, Array]] | None = field(default=None, repr=False)
     flow_frame: Callable[[Array, Array, Array, float, float], Stretched] | None = field(default=None, repr=False)
-    is_stiff: Callable[[], bool] | None = field(default=None, repr=False)
+    is_stiff: Callable[[Array, float, float], bool] | None = field(default=None, repr=False)
     velocity_series: Callable[[Array], Array] | None = field(default=None, repr=False)
     concurrent: bool = field(default=False, repr=False)
     symmetry_order: int = field(init=False, default=1, repr=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from chilopod.stability.scales import numerical_balance
+from chilopod.flows.balance import numerical_balance
 
 Array = NDArray[np.float64]
 

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.flows.arguments import finite_array
 from chilopod.frozen import ReadOnlyArrays, read_only
-from chilopod.stability.arguments import finite_array
 from chilopod.stability.symmetry.group_closure import SAME, factors, generating
 from chilopod.stability.symmetry.group_scales import coordinate_scales
 

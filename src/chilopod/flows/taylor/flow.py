@@ -1,6 +1,6 @@
 """Flows of taped right-hand sides, by Taylor series in compiled code that is the same for all of them.
 
-A :class:`TaylorFlow` holds a tape (:func:`chilopod.stability.taylor.trace.trace`) and what steps must respect; the
+A :class:`TaylorFlow` holds a tape (:func:`chilopod.flows.tracing.trace.trace`) and what steps must respect; the
 values of its parameters are an argument of every call, so one object serves a whole family::
 
     traced = trace(rhs, n, args, events=[(guard, reset)])
@@ -11,7 +11,7 @@ values of its parameters are an argument of every call, so one object serves a w
 * Switches of the right-hand side (sign, abs, where, floor, %, ...) are found and crossed exactly, in time and state.
 * Event k happens where its guard g_k(t, x) passes zero, rising if its direction is 1, falling if -1, either way if 0;
   the state jumps to r_k(t, x). The derivative gets the saltation matrix. ``passage.events`` has their
-  times and numbers. What happens at the start: :func:`chilopod.stability.taylor.switching.await_events`.
+  times and numbers. What happens at the start: :func:`chilopod.flows.taylor.switching.await_events`.
 * :meth:`TaylorFlow.advance` raises ``AnalysisError`` where the motion cannot go on (see ``_REASONS``), with the time.
 * :meth:`TaylorFlow.tangents` carries any directions in place of the whole derivative.
 * :meth:`TaylorFlow.states` carries many states without derivatives, on all cores; each with parameters of its own if
@@ -33,9 +33,9 @@ from numpy.typing import NDArray
 
 from chilopod.cores import cores
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.flows.tracing.evaluation import evaluate
+from chilopod.flows.tracing.tape import Tape
 from chilopod.frozen import ReadOnlyArrays, read_only
-from chilopod.stability.taylor.evaluation import evaluate
-from chilopod.stability.taylor.tape import Tape
 
 Array = NDArray[np.float64]
 
@@ -117,6 +117,9 @@ class TaylorFlow(ReadOnlyArrays):
     tolerance
         Truncation error of a step relative to the size of each state and entry of the derivative; never more exact
         than round-off.
+    patience
+        Number of steps after which it is seen that the budget of steps will not suffice, as where the motion is stiff;
+        0 for none: then a motion that is slow only at first gets to its end.
     """
 
     tape: Tape
@@ -124,17 +127,14 @@ class TaylorFlow(ReadOnlyArrays):
     period: float = math.inf
     directions: tuple[float, ...] = ()
     tolerance: float = _LEAST_TOLERANCE
-    _arrays: tuple[Any, ...] = field(init=False, repr=False, compare=False)
+    patience: int = 0
     _clocks: list[tuple[bytes | None, Array]] = field(
         init=False, repr=False, compare=False, default_factory=lambda: [(None, _NOTHING)]
     )
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        t = self.tape
-        arrays = (t.program, t.terms, t.numbers, t.layout, t.slopes, t.switches, t.resets, t.clocks)
-        directions = np.array(self.directions, dtype=np.float64) if t.switches.size else None
-        object.__setattr__(self, "_arrays", (arrays, directions))
+    @functools.cached_property
+    def _directions(self) -> Array | None:
+        return np.array(self.directions, dtype=np.float64) if self.tape.switches.size else None
 
     @functools.cached_property
     def order(self) -> int:
@@ -176,12 +176,12 @@ class TaylorFlow(ReadOnlyArrays):
         x, params = np.array(x, dtype=np.float64), np.array(params, dtype=np.float64)
         if not bounded:
             derivative = np.eye(n) if derived else np.empty((n, 0))
-            events, steps = self._run(x, t0, t1, params, derivative, _NOTHING, self.order, 0.0)
+            events, steps = self._run(x, (t0, t1), params, derivative)
             return Passage(x, derivative, _NOTHING, events, steps)
         other_x = x.copy()
         derivative, bound, other = np.eye(n), np.zeros((n, n)), np.eye(n)
-        events, steps = self._run(x, t0, t1, params, derivative, bound, self.order, 0.0)
-        self._run(other_x * self._shaken, t0, t1, params, other, _NOTHING, self.order - _OTHER_ORDER, _SHAKE)
+        events, steps = self._run(x, (t0, t1), params, derivative, bound)
+        self._run(other_x * self._shaken, (t0, t1), params, other, lower=_OTHER_ORDER, shake=_SHAKE)
         difference = np.abs(other - derivative)
         # An entry that is zero but for round-off says nothing of how much the others differ.
         beside = np.sqrt(bound.max(axis=1)[:, None]) * np.sqrt(bound.max(axis=0))
@@ -199,7 +199,7 @@ class TaylorFlow(ReadOnlyArrays):
         """
         x, params = np.array(x, dtype=np.float64), np.array(params, dtype=np.float64)
         images = np.array(directions, dtype=np.float64, order="C")
-        self._run(x, t0, t1, params, images, _NOTHING, self.order, 0.0, stepwise=False)
+        self._run(x, (t0, t1), params, images, stepwise=False)
         return x, images
 
     def states(self, states: Array, t0: float, t1: float, params: Array) -> Array:
@@ -211,7 +211,7 @@ class TaylorFlow(ReadOnlyArrays):
 
         def carry(numbers: range) -> None:
             for i in numbers:
-                self._run(states[i], t0, t1, rows[i], none, _NOTHING, self.order, 0.0)
+                self._run(states[i], (t0, t1), rows[i], none)
 
         threads = min(cores(), states.shape[0] // _FEWEST_PER_THREAD)
         if threads > 1:
@@ -224,42 +224,29 @@ class TaylorFlow(ReadOnlyArrays):
     def _run(
         self,
         x: Array,
-        t0: float,
-        t1: float,
+        interval: tuple[float, float],
         params: Array,
         derivative: Array,
-        bound: Array,
-        order: int,
-        shake: float,
+        bound: Array = _NOTHING,
+        *,
+        lower: int = 0,
+        shake: float = 0.0,
         stepwise: bool = True,
     ) -> tuple[Array, int]:
+        """Carry state, derivative and bound over an interval in place; events and number of steps."""
+        kernels = _compiled()
         n, parameters = int(self.tape.layout[0]), int(self.tape.layout[1])
         if not (x.shape == derivative.shape[:1] == (n,) and params.shape == (parameters,)):
             # Compiled code would read beyond them.
             raise ParameterError("has the wrong shape", field="x", value=x.shape, allowed=f"({n},)")
-        events = np.empty((_MOST_EVENTS if self.directions else 0, 2))
-        report = np.zeros(4)
+        events, report = np.empty((_MOST_EVENTS if self.directions else 0, 2)), np.zeros(4)
+        control = kernels.Control(self._epsilon, self.order - lower, self.most_steps, self.patience, shake, stepwise)
+        outcome = kernels.Outcome(derivative, bound, events, report)
         seen = []
         steps = 0
         clock = self._clock(params)
-        for a, b in self._pieces(t0, t1):
-            status = _compiled().advance(
-                *self._arrays,
-                clock,
-                params,
-                x,
-                a,
-                b,
-                self._epsilon,
-                order,
-                self.most_steps,
-                shake,
-                stepwise,
-                derivative,
-                bound,
-                events,
-                report,
-            )
+        for span in self._pieces(*interval):
+            status = kernels.advance(self.tape, self._directions, clock, params, x, span, control, outcome)
             if status:
                 raise _failure(status, report[3])
             steps += int(report[0])
@@ -311,6 +298,6 @@ def _failure(status: int, t: float) -> AnalysisError:
 @functools.cache
 def _compiled() -> Any:
     # numba takes half a second to import, and only who integrates needs it.
-    from chilopod.stability.taylor import stepping
+    from chilopod.flows.taylor import stepping
 
     return stepping

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from chilopod.stability.taylor.evaluation import evaluate, evaluate_jacobian
-from chilopod.stability.taylor.trace import trace
-from chilopod.stability.taylor.traced import Untraceable
+from chilopod.flows.tracing.evaluation import evaluate, evaluate_jacobian
+from chilopod.flows.tracing.trace import trace
+from chilopod.flows.tracing.traced import Untraceable
 
 STIFFNESS = 1.7
 MATRIX = np.array([[0.0, 1.0, 0.5], [-1.0, 0.0, 0.2], [0.3, 0.1, -0.4]])

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from chilopod.stability.taylor import tape as ops
-from chilopod.stability.taylor.graph import Graph
+from chilopod.flows.tracing import tape as ops
+from chilopod.flows.tracing.graph import Graph
 
 BUILDS: dict[str, Callable[..., int]] = {}
 """``BUILDS[name](graph, *operands) -> node``."""

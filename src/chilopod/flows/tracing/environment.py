@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from chilopod.stability.taylor.standins import stand_in
-from chilopod.stability.taylor.traced import as_traced
+from chilopod.flows.tracing.standins import stand_in
+from chilopod.flows.tracing.traced import as_traced
 
 _PLAIN = (int, bool, str, bytes, complex, type(None), np.integer, np.bool_)
 _OUTSIDE = ("numpy", "scipy", "math", "builtins", "numba")

@@ -1,20 +1,18 @@
 """Taylor coefficients of the solution of dx/dt = f(t, x) and of its derivative, from a tape.
 
 The recurrences are those of Griewank and Walther, *Evaluating Derivatives*, 2nd ed., SIAM 2008, sec. 13.2, with the
-tangents of a function phi(a) from d phi = w da, w = phi'(a), so that each costs one product of series. Coefficients of
-node i stand in ``values[i, k]``, its derivatives with respect to the state at the start in ``tangents[i, k, :]``; the
-tangents are padded to a multiple of ``LANES``.
+tangents of a function phi(a) from d phi = w da, w = phi'(a), so that each costs one product of series.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from chilopod.compiled import fused_njit
-from chilopod.stability.taylor import tape as ops
+from chilopod.flows.tracing import tape as ops
 
 LANES = 4
 """Tangents that one instruction can treat at once."""
@@ -23,6 +21,25 @@ LINEAR, PRODUCT, SQUARE, QUOTIENT = ops.LINEAR, ops.PRODUCT, ops.SQUARE, ops.QUO
 STEP, FLOOR, SELECT = ops.STEP, ops.FLOOR, ops.SELECT
 EXP, SIN, COS, TAN, SINH, COSH, TANH = ops.EXP, ops.SIN, ops.COS, ops.TAN, ops.SINH, ops.COSH, ops.TANH
 LOG, SQRT, POWER, ATAN, ASIN = ops.LOG, ops.SQRT, ops.POWER, ops.ATAN, ops.ASIN
+
+
+class Series(NamedTuple):
+    """Taylor coefficients of all nodes of a tape along a motion.
+
+    Attributes
+    ----------
+    values
+        Coefficients, shape (nodes, orders).
+    tangents
+        Derivatives of the coefficients along some directions of the state at the start, shape (nodes, orders, lanes);
+        the lanes are the directions, padded to a multiple of ``LANES``.
+    branches
+        Branch of every switch, shape (switches,).
+    """
+
+    values: Any
+    tangents: Any
+    branches: Any
 
 
 @fused_njit(error_model="numpy")
@@ -54,7 +71,10 @@ def _function(code: int, a: float, b: float) -> float:
 
 @fused_njit(error_model="numpy")
 def values_at(program: Any, terms: Any, start: int, stop: int, k: int, values: Any, branches: Any) -> None:
-    """Coefficient k of the operations from ``start`` up to ``stop``."""
+    """Coefficient k of the operations from ``start`` up to ``stop``.
+
+    It takes single arrays: whole tuples would be copied at every call.
+    """
     for i in range(start, stop):
         code = program[0, i]
         a = program[1, i]
@@ -165,44 +185,36 @@ def tangents_at(program: Any, terms: Any, start: int, stop: int, k: int, values:
 
 
 @fused_njit(error_model="numpy")
-def load(program: Any, terms: Any, numbers: Any, layout: Any, params: Any, values: Any) -> None:
+def load(tape: Any, params: Any, series: Any) -> None:
     """Numbers, parameters and what depends on them only; the other coefficients of these nodes have to be zero."""
+    layout, values = tape.layout, series.values
     n = layout[0]
     for i in range(layout[1]):
         values[n + 1 + i, 0] = params[i]
-    for i in range(numbers.size):
-        values[n + 1 + layout[1] + i, 0] = numbers[i]
+    for i in range(tape.numbers.size):
+        values[n + 1 + layout[1] + i, 0] = tape.numbers[i]
     for i in range(layout[2], layout[3]):
-        values_at(program, terms, i, i + 1, 0, values, numbers)
+        values_at(tape.program, tape.terms, i, i + 1, 0, values, series.branches)
 
 
 @fused_njit(error_model="numpy")
-def expand(
-    program: Any,
-    terms: Any,
-    layout: Any,
-    slopes: Any,
-    order: int,
-    values: Any,
-    tangents: Any,
-    branches: Any,
-    stop: int,
-    unit: float,
-) -> None:
+def expand(tape: Any, order: int, stop: int, unit: float, series: Any) -> None:
     """Coefficients 0 to ``order`` of the states and of all operations up to ``stop``, in powers of the time since the
     start over ``unit``.
 
     ``values[state, 0]`` and ``values[time, 0]`` have to be set, and the tangents of the states at order 0.
     """
-    n = layout[0]
+    program, terms, slopes = tape.program, tape.terms, tape.slopes
+    values, tangents, branches = series.values, series.tangents, series.branches
+    n, first = tape.layout[0], tape.layout[3]
     values[n, 1] = unit
     for k in range(order + 1):
-        values_at(program, terms, layout[3], stop, k, values, branches)
+        values_at(program, terms, first, stop, k, values, branches)
         if k < order:
             for i in range(n):
                 values[i, k + 1] = values[slopes[i], k] * (unit / (k + 1))
         if tangents.shape[2] > 0:
-            tangents_at(program, terms, layout[3], stop, k, values, tangents)
+            tangents_at(program, terms, first, stop, k, values, tangents)
             if k < order:
                 for i in range(n):
                     f = unit / (k + 1)

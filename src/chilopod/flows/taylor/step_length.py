@@ -50,24 +50,25 @@ def _allowed(coefficients: Any, order: int, h: float, epsilon: float) -> float:
     return h
 
 
-@fused_njit(error_model="numpy")
-def step_size(
-    layout: Any, switches: Any, order: int, h: float, epsilon: float, values: Any, tangents: Any, columns: int
-) -> float:
+@fused_njit(error_model="numpy", inline="always")
+def step_size(tape: Any, series: Any, columns: int, order: int, h: float, epsilon: float) -> float:
     """The largest step up to h at which states, switching functions and tangents are exact to epsilon."""
-    for i in range(layout[0]):
+    values, tangents = series.values, series.tangents
+    for i in range(tape.layout[0]):
         h = _allowed(values[i], order, h, epsilon)
-    for s in range(switches.shape[1]):
-        h = _allowed(values[switches[1, s]], order, h, epsilon)
-    for i in range(layout[0]):
+    for s in range(tape.switches.shape[1]):
+        h = _allowed(values[tape.switches[1, s]], order, h, epsilon)
+    for i in range(tape.layout[0]):
         for j in range(columns):
             h = _allowed(tangents[i, :, j], order, h, epsilon)
     return h
 
 
-@fused_njit(error_model="numpy")
-def agrees(clocks: Any, table: Any, period: float, t: float, h: float, unit: float, order: int, values: Any) -> float:
+@fused_njit(error_model="numpy", inline="always")
+def agrees(tape: Any, clock: Any, series: Any, order: int, t: float, h: float, unit: float) -> float:
     """A step within which the series of functions of time agree with their values on a grid over the period."""
+    clocks, values = tape.clocks, series.values
+    table, period = clock
     if clocks.size == 0 or table.shape[1] < 2:
         return h
     spacing = period / (table.shape[1] - 1)

@@ -1,6 +1,6 @@
 """Numbers and arrays that record what is done with them.
 
-A function that is called with these records its operations in a :class:`chilopod.stability.taylor.graph.Graph`.
+A function that is called with these records its operations in a :class:`chilopod.flows.tracing.graph.Graph`.
 Whatever needs the value of a traced number (a branch, an index, a foreign library) raises :class:`Untraceable`; where
 that value depends on the parameters only, :class:`Concrete`, and the function can be traced anew with those as plain
 numbers.
@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chilopod.stability.taylor.elementary import BUILDS
-from chilopod.stability.taylor.graph import Graph
-from chilopod.stability.taylor.tape import CONSTANT
+from chilopod.flows.tracing.elementary import BUILDS
+from chilopod.flows.tracing.graph import Graph
+from chilopod.flows.tracing.tape import CONSTANT
 
 
 class Untraceable(Exception):

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from chilopod.stability.taylor.tape import (
+from chilopod.flows.tracing.tape import (
     ASIN,
     ATAN,
     CONSTANT,

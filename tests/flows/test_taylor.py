@@ -10,9 +10,9 @@ from numba.core.analysis import dead_branch_prune
 from numba.core.compiler import run_frontend
 
 from chilopod.errors import AnalysisError
-from chilopod.stability.taylor import stepping
-from chilopod.stability.taylor.taylor import TaylorFlow
-from chilopod.stability.taylor.trace import trace
+from chilopod.flows.taylor import stepping
+from chilopod.flows.taylor.flow import TaylorFlow
+from chilopod.flows.tracing.trace import trace
 
 GRAVITY = 9.81
 
@@ -176,7 +176,7 @@ def test_sliding_is_named():
 
 
 def test_what_cannot_go_on_ends(monkeypatch):
-    monkeypatch.setattr("chilopod.stability.taylor.taylor._MOST_WORK", 1e5)
+    monkeypatch.setattr("chilopod.flows.taylor.flow._MOST_WORK", 1e5)
     flow, params = flow_of(lambda t, x: x**2, 1)
     with pytest.raises(AnalysisError, match=r"diverges|beyond t = (1|0\.999)"):
         flow.advance(np.array([1.0]), 0.0, 2.0, params)
@@ -255,7 +255,7 @@ def test_what_goes_through_switches_is_compiled_only_where_there_are_any():
 
     def left(flow):
         function = run_frontend(stepping.advance.py_func)
-        directions = numba.typeof(flow._arrays[1])
+        directions = numba.typeof(flow._directions)
         dead_branch_prune(function, [directions if name == "directions" else None for name in function.arg_names])
         values = (line.value for block in function.blocks.values() for line in block.find_insts(ir.Assign))
         return {value.name for value in values if isinstance(value, ir.Global)}

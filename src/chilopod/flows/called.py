@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,14 +13,18 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
 from chilopod.errors import AnalysisError
-from chilopod.stability.arguments import numbers
-from chilopod.stability.jumps import UndeclaredSwitch
-from chilopod.stability.taylor.taylor import pieces
+from chilopod.flows.arguments import numbers
+from chilopod.flows.jumps import UndeclaredSwitch
+from chilopod.flows.taylor.flow import pieces
 
 Array = NDArray[np.float64]
 Parts = list[tuple[float, float]]
 
+Gradient = Callable[[float, Array], Array]
+"""``gradient(t, x)`` -> derivative of f with respect to the state, shape (n, n)."""
+
 _COMPLEX_STEP = 1e-40
+_DIFFERENCE = 6e-6
 _OTHER = 5.0  # two independent errors differ by less than a fifth of them rarely enough
 _ANALYTIC_FLOOR = 1e-14
 _DIFFERENCE_FLOOR = 1e-8
@@ -44,7 +48,7 @@ class CalledFlow:
     ----------
     rhs, args, jacobian
         As for :func:`chilopod.stability.from_rhs`. Without a jacobian the derivative is taken by a complex step if the
-        function takes it, else by central differences; that is seen at the first state.
+        function takes it near the state, else by central differences.
     edges
         Times from 0 to the period at which the integration stops and starts anew.
     fast
@@ -66,28 +70,27 @@ class CalledFlow:
     times: Array
     reason: str
     tolerance: float
-    _analytic: list[bool] = field(default_factory=list, repr=False)
-    _warned: list[bool] = field(default_factory=list, repr=False)
 
     def flow(self, x: Array, t0: float, t1: float) -> tuple[Array, Array]:
         """State at t1 and its derivative with respect to the state at t0."""
         parts = self._parts(t0, t1)
-        return self._over(x, parts, self.tolerance, self._sizes(x, parts))
+        sizes = self._sizes(x, parts)
+        return self._over(x, parts, self.tolerance, sizes, self._gradient(x, sizes)[0])
 
     def flow_with_error(self, x: Array, t0: float, t1: float) -> tuple[Array, Array, float]:
         """The same with a bound on the error of the largest entry of the derivative."""
         parts = self._parts(t0, t1)
         sizes = self._sizes(x, parts)
-        state, derivative = self._over(x, parts, self.tolerance, sizes)
+        gradient, floor = self._gradient(x, sizes)
+        state, derivative = self._over(x, parts, self.tolerance, sizes, gradient)
         # The same with a tolerance a hundred times as large errs at least ten times as much, so the difference bounds
         # the error. Except where the step control is deceived: its estimate passes through zero now and then, and lets
         # a step through that is too long. Other steps, from other starts, are not deceived alike.
-        _, coarse = self._over(x, parts, 100.0 * self.tolerance, sizes)
-        _, shifted = self._over(x, _cut(parts), self.tolerance, sizes)
+        _, coarse = self._over(x, parts, 100.0 * self.tolerance, sizes, gradient)
+        _, shifted = self._over(x, _cut(parts), self.tolerance, sizes, gradient)
         unit = sizes[None, :] / sizes[:, None]
         rough = float(np.abs((coarse - derivative) * unit).max())
         other = _OTHER * float(np.abs((shifted - derivative) * unit).max())
-        floor = _ANALYTIC_FLOOR if self.jacobian is not None or self._analytic[0] else _DIFFERENCE_FLOOR
         error = max(rough, other) + floor * float(np.abs(derivative * unit).max())
         error = max(error, self._missed(x, parts, derivative * unit, sizes))
         return state, derivative, error * float((1.0 / unit).max())
@@ -122,16 +125,7 @@ class CalledFlow:
         # At a switch itself it is anybody's guess which side counts.
         return lambda t, y: self._slope(min(max(t, inner_a), inner_b), y * sizes) / sizes
 
-    def _over(self, x: Array, parts: Parts, tolerance: float, sizes: Array) -> tuple[Array, Array]:
-        if self.jacobian is None and not self._analytic:
-            self._analytic.append(_is_analytic(self.rhs, self.args, x, sizes, self.times))
-            if not self._analytic[0]:
-                warnings.warn(
-                    f"the right-hand side cannot be traced ({self.reason}) nor differentiated by a complex step: its "
-                    "derivative is taken by differences, with about nine digits",
-                    NotAnalytic,
-                    stacklevel=3,
-                )
+    def _over(self, x: Array, parts: Parts, tolerance: float, sizes: Array, gradient: Gradient) -> tuple[Array, Array]:
         n = x.size
         y = np.concatenate([x / sizes, np.eye(n).ravel()])
         for a, b in parts:
@@ -139,8 +133,8 @@ class CalledFlow:
 
             def both(t: float, y: Array, low: float = inner_a, high: float = inner_b) -> Array:
                 t, state = min(max(t, low), high), y[:n] * sizes
-                gradient = self._gradient(t, state, sizes) * (sizes[None, :] / sizes[:, None])
-                return np.concatenate([self._slope(t, state) / sizes, (gradient @ y[n:].reshape(n, n)).ravel()])
+                matrix = gradient(t, state) * (sizes[None, :] / sizes[:, None])
+                return np.concatenate([self._slope(t, state) / sizes, (matrix @ y[n:].reshape(n, n)).ravel()])
 
             y = self._solved(both, y, a, b, tolerance, 0.01 * tolerance)[:, -1]
         return y[:n] * sizes, y[n:].reshape(n, n) * (sizes[:, None] / sizes[None, :])
@@ -163,34 +157,50 @@ class CalledFlow:
                 return 0.0
         if off[1] < 0.5 * off[0]:
             return 0.0  # falls with the difference: curvature
-        if not self._warned:
-            self._warned.append(True)
-            warnings.warn(
-                "the derivative of the flow disagrees with its differences: the right-hand side jumps somewhere in the "
-                "state. Write it without branches (numpy.where, sign, maximum), and the jumps are crossed exactly",
-                UndeclaredSwitch,
-                stacklevel=4,
-            )
+        warnings.warn(
+            "the derivative of the flow disagrees with its differences: the right-hand side jumps somewhere in the "
+            "state. Write it without branches (numpy.where, sign, maximum), and the jumps are crossed exactly",
+            UndeclaredSwitch,
+            stacklevel=4,
+        )
         return 2.0 * max(off) / float(np.abs(direction).min())
 
     def _slope(self, t: float, x: Array) -> Array:
         return numbers(self.rhs(t, x, *self.args), x.shape, "rhs")
 
-    def _gradient(self, t: float, x: Array, sizes: Array) -> Array:
+    def _gradient(self, x: Array, sizes: Array) -> tuple[Gradient, float]:
+        """The derivative of f near a state, by what f allows, and its error relative to its largest entry."""
         if self.jacobian is not None:
-            return numbers(self.jacobian(t, x, *self.args), (x.size, x.size), "jacobian")
+            return self._given, _ANALYTIC_FLOOR
+        if _is_analytic(self.rhs, self.args, x, sizes, self.times):
+            return lambda t, x: self._by_complex_steps(t, x, sizes), _ANALYTIC_FLOOR
+        warnings.warn(
+            f"the right-hand side cannot be traced ({self.reason}) nor differentiated by a complex step: its "
+            "derivative is taken by differences, with about nine digits",
+            NotAnalytic,
+            stacklevel=4,
+        )
+        return lambda t, x: self._by_differences(t, x, sizes), _DIFFERENCE_FLOOR
+
+    def _given(self, t: float, x: Array) -> Array:
+        assert self.jacobian is not None
+        return numbers(self.jacobian(t, x, *self.args), (x.size, x.size), "jacobian")
+
+    def _by_complex_steps(self, t: float, x: Array, sizes: Array) -> Array:
         columns = []
         for j in range(x.size):
-            if self._analytic[0]:
-                z = x.astype(np.complex128)
-                z[j] += 1j * _COMPLEX_STEP * sizes[j]
-                columns.append(np.asarray(self.rhs(t, z, *self.args)).imag / (_COMPLEX_STEP * sizes[j]))
-            else:
-                h = 6e-6 * sizes[j]
-                up, down = x.copy(), x.copy()
-                up[j] += h
-                down[j] -= h
-                columns.append((self._slope(t, up) - self._slope(t, down)) / (up[j] - down[j]))
+            z = x.astype(np.complex128)
+            z[j] += 1j * _COMPLEX_STEP * sizes[j]
+            columns.append(np.asarray(self.rhs(t, z, *self.args)).imag / (_COMPLEX_STEP * sizes[j]))
+        return np.array(columns).T
+
+    def _by_differences(self, t: float, x: Array, sizes: Array) -> Array:
+        columns = []
+        for j in range(x.size):
+            up, down = x.copy(), x.copy()
+            up[j] += _DIFFERENCE * sizes[j]
+            down[j] -= _DIFFERENCE * sizes[j]
+            columns.append((self._slope(t, up) - self._slope(t, down)) / (up[j] - down[j]))
         return np.array(columns).T
 
     def _solved(

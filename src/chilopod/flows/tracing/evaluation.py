@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.stability.taylor import tape as ops
-from chilopod.stability.taylor.tape import Tape
+from chilopod.flows.tracing import tape as ops
+from chilopod.flows.tracing.tape import Tape
 
 Array = NDArray[np.float64]
 
@@ -93,22 +93,21 @@ def evaluate_series(tape: Tape, curves: Array, params: Array) -> Array:
     AnalysisError
         If a curve starts on a switching surface, where f has no series.
     """
-    from chilopod.stability.taylor import series  # numba takes half a second to import
+    from chilopod.flows.tracing import series  # numba takes half a second to import
 
-    # Copies, because compiled code is compiled anew for arrays that are read-only.
-    program, terms, numbers, layout = (np.array(part) for part in (tape.program, tape.terms, tape.numbers, tape.layout))
-    n, first, last = (int(layout[i]) for i in (0, 3, 4))
-    branches = np.zeros(tape.switches.shape[1])
-    values = np.zeros((program.shape[1], curves.shape[1]))
+    n, first, last = (int(tape.layout[i]) for i in (0, 3, 4))
+    values = np.zeros((tape.program.shape[1], curves.shape[1]))
+    coefficients = series.Series(values, np.empty((0, 0, 0)), np.zeros(tape.switches.shape[1]))
     result = np.empty_like(curves)
     with np.errstate(all="ignore"):
-        series.load(program, terms, numbers, layout, np.array(params, dtype=np.float64), values)
+        # A copy, because compiled code is compiled anew for arrays that are read-only.
+        series.load(tape, np.array(params, dtype=np.float64), coefficients)
         for curve, out in zip(curves, result, strict=True):
-            if branches.size:
-                branches = _branches(tape, curve[0], params)
+            if tape.switches.shape[1]:
+                coefficients.branches[:] = _branches(tape, curve[0], params)
             values[:n] = curve.T
             for k in range(curves.shape[1]):
-                series.values_at(program, terms, first, last, k, values, branches)
+                series.values_at(tape.program, tape.terms, first, last, k, values, coefficients.branches)
             out[:] = values[tape.slopes].T
     return result
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from chilopod.stability.taylor.graph import Graph
-from chilopod.stability.taylor.tape import (
+from chilopod.flows.tracing.graph import Graph
+from chilopod.flows.tracing.tape import (
     CONSTANT,
     COS,
     FLOOR,
@@ -26,6 +27,7 @@ from chilopod.stability.taylor.tape import (
     TIMED,
     Tape,
 )
+from chilopod.frozen import read_only
 
 Terms = dict[int, list[tuple[int, int]]]
 """Weight and node of every term of the sums."""
@@ -79,16 +81,17 @@ def ordered(
         len(order) - len(later),
         len(order),
     ]
-    return Tape(
-        program=program,
-        terms=np.array(terms, dtype=np.int64).reshape(-1, 2).T.copy(),
-        numbers=np.array([graph.value(i) for i in numbers], dtype=np.float64),
-        layout=np.array(layout, dtype=np.int64),
-        slopes=np.array([place[i] for i in slopes], dtype=np.int64),
-        switches=np.array(switches, dtype=np.int64).reshape(-1, 3).T.copy(),
-        resets=np.array([[place[i] for i in reset] for reset in resets], dtype=np.int64).reshape(-1, len(slopes)),
-        clocks=np.array([place[i] for i in _clocks(graph, every, flat)], dtype=np.int64),
+    parts: tuple[Any, ...] = (
+        program,
+        np.array(terms, dtype=np.int64).reshape(-1, 2).T,
+        np.array([graph.value(i) for i in numbers], dtype=np.float64),
+        np.array(layout, dtype=np.int64),
+        np.array([place[i] for i in slopes], dtype=np.int64),
+        np.array(switches, dtype=np.int64).reshape(-1, 3).T,
+        np.array([[place[i] for i in reset] for reset in resets], dtype=np.int64).reshape(-1, len(slopes)),
+        np.array([place[i] for i in _clocks(graph, every, flat)], dtype=np.int64),
     )
+    return Tape(*(read_only(np.ascontiguousarray(part)) for part in parts))
 
 
 def _operands(graph: Graph, node: int, flat: Terms) -> list[int]:

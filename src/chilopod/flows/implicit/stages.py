@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from chilopod.compiled import fused_njit
-from chilopod.stability.taylor.series import tangents_at, values_at
+from chilopod.flows.tracing.series import tangents_at, values_at
 
 _MOST_ROUNDS = 10
 _CLOSE = 1e-7
@@ -66,53 +66,122 @@ def substitute(matrix: Any, order: Any, columns: Any) -> None:
             columns[i, j] *= f
 
 
+class Problem(NamedTuple):
+    """A right-hand side on an interval, in units of the states.
+
+    Attributes
+    ----------
+    tape
+        Its operations.
+    units
+        Units of the states, shape (n,), positive; everything else here is in these units.
+    series
+        Values and tangents of the tape, the tangents of the states at 1, and the branches of its switches, which hold
+        on the interval.
+    largest
+        Largest moduli of the states so far, shape (n,).
+    """
+
+    tape: Any
+    units: Any
+    series: Any
+    largest: Any
+
+
+class Method(NamedTuple):
+    """A formula of collocation: nodes, matrix, start and filter of :class:`chilopod.flows.implicit.radau.Radau`."""
+
+    nodes: Any
+    weights: Any
+    start: Any
+    gamma: float
+
+
+class Step(NamedTuple):
+    """A step with s stages.
+
+    Attributes
+    ----------
+    slope, jacobian
+        f and its jacobian at the start, shapes (n,) and (n, n).
+    moved
+        States of the stages less the state at the start, shape (s, n).
+    slopes, jacobians
+        f and its jacobian in the stages, shapes (s, n) and (s, n, n).
+    matrix, order
+        Decomposed matrix of Newton's method, shape (s n, s n), and the exchanges of its rows.
+    columns
+        Derivative of the stages with respect to the state at the start, shape (s n, n).
+    reached
+        Derivative of the stages with respect to the start of the interval, shape (s, n, n).
+    """
+
+    slope: Any
+    jacobian: Any
+    moved: Any
+    slopes: Any
+    jacobians: Any
+    matrix: Any
+    order: Any
+    columns: Any
+    reached: Any
+
+
 @fused_njit(error_model="numpy")
-def at(
-    tape: Any, units: Any, x: Any, t: float, values: Any, tangents: Any, branches: Any, slope: Any, jacobian: Any
-) -> bool:
-    """f and its jacobian in a state, everything in units; False if they are not finite."""
-    program, terms, _, layout, slopes = tape
-    n = layout[0]
+def at(problem: Any, x: Any, t: float, slope: Any, jacobian: Any) -> bool:
+    """f and its jacobian in a state; False if they are not finite."""
+    tape, units = problem.tape, problem.units
+    values, tangents, branches = problem.series.values, problem.series.tangents, problem.series.branches
+    n, first, stop = tape.layout[0], tape.layout[3], tape.layout[4]
     for i in range(n):
         values[i, 0] = x[i] * units[i]
     values[n, 0] = t
-    values_at(program, terms, layout[3], layout[4], 0, values, branches)
-    tangents_at(program, terms, layout[3], layout[4], 0, values, tangents)
+    values_at(tape.program, tape.terms, first, stop, 0, values, branches)
+    tangents_at(tape.program, tape.terms, first, stop, 0, values, tangents)
     s = 0.0
     for i in range(n):
-        slope[i] = values[slopes[i], 0] / units[i]
+        slope[i] = values[tape.slopes[i], 0] / units[i]
         s += abs(slope[i])
         for j in range(n):
-            jacobian[i, j] = tangents[slopes[i], 0, j] * (units[j] / units[i])
+            jacobian[i, j] = tangents[tape.slopes[i], 0, j] * (units[j] / units[i])
             s += abs(jacobian[i, j])
     return s < math.inf
 
 
 @fused_njit(error_model="numpy")
-def stages(
-    tape: Any,
-    coefficients: Any,
-    units: Any,
-    x: Any,
-    t: float,
-    h: float,
-    largest: Any,
-    values: Any,
-    tangents: Any,
-    branches: Any,
-    moved: Any,
-    slopes: Any,
-    jacobians: Any,
-    matrix: Any,
-    order: Any,
-    columns: Any,
-) -> bool:
-    """Solve for the stages; ``moved`` is Y - x, a guess at first.
+def _newton_matrix(weights: Any, h: float, jacobians: Any, matrix: Any) -> None:
+    """Matrix of Newton's method for the stages."""
+    s, n = jacobians.shape[:2]
+    for i in range(s):
+        for j in range(s):
+            f = h * weights[i, j]
+            for k in range(n):
+                for m in range(n):
+                    matrix[i * n + k, j * n + m] = -f * jacobians[j, k, m]
+    for i in range(s * n):
+        matrix[i, i] += 1.0
 
-    In the end ``columns`` has the derivative of the stages with respect to x, shape (s n, n), and ``slopes`` and
-    ``jacobians`` belong to the stages. False if it does not converge.
+
+@fused_njit(error_model="numpy")
+def _stage_columns(step: Any) -> None:
+    """Derivative of the stages with respect to the state at the start."""
+    s, n = step.moved.shape
+    step.columns[:] = 0.0
+    for i in range(s):
+        for k in range(n):
+            step.columns[i * n + k, k] = 1.0
+    substitute(step.matrix, step.order, step.columns)
+
+
+@fused_njit(error_model="numpy")
+def stages(problem: Any, method: Any, x: Any, t: float, h: float, step: Any) -> bool:
+    """Solve for the stages; ``moved`` is a guess at first.
+
+    In the end ``columns`` has the derivative of the stages with respect to x, and ``slopes`` and ``jacobians`` belong
+    to the stages. False if it does not converge.
     """
-    nodes, weights = coefficients
+    nodes, weights, largest = method.nodes, method.weights, problem.largest
+    moved, slopes = step.moved, step.slopes
     s, n = moved.shape
     y = np.empty(n)
     residual = np.empty((s * n, 1))
@@ -122,7 +191,7 @@ def stages(
         for j in range(s):
             for i in range(n):
                 y[i] = x[i] + moved[j, i]
-            if not at(tape, units, y, t + nodes[j] * h, values, tangents, branches, slopes[j], jacobians[j]):
+            if not at(problem, y, t + nodes[j] * h, slopes[j], step.jacobians[j]):
                 return False
         for i in range(s):
             for k in range(n):
@@ -130,16 +199,10 @@ def stages(
                 for j in range(s):
                     total += weights[i, j] * slopes[j, k]
                 residual[i * n + k, 0] = h * total - moved[i, k]
-            for j in range(s):
-                f = h * weights[i, j]
-                for k in range(n):
-                    for m in range(n):
-                        matrix[i * n + k, j * n + m] = -f * jacobians[j, k, m]
-        for i in range(s * n):
-            matrix[i, i] += 1.0
-        if not decompose(matrix, order):
+        _newton_matrix(weights, h, step.jacobians, step.matrix)
+        if not decompose(step.matrix, step.order):
             return False
-        substitute(matrix, order, residual)
+        substitute(step.matrix, step.order, residual)
         off = 0.0
         for k in range(n):
             size = largest[k]
@@ -151,11 +214,7 @@ def stages(
                 if move != 0.0:
                     off = max(off, abs(move) / max(size, abs(move)))
         if close or off <= 1e-15:
-            columns[:] = 0.0
-            for i in range(s):
-                for k in range(n):
-                    columns[i * n + k, k] = 1.0
-            substitute(matrix, order, columns)
+            _stage_columns(step)
             return True
         if off > 2.0 * before:
             return False
@@ -165,78 +224,64 @@ def stages(
 
 
 @fused_njit(error_model="numpy")
-def estimated(
-    x: Any,
-    h: float,
-    coefficients: Any,
-    largest: Any,
-    near: Any,
-    moved: Any,
-    slopes: Any,
-    jacobians: Any,
-    columns: Any,
-    slope: Any,
-    jacobian: Any,
-    derivative: Any,
-    extent: Any,
-    reached: Any,
-) -> float:
-    """The error of a step over what every state and entry of the derivative is large for.
-
-    What f at the start differs by from the polynomial through its values in the stages, filtered by the inverse of
-    1 - h gamma J. States are measured
-    by the largest they have been, and by what the others make of them within the step; so are the entries of the
-    derivative, ``extent``.
+def _defects(x: Any, h: float, method: Any, step: Any, derivative: Any) -> tuple[Any, Any]:
+    """What f at the start differs by from the polynomial through its values in the stages, filtered by the inverse of
+    1 - h gamma J, of the state and of the columns of the derivative, shape (n, 1 + columns); and the round-off in it.
     """
-    start, gamma = coefficients
-    s, n = moved.shape
+    start, gamma = method.start, method.gamma
+    s, n = step.moved.shape
     size = derivative.shape[0]
-    off = np.empty((n, 1 + size))
-    terms = np.empty((n, 1 + size))
-    filtering = np.empty((n, n))
-    inverse = np.eye(n)
-    order = np.empty(n, np.int64)
-    end = columns[(s - 1) * n :]
-    factor = np.zeros((n, n))
+    off, terms = np.empty((n, 1 + size)), np.empty((n, 1 + size))
+    filtering, inverse, order = np.empty((n, n)), np.eye(n), np.empty(n, np.int64)
     for k in range(n):
-        total = slope[k]
+        total = step.slope[k]
         for j in range(s):
-            total -= start[j] * slopes[j, k]
+            total -= start[j] * step.slopes[j, k]
         off[k, 0] = h * gamma * total
+        terms[k, 0] = abs(x[k])
         for m in range(n):
-            filtering[k, m] = (1.0 if k == m else 0.0) - h * gamma * jacobian[k, m]
+            filtering[k, m] = (1.0 if k == m else 0.0) - h * gamma * step.jacobian[k, m]
     if size > 0:
-        for k in range(n):
-            for m in range(n):
-                factor[k, m] = jacobian[k, m]
+        factor = step.jacobian.copy()
         for j in range(s):
-            factor -= start[j] * (jacobians[j] @ columns[j * n : (j + 1) * n])
+            factor -= start[j] * (step.jacobians[j] @ step.columns[j * n : (j + 1) * n])
         entries = (h * gamma) * (factor @ derivative)
         for k in range(n):
             for m in range(n):
                 off[k, 1 + m] = entries[k, m]
-    for m in range(n):
-        terms[m, 0] = abs(x[m])
-        for j in range(size):
-            terms[m, 1 + j] = abs(derivative[m, j])
+                terms[k, 1 + m] = abs(derivative[k, m])
     if not decompose(filtering, order):
-        return math.inf
+        off[:] = math.inf
+        return off, np.zeros(off.shape)
     substitute(filtering, order, inverse)
-    off = inverse @ off
     # No shorter step takes away what is round-off in it.
-    noise = (_NOISE * h * gamma) * (np.abs(inverse) @ (np.abs(jacobian) @ terms))
+    noise = (_NOISE * h * gamma) * (np.abs(inverse) @ (np.abs(step.jacobian) @ terms))
+    return inverse @ off, noise
+
+
+@fused_njit(error_model="numpy")
+def estimated(problem: Any, method: Any, x: Any, h: float, step: Any, near: Any, derivative: Any, extent: Any) -> float:
+    """The error of a step over what every state and entry of the derivative is large for.
+
+    States are measured by the largest they have been, and by what the others make of them within the step; so are the
+    entries of the derivative, ``extent``.
+    """
+    largest, reached = problem.largest, step.reached
+    s, n = step.moved.shape
+    off, noise = _defects(x, h, method, step, derivative)
+    end = step.columns[(s - 1) * n :]
     worst = 0.0
     for k in range(n):
         scale = largest[k]
         for i in range(s):
-            scale = max(scale, abs(x[k] + moved[i, k]))
+            scale = max(scale, abs(x[k] + step.moved[i, k]))
         for m in range(n):
             scale = max(scale, abs(end[k, m]) * largest[m])
         if abs(off[k, 0]) > noise[k, 0]:
             worst = max(worst, abs(off[k, 0]) / scale)
-    if size > 0:
+    if derivative.shape[0] > 0:
         for i in range(s):
-            reached[i] = columns[i * n : (i + 1) * n] @ derivative
+            reached[i] = step.columns[i * n : (i + 1) * n] @ derivative
         for k in range(n):
             for j in range(n):
                 if not near[k, j] or abs(off[k, 1 + j]) <= noise[k, 1 + j]:

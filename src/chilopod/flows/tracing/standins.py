@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from chilopod.stability.taylor import tape as ops
-from chilopod.stability.taylor.traced import (
+from chilopod.flows.tracing import tape as ops
+from chilopod.flows.tracing.traced import (
     REPLACED,
     SCALAR,
     Traced,

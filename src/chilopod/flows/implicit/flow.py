@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 
 from chilopod.cores import cores
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.flows.balance import numerical_balance
+from chilopod.flows.taylor.flow import RESOLUTION, pieces
+from chilopod.flows.tracing import tape as ops
+from chilopod.flows.tracing.evaluation import evaluate, evaluate_jacobian
+from chilopod.flows.tracing.tape import Tape
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.capabilities import Stretched
-from chilopod.stability.scales import numerical_balance
-from chilopod.stability.taylor import tape as ops
-from chilopod.stability.taylor.evaluation import evaluate, evaluate_jacobian
-from chilopod.stability.taylor.tape import Tape
-from chilopod.stability.taylor.taylor import RESOLUTION, pieces
 
 Array = NDArray[np.float64]
 
@@ -38,6 +37,32 @@ _REASONS = {
     2: "takes too many steps, and came to t = {t:g} only",
     3: "cannot be continued beyond t = {t:.17g}: a singularity, or rates beyond the resolution of time",
 }
+
+
+@dataclass(frozen=True)
+class Stretched(ReadOnlyArrays):
+    """What a flow makes of a frame.
+
+    Attributes
+    ----------
+    state
+        At the end, shape (n,).
+    frame
+        Orthonormal, shape (n, n): for every k its first k columns span what the flow made of those at the start.
+    stretch
+        Logarithms of the growth of the columns, shape (n,): of the volume of the first k, less that of the first k-1.
+    other
+        The logarithms by another computation, which tells their error.
+    turned
+        The smallest cosine of the angles between a column and itself a step later, shape (n,): the sign of a column
+        is carried along where it is clearly positive.
+    """
+
+    state: Array
+    frame: Array
+    stretch: Array
+    other: Array
+    turned: Array
 
 
 @dataclass(frozen=True)
@@ -143,7 +168,7 @@ class ImplicitFlow(ReadOnlyArrays):
         carried: tuple[Array, Array, Array] = (np.empty((0, 0)), np.empty(0), np.empty(0)),
     ) -> tuple[Array, Array]:
         """State and derivative at t1; a frame is carried in place, with the stretch and the turn of its directions."""
-        n, t = self.tape.dimension, self.tape
+        n = self.tape.dimension
         # Copies, because compiled code is compiled anew for arrays that are read-only.
         x, params = np.array(x, dtype=np.float64), self.params.copy()
         if not (x.shape == (n,) and carried[0].shape[0] in (0, n) and (units is None or np.shape(units) == (n,))):
@@ -155,29 +180,14 @@ class ImplicitFlow(ReadOnlyArrays):
         units = balanced if units is None else np.array(units)
         x = x / units
         size = n if derived else 0
-        derivative, extent, largest = np.eye(size), np.eye(size), np.zeros(n)
-        report = np.zeros(2)
+        derivative, report = np.eye(size), np.zeros(2)
+        kernels, method = _compiled(), _method(stages)
+        result = kernels.Outcome(derivative, np.zeros(n), np.eye(size), *carried, report)
         budget = max(_FEWEST_STEPS, int(_MOST_WORK / (n * stages) ** 3))
         for a, b in pieces(self._cuts, float(self.edges[-1]), t0, t1):
-            status = _compiled().advance(
-                (t.program, t.terms, t.numbers, t.layout, t.slopes),
-                _coefficients(stages),
-                params,
-                units,
-                near,
-                x,
-                a,
-                b,
-                self._longest(a, b),
-                tolerance,
-                budget,
-                self._branches(a, b),
-                derivative,
-                largest,
-                extent,
-                *carried,
-                report,
-            )
+            interval = kernels.Interval(a, b, self._longest(a, b), self._branches(a, b))
+            control = kernels.Control(tolerance, budget, units, near)
+            status = kernels.advance(self.tape, method, params, x, interval, control, result)
             if status:
                 raise AnalysisError(_REASONS[status].format(t=report[1]), field="rhs")
             budget -= int(report[0])
@@ -234,16 +244,16 @@ def _switch_instants(tape: Tape, params: Array, period: float) -> Array:
 
 
 @functools.cache
-def _coefficients(stages: int) -> tuple[Any, ...]:
-    from chilopod.stability.implicit.radau import radau  # scipy.special takes its time to import
+def _method(stages: int) -> Any:
+    from chilopod.flows.implicit.radau import radau  # scipy.special takes its time to import
 
     found = radau(stages)
-    return found.nodes.copy(), found.matrix.copy(), found.start.copy(), found.filter
+    return _compiled().Method(found.nodes.copy(), found.matrix.copy(), found.start.copy(), found.filter)
 
 
 @functools.cache
 def _compiled() -> Any:
     # numba takes half a second to import, and only who integrates needs it.
-    from chilopod.stability.implicit import collocation
+    from chilopod.flows.implicit import collocation
 
     return collocation

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import ParameterError
-from chilopod.stability.arguments import numbers
+from chilopod.flows.arguments import numbers
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.stability.arguments import Slopes, numbers
+from chilopod.flows.arguments import Slopes, numbers
 
 Array = NDArray[np.float64]
 

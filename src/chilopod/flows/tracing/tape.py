@@ -1,7 +1,7 @@
 """A right-hand side as data: the list of the elementary operations that evaluate it.
 
-A :class:`chilopod.stability.taylor.graph.Graph` collects operations while a function is traced, and
-:func:`chilopod.stability.taylor.ordering.ordered` orders them into a :class:`Tape`. The operations are those whose
+A :class:`chilopod.flows.tracing.graph.Graph` collects operations while a function is traced, and
+:func:`chilopod.flows.tracing.ordering.ordered` orders them into a :class:`Tape`. The operations are those whose
 Taylor coefficients obey a recurrence (Griewank and Walther, *Evaluating Derivatives*, 2nd ed., SIAM 2008, sec. 13.2):
 
 * ``LINEAR``: a sum of nodes with constant weights, ``PRODUCT``, ``SQUARE``, ``QUOTIENT``;
@@ -12,12 +12,10 @@ Taylor coefficients obey a recurrence (Griewank and Walther, *Evaluating Derivat
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
-from chilopod.frozen import ReadOnlyArrays
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -34,9 +32,10 @@ CONSTANT, TIMED, MOVING = 0, 1, 2
 """What a node depends on: parameters only, time too, or the state."""
 
 
-@dataclass(frozen=True)
-class Tape(ReadOnlyArrays):
+class Tape(NamedTuple):
     """The operations that evaluate dx/dt = f(t, x), the guards g_k(t, x) and resets r_k(t, x) of its events.
+
+    Compiled code takes it as it is; its arrays are read-only.
 
     Nodes are numbered: n states, time, parameters, numbers, then operations, each after its operands: those that depend
     on the parameters only, those of f and the guards, those of the resets.

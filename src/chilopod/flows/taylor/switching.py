@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from chilopod.compiled import fused_njit
-from chilopod.stability.taylor import tape as ops
-from chilopod.stability.taylor.series import expand, values_at
+from chilopod.flows.tracing import tape as ops
+from chilopod.flows.tracing.series import Series, expand, values_at
 
 STEP, FLOOR, GUARD = ops.STEP, ops.FLOOR, ops.GUARD
 
@@ -20,32 +20,62 @@ _ZERO = 1e-13
 """A switching function this small, relative to what it was before, is zero."""
 
 
+class Motion(NamedTuple):
+    """A state on its way, and its series there.
+
+    Attributes
+    ----------
+    x
+        State, shape (n,).
+    seeds
+        Directions of the tangents, shape (n, columns).
+    series
+        Series of all nodes from the state.
+    scales
+        Largest value of every switching function so far, shape (switches,).
+    """
+
+    x: Any
+    seeds: Any
+    series: Any
+    scales: Any
+
+
+@fused_njit(error_model="numpy", inline="always")
+def start(tape: Any, motion: Any, t: float) -> None:
+    """Set the state and the time from which a series starts; the tangents are those along the columns of ``seeds``."""
+    n = tape.layout[0]
+    values, tangents, seeds = motion.series.values, motion.series.tangents, motion.seeds
+    for i in range(n):
+        values[i, 0] = motion.x[i]
+        for lane in range(tangents.shape[2]):
+            tangents[i, 0, lane] = seeds[i, lane] if lane < seeds.shape[1] else 0.0
+    values[n, 0] = t
+
+
 @fused_njit(error_model="numpy")
-def settle(
-    program: Any,
-    terms: Any,
-    layout: Any,
-    slopes: Any,
-    switches: Any,
-    unit: float,
-    values: Any,
-    tangents: Any,
-    branches: Any,
-    scales: Any,
-) -> int:
+def _expand_values(tape: Any, series: Any, unit: float) -> None:
+    """The first two coefficients of f, without tangents."""
+    alone = Series(series.values, series.tangents[:, :, :0], series.branches)
+    expand(tape, 1, tape.layout[4], unit, alone)
+
+
+@fused_njit(error_model="numpy")
+def settle(tape: Any, motion: Any, unit: float) -> int:
     """Choose the branch of every switch at a state; where its function is zero, by where that goes."""
-    for i in range(layout[3], layout[4]):
+    program, switches = tape.program, tape.switches
+    values, branches, scales = motion.series.values, motion.series.branches, motion.scales
+    for i in range(tape.layout[3], tape.layout[4]):
         if program[0, i] == STEP:
             branches[program[2, i]] = 1.0 if values[program[1, i], 0] >= 0.0 else -1.0
         elif program[0, i] == FLOOR:
             branches[program[2, i]] = math.floor(values[program[1, i], 0])
-        values_at(program, terms, i, i + 1, 0, values, branches)
+        values_at(program, tape.terms, i, i + 1, 0, values, branches)
     for s in range(switches.shape[1]):
         if switches[0, s] == GUARD:
             branches[s] = 1.0 if values[switches[1, s], 0] >= 0.0 else -1.0
-    nothing = tangents[:, :, :0]
     for _ in range(2):
-        expand(program, terms, layout, slopes, 1, values, nothing, branches, layout[4], unit)
+        _expand_values(tape, motion.series, unit)
         settled = True
         for s in range(switches.shape[1]):
             g = values[switches[1, s], 0]
@@ -68,36 +98,17 @@ def settle(
 
 
 @fused_njit(error_model="numpy")
-def is_timed(program: Any, switches: Any, s: int) -> bool:
+def is_timed(tape: Any, s: int) -> bool:
     """Whether a switch is a guard that knows only time."""
-    return bool(switches[0, s] == GUARD and program[4, switches[1, s]] == 0)
+    return bool(tape.switches[0, s] == GUARD and tape.program[4, tape.switches[1, s]] == 0)
 
 
 @fused_njit(error_model="numpy")
-def start(layout: Any, x: Any, t: float, seeds: Any, values: Any, tangents: Any) -> None:
-    """Set the state and the time from which a series starts; the tangents are those along the columns of ``seeds``."""
-    n = layout[0]
-    for i in range(n):
-        values[i, 0] = x[i]
-        for lane in range(tangents.shape[2]):
-            tangents[i, 0, lane] = seeds[i, lane] if lane < seeds.shape[1] else 0.0
-    values[n, 0] = t
-
-
-@fused_njit(error_model="numpy")
-def _carry_over(
-    program: Any,
-    terms: Any,
-    layout: Any,
-    switches: Any,
-    switched: int,
-    surfaces: Any,
-    values: Any,
-    branches: Any,
-    scales: Any,
-) -> None:
+def _carry_over(tape: Any, motion: Any, switched: int, surfaces: Any) -> None:
     """Choose anew the branches of the switches whose own functions jump where another one switches."""
-    for i in range(layout[3], layout[4]):
+    program, switches = tape.program, tape.switches
+    values, branches, scales = motion.series.values, motion.series.branches, motion.scales
+    for i in range(tape.layout[3], tape.layout[4]):
         if program[0, i] == STEP or program[0, i] == FLOOR:
             s = program[2, i]
             g = values[program[1, i], 0]
@@ -106,7 +117,7 @@ def _carry_over(
                     branches[s] = math.floor(g)
                 else:
                     branches[s] = 1.0 if g >= 0.0 else -1.0
-        values_at(program, terms, i, i + 1, 0, values, branches)
+        values_at(program, tape.terms, i, i + 1, 0, values, branches)
     for s in range(switches.shape[1]):
         g = values[switches[1, s], 0]
         if switches[0, s] == GUARD and abs(g - surfaces[s]) > _ZERO * scales[s]:
@@ -114,81 +125,57 @@ def _carry_over(
 
 
 @fused_njit(error_model="numpy")
+def _reset(tape: Any, motion: Any, event: int, before: Any, jump: Any) -> bool:
+    """Put the state where an event puts it, with what it makes of the tangents and of dx/dt; whether it moves."""
+    values, tangents = motion.series.values, motion.series.tangents
+    moves = False
+    for i in range(tape.layout[0]):
+        node = tape.resets[event, i]
+        if node != i:
+            moves = True
+        motion.x[i] = values[node, 0]
+        before[i] = values[node, 1]
+        for j in range(jump.shape[1]):
+            jump[i, j] = tangents[node, 0, j]
+    return moves
+
+
+@fused_njit(error_model="numpy")
 def cross(
-    program: Any,
-    terms: Any,
-    layout: Any,
-    slopes: Any,
-    switches: Any,
-    resets: Any,
-    directions: Any,
-    s: int,
-    direction: float,
-    unit: float,
-    x: Any,
-    t: float,
-    seeds: Any,
-    values: Any,
-    tangents: Any,
-    branches: Any,
-    scales: Any,
-    jump: Any,
+    tape: Any, directions: Any, motion: Any, s: int, direction: float, unit: float, t: float, jump: Any
 ) -> tuple[int, int]:
     """Go through a switch or an event: the state after it in ``x``, its derivative times ``seeds`` in ``jump``.
 
     Returns the status, and the number of the event or -1.
     """
-    n = layout[0]
+    n, switches = tape.layout[0], tape.switches
+    values, branches = motion.series.values, motion.series.branches
     g = switches[1, s]
     event = -1
     if switches[0, s] == GUARD and directions[switches[2, s]] * direction >= 0.0:
         event = switches[2, s]
-    start(layout, x, t, seeds, values, tangents)
-    expand(
-        program,
-        terms,
-        layout,
-        slopes,
-        1,
-        values,
-        tangents,
-        branches,
-        layout[5] if event >= 0 else layout[4],
-        unit,
-    )
+    start(tape, motion, t)
+    expand(tape, 1, tape.layout[5] if event >= 0 else tape.layout[4], unit, motion.series)
     slope = values[g, 1]
-    gradient = tangents[g, 0].copy()
+    gradient = motion.series.tangents[g, 0].copy()
     surfaces = values[switches[1], 0]
     before = np.empty(n)
     for i in range(n):
         before[i] = values[i, 1]
-        for j in range(seeds.shape[1]):
-            jump[i, j] = seeds[i, j]
-    if switches[0, s] == FLOOR:
-        branches[s] += direction
-    else:
-        branches[s] = direction
-    moves = False
-    if event >= 0:
-        for i in range(n):
-            node = resets[event, i]
-            if node != i:
-                moves = True
-            x[i] = values[node, 0]
-            before[i] = values[node, 1]
-            for j in range(seeds.shape[1]):
-                jump[i, j] = tangents[node, 0, j]
-    start(layout, x, t, seeds, values, tangents)
+        for j in range(jump.shape[1]):
+            jump[i, j] = motion.seeds[i, j]
+    branches[s] = branches[s] + direction if switches[0, s] == FLOOR else direction
+    moves = event >= 0 and _reset(tape, motion, event, before, jump)
+    start(tape, motion, t)
     if moves:
-        status = settle(program, terms, layout, slopes, switches, unit, values, tangents, branches, scales)
+        status = settle(tape, motion, unit)
         if status != DONE:
             return status, event
     elif switches[0, s] == GUARD:
         return DONE, event  # f does not switch here
     else:
-        _carry_over(program, terms, layout, switches, s, surfaces, values, branches, scales)
-    nothing = tangents[:, :, :0]
-    expand(program, terms, layout, slopes, 1, values, nothing, branches, layout[4], unit)
+        _carry_over(tape, motion, s, surfaces)
+    _expand_values(tape, motion.series, unit)
     if not moves and values[g, 1] * direction < 0.0:
         return SLIDES, event
     steepest = 0.0
@@ -204,30 +191,13 @@ def cross(
         if differs:
             for i in range(n):
                 f = (values[i, 1] - before[i]) / slope
-                for j in range(seeds.shape[1]):
+                for j in range(jump.shape[1]):
                     jump[i, j] += f * gradient[j]
     return DONE, event
 
 
 @fused_njit(error_model="numpy")
-def await_events(
-    program: Any,
-    terms: Any,
-    layout: Any,
-    slopes: Any,
-    switches: Any,
-    resets: Any,
-    directions: Any,
-    unit: float,
-    soon: float,
-    x: Any,
-    t: float,
-    seeds: Any,
-    values: Any,
-    tangents: Any,
-    branches: Any,
-    scales: Any,
-) -> None:
+def await_events(tape: Any, directions: Any, motion: Any, unit: float, soon: float, t: float) -> None:
     """Set the guards that pass zero within a time ``soon`` of the start of an interval to before it, if the event is
     still to come, else to after it.
 
@@ -235,38 +205,22 @@ def await_events(
     a guard that moves as if to fire is one before the event if the event leaves it moving away (an impact); else, as
     where legs change places, it may as well be the state after it, and is taken for that.
     """
+    switches, series, scales = tape.switches, motion.series, motion.scales
     for s in range(switches.shape[1]):
         if switches[0, s] != GUARD:
             continue
-        value, slope = values[switches[1, s], 0], values[switches[1, s], 1]
+        value, slope = series.values[switches[1, s], 0], series.values[switches[1, s], 1]
         scales[s] = soon * abs(slope) / _ZERO
         if not (slope != 0.0 and abs(value) <= soon * abs(slope)):
             continue
         direction = 1.0 if slope > 0.0 else -1.0
-        ahead = is_timed(program, switches, s)
+        ahead = is_timed(tape, s)
         if not ahead and directions[switches[2, s]] * direction > 0.0:
-            after, then, jump = x.copy(), branches.copy(), np.empty(seeds.shape)
-            cross(
-                program,
-                terms,
-                layout,
-                slopes,
-                switches,
-                resets,
-                directions,
-                s,
-                direction,
-                unit,
-                after,
-                t,
-                seeds,
-                values,
-                tangents,
-                then,
-                scales,
-                jump,
-            )
-            ahead = values[switches[1, s], 1] * direction < 0.0
-            start(layout, x, t, seeds, values, tangents)
-            settle(program, terms, layout, slopes, switches, unit, values, tangents, then, scales)
-        branches[s] = -direction if ahead else direction
+            then = Series(series.values, series.tangents, series.branches.copy())
+            after = Motion(motion.x.copy(), motion.seeds, then, scales)
+            cross(tape, directions, after, s, direction, unit, t, np.empty(motion.seeds.shape))
+            ahead = series.values[switches[1, s], 1] * direction < 0.0
+            back = Motion(motion.x, motion.seeds, then, scales)
+            start(tape, back, t)
+            settle(tape, back, unit)
+        series.branches[s] = -direction if ahead else direction

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.stability.taylor.environment import Opaque, describe, python_function, rebuild
-from chilopod.stability.taylor.evaluation import evaluate
-from chilopod.stability.taylor.graph import Graph
-from chilopod.stability.taylor.ordering import ordered
-from chilopod.stability.taylor.tape import Tape
-from chilopod.stability.taylor.traced import Concrete, Traced, Untraceable, as_traced, node_of, states
+from chilopod.flows.tracing.environment import Opaque, describe, python_function, rebuild
+from chilopod.flows.tracing.evaluation import evaluate
+from chilopod.flows.tracing.graph import Graph
+from chilopod.flows.tracing.ordering import ordered
+from chilopod.flows.tracing.tape import Tape
+from chilopod.flows.tracing.traced import Concrete, Traced, Untraceable, as_traced, node_of, states
 
 Array = NDArray[np.float64]
 

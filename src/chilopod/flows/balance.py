@@ -1,0 +1,16 @@
+"""Sizes of states by which a matrix is balanced."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dgebal
+
+Array = NDArray[np.float64]
+
+
+def numerical_balance(matrix: Array) -> Array:
+    """Sizes d of the states for which the rows and columns of ``matrix[i, j] * d[j] / d[i]`` are about alike, by
+    LAPACK: for bounds on round-off."""
+    d: Array = dgebal(matrix, scale=1, permute=0)[3]
+    return d

@@ -1,0 +1,1 @@
+"""Flows of stiff tapes by implicit collocation in compiled code."""

@@ -1,0 +1,242 @@
+"""The solution of a stiff dx/dt = f(t, x), with its derivative, by collocation at the Radau points, in compiled code.
+
+Radau IIA with s stages is of order 2s - 1 and L-stable, so steps may be as long as the solution is smooth, however fast
+disturbances of it decay (Hairer and Wanner, *Solving Ordinary Differential Equations II*, 2nd ed., Springer 1996,
+sections IV.5 and IV.8). A step solves
+
+    Y_i = x + h sum_j a_ij f(t + c_j h, Y_j),        x(t + h) = Y_s,
+
+by Newton's method with the jacobian of every stage, not that of the start for all of them: the matrix of its last
+round, 1 - h a_ij J_j in block (i, j), is then the one in the derivative of these equations with respect to x,
+
+    dY_i - h sum_j a_ij J_j dY_j = 1,
+
+so one decomposition gives the exact derivative of the discrete map, all columns of it. The state and the columns of
+the derivative since the start are under step control together. A disturbance that decays fast makes short steps at
+the start, until it is gone, and long ones from there on.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from chilopod.compiled import fused_njit
+from chilopod.flows.implicit.stages import Method, Problem, Step, at, estimated, stages, turn
+from chilopod.flows.tracing.series import LANES, Series, load
+
+__all__ = ["Control", "Interval", "Method", "Outcome", "advance"]
+
+DONE, NOT_FINITE, BUDGET, STALLED = range(4)
+"""How an integration ends."""
+
+_FASTEST_FALL, _FASTEST_GROWTH, _SAFETY = 0.1, 6.0, 0.9
+
+
+class Interval(NamedTuple):
+    """An interval of time on which the right-hand side is smooth.
+
+    Attributes
+    ----------
+    t0, t1
+        Start and end.
+    longest
+        Longest step.
+    branches
+        Branches of the switches, shape (switches,).
+    """
+
+    t0: float
+    t1: float
+    longest: float
+    branches: Any
+
+
+class Control(NamedTuple):
+    """How an integration steps.
+
+    Attributes
+    ----------
+    tolerance
+        Estimated error of a step over the size of every state and entry of the derivative.
+    most_steps
+        Budget of steps in an interval.
+    units
+        Units of the states, shape (n,), positive.
+    near
+        Entries of the derivative that are under step control, shape (n, n).
+    """
+
+    tolerance: float
+    most_steps: int
+    units: Any
+    near: Any
+
+
+class Outcome(NamedTuple):
+    """What an integration fills in, in units of the states.
+
+    Attributes
+    ----------
+    derivative
+        Shape (n, n), multiplied by the derivative; shape (0, 0) for none.
+    largest, extent
+        Largest moduli of the states and of the entries of the derivative so far, shapes (n,) and as ``derivative``.
+    frame
+        Orthonormal, shape (n, n), carried along (:func:`.stages.turn`); shape (0, 0) for none.
+    stretch, turned
+        Logarithm of the growth of each direction of the frame, which is added, and cosine of the largest angle it turns
+        by in a step, shape (n,).
+    report
+        Number of steps, and the time reached, shape (2,).
+    """
+
+    derivative: Any
+    largest: Any
+    extent: Any
+    frame: Any
+    stretch: Any
+    turned: Any
+    report: Any
+
+
+@fused_njit(error_model="numpy")
+def _first_step(jacobian: Any, longest: float) -> float:
+    """A step as long as the fastest rate allows."""
+    rate = 0.0
+    for i in range(jacobian.shape[0]):
+        total = 0.0
+        for j in range(jacobian.shape[0]):
+            total += abs(jacobian[i, j])
+        rate = max(rate, total)
+    return min(longest, 1.0 / rate) if rate > 0.0 else longest
+
+
+@fused_njit(error_model="numpy")
+def _predict(nodes: Any, ratio: float, last: Any, moved: Any) -> None:
+    """Guess the stages by the polynomial of the step before, which goes on for a while: Lagrange polynomials on 0 and
+    its nodes. ``ratio`` is the step over the one before; 0 if there is none."""
+    s, n = moved.shape
+    for i in range(s):
+        for k in range(n):
+            moved[i, k] = 0.0
+        z = 1.0 + nodes[i] * ratio
+        if ratio > 0.0 and z <= 3.0:
+            for j in range(s):
+                f = z / nodes[j]
+                for m in range(s):
+                    if m != j:
+                        f *= (z - nodes[m]) / (nodes[j] - nodes[m])
+                for k in range(n):
+                    moved[i, k] += f * last[j, k]
+            for k in range(n):
+                moved[i, k] -= last[s - 1, k]
+
+
+@fused_njit(error_model="numpy")
+def _take(x: Any, step: Any, last: Any, result: Any) -> None:
+    """Go on to the end of a step."""
+    s, n = step.moved.shape
+    for i in range(n):
+        for j in range(s):
+            result.largest[i] = max(result.largest[i], abs(x[i] + step.moved[j, i]))
+            last[j, i] = step.moved[j, i]
+        x[i] += step.moved[s - 1, i]
+    if result.derivative.shape[0] > 0:
+        for j in range(s):
+            for i in range(n):
+                for k in range(n):
+                    result.extent[i, k] = max(result.extent[i, k], abs(step.reached[j, i, k]))
+        result.derivative[:] = step.reached[s - 1]
+
+
+@fused_njit(error_model="numpy")
+def _prepared(tape: Any, units: Any, params: Any, branches: Any, largest: Any) -> Any:
+    """A right-hand side with its parameters loaded and room for its values."""
+    n = tape.layout[0]
+    lanes = (n + LANES - 1) // LANES * LANES
+    series = Series(np.zeros((tape.layout[5], 1)), np.zeros((tape.layout[5], 1, lanes)), branches)
+    for i in range(n):
+        series.tangents[i, 0, i] = 1.0
+    load(tape, params, series)
+    return Problem(tape, units, series, largest)
+
+
+@fused_njit(error_model="numpy", nogil=True)
+def advance(tape: Any, method: Any, params: Any, x: Any, interval: Any, control: Any, result: Any) -> int:
+    """Carry a state over an interval in place.
+
+    Parameters
+    ----------
+    tape
+        :class:`chilopod.flows.tracing.tape.Tape`.
+    method
+        :class:`chilopod.flows.implicit.stages.Method`.
+    params, x
+        Values of the parameters; the state, shape (n,), in units.
+    interval, control, result
+        :class:`Interval`, :class:`Control` and :class:`Outcome`.
+    """
+    n, s, t1 = x.size, method.nodes.size, interval.t1
+    problem = _prepared(tape, control.units, params, interval.branches, result.largest)
+    step = Step(
+        np.empty(n),
+        np.empty((n, n)),
+        np.zeros((s, n)),
+        np.empty((s, n)),
+        np.empty((s, n, n)),
+        np.empty((s * n, s * n)),
+        np.empty(s * n, np.int64),
+        np.empty((s * n, n)),
+        np.empty((s, n, n)),
+    )
+    last = np.zeros((s, n))
+    t, h, h_last = interval.t0, 0.0, 0.0
+    steps = 0
+    status = DONE
+    fresh = True
+    while t < t1:
+        if fresh:
+            if not at(problem, x, t, step.slope, step.jacobian):
+                status = NOT_FINITE
+                break
+            for i in range(n):
+                result.largest[i] = max(result.largest[i], abs(x[i]))
+            h = h if h > 0.0 else _first_step(step.jacobian, t1 - t)
+            fresh = False
+        steps += 1
+        if steps > control.most_steps:
+            status = BUDGET
+            break
+        h = min(h, interval.longest)
+        ends = h >= (1.0 - 1e-10) * (t1 - t)
+        if ends:
+            h = t1 - t
+        elif h > 0.5 * (t1 - t):
+            h = 0.5 * (t1 - t)
+        if t + method.nodes[0] * h <= t:
+            status = STALLED
+            break
+        _predict(method.nodes, h / h_last if h_last > 0.0 else 0.0, last, step.moved)
+        if not stages(problem, method, x, t, h, step):
+            h *= 0.3
+            h_last = 0.0
+            continue
+        off = estimated(problem, method, x, h, step, control.near, result.derivative, result.extent)
+        factor = _FASTEST_GROWTH
+        if off > 0.0:
+            factor = min(factor, max(_FASTEST_FALL, _SAFETY * (control.tolerance / off) ** (1.0 / (s + 1))))
+        if not off <= control.tolerance:
+            h *= min(factor, 0.9) if off < math.inf else _FASTEST_FALL
+            continue
+        _take(x, step, last, result)
+        if result.frame.shape[0] > 0:
+            turn(result.frame, step.columns, step.jacobians, method.weights[s - 1], h, result.stretch, result.turned)
+        t = t1 if ends else t + h
+        h_last = h
+        h *= factor
+        fresh = True
+    result.report[0], result.report[1] = steps, t
+    return status

@@ -1,0 +1,304 @@
+"""Flows of a right-hand side, by the method that suits it."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Sequence
+from typing import Any, Literal, NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chilopod.errors import ParameterError
+from chilopod.flows.arguments import (
+    Slopes,
+    check_shape,
+    check_timeless,
+    checked_arguments,
+    finite_array,
+    sampled,
+)
+from chilopod.flows.called import CalledFlow
+from chilopod.flows.events import Event, check_events, checked_events
+from chilopod.flows.implicit.flow import ImplicitFlow, Stretched, can_be_implicit
+from chilopod.flows.jumps import fast_parts, warn_of_jumps
+from chilopod.flows.taylor.flow import TaylorFlow, TooManySteps
+from chilopod.flows.tracing.evaluation import evaluate, evaluate_jacobian, evaluate_series
+from chilopod.flows.tracing.trace import Trace, trace
+from chilopod.flows.tracing.traced import Untraceable
+
+Array = NDArray[np.float64]
+
+TOLERANCE = 1e-14
+_SAME = 1e-6
+_FLOOR = 0.01
+"""Truncation of a Taylor step relative to the tolerance: it costs next to nothing."""
+_ESTIMATED = 100.0
+"""Estimate of the error of an implicit step relative to the tolerance: it is far larger than the error."""
+_PATIENCE = 256
+"""Taylor steps after which a motion that would need more than the budget is left to the implicit method."""
+
+Method = Literal["automatic", "taylor", "implicit"]
+
+
+class Flows(NamedTuple):
+    """Flows of a right-hand side; the arguments and results are those of :mod:`chilopod.stability.capabilities`.
+
+    Every answer follows from the arguments of its call alone.
+
+    Attributes
+    ----------
+    slopes
+        ``slopes(times, states)`` -> dx/dt at many times and states.
+    flow, flow_with_error, flow_states
+        Flow with derivative; with the bound of its error; of many states.
+    flow_tangents
+        Flow of some directions; None if there is only the whole derivative.
+    flow_frame, is_stiff
+        Flow of an orthonormal frame, and whether the flow from a state is an implicit one; None if it never is.
+    velocity_series
+        Taylor coefficients of f along curves; None where f cannot be traced, or depends on time.
+    concurrent
+        Whether flows may run in several threads at once.
+    """
+
+    slopes: Slopes
+    flow: Callable[[Array, float, float], tuple[Array, Array]]
+    flow_with_error: Callable[[Array, float, float], tuple[Array, Array, float | Array]]
+    flow_states: Callable[[Array, float, float], Array]
+    flow_tangents: Callable[[Array, Array, float, float], tuple[Array, Array]] | None = None
+    flow_frame: Callable[[Array, Array, Array, float, float], Stretched] | None = None
+    is_stiff: Callable[[Array, float, float], bool] | None = None
+    velocity_series: Callable[[Array], Array] | None = None
+    concurrent: bool = False
+
+
+class RightHandSide:
+    """A right-hand side f(t, x, *args), checked.
+
+    Parameters
+    ----------
+    rhs, dimension, args, events, switch_times, jacobian, orbit, method, tolerance
+        See :func:`chilopod.stability.from_rhs`.
+    duration, autonomous
+        Period of the explicit dependence on time; where there is none, about how long a motion takes.
+
+    Attributes
+    ----------
+    start, base
+        State on the orbit, None if it is not known; a state to try f at.
+    times
+        A time inside every interval between switches.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is not what it should be.
+    """
+
+    def __init__(
+        self,
+        rhs: Callable[..., ArrayLike],
+        dimension: int,
+        duration: float,
+        autonomous: bool,
+        args: tuple[Any, ...],
+        events: Sequence[Event],
+        switch_times: Sequence[float],
+        jacobian: Callable[..., ArrayLike] | None,
+        orbit: ArrayLike | None,
+        method: Method,
+        tolerance: float,
+    ) -> None:
+        if method not in get_args(Method):
+            raise ParameterError("is not known", field="method", value=method, allowed=", ".join(get_args(Method)))
+        self.rhs, self.jacobian, self.method, self.autonomous, self.duration = (
+            rhs,
+            jacobian,
+            method,
+            autonomous,
+            duration,
+        )
+        self.dimension, self.args, self.tolerance = checked_arguments(rhs, dimension, args, tolerance)
+        self.events = checked_events(events)
+        self.edges = _edges(switch_times, duration)
+        if autonomous and self.edges.size > 2:
+            raise ParameterError("need a period", field="switch_times", value=switch_times, allowed="none")
+        self.start = None if orbit is None else finite_array(orbit, (self.dimension,), "orbit")
+        self.base = np.zeros(self.dimension) if self.start is None else self.start
+        self.times = np.asarray(self.edges[:-1] + 0.4142 * np.diff(self.edges))
+        check_events(self.events, self.args, self.times, self.start, self.dimension)
+
+    def flows(self) -> Flows:
+        """Flows of the right-hand side: traced if it can be, else from calls."""
+        pairs = [(event.guard, event.reset) for event in self.events]
+        try:
+            traced = trace(
+                self.rhs, self.dimension, self.args, times=(0.0, self.duration), base=self.base, events=pairs
+            )
+        except Untraceable as reason:
+            self._check_shapes()
+            self._refuse_calls(reason)
+            flows = self._called(str(reason))
+        else:
+            if self.jacobian is not None:
+                self._check_jacobian(self.jacobian, traced)
+            flows = self._traced(traced)
+        if self.autonomous:
+            check_timeless(flows.slopes, self.base, self.duration)
+        return flows
+
+    def _check_shapes(self) -> None:
+        n = self.dimension
+        check_shape(self.rhs, self.args, self.times, self.base, (n,), "rhs")
+        if self.jacobian is not None:
+            check_shape(self.jacobian, self.args, self.times, self.base, (n, n), "jacobian")
+
+    def _refuse_calls(self, reason: Untraceable) -> None:
+        """Refuse what needs a function that can be traced."""
+        if self.events:
+            raise ParameterError(
+                f"need functions that can be traced: {reason}",
+                field="events",
+                allowed="arithmetic, elementary functions and numpy arrays, without branches on the state",
+            ) from None
+        if self.method != "automatic":
+            raise ParameterError(
+                f"needs a function that can be traced: {reason}",
+                field="method",
+                value=self.method,
+                allowed="automatic",
+            ) from None
+
+    def _called(self, reason: str) -> Flows:
+        slopes = sampled(self.rhs, self.args, self.dimension)
+        warn_of_jumps(self.rhs, self.args, self.dimension, self.edges, self.start)
+        fast = fast_parts(slopes, self.base, self.edges)
+        called = CalledFlow(self.rhs, self.args, self.jacobian, self.edges, fast, self.times, reason, self.tolerance)
+        return Flows(slopes, called.flow, called.flow_with_error, called.flow_states)
+
+    def _traced(self, traced: Trace) -> Flows:
+        tape, params = traced.tape, traced.params
+
+        def slopes(t: Array, x: Array) -> Array:
+            return evaluate(tape, t, x, params)[tape.slopes]
+
+        @functools.cache
+        def implicit() -> ImplicitFlow:
+            fast = fast_parts(slopes, self.base, self.edges) if tape.clocks.size else np.empty((0, 2))
+            return ImplicitFlow(tape, params, self.edges, fast, _ESTIMATED * self.tolerance)
+
+        if self.method == "implicit":
+            stiff = implicit()
+            flows = Flows(
+                slopes,
+                stiff.flow,
+                stiff.flow_with_error,
+                stiff.flow_states,
+                flow_frame=stiff.flow_frame,
+                is_stiff=lambda x, t0, t1: True,
+                concurrent=True,
+            )
+        else:
+            flows = _taylor_flows(slopes, self._taylor(traced), params)
+            if self.method == "automatic" and can_be_implicit(tape):
+                flows = _either(flows, implicit)
+        if self.autonomous:
+            flows = flows._replace(velocity_series=lambda curves: evaluate_series(tape, curves, params))
+        return flows
+
+    def _taylor(self, traced: Trace) -> TaylorFlow:
+        other = self.method == "automatic" and can_be_implicit(traced.tape)
+        return TaylorFlow(
+            traced.tape,
+            edges=tuple(self.edges.tolist()) if self.edges.size > 2 else (),
+            period=float(self.edges[-1]),
+            tolerance=_FLOOR * self.tolerance,
+            directions=tuple(float(event.direction) for event in self.events),
+            patience=_PATIENCE if other else 0,
+        )
+
+    def _check_jacobian(self, jacobian: Callable[..., ArrayLike], traced: Trace) -> None:
+        """A traced function needs no jacobian, but who hands over one that is wrong wants to know."""
+        base, n = self.base, self.dimension
+        check_shape(jacobian, self.args, self.times, base, (n, n), "jacobian")
+        for t in self.times.tolist():
+            x = base + (float(np.abs(base).max()) or 1.0) * np.cos(3.0 * np.arange(n) + 1.0)
+            _, right = evaluate_jacobian(traced.tape, t, x, traced.params)
+            with np.errstate(all="ignore"):
+                given = np.asarray(jacobian(t, x.copy(), *self.args), dtype=np.float64)
+            off = np.abs((given - right) * x) > _SAME * (np.abs(right) @ np.abs(x))[:, None]
+            if off.any() and np.isfinite(right).all():
+                i, j = np.argwhere(off)[0]
+                raise ParameterError(
+                    f"is not the derivative of rhs: entry ({i}, {j}) at t = {t:g} should be {right[i, j]:g}",
+                    field="jacobian",
+                    value=float(given[i, j]),
+                )
+
+
+def _taylor_flows(slopes: Slopes, taylor: TaylorFlow, params: Array) -> Flows:
+    def flow(x: Array, t0: float, t1: float) -> tuple[Array, Array]:
+        passage = taylor.advance(x, t0, t1, params)
+        return passage.state, passage.derivative
+
+    def flow_with_error(x: Array, t0: float, t1: float) -> tuple[Array, Array, Array]:
+        passage = taylor.advance(x, t0, t1, params, bounded=True)
+        return passage.state, passage.derivative, passage.bound
+
+    def is_stiff(x: Array, t0: float, t1: float) -> bool:
+        try:
+            taylor.advance(x, t0, t1, params)
+        except TooManySteps:
+            return True
+        return False
+
+    return Flows(
+        slopes,
+        flow,
+        flow_with_error,
+        lambda states, t0, t1: taylor.states(states, t0, t1, params),
+        flow_tangents=lambda x, directions, t0, t1: taylor.tangents(x, directions, t0, t1, params),
+        is_stiff=is_stiff,
+        concurrent=True,
+    )
+
+
+def _either(flows: Flows, implicit: Callable[[], ImplicitFlow]) -> Flows:
+    """Flows by Taylor series, and by the implicit method from every state from which the series take too many steps.
+
+    That is found out anew in every call, so that no answer hangs on what was asked before.
+    """
+
+    def either(name: Literal["flow", "flow_with_error", "flow_states"]) -> Callable[..., Any]:
+        taylor = getattr(flows, name)
+
+        def flow(x: Array, t0: float, t1: float) -> Any:
+            try:
+                return taylor(x, t0, t1)
+            except TooManySteps:
+                return getattr(implicit(), name)(x, t0, t1)
+
+        return flow
+
+    return flows._replace(
+        flow=either("flow"),
+        flow_with_error=either("flow_with_error"),
+        flow_states=either("flow_states"),
+        flow_frame=lambda *arguments: implicit().flow_frame(*arguments),
+    )
+
+
+def _edges(switch_times: Sequence[float], period: float) -> Array:
+    if isinstance(switch_times, tuple) and not switch_times:
+        return np.array([0.0, period])
+    try:
+        switches = np.unique(np.array(switch_times, dtype=np.float64))
+        valid = np.ndim(switch_times) == 1 and bool(((switches >= 0) & (switches < period)).all())
+    except (TypeError, ValueError):
+        valid = False
+    if not valid:
+        raise ParameterError(
+            "must be times within one period", field="switch_times", value=switch_times, allowed=f"[0, {period:g})"
+        )
+    return np.unique(np.concatenate([[0.0], switches, [period]]))

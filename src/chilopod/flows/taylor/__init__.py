@@ -1,0 +1,1 @@
+"""Flows of tapes by Taylor series in compiled code."""

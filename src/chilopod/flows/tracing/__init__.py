@@ -1,0 +1,1 @@
+"""Right-hand sides as tapes of operations, their values and their Taylor series."""

@@ -1,1 +1,0 @@
-"""Flows of stiff right-hand sides."""

@@ -1,1 +1,0 @@
-"""Right-hand sides as tapes of operations, and their solutions by Taylor series in compiled code."""
