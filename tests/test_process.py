@@ -20,7 +20,8 @@ class LeftError(Exception):
 @pytest.fixture
 def answering(monkeypatch):
     """Ctrl-C answered as by the command line, but the process stays."""
-    handler, hook = signal.getsignal(signal.SIGINT), sys.unraisablehook
+    ends = [each for each in signal.Signals if each.name in process._ENDS]
+    handlers, hook = [signal.getsignal(each) for each in ends], sys.unraisablehook
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
     def leave(words=""):
@@ -32,7 +33,8 @@ def answering(monkeypatch):
     process.answer_interrupts()
     yield
     os.close(signal.set_wakeup_fd(-1))
-    signal.signal(signal.SIGINT, handler)
+    for each, handler in zip(ends, handlers, strict=True):
+        signal.signal(each, handler)
     sys.unraisablehook = hook
 
 
@@ -48,6 +50,33 @@ def test_ctrl_c_ends_the_process_while_something_is_imported(answering, tmp_path
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(LeftError):
         import interrupted_import  # noqa: F401
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="needs SIGHUP")
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_all_that_ends_politely_leaves_nothing_behind(name, tmp_path):
+    """Sent twice, as by a terminal that is closed; Ctrl-C once."""
+    number = signal.Signals[name]
+    times = 1 if name == "SIGINT" else 2
+    script = f"""
+import signal, tempfile, time
+for each, usual in ((signal.SIGINT, signal.default_int_handler), (signal.SIGTERM, 0), (signal.SIGHUP, 0)):
+    signal.signal(each, usual)
+from chilopod import process
+process.answer_interrupts()
+try:
+    with tempfile.TemporaryDirectory(dir="."):
+        try:
+            signal.raise_signal({int(number)})
+        finally:
+            for _ in range({times - 1}):
+                signal.raise_signal({int(number)})
+except KeyboardInterrupt:
+    raise SystemExit(process.exit_code())
+"""
+    ended = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stderr) == (128 + number, "")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_end_on_the_spot_leaves_no_semaphores(tmp_path):

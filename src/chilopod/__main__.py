@@ -29,8 +29,9 @@ def _run() -> int:
 
     code = run()
     lost = process.unwritten(stdout)
-    if code != process.INTERRUPTED:
-        process.ignore_interrupts()
+    if code == process.INTERRUPTED:
+        return process.exit_code()
+    process.ignore_interrupts()
     if code == 0 and lost:
         print(f"error: stdout cannot be written ({lost})", file=sys.stderr)
         return USAGE_ERROR

@@ -1,4 +1,4 @@
-"""What the process of the command line owes whoever started it: streams that may fail, and Ctrl-C at any moment.
+"""What the process of the command line owes whoever started it: streams that may fail, an end at any moment.
 
 Nothing is imported here but small modules of Python itself: this comes before everything else.
 """
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
 INTERRUPTED = 130
+
+_ENDS = ("SIGINT", "SIGTERM", "SIGHUP")  # not all systems have all of them
 
 _PATIENCE = 1.0  # s after Ctrl-C until it is said that something is still being stopped
 _SHOW_CURSOR = b"\n\x1b[?25h"  # a progress bar hides it
@@ -90,16 +92,19 @@ def unwritten(stdout: Stream) -> str | None:
 
 
 def answer_interrupts() -> None:
-    """Let Ctrl-C end this process with one line and exit code 130, whatever it is doing.
+    """Let Ctrl-C, SIGTERM and SIGHUP end this process with one line and exit code 128 + signal, whatever it is doing.
 
-    As anywhere in Python it becomes a KeyboardInterrupt, so that all is left in order. Only while something is being
+    As anywhere in Python they become a KeyboardInterrupt, so that all is left in order. Only while something is being
     imported (which C code may turn into any other exception, or forget), and at a second Ctrl-C, the process ends on
     the spot: files are there whole or not at all at any moment. Where stopping takes more than a second, that is said.
     """
-    # Ignored in the background of a script, it stays ignored.
-    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+    # Ignored in the background of a script, or by nohup, they stay ignored.
+    usual = (signal.default_int_handler, signal.SIG_DFL)
+    heard = [each for each in signal.Signals if each.name in _ENDS and signal.getsignal(each) in usual]
+    for each in heard:
+        signal.signal(each, _interrupted)
+    if not heard:
         return
-    signal.signal(signal.SIGINT, _interrupted)
     sys.unraisablehook = _unraisable
     if sys.platform != "win32":
         # While compiled code runs Python calls no handler, but it writes the signal's number into a pipe.
@@ -111,7 +116,14 @@ def answer_interrupts() -> None:
 
 def ignore_interrupts() -> None:
     """From the end of the work on there is nothing to stop."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for each in signal.Signals:
+        if each.name in _ENDS:
+            signal.signal(each, signal.SIG_IGN)
+
+
+def exit_code() -> int:
+    """Exit code of this process where it was interrupted: 128 + the number of the signal, 130 after Ctrl-C."""
+    return 128 + _pressed[0] if _pressed else INTERRUPTED
 
 
 def leave(words: str = "error: interrupted\n") -> NoReturn:
@@ -126,7 +138,7 @@ def leave(words: str = "error: interrupted\n") -> NoReturn:
     if started is not None:
         with suppress(Exception):
             started._run_finalizers(0)
-    os._exit(INTERRUPTED)
+    os._exit(exit_code())
 
 
 on_leave: list[Callable[[], object]] = []
@@ -136,10 +148,12 @@ _pressed: list[int] = []
 
 
 def _interrupted(number: int, frame: FrameType | None) -> None:
-    if _pressed or _importing(frame):
-        leave()
+    first = not _pressed
     _pressed.append(number)
-    raise KeyboardInterrupt
+    if _importing(frame) or not (first or number != signal.SIGINT):
+        leave()
+    if first:  # a terminal that is closed says so twice
+        raise KeyboardInterrupt
 
 
 def _importing(frame: FrameType | None) -> bool:
@@ -158,15 +172,15 @@ def _unraisable(found: Any) -> None:
 
 
 def _watch(pressed: int) -> None:
-    _next(pressed)
+    _next(pressed, *(each for each in signal.Signals if each.name in _ENDS))
     time.sleep(_PATIENCE)
     with suppress(OSError):
         os.write(2, b"stopping ... (Ctrl-C once more ends at once)\n")
-    _next(pressed)
+    _next(pressed, signal.SIGINT)
     leave()
 
 
-def _next(pressed: int) -> None:
-    """Wait for a Ctrl-C; other signals come the same way."""
-    while os.read(pressed, 1) != bytes([signal.SIGINT]):
+def _next(pressed: int, *numbers: int) -> None:
+    """Wait for one of some signals; others come the same way."""
+    while os.read(pressed, 1)[0] not in numbers:
         pass

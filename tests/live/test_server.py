@@ -23,6 +23,7 @@ import xarray as xr
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
+from chilopod import process
 from chilopod.cli import main
 from chilopod.errors import ParameterError
 from chilopod.live import Live, Session, gate, wishes
@@ -353,9 +354,8 @@ def test_a_recording_outlives_whoever_ends_the_page(number, options, folder, tmp
         wait(page, seconds)
 
     monkeypatch.setattr(Live, "wait", recorded)
-    # Where the tests run in the background, or under nohup, some are ignored.
-    usual = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL, signal.SIGHUP: signal.SIG_DFL}
-    former = {each: signal.signal(each, handler) for each, handler in usual.items()}
+    monkeypatch.setattr(process, "_pressed", [])  # the handler is that of the command line's own process
+    former = {each: signal.signal(each, process._interrupted) for each in (number,)}
     try:
         assert main(["live", "--port", "0", *options]) == 130
     finally:

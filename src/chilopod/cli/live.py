@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-import signal
 import webbrowser
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -90,11 +88,10 @@ def live(
     kept = None if out is None else partial(_keep, out, force)
     page = Live(described, engine, seed=seed, strategy=strategy, **there, kept=kept)
     try:
-        with _ended_by_signals():
-            typer.echo(f"{described.name} walks at {page.address} (Ctrl-C ends it)")
-            if browser and not webbrowser.open(page.address):
-                typer.echo(f"no browser could be started: open {page.address} in one", err=True)
-            page.wait(seconds)
+        typer.echo(f"{described.name} walks at {page.address} (Ctrl-C ends it)")
+        if browser and not webbrowser.open(page.address):
+            typer.echo(f"no browser could be started: open {page.address} in one", err=True)
+        page.wait(seconds)
     finally:
         _end(page, force)
 
@@ -124,24 +121,3 @@ def _end(page: Live, replace: bool) -> None:
 
 def _files(folder: Path, name: str) -> list[Path]:
     return [folder / f"{name}.nc", folder / f"{name}.html"]
-
-
-@contextmanager
-def _ended_by_signals() -> Iterator[None]:
-    """What ends a process politely is as good as Ctrl-C here, and once is enough."""
-
-    def listen(how: Any) -> None:
-        for each in heard:
-            signal.signal(each, how)
-
-    def end(number: int, frame: Any) -> None:
-        listen(signal.SIG_IGN)  # a terminal that is closed says so twice
-        raise KeyboardInterrupt
-
-    everywhere = [each for each in signal.Signals if each.name in ("SIGTERM", "SIGHUP")]
-    heard = [each for each in everywhere if signal.getsignal(each) is signal.SIG_DFL]  # nohup's is not
-    listen(end)
-    try:
-        yield
-    finally:
-        listen(signal.SIG_IGN)

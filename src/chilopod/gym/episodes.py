@@ -18,11 +18,11 @@ from chilopod import memory
 from chilopod.engine import Observation, Walk, engine_named
 from chilopod.engine.arguments import as_number
 from chilopod.errors import ParameterError
+from chilopod.flows.arguments import checked_count
 from chilopod.gym.actions import Actions
 from chilopod.gym.sight import Sight
 from chilopod.record import LONGEST
 from chilopod.robot import Robot
-from chilopod.stability.arguments import checked_count
 from chilopod.steering import CourseReferee, Judged, Verdict, random_course
 from chilopod.steering.course import MOST_GOALS, RANDOM_DISTANCES
 from chilopod.tasks.course import patience_of

@@ -18,6 +18,7 @@ from typing import Any
 
 from chilopod.errors import ClusterError, ParameterError, one_line
 from chilopod.extras import needs
+from chilopod.process import on_leave
 from chilopod.trials.on_worker import PACKAGES, check_versions, versions
 
 MOST = 1000  # worker processes of one machine
@@ -60,6 +61,8 @@ def connected(where: str | int, threads: int | None, stack: ExitStack) -> Any:
     if isinstance(where, int):
         needs("cryptography", extra="cluster")
         folder = tempfile.TemporaryDirectory(prefix="chilopod-cluster-", ignore_cleanup_errors=True)
+        on_leave.append(folder.cleanup)
+        stack.callback(on_leave.remove, folder.cleanup)
         # Of the scheduler, which has no argument for it.
         stack.enter_context(dask.config.set({"temporary-directory": stack.enter_context(folder)}))
         return _own(where, threads or max(1, usable_cores() // where), distributed, stack)
