@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from chilopod.errors import ParameterError
-from chilopod.stability import BifurcationPoint, CodimensionTwo, CurveEnd, Kind, PeriodicSystem, follow2
+from chilopod.stability import BifurcationPoint, CodimensionTwo, Ending, Kind, PeriodicSystem, follow2
 from chilopod.stability.codimension_two import detection
 from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 
@@ -45,7 +45,7 @@ def start_at(angle, kind=Kind.PERIOD_DOUBLING):
 def test_closed_curve_ends_where_it_began(rising):
     point, second = start_at(0.4)
     curve = follow2(circle(), point, BOX, second=second, rising=rising, points=500)
-    assert CurveEnd.CLOSED in curve.endings
+    assert Ending.CLOSED in curve.endings
     assert not curve.special
     angles = np.unwrap(np.arctan2(curve.values[:, 1], curve.values[:, 0]))
     assert np.abs(np.hypot(*curve.values.T) - 1.0).max() < 1e-13
@@ -56,7 +56,7 @@ def test_closed_curve_ends_where_it_began(rising):
 def test_edges_of_the_box_are_met_exactly():
     point, second = start_at(0.4)
     curve = follow2(circle(), point, ((0.3, 2.0), (-0.7, 2.0)), second=second)
-    assert curve.endings == (CurveEnd.LEFT_BOX, CurveEnd.LEFT_BOX)
+    assert curve.endings == (Ending.LEFT_INTERVAL, Ending.LEFT_INTERVAL)
     (one, other) = (curve.values[0], curve.values[-1])
     assert one[1] == -0.7
     assert one[0] == pytest.approx(np.sqrt(1.0 - 0.49), abs=1e-13)
@@ -69,7 +69,7 @@ def test_a_direction_is_kept():
     point, second = start_at(0.4)
     up = follow2(circle(), point, ((0.3, 2.0), (-0.7, 2.0)), second=second, rising=True)
     down = follow2(circle(), point, ((0.3, 2.0), (-0.7, 2.0)), second=second, rising=False)
-    assert up.endings == (CurveEnd.START, CurveEnd.LEFT_BOX)
+    assert up.endings == (Ending.START, Ending.LEFT_INTERVAL)
     assert (np.diff(up.values[:, 1]) > 0.0).all()
     assert (np.diff(down.values[:, 1]) < 0.0).all()
 
@@ -77,7 +77,7 @@ def test_a_direction_is_kept():
 def test_where_the_map_does_not_exist_the_curve_is_lost_with_a_reason():
     point, second = start_at(0.4)
     curve = follow2(circle(hole=lambda p, q: q > 0.8), point, BOX, second=second, rising=True)
-    assert curve.endings[1] is CurveEnd.LOST
+    assert curve.endings[1] is Ending.LOST
     assert "not finite" in curve.reasons[1]
     assert 0.8 - 1e-5 < curve.values[-1][1] <= 0.8
 
@@ -90,7 +90,7 @@ def test_a_family_that_refuses_values_ends_the_curve():
 
     point, second = start_at(0.4)
     curve = follow2(family2, point, BOX, second=second, rising=True)
-    assert curve.endings[1] is CurveEnd.LOST
+    assert curve.endings[1] is Ending.LOST
     assert "at most 0.8" in curve.reasons[1]
 
 
@@ -103,10 +103,10 @@ def test_budgets_are_kept():
         return circle()(p, q)
 
     curve = follow2(family2, point, BOX, second=second, rising=True, budget=200, coefficients=False)
-    assert curve.endings[1] is CurveEnd.OUT_OF_BUDGET
+    assert curve.endings[1] is Ending.BUDGET
     assert len(calls) < 1000
     short = follow2(circle(), point, BOX, second=second, points=7)
-    assert short.endings == (CurveEnd.ENOUGH_POINTS, CurveEnd.ENOUGH_POINTS)
+    assert short.endings == (Ending.ENOUGH_POINTS, Ending.ENOUGH_POINTS)
     assert len(short.points) == 15
 
 
@@ -193,7 +193,7 @@ def test_a_coefficient_that_is_not_found_near_its_zero_is_bracketed(monkeypatch)
     (found,) = curve.special
     assert found.kind is CodimensionTwo.GENERALISED_PERIOD_DOUBLING
     assert abs(found.values[1] - 0.1) <= found.error_bound[1] < 0.03
-    assert curve.endings == (CurveEnd.LEFT_BOX, CurveEnd.LEFT_BOX)
+    assert curve.endings == (Ending.LEFT_INTERVAL, Ending.LEFT_INTERVAL)
 
 
 def test_a_point_that_may_be_anywhere_is_none(monkeypatch):
@@ -201,4 +201,4 @@ def test_a_point_that_may_be_anywhere_is_none(monkeypatch):
     monkeypatch.setattr(detection, "_along", lambda *arguments: np.inf)
     curve = follow2(turning, TURNS, ((-1.0, 1.0), (-1.0, 1.0)), second=-0.3)
     assert not curve.special
-    assert curve.endings == (CurveEnd.LEFT_BOX, CurveEnd.LEFT_BOX)
+    assert curve.endings == (Ending.LEFT_INTERVAL, Ending.LEFT_INTERVAL)

@@ -12,7 +12,7 @@ from scipy.special import mathieu_b
 from chilopod.stability import (
     BifurcationPoint,
     CodimensionTwo,
-    CurveEnd,
+    Ending,
     Kind,
     PeriodicSystem,
     follow2,
@@ -98,7 +98,7 @@ def test_cusp(unit):
     (cusp,) = curve.special
     assert (np.abs(cusp.values) <= cusp.error_bound).all()
     assert (cusp.error_bound <= 1e-13 * np.array([unit, 1.0])).all()
-    assert curve.endings == (CurveEnd.LEFT_BOX, CurveEnd.LEFT_BOX)
+    assert curve.endings == (Ending.LEFT_INTERVAL, Ending.LEFT_INTERVAL)
     assert curve.values[0][1] == curve.values[-1][1] == 1.0
     assert curve.values[0][0] == pytest.approx(-curve.values[-1][0], rel=1e-12)
 
@@ -140,7 +140,7 @@ def test_resonances_on_a_curve_of_neimark_sacker():
         x = 2.0 * cosine / (0.2 - 2.0)
         expected.append((kind, parameters_at(x, 1.0 + 0.2 * x)))
     check_special(curve, *expected)
-    assert curve.endings == (CurveEnd.RESONANCE, CurveEnd.RESONANCE)
+    assert curve.endings == (Ending.RESONANCE, Ending.RESONANCE)
     for point in curve.points:
         x = 2.0 * point.multiplier.real / (0.2 - 2.0)
         np.testing.assert_allclose(point.values, parameters_at(x, 1.0 + 0.2 * x), atol=1e-12)
@@ -276,7 +276,7 @@ def test_first_tongue_of_the_mathieu_equation():
     value = float(mathieu_b(1, 0.5))
     start = BifurcationPoint(Kind.PERIOD_DOUBLING, value, 0.0, np.zeros(2), np.array([0.0, 1.0 + 0j]), -1.0 + 0j, 1.0)
     curve = follow2(family2, start, ((0.0, 1.0), (0.3, 0.8)), second=0.5, step=0.3, longest=0.5, coefficients=False)
-    assert curve.endings == (CurveEnd.LEFT_BOX, CurveEnd.LEFT_BOX)
+    assert curve.endings == (Ending.LEFT_INTERVAL, Ending.LEFT_INTERVAL)
     assert not curve.special
     for point in curve.points:
         a, q = point.values

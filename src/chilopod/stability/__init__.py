@@ -11,8 +11,8 @@ from chilopod.flows.called import NotAnalytic
 from chilopod.flows.events import Event
 from chilopod.flows.implicit.flow import Stretched
 from chilopod.flows.jumps import UndeclaredSwitch
-from chilopod.stability.asked import ReturnBudget
-from chilopod.stability.branches.branch import Branch, BranchPoint, Ending, Start, begin, follow, proceed, switch
+from chilopod.stability.branches.branch import Branch, BranchPoint, Start, begin, follow, proceed, switch
+from chilopod.stability.budget import Budget
 from chilopod.stability.capabilities import (
     Autonomous,
     CyclicallySymmetric,
@@ -28,7 +28,7 @@ from chilopod.stability.capabilities import (
     SystemLike,
 )
 from chilopod.stability.codimension_two.codimension2 import Codimension2, CodimensionTwo
-from chilopod.stability.codimension_two.curve2 import Curve2, CurveEnd, Point2
+from chilopod.stability.codimension_two.curve2 import Curve2, Point2
 from chilopod.stability.codimension_two.two_parameters import follow2
 from chilopod.stability.equilibria import Equilibrium, find_equilibrium
 from chilopod.stability.floquet import Exponents, Multipliers, exponents, multipliers, sweep
@@ -43,6 +43,7 @@ from chilopod.stability.rhs import from_rhs
 from chilopod.stability.shown import Result
 from chilopod.stability.symmetry.equivariants import AxialBranch, SymmetricCrossing, SymmetricKind
 from chilopod.stability.system import PeriodicSystem
+from chilopod.stability.tracing.ending import Ending
 from chilopod.stability.unit_circle.crossings import SearchStatus
 
 __all__ = [
@@ -51,11 +52,11 @@ __all__ = [
     "BifurcationPoint",
     "Branch",
     "BranchPoint",
+    "Budget",
     "Codimension2",
     "CodimensionTwo",
     "Criticality",
     "Curve2",
-    "CurveEnd",
     "CyclicallySymmetric",
     "Ending",
     "Equilibrium",
@@ -78,7 +79,6 @@ __all__ = [
     "PeriodicSystem",
     "Point2",
     "Result",
-    "ReturnBudget",
     "ReturnMap",
     "Scaled",
     "SearchStatus",

@@ -18,7 +18,7 @@ from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.arguments import finite_array
 from chilopod.flows.balance import numerical_balance
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.asked import Asking
+from chilopod.stability.budget import UserCode
 from chilopod.stability.capabilities import (
     Autonomous,
     Family,
@@ -343,7 +343,7 @@ def hopf_cycle(family: Family, point: BifurcationPoint) -> tuple[float, Orbit, A
             field="point",
             value=point.value,
         )
-    with Asking("family", point.value):
+    with UserCode("family", point.value):
         here = autonomous(family(point.value))
     form = hopf_form(here, point.orbit, np.zeros(point.orbit.size), point.frequency)
     units = numerical_balance(linear_part(here, point.orbit)[1])
@@ -366,7 +366,7 @@ def _cycle(
     shift = -form.cubic.real / point.rate.real * square
     value = point.value + shift
     duration = 2.0 * np.pi / (point.frequency + form.cubic.imag * square + point.rate.imag * shift)
-    with Asking("family", value):
+    with UserCode("family", value):
         system = autonomous(family(value))
         rest = find_equilibrium(system, point.orbit).state
         moved = 2.0 * (np.sqrt(square) * form.mode + square * form.second).real + square * form.mean

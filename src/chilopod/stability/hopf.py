@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.balance import numerical_balance
-from chilopod.stability.asked import Asking
+from chilopod.stability.budget import UserCode
 from chilopod.stability.capabilities import Autonomous, Family, SystemLike, expands_velocity, given_scale
 from chilopod.stability.course import Course, place_error
 from chilopod.stability.equilibria import (
@@ -95,7 +95,7 @@ def locate_hopf(
     """
     low, high = checked_interval(between)
     family = functools.lru_cache(_KEPT)(family)
-    with Asking("family", low):
+    with UserCode("family", low):
         system = autonomous(family(low))
         start = find_equilibrium(system, equilibrium)
     duration, scale = _duration(start, system.guess_period), _scale(system, start)
@@ -268,7 +268,7 @@ def _hopf_point(
     value, state = point.value, point.orbit
     rate, frequency = _rate(family, between, point, duration)
     for correcting in (True, True, False):  # the search has found it almost to the last digit
-        with Asking("family", value):
+        with UserCode("family", value):
             system = autonomous(family(value))
             here = find_equilibrium(system, state)
         index = int(np.abs(here.eigenvalues - 1j * frequency).argmin())
@@ -310,7 +310,7 @@ def _rate(
     values = np.clip([point.value - beside, point.value + beside], low, high)
     found = []
     for each in values.tolist():
-        with Asking("family", each):
+        with UserCode("family", each):
             found.append(find_equilibrium(family(each), point.orbit))
     matrices = [each.jacobian for each in found]
     matrix = 0.5 * (matrices[0] + matrices[1])
@@ -333,7 +333,7 @@ def _change(family: Family, between: tuple[float, float], value: float, eigenval
     values = np.clip(value + _BESIDE * (between[1] - between[0]) * np.array([-1.0, 1.0]), *between)
     found = []
     for each in values.tolist():
-        with Asking("family", each):
+        with UserCode("family", each):
             system = autonomous(family(each))
             here = find_equilibrium(system, state)
             found.append(hopf_form(system, here.state, here.error, eigenvalue.imag).cubic.real)

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.balance import numerical_balance
-from chilopod.stability.asked import Asking
 from chilopod.stability.branches.fold import Fold
+from chilopod.stability.budget import UserCode
 from chilopod.stability.capabilities import Family
 from chilopod.stability.course import Course, place_error
 from chilopod.stability.described import Formed, described
@@ -177,7 +177,7 @@ def locate(
                     continue
                 samples.allow(_DESCRIBING)
                 try:
-                    with Asking("family", crossing.value):
+                    with UserCode("family", crossing.value):
                         point = _described(samples, crossing, block, normal_form)
                     if not point.error_bound < samples.width:
                         raise AnalysisError(f"its error bound of {point.error_bound:.1e} tells nothing", field="value")

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import AnalysisError
 from chilopod.flows.arguments import finite_array
 from chilopod.frozen import ReadOnlyArrays, in_one_line
-from chilopod.stability.asked import ReturnBudget, SpentError
+from chilopod.stability.budget import Budget, SpentError
 from chilopod.stability.capabilities import (
     FlowsTangents,
     SystemLike,
@@ -124,7 +124,7 @@ def find_orbit(
     with_error: bool = True,
     section: Section | None = None,
     settle: bool = True,
-    budget: ReturnBudget | None = None,
+    budget: Budget | None = None,
     shortest: bool = True,
 ) -> Orbit:
     """A periodic orbit: a fixed point of the return map, by Newton's method.
@@ -216,7 +216,7 @@ def find_large_orbit(system: FlowsTangents, guess: ArrayLike | None = None) -> t
     return image, size
 
 
-def _shortest(system: SystemLike, orbit: Orbit, with_error: bool, budget: ReturnBudget | None) -> Orbit:
+def _shortest(system: SystemLike, orbit: Orbit, with_error: bool, budget: Budget | None) -> Orbit:
     """The same orbit over its shortest period, where every instant may be time 0."""
     if not is_autonomous(system):
         return orbit
@@ -255,7 +255,7 @@ def from_known(
     x: Array,
     with_error: bool = True,
     image: ReturnMap | None = None,
-    budget: ReturnBudget | None = None,
+    budget: Budget | None = None,
 ) -> Orbit:
     """The orbit through a state that is on it, by what the system says of itself; improved if not to the last digit.
 
@@ -290,9 +290,7 @@ def _relative(values: Array, size: Array) -> float:
     return float((np.abs(values) / size).max())
 
 
-def _newton(
-    system: SystemLike, x: Array, with_error: bool, section: Section | None, budget: ReturnBudget | None
-) -> Orbit:
+def _newton(system: SystemLike, x: Array, with_error: bool, section: Section | None, budget: Budget | None) -> Orbit:
     size = sizes(system, x, return_duration(system) if section is None else section.duration)
     section = section_at(system, x, size) if section is None else section
     best = np.inf

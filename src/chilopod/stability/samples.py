@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError, in_words
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.asked import Asking, ReturnBudget, SpentError, UserError
+from chilopod.stability.budget import Budget, SpentError, UserCode, UserError
 from chilopod.stability.capabilities import Family, SystemLike, is_autonomous
 from chilopod.stability.floquet import return_multipliers
 from chilopod.stability.orbits import Orbit, find_orbit, from_known, known_state
@@ -133,11 +133,11 @@ class Samples:
         self._refused: dict[str, tuple[str, set[float]]] = {}
         self._dimension, self.timed = 0, True
         self.count = self._counted = 0
-        with Asking("family", low):
+        with UserCode("family", low):
             self.first = find_orbit(self.family(low), guess)
             self.size = sizes(self.family(low), self.first.state, self.first.period / self.first.image.returns)
         # From here on: by now most of what is compiled when it is first called has been.
-        self._returns = ReturnBudget(self._allowed, seconds)
+        self._returns = Budget(self._allowed, seconds)
         if not (self.known and self.timed):
             self._keep(_sample(low, self.first))
         self.spent = False
@@ -204,7 +204,7 @@ class Samples:
         systems = [self.family(value) for value in values]
         for _ in systems:
             self._returns.take()
-        with self._asking(values[0]) if len(values) == 1 else Asking("family", values[0]):
+        with self._asking(values[0]) if len(values) == 1 else UserCode("family", values[0]):
             states = [known_state(system) for system in systems]
             images = return_maps(systems, states)
         for value, system, state, image in zip(values, systems, states, images, strict=True):
@@ -239,7 +239,7 @@ class Samples:
     def _asking(self, value: float) -> Iterator[None]:
         """Around calls of the user's functions: exceptions of theirs mean that there is no system."""
         try:
-            with Asking("family", value):
+            with UserCode("family", value):
                 yield
         except (UserError, ParameterError) as error:
             if not self._dimension:

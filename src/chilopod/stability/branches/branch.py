@@ -8,17 +8,17 @@ depends on.
 
 from __future__ import annotations
 
-import enum
 import itertools
+import math
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.errors import AnalysisError, ChilopodError, ParameterError
+from chilopod.errors import ChilopodError, ParameterError
 from chilopod.flows.arguments import checked_count
 from chilopod.notebook import picture
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, Step
@@ -27,11 +27,14 @@ from chilopod.stability.branches.closure import closes
 from chilopod.stability.branches.curve import PRECISION, Curve
 from chilopod.stability.branches.inspection import Found, inspect
 from chilopod.stability.branches.stepping import taken
+from chilopod.stability.budget import Budget
 from chilopod.stability.capabilities import Family
 from chilopod.stability.matrix_errors import VERDICTS
 from chilopod.stability.orbits import Orbit
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.shown import Result, axes_for, columns, dataset, mark, rows, said
+from chilopod.stability.tracing.ending import Ending
+from chilopod.stability.tracing.tracer import Pace, trace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -47,7 +50,6 @@ LONGEST = 0.15
 BUDGET = 200_000
 """Flows that a branch may ask for by default."""
 
-_SHORTEST = 1e-5  # step at which a curve is lost, relative to the longest
 _FEW, _MANY = 4, 7  # corrections after which steps grow, and shrink
 _STYLES = {True: "-", False: "--", None: ":"}  # of lines, by stability
 _NARROWEST = 1e-9  # width of an interval, relative to the values in it
@@ -57,20 +59,6 @@ Progress = Callable[[int, BranchPoint], None]
 
 def _silent(count: int, point: BranchPoint) -> None:
     """A :data:`Progress` that shows nothing."""
-
-
-class Ending(enum.Enum):
-    """Why a branch ends where it does; each member's ``sentence`` says it in words."""
-
-    LEFT_INTERVAL = "left the interval", "the parameter reached an end of the interval"
-    ENOUGH_POINTS = "enough points", "as many points as were asked for"
-    CLOSED = "closed", "the curve came back to where it started"
-    BUDGET = "budget", "as many flows as were allowed were spent"
-    LOST = "lost", "the step became too small: the curve could not be followed further"
-
-    def __init__(self, label: str, sentence: str) -> None:
-        self.label = label
-        self.sentence = sentence
 
 
 @dataclass(frozen=True)
@@ -204,6 +192,7 @@ def follow(
     precision: float = PRECISION,
     symmetric: bool = False,
     budget: int = BUDGET,
+    seconds: float = math.inf,
     progress: Progress = _silent,
 ) -> Branch:
     """Follow a branch from a point along its tangent.
@@ -231,8 +220,8 @@ def follow(
     symmetric
         Whether to stay among the orbits that have the systems' symmetry in time. By default the full period is used
         even where there is such a symmetry, for the orbits of interest have lost it.
-    budget
-        At most so many flows.
+    budget, seconds
+        Number of flows, and time in s, after which the branch ends.
     progress
         Called with the number of points and the newest one.
 
@@ -247,7 +236,8 @@ def follow(
     low, high = _checked(between, points, longest)
     if not step > 0:
         raise ParameterError("must be positive", field="step", value=step)
-    curve = Curve(family, high - low, between=between, symmetric=symmetric, precision=precision, budget=budget)
+    allowed = Budget(budget, seconds)
+    curve = Curve(family, high - low, between=between, symmetric=symmetric, precision=precision, budget=allowed)
     anchor = _anchored(family, curve, start, low, step)
     in_fold = anchor.last.special is None and abs(float(anchor.last.tangent[-1])) <= IN_FOLD
     remarks = ("the branch starts in a fold",) if in_fold else ()
@@ -265,13 +255,14 @@ def proceed(
     closely: bool = True,
     precision: float = PRECISION,
     budget: int = BUDGET,
+    seconds: float = math.inf,
     progress: Progress = _silent,
 ) -> Branch:
     """Follow a branch on from where it ends; in pieces it has the same points as in one.
 
     Parameters
     ----------
-    family, points, longest, closely, precision, budget, progress
+    family, points, longest, closely, precision, budget, seconds, progress
         As for :func:`follow`; ``points`` are those that are added.
     branch
         From :func:`follow` or from here.
@@ -302,7 +293,7 @@ def proceed(
         periods=branch.periods,
         symmetric=branch.symmetric,
         precision=precision,
-        budget=budget,
+        budget=Budget(budget, seconds),
     )
     first = branch.points[0]
     last, *earlier = [point for point in reversed(branch.points) if point.special is None or point is first]
@@ -358,55 +349,66 @@ def _outward(point: BranchPoint, between: tuple[float, float]) -> bool:
     return bool((point.value <= between[0] and ahead < 0.0) or (point.value >= between[1] and ahead > 0.0))
 
 
+@dataclass
+class _Orbits:
+    """A branch that is being followed: see :class:`chilopod.stability.tracing.tracer.Traced`."""
+
+    curve: Curve
+    anchor: Anchor
+    found: list[BranchPoint]
+    remarks: list[str]
+    closely: bool
+    progress: Progress
+
+    def advance(self, size: float, count: int) -> tuple[_Advance, int]:
+        """A step, cut off where the curve has come back to its start."""
+        step, left = taken(self.curve, self.anchor, size)
+        within, closed = inspect(self.curve, step, self.closely), None
+        if count > 2 and not left:
+            closed = closes(self.curve, self.found[0], step)
+        ending = Ending.LEFT_INTERVAL if left else None
+        if closed is not None:
+            points = tuple(point for point in within.points if _before(point, closed, step))
+            return _Advance(closed, replace(within, points=points), Ending.CLOSED), step.corrections
+        return _Advance(step, within, ending), step.corrections
+
+    def arrive(self, step: _Advance, count: int) -> Ending | None:
+        """Go on to the end of a step."""
+        self.found += [*step.within.points, step.taken.end.last]
+        self.remarks += step.within.remarks
+        self.anchor = step.taken.end
+        if self.curve.relative_error is None:
+            _take_error(self.curve, self.found)
+            self.found[-1] = replace(self.found[-1], error_bound=self.curve.multipliers(step.taken.image)[1])
+            self.anchor = replace(self.anchor, last=self.found[-1])
+        self.progress(count, self.found[-1])
+        return step.ending
+
+
+class _Advance(NamedTuple):
+    """A step, what happens within it, and why the branch ends with it, if it does."""
+
+    taken: Step
+    within: Found
+    ending: Ending | None
+
+
 def _followed(
     curve: Curve, branch: Branch, anchor: Anchor, points: int | None, longest: float, closely: bool, progress: Progress
 ) -> Branch:
-    size, found, remarks = branch.step, list(branch.points), list(branch.remarks)
-
-    def ended(ending: Ending, reason: str = "") -> Branch:
-        kept = tuple(dict.fromkeys(remarks))
-        return replace(branch, points=tuple(found), ending=ending, step=size, reason=reason, remarks=kept)
-
-    _take_error(curve, found)
-    if _outward(found[-1], curve.between):
-        return ended(Ending.LEFT_INTERVAL)
-    for count in itertools.count(1) if points is None else range(1, points + 1):
-        shortened = False
-        while True:
-            if curve.left <= 0:
-                return ended(Ending.BUDGET)
-            try:
-                step, left = taken(curve, anchor, size)
-                what, closed = inspect(curve, step, closely), None
-                if count > 2 and not left:
-                    closed = closes(curve, found[0], step)
-                break
-            except ChilopodError as error:
-                # A parameter may also step out of what the system can have.
-                if not isinstance(error, AnalysisError | ParameterError):
-                    raise
-                size, shortened = 0.5 * size, True
-                if size < _SHORTEST * longest:
-                    return ended(Ending.LOST, str(error))
-        if closed is not None:
-            what = Found(tuple(p for p in what.points if _before(p, closed, step)), what.remarks)
-            step = closed
-        found += [*what.points, step.end.last]
-        remarks += what.remarks
-        anchor = step.end
-        if not shortened:  # or an edge of what the system can have would be met again at once
-            size *= 1.5 if step.corrections <= _FEW else 1.0 if step.corrections <= _MANY else 0.6
-        size = min(longest, size)
-        if curve.relative_error is None:
-            _take_error(curve, found)
-            found[-1] = replace(found[-1], error_bound=curve.multipliers(step.image)[1])
-            anchor = replace(anchor, last=found[-1])
-        progress(count, found[-1])
-        if closed is not None:
-            return ended(Ending.CLOSED)
-        if left:
-            return ended(Ending.LEFT_INTERVAL)
-    return ended(Ending.ENOUGH_POINTS)
+    orbits = _Orbits(curve, anchor, list(branch.points), list(branch.remarks), closely, progress)
+    _take_error(curve, orbits.found)
+    ending, reason, size = Ending.LEFT_INTERVAL, "", branch.step
+    if not _outward(orbits.found[-1], curve.between):
+        ending, reason, size = trace(orbits, branch.step, Pace(longest, _FEW, _MANY), points, curve.budget)
+    return replace(
+        branch,
+        points=tuple(orbits.found),
+        ending=ending,
+        step=size,
+        reason=reason,
+        remarks=tuple(dict.fromkeys(orbits.remarks)),
+    )
 
 
 def _before(point: BranchPoint, closed: Step, step: Step) -> bool:

@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.asked import Asking
 from chilopod.stability.branches.bordered_matrices import symmetric_space, within_space
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint
 from chilopod.stability.branches.curve import Curve
+from chilopod.stability.budget import UserCode
 from chilopod.stability.capabilities import Family, SystemLike, given_scale, is_autonomous, known_orbit
 from chilopod.stability.equilibria import find_equilibrium, hopf_cycle
 from chilopod.stability.orbits import find_orbit, known_state
@@ -101,7 +101,7 @@ def begin(
     AnalysisError
         If there is no orbit near the guess, or ``family`` raises an exception.
     """
-    with Asking("family", value):
+    with UserCode("family", value):
         system = family(value)
         guess = known_state(system) if orbit is None else orbit
         studied = system if symmetric else whole_period(system, periods)

@@ -67,7 +67,7 @@ def _closes_on_orbit(curve: Curve, first: BranchPoint, step: Step) -> Step | Non
         return None
     system, sizes = curve.system(point.value), curve.units(point.orbit.size)[:-1]
     states = [point.orbit]
-    curve.left -= _PARTS
+    curve.budget.take(_PARTS)
     for _ in range(_PARTS):
         states.append(system.flow(np.array(states[-1]), 0.0, point.period / _PARTS)[0])
     path = (np.array(states) - first.orbit) / sizes

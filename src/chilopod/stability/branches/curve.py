@@ -8,6 +8,7 @@ has the section across the motion where it starts.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TypeGuard
@@ -17,9 +18,9 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import read_only
-from chilopod.stability.asked import Asking
 from chilopod.stability.branches.bordered_matrices import inverted, null_vector, symmetric_space, within_space
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, Step
+from chilopod.stability.budget import Budget, SpentError, UserCode
 from chilopod.stability.capabilities import (
     Family,
     FlowsEach,
@@ -88,7 +89,7 @@ class Curve:
     precision
         How closely orbits are solved for, of the sizes of the states.
     budget
-        Flows that may be asked for.
+        Flows and time that may be taken; None for any.
     """
 
     def __init__(
@@ -101,7 +102,7 @@ class Curve:
         periods: int = 1,
         symmetric: bool = False,
         precision: float = PRECISION,
-        budget: float = np.inf,
+        budget: Budget | None = None,
     ) -> None:
         self._family = family
         self.scale = scale
@@ -110,7 +111,7 @@ class Curve:
         self.periods = periods
         self.symmetric = symmetric
         self.precision = precision
-        self.left = budget
+        self.budget = Budget(math.inf) if budget is None else budget
         self.relative_error: float | None = None
         self._motion = 0.0  # the largest within a period so far
         self._steepness = 1.0  # of the return map over the parameter, where the step starts, in units
@@ -126,7 +127,7 @@ class Curve:
         """The family's system, and what is studied of it."""
         known = self._known.get(value)
         if known is None:
-            with Asking("family", value):
+            with UserCode("family", value):
                 own = self._family(value)
             self._dimension = self._dimension or own.dimension
             if own.dimension != self._dimension:
@@ -147,8 +148,8 @@ class Curve:
     def image(self, x: Array, value: float, section: Section | None = None, with_error: bool = False) -> ReturnMap:
         """The return map and its derivative."""
         system = self.system(value)
-        self.left -= 1
-        with Asking("flow", value):
+        self.budget.take()
+        with UserCode("flow", value):
             if section is None and system.period is None:
                 section = section_at(system, x, self.sizes)
             return return_map(system, x, with_error, section)
@@ -266,7 +267,7 @@ class Curve:
         else:
             try:
                 found = self._corrected(where, guess, matrix)
-            except OutsideIntervalError:
+            except (OutsideIntervalError, SpentError):
                 raise
             except AnalysisError:
                 if count < _FEWEST_NODES:
@@ -295,8 +296,8 @@ class Curve:
         system, units = self.system(last.value), self.units(last.orbit.size)
         duration = return_duration(system) if where.anchor.section is None else where.anchor.section.duration
         start = np.append(last.orbit, last.value)
-        self.left -= 2 * FEW_ROUNDS  # each in parts
-        with Asking("flow", last.value):
+        self.budget.take(2 * FEW_ROUNDS)  # each in parts
+        with UserCode("flow", last.value):
             nodes = nodes_along(system, last.orbit, duration, count, last.value)
             free = Free(where.row, where.target, start, self.scale)
             found = shot(lambda value: self.system(self._inside(value)), nodes, units[:-1], where.anchor.section, free)
@@ -437,9 +438,9 @@ class Curve:
 
     def _mapped(self, x: Array, value: float, section: Section | None) -> tuple[Array, Array | None]:
         """H at a state, and at a neighbouring value of the parameter if that costs no time."""
-        self.left -= 1
+        self.budget.take()
         own, system = self._systems(value)
-        with Asking("flow", value):
+        with UserCode("flow", value):
             period = own.period
             if section is None and period is not None and not self.symmetric and self.periods == 1:
                 beside = (
@@ -459,7 +460,7 @@ class Curve:
         image, system = self.image(x, value, section), self.system(value)
         duration, passing = image.period / image.returns, x[None]
         times = [part * duration for part in CUTS] + [duration]
-        with Asking("flow", value):
+        with UserCode("flow", value):
             for a, b in zip(times, times[1:], strict=False):
                 passing = carried(system, passing, a, b)
         return float(np.abs((turned(system, passing)[0] - image.state) / self.units(x.size)[:-1]).max())
@@ -496,8 +497,8 @@ class Curve:
             step = self._parameter_step(value, steepness)
             try:
                 if beside is None:
-                    self.left -= 1
-                    with Asking("flow", value + step):
+                    self.budget.take()
+                    with UserCode("flow", value + step):
                         beside = returned_states(self.system(value + step), x[None], section)[0]
             except AnalysisError:
                 if last:

@@ -244,7 +244,7 @@ def _searched(within: Within) -> list[tuple[Block | None, Crossings]]:
         return step.start.last.value + curve.scale * float(step.between(place)[0][-1])
 
     def search(matrices: Matrices) -> Crossings:
-        budget = int(min(_BUDGET, max(curve.left, 0.0)))
+        budget = int(min(_BUDGET, curve.budget.left))
         return find_crossings(matrices, within.low, step.size, budget=max(budget, 30), shown=parameter)
 
     return [(block, crossings_in(block, matrices, search)) for block in within.blocks]

@@ -176,9 +176,7 @@ def _form(
     system = curve.system(point.value)
 
     def mapped(states: Array) -> Array:
-        curve.left -= len(states)
-        if curve.left <= 0:
-            raise AnalysisError("the budget is spent", field="budget")
+        curve.budget.take(len(states))
         return returned_states(system, states, orbit.section)
 
     try:

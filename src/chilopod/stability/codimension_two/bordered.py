@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.asked import Asking
+from chilopod.stability.budget import Budget, UserCode
 from chilopod.stability.capabilities import KnowsOrbit, Scaled, SystemLike
 from chilopod.stability.orbits import from_known, known_state
 from chilopod.stability.returns import ReturnMap, Section, return_map, section_at
@@ -41,10 +41,6 @@ _STEP = 1e-6  # of differences, in units of the frame: it sets how fast Newton's
 _ROUNDS = 14
 _ROUND_OFF = 4e-15  # of a correction, in units of the frame
 _SETTLED = 1e-8  # of the same, below which it may stop falling
-
-
-class OutOfBudget(AnalysisError):
-    """As many return maps as were allowed have been evaluated."""
 
 
 @dataclass(frozen=True)
@@ -189,20 +185,20 @@ class Equations:
     box
         Lower and upper ends of both parameters' intervals, shape (2, 2): one row for each parameter.
     budget
-        How many return maps may be evaluated.
+        Return maps and time that may be taken.
     """
 
-    def __init__(self, family2: Family2, target: int, known: bool, box: Array, budget: int) -> None:
+    def __init__(self, family2: Family2, target: int, known: bool, box: Array, budget: Budget) -> None:
         self._family2 = family2
         self.target = target
         self.known = known
         self.box = box
-        self._left = budget
+        self.budget = budget
 
     def system(self, values: Array) -> SystemLike:
         """The system at values of both parameters."""
         first, second = float(values[0]), float(values[1])
-        with Asking("family", (first, second)):
+        with UserCode("family", (first, second)):
             return self._family2(first, second)
 
     def begin(self, place: Place) -> Spot:
@@ -279,11 +275,9 @@ class Equations:
         return self._equations(place, image, frame)
 
     def _mapped(self, place: Place, section: Section | None, with_error: bool) -> tuple[Place, ReturnMap]:
-        if self._left <= 0:
-            raise OutOfBudget("as many return maps as were allowed have been evaluated", field="budget")
-        self._left -= 1
+        self.budget.take()
         system = self.system(place.values)
-        with Asking("flow", tuple(place.values.tolist())):
+        with UserCode("flow", tuple(place.values.tolist())):
             if self.known:
                 orbit = from_known(system, known_state(system), with_error)
                 return replace(place, state=orbit.state), orbit.image

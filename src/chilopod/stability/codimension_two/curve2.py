@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.labels import Labelled
 from chilopod.stability.codimension_two.codimension2 import Codimension2
 from chilopod.stability.points import Kind
 from chilopod.stability.shown import Result, axes_for, bounded, columns, dataset, mark, rows
+from chilopod.stability.tracing.ending import Ending
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,18 +20,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
-
-
-class CurveEnd(Labelled):
-    """Why a curve ends where it does; each member's ``sentence`` says it in words."""
-
-    START = "start", "the curve was followed from here, the other way only"
-    LEFT_BOX = "left the box", "a parameter reached an end of its interval"
-    CLOSED = "closed", "the curve came back to where it started"
-    RESONANCE = "resonance", "the two multipliers of the pair meet: here the curve ends indeed"
-    ENOUGH_POINTS = "enough points", "as many points as were asked for"
-    OUT_OF_BUDGET = "out of budget", "as many return maps as were allowed have been evaluated"
-    LOST = "lost", "the step became too small: the curve could not be followed further"
 
 
 @dataclass(frozen=True)
@@ -92,7 +80,7 @@ class Curve2(Result):
     kind: Kind
     points: tuple[Point2, ...]
     special: tuple[Codimension2, ...]
-    endings: tuple[CurveEnd, CurveEnd]
+    endings: tuple[Ending, Ending]
     reasons: tuple[str, str] = ("", "")
 
     @property

@@ -7,22 +7,27 @@ parameter) with the equations of :mod:`.bordered`, and on the way the points of 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from chilopod.errors import AnalysisError, ChilopodError, ParameterError
-from chilopod.stability.codimension_two.bordered import Equations, Family2, OutOfBudget, Place, Spot, knows_orbit
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.stability.budget import Budget
+from chilopod.stability.codimension_two.bordered import Equations, Family2, Place, Spot, knows_orbit
 from chilopod.stability.codimension_two.codimension2 import Codimension2, CodimensionTwo
-from chilopod.stability.codimension_two.curve2 import Curve2, CurveEnd, Point2
+from chilopod.stability.codimension_two.curve2 import Curve2, Point2
 from chilopod.stability.codimension_two.detection import Detector, Signals, across, critical
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import return_duration
 from chilopod.stability.scales import sizes
 from chilopod.stability.symmetry.mirrored import reverses
+from chilopod.stability.tracing.ending import Ending
+from chilopod.stability.tracing.tracer import Pace, trace
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -30,11 +35,12 @@ ComplexArray = NDArray[np.complex128]
 BUDGET = 20_000
 """Return maps, with derivatives, that a curve may take by default."""
 
-_SHORTEST = 1e-6  # step at which a curve is lost, relative to the longest
 _FEW, _MANY = 7, 10  # corrections after which steps grow, and shrink
 _SHARPEST_TURN = 0.9  # cosine between tangents at both ends of a step
 _FARTHEST = 0.3  # of a step, from where it was predicted to end
 _SAME = 1e-6  # of a step: how near a curve comes to its start to be closed
+
+_MEETINGS = CodimensionTwo.RESONANCE_1_1, CodimensionTwo.RESONANCE_1_2
 
 Progress2 = Callable[[int, Point2], None]
 
@@ -51,6 +57,7 @@ def follow2(
     longest: float = 0.05,
     coefficients: bool = True,
     budget: int = BUDGET,
+    seconds: float = math.inf,
     progress: Progress2 = lambda count, point: None,
 ) -> Curve2:
     """Follow a bifurcation point as two parameters change.
@@ -73,8 +80,9 @@ def follow2(
         First and largest step along the curve, in units of the box and of the states.
     coefficients
         Whether to compute normal forms, without which cusps and degenerate points are not found.
-    budget
-        How many return maps with derivatives may be evaluated (normal forms have a budget of their own).
+    budget, seconds
+        Number of return maps with derivatives (normal forms have a budget of their own), and time in s, after which the
+        curve ends.
     progress
         Called with the number of points and the newest one.
 
@@ -93,21 +101,21 @@ def follow2(
     if not ((box[:, 0] <= values) & (values <= box[:, 1])).all():
         raise ParameterError("does not hold the start", field="between", value=between, allowed=f"{values} within")
     target, known = _what(family2, start, second)
-    equations = Equations(family2, target, known, box, budget)
+    equations = Equations(family2, target, known, box, Budget(budget, seconds))
     nu = complex(start.multiplier)
     first = equations.begin(Place(start.orbit, values, 0.0 if target else nu.real / abs(nu)))
-    tracer = _Tracer(equations, start.kind, coefficients, points, step, longest, progress)
-    origin = tracer.station(first)
+    curve, pace = _Critical(equations, start.kind, coefficients, progress), Pace(longest, _FEW, _MANY)
+    origin = curve.station(first)
     upward = float(np.sign(first.tangent[first.frame.parameters][1]) or 1.0)
     signs = (1.0, -1.0) if rising is None else (1.0,) if rising else (-1.0,)
     halves = []
     for sign in signs:
-        halves.append(tracer.traced(origin, sign * upward))
-        if halves[-1].ending is CurveEnd.CLOSED:
-            return _joined(start.kind, origin, _Half((), (), CurveEnd.CLOSED, ""), halves[-1])
+        halves.append(curve.traced(origin, sign * upward, step, pace, points))
+        if halves[-1].ending is Ending.CLOSED:
+            return _joined(start.kind, origin, _Half((), (), Ending.CLOSED, ""), halves[-1])
     if rising is None:
         return _joined(start.kind, origin, halves[1], halves[0])
-    return _joined(start.kind, origin, _Half((), (), CurveEnd.START, ""), halves[0])
+    return _joined(start.kind, origin, _Half((), (), Ending.START, ""), halves[0])
 
 
 def _checked(between: object, points: int, step: float, longest: float, budget: int) -> Array:
@@ -162,7 +170,7 @@ class _Half:
 
     stations: tuple[_Station, ...]
     special: tuple[Codimension2, ...]
-    ending: CurveEnd
+    ending: Ending
     reason: str
 
 
@@ -177,23 +185,21 @@ def _joined(kind: Kind, origin: _Station, before: _Half, after: _Half) -> Curve2
     )
 
 
-class _Tracer:
-    def __init__(
-        self,
-        equations: Equations,
-        kind: Kind,
-        coefficients: bool,
-        points: int,
-        step: float,
-        longest: float,
-        progress: Progress2,
-    ) -> None:
+class _Advance(NamedTuple):
+    """A step to a station, what happens within it, and why the curve ends with it, if it does."""
+
+    station: _Station | None
+    special: tuple[Codimension2, ...] = ()
+    ending: Ending | None = None
+
+
+class _Critical:
+    """A curve of critical orbits that is being followed: see :class:`chilopod.stability.tracing.tracer.Traced`."""
+
+    def __init__(self, equations: Equations, kind: Kind, coefficients: bool, progress: Progress2) -> None:
         self._equations = equations
         self._detector = Detector(equations, kind, coefficients)
-        self._kind = kind
         self._coefficients = coefficients
-        self._points = points
-        self._first, self._longest = step, longest
         self._progress = progress
 
     def station(self, spot: Spot) -> _Station:
@@ -218,45 +224,40 @@ class _Tracer:
         )
         return _Station(spot, point, self._detector.measured(spot, own, form))
 
-    def traced(self, origin: _Station, sign: float) -> _Half:
+    def traced(self, origin: _Station, sign: float, size: float, pace: Pace, points: int) -> _Half:
         """The curve from its start on, along the tangent or against it."""
-        last = replace(origin, spot=replace(origin.spot, tangent=sign * origin.spot.tangent))
-        home = last.spot
-        found: list[_Station] = []
-        special: list[Codimension2] = []
-        size = min(self._first, self._longest)
-        while len(found) < self._points:
-            try:
-                new, corrections, edge = self._step(last.spot, size)
-                if len(found) > 1 and self._closes(last.spot, new, home):
-                    return _Half(tuple(found), tuple(special), CurveEnd.CLOSED, "")
-                station = self.station(new)
-                events = self._detector.between(last.spot, last.signals, new, station.signals)
-            except OutOfBudget:
-                return _Half(tuple(found), tuple(special), CurveEnd.OUT_OF_BUDGET, "")
-            except (ChilopodError, ArithmeticError, ValueError) as error:
-                # Parameters may step out of what the systems can have, whatever these then raise.
-                size *= 0.5
-                if size < _SHORTEST * self._longest:
-                    return _Half(tuple(found), tuple(special), CurveEnd.LOST, str(error))
-                continue
-            for _, spot, event in events:
-                special.append(event)
-                if self._equations.target == 0 and event.kind in (
-                    CodimensionTwo.RESONANCE_1_1,
-                    CodimensionTwo.RESONANCE_1_2,
-                ):
-                    found.append(self.station(spot))
-                    return _Half(tuple(found), tuple(special), CurveEnd.RESONANCE, "")
-            if np.array_equal(new.place.values, last.spot.place.values):
-                return _Half(tuple(found), tuple(special), CurveEnd.LEFT_BOX, "")
-            found.append(station)
-            self._progress(len(found), station.point)
-            last = station
-            if edge:
-                return _Half(tuple(found), tuple(special), CurveEnd.LEFT_BOX, "")
-            size = min(self._longest, size * (1.5 if corrections <= _FEW else 1.0 if corrections <= _MANY else 0.6))
-        return _Half(tuple(found), tuple(special), CurveEnd.ENOUGH_POINTS, "")
+        self._last = replace(origin, spot=replace(origin.spot, tangent=sign * origin.spot.tangent))
+        self._home = self._last.spot
+        self._found: list[_Station] = []
+        self._special: list[Codimension2] = []
+        ending, reason, _ = trace(self, min(size, pace.longest), pace, points, self._equations.budget)
+        return _Half(tuple(self._found), tuple(self._special), ending, reason)
+
+    def advance(self, size: float, count: int) -> tuple[_Advance, int]:
+        """A step of some size, with what happens within it."""
+        last = self._last
+        new, corrections, edge = self._step(last.spot, size)
+        if count > 2 and self._closes(last.spot, new, self._home):
+            return _Advance(None, ending=Ending.CLOSED), corrections
+        station = self.station(new)
+        special: tuple[Codimension2, ...] = ()
+        for _, spot, event in self._detector.between(last.spot, last.signals, new, station.signals):
+            special += (event,)
+            if self._equations.target == 0 and event.kind in _MEETINGS:
+                return _Advance(self.station(spot), special, Ending.RESONANCE), corrections
+        if np.array_equal(new.place.values, last.spot.place.values):
+            return _Advance(None, special, Ending.LEFT_INTERVAL), corrections
+        return _Advance(station, special, Ending.LEFT_INTERVAL if edge else None), corrections
+
+    def arrive(self, step: _Advance, count: int) -> Ending | None:
+        """Go on to the end of a step."""
+        self._special += step.special
+        if step.station is not None:
+            self._found.append(step.station)
+            self._last = step.station
+            if step.ending is not Ending.RESONANCE:
+                self._progress(count, step.station.point)
+        return step.ending
 
     def _step(self, last: Spot, size: float) -> tuple[Spot, int, bool]:
         """The spot a step further, how many corrections it took, and whether it is on the edge of the box."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.stability.asked import ReturnBudget
+from chilopod.stability.budget import Budget
 from chilopod.stability.capabilities import FlowsTangents
 from chilopod.stability.krylov.arnoldi import krylov_subspaces
 from chilopod.stability.krylov.tangent_map import TangentMap, tangent_map, tangent_sizes
@@ -40,7 +40,7 @@ def closed_orbit(
     x: Array,
     section: Section | None = None,
     farthest: float = np.inf,
-    budget: ReturnBudget | None = None,
+    budget: Budget | None = None,
 ) -> tuple[TangentMap, Array]:
     """The return map in a state on a periodic orbit near a guess, and the sizes of the states, shape (n,).
 

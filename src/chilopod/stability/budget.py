@@ -1,15 +1,16 @@
-"""What is asked of a user's functions: how often, and what becomes of their exceptions."""
+"""Limits of a search, and what becomes of exceptions of a user's functions."""
 
 from __future__ import annotations
 
+import math
 import time
 
 from chilopod.errors import AnalysisError, ChilopodError, in_words
 
 
-class Asking:
-    """Around calls of a user's functions at a value of the parameter: whatever they raise becomes a :class:`UserError`,
-    an AnalysisError of one line as where a family has no orbit."""
+class UserCode:
+    """Context of a call of a user's function at a value of the parameter: whatever it raises becomes a
+    :class:`UserError`, an AnalysisError of one line as where a family has no orbit."""
 
     def __init__(self, field: str, value: object) -> None:
         self._field, self._value = field, value
@@ -27,19 +28,26 @@ class UserError(AnalysisError):
 
 
 class SpentError(AnalysisError):
-    """A search has evaluated as many return maps as it may."""
+    """The budget of a search is spent."""
 
 
-class ReturnBudget:
-    """Return maps that may still be evaluated.
+class Budget:
+    """Flows over a return, and time, that a search may still take.
 
     Attributes
     ----------
     left
-        How many; never below zero.
+        Number of flows; never below zero.
+
+    Parameters
+    ----------
+    allowed
+        Number of flows.
+    seconds
+        Time from now on, s.
     """
 
-    def __init__(self, allowed: int, seconds: float) -> None:
+    def __init__(self, allowed: float, seconds: float = math.inf) -> None:
         self.left = allowed
         self._ends = time.monotonic() + seconds
 
@@ -54,7 +62,7 @@ class ReturnBudget:
         return self.left <= 0 or self.late
 
     def take(self, count: int = 1) -> None:
-        """Count some that are about to be evaluated.
+        """Count some flows that are about to be computed.
 
         Raises
         ------
@@ -62,7 +70,7 @@ class ReturnBudget:
             If there is none left.
         """
         if self.left <= 0:
-            raise SpentError("as many return maps as were allowed were evaluated", field="budget")
+            raise SpentError("as many flows as were allowed are spent", field="budget")
         if self.late:
             raise SpentError("the time is over", field="seconds")
         self.left = max(self.left - count, 0)

@@ -1,0 +1,1 @@
+"""One tracer for all curves."""
