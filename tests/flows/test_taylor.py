@@ -254,11 +254,13 @@ def test_what_goes_through_switches_is_compiled_only_where_there_are_any():
     """It takes as long to compile as the rest. Numba leaves out what it knows not to run for the types it is given."""
 
     def left(flow):
-        function = run_frontend(stepping.advance.py_func)
-        directions = numba.typeof(flow._directions)
-        dead_branch_prune(function, [directions if name == "directions" else None for name in function.arg_names])
-        values = (line.value for block in function.blocks.values() for line in block.find_insts(ir.Assign))
-        return {value.name for value in values if isinstance(value, ir.Global)}
+        directions, names = numba.typeof(flow._directions), set()
+        for kernel in (stepping.advance, stepping._chosen):
+            function = run_frontend(kernel.py_func)
+            dead_branch_prune(function, [directions if name == "directions" else None for name in function.arg_names])
+            values = (line.value for block in function.blocks.values() for line in block.find_insts(ir.Assign))
+            names |= {value.name for value in values if isinstance(value, ir.Global)}
+        return names
 
     smooth, _ = flow_of(lambda t, x: [-x[0]], 1)
     switching = {"settle", "await_events", "_first_crossing", "cross"}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
@@ -73,6 +74,7 @@ class Flows(NamedTuple):
     concurrent: bool = False
 
 
+@dataclass
 class RightHandSide:
     """A right-hand side f(t, x, *args), checked.
 
@@ -87,8 +89,8 @@ class RightHandSide:
     ----------
     start, base
         State on the orbit, None if it is not known; a state to try f at.
-    times
-        A time inside every interval between switches.
+    edges, times
+        Times from 0 to the period at which f switches; a time inside every interval between them.
 
     Raises
     ------
@@ -96,35 +98,29 @@ class RightHandSide:
         If an argument is not what it should be.
     """
 
-    def __init__(
-        self,
-        rhs: Callable[..., ArrayLike],
-        dimension: int,
-        duration: float,
-        autonomous: bool,
-        args: tuple[Any, ...],
-        events: Sequence[Event],
-        switch_times: Sequence[float],
-        jacobian: Callable[..., ArrayLike] | None,
-        orbit: ArrayLike | None,
-        method: Method,
-        tolerance: float,
-    ) -> None:
-        if method not in get_args(Method):
-            raise ParameterError("is not known", field="method", value=method, allowed=", ".join(get_args(Method)))
-        self.rhs, self.jacobian, self.method, self.autonomous, self.duration = (
-            rhs,
-            jacobian,
-            method,
-            autonomous,
-            duration,
+    rhs: Callable[..., ArrayLike]
+    dimension: int
+    duration: float
+    autonomous: bool
+    args: tuple[Any, ...] = ()
+    events: Sequence[Event] = ()
+    switch_times: Sequence[float] = ()
+    jacobian: Callable[..., ArrayLike] | None = None
+    orbit: ArrayLike | None = None
+    method: Method = "automatic"
+    tolerance: float = TOLERANCE
+
+    def __post_init__(self) -> None:
+        if self.method not in get_args(Method):
+            raise ParameterError("is not known", field="method", value=self.method, allowed=", ".join(get_args(Method)))
+        self.dimension, self.args, self.tolerance = checked_arguments(
+            self.rhs, self.dimension, self.args, self.tolerance
         )
-        self.dimension, self.args, self.tolerance = checked_arguments(rhs, dimension, args, tolerance)
-        self.events = checked_events(events)
-        self.edges = _edges(switch_times, duration)
-        if autonomous and self.edges.size > 2:
-            raise ParameterError("need a period", field="switch_times", value=switch_times, allowed="none")
-        self.start = None if orbit is None else finite_array(orbit, (self.dimension,), "orbit")
+        self.events = checked_events(self.events)
+        self.edges = _edges(self.switch_times, self.duration)
+        if self.autonomous and self.edges.size > 2:
+            raise ParameterError("need a period", field="switch_times", value=self.switch_times, allowed="none")
+        self.start = None if self.orbit is None else finite_array(self.orbit, (self.dimension,), "orbit")
         self.base = np.zeros(self.dimension) if self.start is None else self.start
         self.times = np.asarray(self.edges[:-1] + 0.4142 * np.diff(self.edges))
         check_events(self.events, self.args, self.times, self.start, self.dimension)

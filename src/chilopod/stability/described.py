@@ -39,8 +39,7 @@ Formed = Callable[[CriticalOrbit, float], NormalForm | None]
 
 def described(
     system: SystemLike,
-    value: float,
-    error_bound: float,
+    place: tuple[float, float],
     orbit: Orbit,
     crossing: Crossing,
     block: Block | None,
@@ -55,8 +54,8 @@ def described(
     ----------
     system
         The system at the value.
-    value, error_bound
-        Of the parameter; round-off is added to the bound.
+    place
+        Value of the parameter and bound of its error, to which round-off is added.
     orbit
         There, with error bounds.
     crossing
@@ -70,6 +69,7 @@ def described(
     with_normal_form
         Whether coefficients and a verdict are wanted.
     """
+    value, error_bound = place
     spec = spectrum(orbit.image)
     critical = critical_multipliers(spec, crossing)
     nu = complex(spec.values[critical[0]])

@@ -245,8 +245,7 @@ def _described(samples: Samples, crossing: Crossing, block: Block | None, with_n
     lost = samples.end < samples.high and value + bound >= samples.end
     return described(
         samples.family(value),
-        value,
-        bound,
+        (value, bound),
         orbit,
         crossing,
         block,
@@ -263,8 +262,7 @@ def _fold(samples: Samples, fold: Fold, with_normal_form: bool) -> BifurcationPo
     formed = _formed(samples, fold.value, orbit)
     return described(
         samples.family(fold.value),
-        fold.value,
-        fold.error_bound,
+        (fold.value, fold.error_bound),
         orbit,
         crossing,
         None,

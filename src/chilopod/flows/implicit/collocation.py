@@ -164,6 +164,22 @@ def _prepared(tape: Any, units: Any, params: Any, branches: Any, largest: Any) -
     return Problem(tape, units, series, largest)
 
 
+@fused_njit(error_model="numpy")
+def _room(n: int, s: int) -> Any:
+    """A step of s stages of n states, to be filled."""
+    return Step(
+        np.empty(n),
+        np.empty((n, n)),
+        np.zeros((s, n)),
+        np.empty((s, n)),
+        np.empty((s, n, n)),
+        np.empty((s * n, s * n)),
+        np.empty(s * n, np.int64),
+        np.empty((s * n, n)),
+        np.empty((s, n, n)),
+    )
+
+
 @fused_njit(error_model="numpy", nogil=True)
 def advance(tape: Any, method: Any, params: Any, x: Any, interval: Any, control: Any, result: Any) -> int:
     """Carry a state over an interval in place.
@@ -181,17 +197,7 @@ def advance(tape: Any, method: Any, params: Any, x: Any, interval: Any, control:
     """
     n, s, t1 = x.size, method.nodes.size, interval.t1
     problem = _prepared(tape, control.units, params, interval.branches, result.largest)
-    step = Step(
-        np.empty(n),
-        np.empty((n, n)),
-        np.zeros((s, n)),
-        np.empty((s, n)),
-        np.empty((s, n, n)),
-        np.empty((s * n, s * n)),
-        np.empty(s * n, np.int64),
-        np.empty((s * n, n)),
-        np.empty((s, n, n)),
-    )
+    step = _room(n, s)
     last = np.zeros((s, n))
     t, h, h_last = interval.t0, 0.0, 0.0
     steps = 0

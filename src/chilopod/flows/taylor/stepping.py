@@ -243,6 +243,29 @@ def _enlarge_scales(tape: Any, motion: Any, order: int, h: float) -> None:
 
 
 @fused_njit(error_model="numpy", inline="always")
+def _chosen(
+    tape: Any, directions: Any, clock: Any, motion: Any, control: Any, when: Any, steps: int, work: Any
+) -> tuple[float, int, float]:
+    """The length of a step, and the switch at its end as of :func:`_first_crossing`; ``when`` has the time, its unit,
+    the units that remain, and those within which two instants are one."""
+    t, unit, remaining, soon = when
+    series, order = motion.series, control.order
+    h = step_size(tape, series, motion.seeds.shape[1], order, remaining, control.epsilon)
+    if control.shake > 0.0 and steps == 1:  # no step is one of the other computation's, to round as that
+        h = min(h, _FIRST * remaining)
+    elif h < remaining and h > 0.5 * remaining:
+        h = 0.5 * remaining
+    crossing, direction = -1, 0.0
+    if directions is not None:
+        h, crossing, direction = _first_crossing(tape, series, order, h, remaining, soon, work)
+    shorter = agrees(tape, clock, series, order, t, h, unit)
+    while shorter < h:
+        h, crossing = shorter, -1
+        shorter = agrees(tape, clock, series, order, t, h, unit)
+    return h, crossing, direction
+
+
+@fused_njit(error_model="numpy", inline="always")
 def _is_spent(control: Any, steps: int, done: float, whole: float) -> bool:
     """Whether a step is beyond the budget, or would be at the end of the interval, of which a part is done."""
     if steps > control.most_steps:
@@ -251,6 +274,28 @@ def _is_spent(control: Any, steps: int, done: float, whole: float) -> bool:
     while 0 < check < steps:
         check *= 2
     return check == steps and steps * whole > control.most_steps * done
+
+
+@fused_njit(error_model="numpy")
+def _begun(tape: Any, params: Any, x: Any, control: Any, derivative: Any) -> Any:
+    """The motion at its start, with room for its series."""
+    n, order, nodes, switches = tape.layout[0], control.order, tape.layout[5], tape.switches.shape[1]
+    columns = derivative.shape[1]
+    lanes = (columns + LANES - 1) // LANES * LANES
+    series = Series(np.zeros((nodes, order + 1)), np.zeros((nodes, order + 1, lanes)), np.zeros(switches))
+    load(tape, params, series)
+    return Motion(x, np.eye(n) if control.stepwise and columns > 0 else derivative, series, np.zeros(switches))
+
+
+@fused_njit(error_model="numpy")
+def _noted(events: Any, passed: int, t: float, event: int) -> int:
+    """Note an event, if there is room and it is one; returns how many there have been."""
+    if event < 0:
+        return passed
+    if passed < events.shape[0]:
+        events[passed, 0] = t
+        events[passed, 1] = event
+    return passed + 1
 
 
 @fused_njit(error_model="numpy", nogil=True)
@@ -273,17 +318,13 @@ def advance(tape: Any, directions: Any, clock: Any, params: Any, x: Any, span: A
         :class:`Control` and :class:`Outcome`.
     """
     t0, t1 = span
-    n, order, nodes, switches = tape.layout[0], control.order, tape.layout[5], tape.switches.shape[1]
+    n, order, switches = tape.layout[0], control.order, tape.switches.shape[1]
     columns = outcome.derivative.shape[1]
-    lanes = (columns + LANES - 1) // LANES * LANES
-    series = Series(np.zeros((nodes, order + 1)), np.zeros((nodes, order + 1, lanes)), np.zeros(switches))
-    seeds = np.eye(n) if control.stepwise and columns > 0 else outcome.derivative
-    motion = Motion(x, seeds, series, np.zeros(switches))
+    motion = _begun(tape, params, x, control, outcome.derivative)
     with_bound = outcome.bound.shape[0] > 0
     blocks = _BLOCK if with_bound else 0
     block = _Block(np.empty((blocks, n, n)), np.empty((blocks, n, n)))
     factor, work = np.empty((n, columns)), np.empty(order + 1)
-    load(tape, params, series)
     t, last, unit = t0, t0 - (t1 - t0), (t1 - t0) / 8.0
     status = DONE
     steps, crossings, passed, in_place, in_block, noise = 0, 0, 0, 0, 0, 1
@@ -301,19 +342,10 @@ def advance(tape: Any, directions: Any, clock: Any, params: Any, x: Any, span: A
         if not finite:
             status = NOT_FINITE
             break
-        remaining = (t1 - t) / unit
-        h = step_size(tape, series, columns, order, remaining, control.epsilon)
-        if control.shake > 0.0 and steps == 1:  # no step is one of the other computation's, to round as that
-            h = min(h, _FIRST * remaining)
-        elif h < remaining and h > 0.5 * remaining:
-            h = 0.5 * remaining
-        crossing, direction = -1, 0.0
-        if directions is not None:
-            h, crossing, direction = _first_crossing(tape, series, order, h, remaining, at_once / unit, work)
-        shorter = agrees(tape, clock, series, order, t, h, unit)
-        while shorter < h:
-            h, crossing = shorter, -1
-            shorter = agrees(tape, clock, series, order, t, h, unit)
+        remaining, soon = (t1 - t) / unit, at_once / unit
+        h, crossing, direction = _chosen(
+            tape, directions, clock, motion, control, (t, unit, remaining, soon), steps, work
+        )
         reached = t1 if h >= remaining else min(t + h * unit, t1)
         in_place = in_place + 1 if reached == t else 0
         if in_place > 0 and crossing < 0:
@@ -326,7 +358,7 @@ def advance(tape: Any, directions: Any, clock: Any, params: Any, x: Any, span: A
         _enlarge_scales(tape, motion, order, h)
         noise = _step(tape, motion, control, h, noise, factor)
         if with_bound:
-            _bound_step(series.tangents, order, h, block.errors[in_block])
+            _bound_step(motion.series.tangents, order, h, block.errors[in_block])
         in_block = _multiply(block, in_block, factor, control.stepwise, outcome)
         t = reached
         unit *= min(max(h, 1e-3), 1e3) if h > 0.0 else 1.0
@@ -336,11 +368,7 @@ def advance(tape: Any, directions: Any, clock: Any, params: Any, x: Any, span: A
             if status == GRAZES and t - last <= 1e-6 * (t - t0):
                 status = CHATTERS
             last = t
-            if event >= 0:
-                if passed < outcome.events.shape[0]:
-                    outcome.events[passed, 0] = t
-                    outcome.events[passed, 1] = event
-                passed += 1
+            passed = _noted(outcome.events, passed, t, event)
             if with_bound:
                 _assign(block.errors[in_block], 16.0 * _ROUNDING * np.abs(factor))
             in_block = _multiply(block, in_block, factor, control.stepwise, outcome)

@@ -197,7 +197,7 @@ def load(tape: Any, params: Any, series: Any) -> None:
         values_at(tape.program, tape.terms, i, i + 1, 0, values, series.branches)
 
 
-@fused_njit(error_model="numpy")
+@fused_njit(error_model="numpy", inline="always")
 def expand(tape: Any, order: int, stop: int, unit: float, series: Any) -> None:
     """Coefficients 0 to ``order`` of the states and of all operations up to ``stop``, in powers of the time since the
     start over ``unit``.

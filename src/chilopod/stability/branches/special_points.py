@@ -82,8 +82,7 @@ def special_point(
         point = replace(point, value=_reached(curve, at(high), regular.sampled)[1])
     found = described(
         curve.system(point.value),
-        point.value,
-        _value_error(curve, at, place, between, along, orbit.image),
+        (point.value, _value_error(curve, at, place, between, along, orbit.image)),
         orbit,
         crossing,
         block,

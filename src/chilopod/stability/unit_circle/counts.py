@@ -6,6 +6,7 @@ from __future__ import annotations
 import bisect
 import itertools
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,12 @@ _JUMP = 0.5
 _SHADOW = 1.5  # widths of a touch within which a crossing explains it
 _WIDER = 100.0
 _EPSILON = float(np.finfo(float).eps)
+
+
+class _Anew(NamedTuple):
+    """Roots to go on with, where the counts are to be compared once more."""
+
+    roots: list[Root]
 
 
 class Accounts:
@@ -123,33 +130,12 @@ class Accounts:
         """Compare counts along all gaps between decided places; the roots after that, the points, and whether to do
         it again."""
         decided = self._decided(roots)
-        points: list[Point] = []
-        kept: list[Root] = []
-        again = False
         if not decided:
             self._remark("the multipliers are nowhere clear of the circle", self._ends)
             return roots, [self._point(root, 0, None, None) for root in roots], False
-        for root in roots:
-            if root.place < decided[0][0] or root.place > decided[-1][0]:
-                kept.append(root)
-                points.append(self._at_end(root, decided))
-        for place in self._ends:
-            outer = place < decided[0][0] or place > decided[-1][0]
-            if (
-                outer
-                and place in self._spectra.values
-                and not any(
-                    (root.place < decided[0][0]) == (place < decided[0][0])
-                    and (root.place > decided[-1][0]) == (place > decided[-1][0])
-                    for root in kept
-                )
-            ):
-                end = Root(place, place, place, None, True)
-                if self._is_critical(end):
-                    kept.append(end)
-                    points.append(self._at_end(end, decided))
-                else:
-                    self._lost(end)
+        kept = self._beyond(roots, decided)
+        points = [self._at_end(root, decided) for root in kept]
+        again = False
         index = 0
         for (x, before), (y, after) in itertools.pairwise(decided):
             inside = []
@@ -157,40 +143,54 @@ class Accounts:
                 if roots[index].place > x:
                     inside.append(roots[index])
                 index += 1
-            if (not inside and before == after) or (x, y) in self._settled:
-                if inside:
-                    kept += inside
-                    points += [self._point(root, 0, None, None) for root in inside]
-                continue
-            if self._spectra.left <= 0 and (len(inside) != 1 or not self._explains(inside[0], after - before)):
-                self.spent = True
-                kept += inside
-                points += [self._point(root, 0, None, None) for root in inside]
-                continue
-            if not inside:
-                kept += self._followed(x, y, before, after)
+            found = self._in_gap(inside, x, y, before, after)
+            if isinstance(found, _Anew):
+                kept += found.roots
                 again = True
-            elif len(inside) > 1:
-                kept += self._separated(inside)
-                again = True
-            elif self._explains(inside[0], after - before):
-                kept += inside
-                points.append(self._point(inside[0], after - before, x, y))
-            elif inside[0].touch and after != before:
-                kept += self._followed(x, y, before, after)
-                again = True
-            elif self._tightened(inside[0], x, y):
-                kept += inside
-                again = True
-            elif self._conservative and before == after:  # a collision whose ends are too near each other
-                kept += inside
-                points.append(self._point(inside[0], 0, x, y))
             else:
-                critical = sum(group.multiplicity for group in self._critical.groups(inside[0]))
-                self._remark(f"{after - before:+d} multipliers outside where {critical} are on the circle", (x, y))
                 kept += inside
-                points.append(self._point(inside[0], after - before, x, y))
+                points += found
         return kept, sorted(points, key=lambda point: point.place), again
+
+    def _beyond(self, roots: list[Root], decided: list[tuple[float, int]]) -> list[Root]:
+        """Roots beyond the first and the last decided place, the ends of the interval among them."""
+        first, last = decided[0][0], decided[-1][0]
+        kept = [root for root in roots if not first <= root.place <= last]
+        for place in self._ends:
+            if first <= place <= last or place not in self._spectra.values:
+                continue
+            if not any((root.place < first, root.place > last) == (place < first, place > last) for root in kept):
+                end = Root(place, place, place, None, True)
+                if self._is_critical(end):
+                    kept.append(end)
+                else:
+                    self._lost(end)
+        return kept
+
+    def _in_gap(self, inside: list[Root], x: float, y: float, before: int, after: int) -> list[Point] | _Anew:
+        """Points of the roots in a gap, if they explain the change of the count; else the roots to go on with."""
+        change = after - before
+        unexplained = [self._point(root, 0, None, None) for root in inside]
+        if (not inside and change == 0) or (x, y) in self._settled:
+            return unexplained
+        explained = len(inside) == 1 and self._explains(inside[0], change)
+        if self._spectra.left <= 0 and not explained:
+            self.spent = True
+            return unexplained
+        if not inside:
+            return _Anew(self._followed(x, y, before, after))
+        if len(inside) > 1:
+            return _Anew(self._separated(inside))
+        if not explained:
+            if inside[0].touch and change != 0:
+                return _Anew(self._followed(x, y, before, after))
+            if self._tightened(inside[0], x, y):
+                return _Anew(inside)
+            # Or it is a collision whose ends are too near each other.
+            if not (self._conservative and change == 0):
+                critical = sum(group.multiplicity for group in self._critical.groups(inside[0]))
+                self._remark(f"{change:+d} multipliers outside where {critical} are on the circle", (x, y))
+        return [self._point(inside[0], change, x, y)]
 
     def _decided(self, roots: list[Root]) -> list[tuple[float, int]]:
         """Places with a count, those within the brackets of roots left out."""

@@ -217,17 +217,9 @@ class _Search:
                 return []
             return _halves(a, b)
         if close.size:
-            # The error may fall with the function: it is the one in the middle of a pair that counts.
-            sure = np.zeros(close.size)
-            if self.error is not None:
-                sure = _CLEAR * np.exp(np.minimum(self.error(_places(a, b, close)) - reference, 0.0))
-            touching = np.abs(chebyshev.chebval(close, coefficients)) + uncertain < sure
-            if not touching.all() and not self._fine(a, b, _FINEST):
-                curvature = abs(float(chebyshev.chebval(close[~touching][0], chebyshev.chebder(coefficients, 2))))
-                # Wide enough that the pieces beside it are clear of zeros, and the pair in it for certain.
-                unsure = np.sqrt(_CLEAR * max(uncertain, _EPSILON) / max(curvature, _EPSILON))
-                reach = min(max(_APART * float(spread[~touching][0]), _APART * unsure), _APART * _NEAR)
-                return _around(a, b, float(close[~touching][0]), reach)
+            around = self._pair(a, b, close, spread, coefficients, uncertain, reference)
+            if around is not None:
+                return around
             real = self._touches(a, b, real, close, coefficients, max(noise, uncertain))
         slopes = np.abs(chebyshev.chebval(real, chebyshev.chebder(coefficients)))
         reach = _CLEAR * max(uncertain, noise) / np.maximum(slopes, 1e-300)
@@ -239,6 +231,30 @@ class _Search:
         alone = (at_left or at_right) and not kept.size
         stations = np.concatenate([[-1.0] if at_left or alone else [], kept, [1.0] if at_right or alone else []])
         return _Piece(a, b, kept.size, (at_left, at_right), _places(a, b, 0.5 * (stations[1:] + stations[:-1])))
+
+    def _pair(
+        self,
+        a: float,
+        b: float,
+        close: Array,
+        spread: Array,
+        coefficients: Array,
+        uncertain: float,
+        reference: float,
+    ) -> list[Interval] | None:
+        """Pieces around the first pair of zeros that the error leaves apart; None if there is none."""
+        # The error may fall with the function: it is the one in the middle of a pair that counts.
+        sure = np.zeros(close.size)
+        if self.error is not None:
+            sure = _CLEAR * np.exp(np.minimum(self.error(_places(a, b, close)) - reference, 0.0))
+        touching = np.abs(chebyshev.chebval(close, coefficients)) + uncertain < sure
+        if touching.all() or self._fine(a, b, _FINEST):
+            return None
+        curvature = abs(float(chebyshev.chebval(close[~touching][0], chebyshev.chebder(coefficients, 2))))
+        # Wide enough that the pieces beside it are clear of zeros, and the pair in it for certain.
+        unsure = np.sqrt(_CLEAR * max(uncertain, _EPSILON) / max(curvature, _EPSILON))
+        reach = min(max(_APART * float(spread[~touching][0]), _APART * unsure), _APART * _NEAR)
+        return _around(a, b, float(close[~touching][0]), reach)
 
     def _touches(self, a: float, b: float, real: Array, close: Array, coefficients: Array, noise: float) -> Array:
         """Note where pairs of zeros cannot be told apart; the zeros that are left."""
