@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.stability import Ending, PeriodicSystem, follow, from_rhs, locate
+from chilopod.stability import Budget, Ending, PeriodicSystem, follow, from_rhs, locate
+from chilopod.stability.budget import SpentError
 from chilopod.stability.unit_circle.crossings import SearchStatus
 
 BUDGET = 150
@@ -190,3 +191,52 @@ def test_what_is_no_array_of_numbers(value, said):
             from_rhs(rhs, 2, 1.0, orbit=[0.0, 0.0]).flow(np.zeros(2), 0.0, 1.0)
         assert "rhs" in str(caught.value)
         assert "\n" not in str(caught.value)
+
+
+def opaque(t, x):
+    return [x[1], -x[0] if x[0] > -9.0 else 0.0]
+
+
+@pytest.mark.parametrize(
+    ("rhs", "options"),
+    [
+        (lambda t, x: [x[1], -x[0]], {"method": "taylor"}),
+        (lambda t, x: [x[1], -x[0]], {"method": "implicit"}),
+        (opaque, {"jacobian": lambda t, x: [[0.0, 1.0], [-1.0, 0.0]]}),
+    ],
+)
+def test_a_flow_ends_with_the_time_of_the_search_that_asked_for_it(rhs, options):
+    system = from_rhs(rhs, 2, 2.0 * math.pi, **options)
+    start = np.array([1.0, 0.0])
+    after = system.flow(start, 0.0, 1.0)[0]  # what has to be compiled is compiled
+    with Budget(10, seconds=0.02), pytest.raises(SpentError, match=r"^seconds: the time is over$"):
+        system.flow(start, 0.0, 1e5)
+    assert np.array_equal(system.flow(start, 0.0, 1.0)[0], after)  # and no longer than that
+
+
+def test_many_states_at_once_end_with_the_time_too():
+    system = from_rhs(lambda t, x: [x[1], -x[0]], 2, 2.0 * math.pi, method="taylor")
+    states = np.ones((64, 2))
+    system.flow_states(states, 0.0, 1.0)
+    with Budget(10, seconds=0.02), pytest.raises(SpentError):
+        system.flow_states(states, 0.0, 1e5)
+
+
+def test_an_inner_search_without_a_limit_keeps_that_of_the_outer_one():
+    system = from_rhs(lambda t, x: [x[1], -x[0]], 2, 2.0 * math.pi, method="taylor")
+    with Budget(10, seconds=0.02), Budget(10), pytest.raises(SpentError):
+        system.flow(np.array([1.0, 0.0]), 0.0, 1e5)
+
+
+def test_the_first_orbit_is_within_the_time():
+    def family(force):
+        return from_rhs(
+            lambda t, x: [x[1], -0.2 * x[1] - x[0] ** 3 + force * math.cos(t)], 2, 2.0 * math.pi, symmetry=-np.eye(2)
+        )
+
+    for search in (
+        lambda: locate(family, (2.3, 2.5), orbit=[1.88, 0.64], seconds=0.0),
+        lambda: follow(family, [1.88, 0.64], (2.3, 2.5), seconds=0.0),
+    ):
+        with pytest.raises(SpentError, match="the time is over"):
+            search()

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
 from chilopod.errors import AnalysisError
+from chilopod.flows import deadline
 from chilopod.flows.arguments import numbers
 from chilopod.flows.jumps import UndeclaredSwitch
 from chilopod.flows.taylor.flow import pieces
@@ -207,7 +208,7 @@ class CalledFlow:
         self, f: Callable[[float, Array], Array], y: Array, a: float, b: float, tolerance: float, smallest: float
     ) -> Array:
         """States at the steps, shape (states, steps)."""
-        calls = 0
+        calls, ended = 0, deadline.stop()
 
         def finite(t: float, y: Array) -> Array:
             nonlocal calls
@@ -218,6 +219,8 @@ class CalledFlow:
                     field="rhs",
                     allowed="a right-hand side that is less stiff, or one without branches, which is traced",
                 )
+            if ended[0] != 0.0:
+                raise deadline.over()
             slope = f(t, y)
             if not np.isfinite(slope).all():  # scipy would shorten its step for ever
                 raise AnalysisError(

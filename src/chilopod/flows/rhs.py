@@ -242,20 +242,12 @@ def _taylor_flows(slopes: Slopes, taylor: TaylorFlow, params: Array) -> Flows:
         passage = taylor.advance(x, t0, t1, params, bounded=True)
         return passage.state, passage.derivative, passage.bound
 
-    def is_stiff(x: Array, t0: float, t1: float) -> bool:
-        try:
-            taylor.advance(x, t0, t1, params)
-        except TooManySteps:
-            return True
-        return False
-
     return Flows(
         slopes,
         flow,
         flow_with_error,
         lambda states, t0, t1: taylor.states(states, t0, t1, params),
         flow_tangents=lambda x, directions, t0, t1: taylor.tangents(x, directions, t0, t1, params),
-        is_stiff=is_stiff,
         concurrent=True,
     )
 
@@ -265,23 +257,37 @@ def _either(flows: Flows, implicit: Callable[[], ImplicitFlow]) -> Flows:
 
     That is found out anew in every call, so that no answer hangs on what was asked before.
     """
+    latest: list[tuple[bytes, float, float] | None] = [None]  # by Taylor series: saves computing it once more
 
     def either(name: Literal["flow", "flow_with_error", "flow_states"]) -> Callable[..., Any]:
         taylor = getattr(flows, name)
 
         def flow(x: Array, t0: float, t1: float) -> Any:
             try:
-                return taylor(x, t0, t1)
+                found = taylor(x, t0, t1)
             except TooManySteps:
                 return getattr(implicit(), name)(x, t0, t1)
+            if name != "flow_states":
+                latest[0] = x.tobytes(), t0, t1
+            return found
 
         return flow
+
+    def is_stiff(x: Array, t0: float, t1: float) -> bool:
+        if latest[0] == (x.tobytes(), t0, t1):
+            return False
+        try:
+            flows.flow(x, t0, t1)
+        except TooManySteps:
+            return True
+        return False
 
     return flows._replace(
         flow=either("flow"),
         flow_with_error=either("flow_with_error"),
         flow_states=either("flow_states"),
         flow_frame=lambda *arguments: implicit().flow_frame(*arguments),
+        is_stiff=is_stiff,
     )
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-import time
 
 from chilopod.errors import AnalysisError, ChilopodError, in_words
+from chilopod.flows.deadline import Deadline, SpentError, over
+
+__all__ = ["Budget", "SpentError", "UserCode", "UserError"]
 
 
 class UserCode:
@@ -27,11 +29,7 @@ class UserError(AnalysisError):
     """A user's function raised an exception of its own."""
 
 
-class SpentError(AnalysisError):
-    """The budget of a search is spent."""
-
-
-class Budget:
+class Budget(Deadline):
     """Flows over a return, and time, that a search may still take.
 
     Attributes
@@ -44,17 +42,12 @@ class Budget:
     allowed
         Number of flows.
     seconds
-        Time from now on, s.
+        Time from now on, s; within its context also that of a flow under way.
     """
 
     def __init__(self, allowed: float, seconds: float = math.inf) -> None:
+        super().__init__(seconds)
         self.left = allowed
-        self._ends = time.monotonic() + seconds
-
-    @property
-    def late(self) -> bool:
-        """Whether the time is over."""
-        return time.monotonic() > self._ends
 
     @property
     def spent(self) -> bool:
@@ -72,5 +65,5 @@ class Budget:
         if self.left <= 0:
             raise SpentError("as many flows as were allowed are spent", field="budget")
         if self.late:
-            raise SpentError("the time is over", field="seconds")
+            raise over()
         self.left = max(self.left - count, 0)

@@ -41,6 +41,7 @@ Array = NDArray[np.float64]
 BUDGET = 5000
 """Orbits that a search may compute, if not told otherwise."""
 
+_GRACE = 0.7  # s, to describe what was found when the time is over
 _DESCRIBING = 400  # return maps to solve for the orbits beside a point
 
 GRAVITY = (SearchStatus.COMPLETE, SearchStatus.CONSERVATIVE, SearchStatus.INCOMPLETE, SearchStatus.BUDGET)
@@ -145,8 +146,8 @@ def locate(
         there. What comes on top has bounds of its own: the first orbit, where the motion is given time to settle, and
         every point that is found, 400 return maps and its normal form.
     seconds
-        Time after which the search ends with what it has, from the first orbit on, if that is before the budget is
-        spent.
+        Time, s, after which the search ends with what it has. The first orbit and a flow that is under way are within
+        it, compiling is not; what has been found is described within 0.7 s more.
 
     Returns
     -------
@@ -162,29 +163,35 @@ def locate(
     """
     low, high = checked_interval(between)
     samples = Samples(family, orbit, low, high, budget, seconds)
-    here = extent(samples)
+    with samples.budget:
+        here = extent(samples)
     remarks = [here.ending] if here.ending else []
     status = SearchStatus.BUDGET if samples.spent else SearchStatus.INCOMPLETE if here.ending else SearchStatus.COMPLETE
     points: list[BifurcationPoint] = []
     if here.start < here.end:
-        searched, more = _searched(samples, here, budget)
+        with samples.budget:
+            searched, more = _searched(samples, here, budget)
         remarks += more
-        for block, found in searched:
-            status = max(status, found.status, key=GRAVITY.index)
-            remarks += found.remarks
-            for crossing in found.crossings:
-                if crossing.event is Event.PLUS and here.explains(crossing.value):
-                    continue
-                samples.allow(_DESCRIBING)
-                try:
-                    with UserCode("family", crossing.value):
-                        point = _described(samples, crossing, block, normal_form)
-                    if not point.error_bound < samples.width:
-                        raise AnalysisError(f"its error bound of {point.error_bound:.1e} tells nothing", field="value")
-                    points.append(point)
-                except AnalysisError as error:
-                    status = max(status, SearchStatus.INCOMPLETE, key=GRAVITY.index)
-                    remarks.append(f"what crosses at {crossing.value:.9g} could not be described: {error}")
+        samples.budget.prolong(_GRACE)  # for what has been found
+        with samples.budget:
+            for block, found in searched:
+                status = max(status, found.status, key=GRAVITY.index)
+                remarks += found.remarks
+                for crossing in found.crossings:
+                    if crossing.event is Event.PLUS and here.explains(crossing.value):
+                        continue
+                    samples.allow(_DESCRIBING)
+                    try:
+                        with UserCode("family", crossing.value):
+                            point = _described(samples, crossing, block, normal_form)
+                        if not point.error_bound < samples.width:
+                            raise AnalysisError(
+                                f"its error bound of {point.error_bound:.1e} tells nothing", field="value"
+                            )
+                        points.append(point)
+                    except AnalysisError as error:
+                        status = max(status, SearchStatus.INCOMPLETE, key=GRAVITY.index)
+                        remarks.append(f"what crosses at {crossing.value:.9g} could not be described: {error}")
     points += [_fold(samples, fold, normal_form) for fold in here.folds]
     if samples.remarks:
         status = max(status, SearchStatus.INCOMPLETE, key=GRAVITY.index)

@@ -128,21 +128,22 @@ class Samples:
         self._values: list[float] = []
         self._missing: dict[float, AnalysisError] = {}
         self._bends: dict[float, float] = {}
-        self._budget = budget
+        self._orbits = budget
         self._allowed = _RETURNS * budget
         self._refused: dict[str, tuple[str, set[float]]] = {}
         self._dimension, self.timed = 0, True
         self.count = self._counted = 0
-        with UserCode("family", low):
-            self.first = find_orbit(self.family(low), guess)
+        self.budget = Budget(self._allowed, seconds)
+        with self.budget, UserCode("family", low):
+            self.first = find_orbit(self.family(low), guess, budget=self.budget)
             self.size = sizes(self.family(low), self.first.state, self.first.period / self.first.image.returns)
-        # From here on: by now most of what is compiled when it is first called has been.
-        self._returns = Budget(self._allowed, seconds)
+        self.budget.left = self._allowed
         if not (self.known and self.timed):
             self._keep(_sample(low, self.first))
         self.spent = False
         self.merges = False
-        self.path = [] if guess is None else self._to_merging(self._followed(low, high))
+        with self.budget:
+            self.path = [] if guess is None else self._to_merging(self._followed(low, high))
         self.end = self.path[-1].value if self.path else high
         self.allow(self._allowed)
 
@@ -203,26 +204,26 @@ class Samples:
         """Samples of systems that depend on time and know their orbits."""
         systems = [self.family(value) for value in values]
         for _ in systems:
-            self._returns.take()
+            self.budget.take()
         with self._asking(values[0]) if len(values) == 1 else UserCode("family", values[0]):
             states = [known_state(system) for system in systems]
             images = return_maps(systems, states)
         for value, system, state, image in zip(values, systems, states, images, strict=True):
-            orbit = from_known(system, state, image=image, budget=self._returns)
+            orbit = from_known(system, state, image=image, budget=self.budget)
             self._keep(Sample(value, orbit.state, orbit.image))
 
     def allow(self, returns: int) -> None:
         """From now on, at most so many return maps."""
         self._allowed, self._counted = returns, self.count
-        self._returns.left = returns
+        self.budget.left = returns
 
     def affordable(self) -> int:
         """How many more orbits there may be, at the price of those since :meth:`allow`."""
-        if self._returns.late:
+        if self.budget.late:
             return 0
-        price = (self._allowed - self._returns.left) / max(self.count - self._counted, 1)
+        price = (self._allowed - self.budget.left) / max(self.count - self._counted, 1)
         # Those that were not found say nothing of the next ones.
-        return int(self._returns.left / min(max(price, 1.0), _DEAREST))
+        return int(self.budget.left / min(max(price, 1.0), _DEAREST))
 
     @property
     def remarks(self) -> list[str]:
@@ -291,7 +292,7 @@ class Samples:
         system = self.family(value)
         try:
             with self._asking(value):
-                return _sample(value, find_orbit(system, known_state(system), settle=False, budget=self._returns))
+                return _sample(value, find_orbit(system, known_state(system), settle=False, budget=self.budget))
         except SpentError:
             raise
         except AnalysisError:
@@ -303,7 +304,7 @@ class Samples:
             raise
         except AnalysisError:
             with self._asking(value):
-                return _sample(value, find_orbit(system, known_state(system), budget=self._returns))
+                return _sample(value, find_orbit(system, known_state(system), budget=self.budget))
 
     def _sampled(self, value: float, near: Array, beside: Sample) -> Sample:
         system = self.family(value)
@@ -312,7 +313,7 @@ class Samples:
             section = section_at(system, near, self.size, beside.image.period / beside.image.returns)
             return _sample(
                 value,
-                find_orbit(system, near, with_error=self.known, section=section, settle=False, budget=self._returns),
+                find_orbit(system, near, with_error=self.known, section=section, settle=False, budget=self.budget),
             )
 
     def _between(self, value: float) -> Sample:
@@ -366,7 +367,7 @@ class Samples:
                 self._keep(sample)
             path += reached
             if path[-1].value != value:
-                self.spent = self._returns.spent or self.count >= self._budget
+                self.spent = self.budget.spent or self.count >= self._orbits
                 break
         return path
 
@@ -401,7 +402,7 @@ class Samples:
         reached: list[Sample] = []
         smallest = _SHORTEST * abs(value - behind[-1].value)
         target = value
-        while attempts > 0 and (np.isfinite(attempts) or self.count + len(reached) < self._budget):
+        while attempts > 0 and (np.isfinite(attempts) or self.count + len(reached) < self._orbits):
             attempts -= 1
             last = behind[-1]
             guess = self._foreseen(behind[::-1], target)

@@ -29,7 +29,7 @@ from chilopod.flows.tracing.series import LANES, Series, load
 
 __all__ = ["Control", "Interval", "Method", "Outcome", "advance"]
 
-DONE, NOT_FINITE, BUDGET, STALLED = range(4)
+DONE, NOT_FINITE, BUDGET, STALLED, TIME_OVER = range(5)
 """How an integration ends."""
 
 _FASTEST_FALL, _FASTEST_GROWTH, _SAFETY = 0.1, 6.0, 0.9
@@ -67,12 +67,15 @@ class Control(NamedTuple):
         Units of the states, shape (n,), positive.
     near
         Entries of the derivative that are under step control, shape (n, n).
+    stop
+        Shape (1,); not zero once there is no more time.
     """
 
     tolerance: float
     most_steps: int
     units: Any
     near: Any
+    stop: Any
 
 
 class Outcome(NamedTuple):
@@ -215,6 +218,9 @@ def advance(tape: Any, method: Any, params: Any, x: Any, interval: Any, control:
         steps += 1
         if steps > control.most_steps:
             status = BUDGET
+            break
+        if control.stop[0] != 0.0:
+            status = TIME_OVER
             break
         h = min(h, interval.longest)
         ends = h >= (1.0 - 1e-10) * (t1 - t)

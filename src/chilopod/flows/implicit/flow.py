@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from chilopod.cores import cores
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.flows import deadline
 from chilopod.flows.balance import numerical_balance
 from chilopod.flows.taylor.flow import RESOLUTION, pieces
 from chilopod.flows.tracing import tape as ops
@@ -131,10 +132,10 @@ class ImplicitFlow(ReadOnlyArrays):
 
     def flow_states(self, states: Array, t0: float, t1: float) -> Array:
         """Many states, shape (states, n), without derivatives."""
-        states = np.array(states, dtype=np.float64)
+        states, stop = np.array(states, dtype=np.float64), deadline.stop()
 
         def carry(i: int) -> Array:
-            return self._run(states[i], t0, t1, _STAGES, self.tolerance, derived=False)[0]
+            return self._run(states[i], t0, t1, _STAGES, self.tolerance, derived=False, stop=stop)[0]
 
         threads = min(cores(), len(states) // _FEWEST_PER_THREAD)
         if threads > 1:
@@ -166,9 +167,10 @@ class ImplicitFlow(ReadOnlyArrays):
         derived: bool = True,
         units: Array | None = None,
         carried: tuple[Array, Array, Array] = (np.empty((0, 0)), np.empty(0), np.empty(0)),
+        stop: Array | None = None,
     ) -> tuple[Array, Array]:
         """State and derivative at t1; a frame is carried in place, with the stretch and the turn of its directions."""
-        n = self.tape.dimension
+        n, stop = self.tape.dimension, deadline.stop() if stop is None else stop
         # Copies, because compiled code is compiled anew for arrays that are read-only.
         x, params = np.array(x, dtype=np.float64), self.params.copy()
         if not (x.shape == (n,) and carried[0].shape[0] in (0, n) and (units is None or np.shape(units) == (n,))):
@@ -186,8 +188,10 @@ class ImplicitFlow(ReadOnlyArrays):
         budget = max(_FEWEST_STEPS, int(_MOST_WORK / (n * stages) ** 3))
         for a, b in pieces(self._cuts, float(self.edges[-1]), t0, t1):
             interval = kernels.Interval(a, b, self._longest(a, b), self._branches(a, b))
-            control = kernels.Control(tolerance, budget, units, near)
+            control = kernels.Control(tolerance, budget, units, near, stop)
             status = kernels.advance(self.tape, method, params, x, interval, control, result)
+            if status not in _REASONS and status:
+                raise deadline.over()
             if status:
                 raise AnalysisError(_REASONS[status].format(t=report[1]), field="rhs")
             budget -= int(report[0])

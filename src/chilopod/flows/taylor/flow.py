@@ -33,6 +33,7 @@ from numpy.typing import NDArray
 
 from chilopod.cores import cores
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.flows import deadline
 from chilopod.flows.tracing.evaluation import evaluate
 from chilopod.flows.tracing.tape import Tape
 from chilopod.frozen import ReadOnlyArrays, read_only
@@ -207,11 +208,11 @@ class TaylorFlow(ReadOnlyArrays):
         states = np.array(states, dtype=np.float64, order="C")
         params = np.asarray(params, dtype=np.float64)
         rows = np.array(np.broadcast_to(params, (states.shape[0], params.shape[-1])), order="C")
-        none = np.empty((self.tape.dimension, 0))
+        none, stop = np.empty((self.tape.dimension, 0)), deadline.stop()
 
         def carry(numbers: range) -> None:
             for i in numbers:
-                self._run(states[i], (t0, t1), rows[i], none)
+                self._run(states[i], (t0, t1), rows[i], none, stop=stop)
 
         threads = min(cores(), states.shape[0] // _FEWEST_PER_THREAD)
         if threads > 1:
@@ -232,15 +233,19 @@ class TaylorFlow(ReadOnlyArrays):
         lower: int = 0,
         shake: float = 0.0,
         stepwise: bool = True,
+        stop: Array | None = None,
     ) -> tuple[Array, int]:
         """Carry state, derivative and bound over an interval in place; events and number of steps."""
         kernels = _compiled()
+        stop = deadline.stop() if stop is None else stop
         n, parameters = int(self.tape.layout[0]), int(self.tape.layout[1])
         if not (x.shape == derivative.shape[:1] == (n,) and params.shape == (parameters,)):
             # Compiled code would read beyond them.
             raise ParameterError("has the wrong shape", field="x", value=x.shape, allowed=f"({n},)")
         events, report = np.empty((_MOST_EVENTS if self.directions else 0, 2)), np.zeros(4)
-        control = kernels.Control(self._epsilon, self.order - lower, self.most_steps, self.patience, shake, stepwise)
+        control = kernels.Control(
+            self._epsilon, self.order - lower, self.most_steps, self.patience, shake, stepwise, stop
+        )
         outcome = kernels.Outcome(derivative, bound, events, report)
         seen = []
         steps = 0
@@ -291,6 +296,8 @@ def pieces(edges: Array, period: float, t0: float, t1: float) -> list[tuple[floa
 
 
 def _failure(status: int, t: float) -> AnalysisError:
+    if status not in _REASONS:
+        return deadline.over()
     reason, advice = _REASONS[status]
     return (TooManySteps if status == 2 else AnalysisError)(reason.format(t=t), field="rhs", allowed=advice)
 

@@ -28,6 +28,7 @@ from chilopod.flows.taylor.switching import (
     GRAZES,
     NOT_FINITE,
     STALLED,
+    TIME_OVER,
     Motion,
     await_events,
     cross,
@@ -64,6 +65,8 @@ class Control(NamedTuple):
     stepwise
         Whether every step computes its own derivative, by which that so far is then multiplied; else it carries the
         columns of the derivative along, of which there may be any number: directions.
+    stop
+        Shape (1,); not zero once there is no more time.
     """
 
     epsilon: float
@@ -72,6 +75,7 @@ class Control(NamedTuple):
     patience: int
     shake: float
     stepwise: bool
+    stop: Any
 
 
 class Outcome(NamedTuple):
@@ -337,6 +341,9 @@ def advance(tape: Any, directions: Any, clock: Any, params: Any, x: Any, span: A
         steps += 1
         if _is_spent(control, steps, t - t0, t1 - t0):
             status = BUDGET
+            break
+        if control.stop[0] != 0.0:
+            status = TIME_OVER
             break
         finite, unit = _expanded(tape, motion, control, t, steps, unit)
         if not finite:

@@ -13,7 +13,7 @@ from chilopod.flows.tracing.series import Series, expand, values_at
 
 STEP, FLOOR, GUARD = ops.STEP, ops.FLOOR, ops.GUARD
 
-DONE, NOT_FINITE, BUDGET, STALLED, SLIDES, CHATTERS, GRAZES = range(7)
+DONE, NOT_FINITE, BUDGET, STALLED, SLIDES, CHATTERS, GRAZES, TIME_OVER = range(8)
 """How an integration ends."""
 
 _ZERO = 1e-13

@@ -238,7 +238,8 @@ def follow(
         raise ParameterError("must be positive", field="step", value=step)
     allowed = Budget(budget, seconds)
     curve = Curve(family, high - low, between=between, symmetric=symmetric, precision=precision, budget=allowed)
-    anchor = _anchored(family, curve, start, low, step)
+    with allowed:
+        anchor = _anchored(family, curve, start, low, step)
     in_fold = anchor.last.special is None and abs(float(anchor.last.tangent[-1])) <= IN_FOLD
     remarks = ("the branch starts in a fold",) if in_fold else ()
     branch = Branch((anchor.last,), Ending.ENOUGH_POINTS, step, curve.periods, symmetric, remarks=remarks)
@@ -400,7 +401,8 @@ def _followed(
     _take_error(curve, orbits.found)
     ending, reason, size = Ending.LEFT_INTERVAL, "", branch.step
     if not _outward(orbits.found[-1], curve.between):
-        ending, reason, size = trace(orbits, branch.step, Pace(longest, _FEW, _MANY), points, curve.budget)
+        with curve.budget:
+            ending, reason, size = trace(orbits, branch.step, Pace(longest, _FEW, _MANY), points, curve.budget)
     return replace(
         branch,
         points=tuple(orbits.found),

@@ -103,7 +103,8 @@ def follow2(
     target, known = _what(family2, start, second)
     equations = Equations(family2, target, known, box, Budget(budget, seconds))
     nu = complex(start.multiplier)
-    first = equations.begin(Place(start.orbit, values, 0.0 if target else nu.real / abs(nu)))
+    with equations.budget:
+        first = equations.begin(Place(start.orbit, values, 0.0 if target else nu.real / abs(nu)))
     curve, pace = _Critical(equations, start.kind, coefficients, progress), Pace(longest, _FEW, _MANY)
     origin = curve.station(first)
     upward = float(np.sign(first.tangent[first.frame.parameters][1]) or 1.0)
@@ -230,7 +231,8 @@ class _Critical:
         self._home = self._last.spot
         self._found: list[_Station] = []
         self._special: list[Codimension2] = []
-        ending, reason, _ = trace(self, min(size, pace.longest), pace, points, self._equations.budget)
+        with self._equations.budget:
+            ending, reason, _ = trace(self, min(size, pace.longest), pace, points, self._equations.budget)
         return _Half(tuple(self._found), tuple(self._special), ending, reason)
 
     def advance(self, size: float, count: int) -> tuple[_Advance, int]:

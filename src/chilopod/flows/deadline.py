@@ -1,0 +1,102 @@
+"""A limit of time that flows see while they are computed."""
+
+from __future__ import annotations
+
+import math
+import sys
+import threading
+import time
+from contextvars import ContextVar, Token
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.errors import AnalysisError
+
+Array = NDArray[np.float64]
+
+_STOP: ContextVar[Array | None] = ContextVar("stop", default=None)
+
+
+class SpentError(AnalysisError):
+    """The budget of a search is spent."""
+
+
+class Deadline:
+    """A limit of time; within its context flows end when it is over, in the midst of an integration too.
+
+    Time that numba spends compiling is not counted.
+
+    Parameters
+    ----------
+    seconds
+        Time from now on, s; infinite for no limit.
+    """
+
+    def __init__(self, seconds: float = math.inf) -> None:
+        self._ends = _now() + seconds
+        self._stop = np.zeros(1)
+        self._token: Token[Array | None] | None = None
+        self._timer: threading.Timer | None = None
+
+    @property
+    def late(self) -> bool:
+        """Whether the time is over."""
+        return _now() > self._ends
+
+    def prolong(self, seconds: float) -> None:
+        """Allow at least some more time from now on, s."""
+        self._ends = max(self._ends, _now() + seconds)
+        self._stop[0] = 0.0
+
+    def __enter__(self) -> Self:
+        if self._ends < math.inf:  # else an outer one holds
+            self._token = _STOP.set(self._stop)
+            self._wait()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._token is not None:
+            _STOP.reset(self._token)
+            self._token = None
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _wait(self) -> None:
+        if self.late:
+            self._stop[0] = 1.0
+            return
+        self._timer = threading.Timer(min(max(self._ends - _now(), 0.0) + 1e-3, threading.TIMEOUT_MAX), self._wait)
+        self._timer.daemon = True
+        self._timer.start()
+
+
+def stop() -> Array:
+    """What compiled code looks at, shape (1,): not zero once the time is over.
+
+    Raises
+    ------
+    SpentError
+        If it is over now.
+    """
+    found = _STOP.get()
+    if found is None:
+        return np.zeros(1)
+    if found[0] != 0.0:
+        raise over()
+    return found
+
+
+def over() -> SpentError:
+    """The error of a flow that has no more time."""
+    return SpentError("the time is over", field="seconds")
+
+
+def _now() -> float:
+    compiler = sys.modules.get("chilopod.numba_internals")
+    return time.monotonic() - (compiler.COMPILING.seconds() if compiler else 0.0)
