@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability import (
     Criticality,
+    Ending,
     Kind,
     PeriodicSystem,
     begin,
@@ -491,3 +492,20 @@ class TestRefusals:
         with pytest.raises(AnalysisError) as raised:
             begin(lorenz, 20.0, [1.0, 30.0, -40.0])
         assert "equilibrium, not" not in str(raised.value)
+
+
+def test_a_cycle_is_followed_in_steps_of_the_size_it_grows_to():
+    """The size of the first cycle is 0.017, that of the last one 0.85."""
+
+    def lure(alpha):
+        return from_rhs(lambda t, x: [x[1], x[2], -alpha * x[2] - x[1] - x[0] + x[0] ** 2], 3, None, guess_period=6.0)
+
+    (hopf,) = locate_hopf(lure, (0.5, 1.5), [0.0, 0.0, 0.0])
+    assert abs(hopf.value - 1.0) <= hopf.error_bound < 1e-12
+    (start,) = switch(lure, hopf)
+    cycles = follow(lure, start, (0.56, 1.5))
+    assert cycles.ending is Ending.LEFT_INTERVAL
+    assert len(cycles.points) < 25
+    (doubling,) = cycles.special_points
+    assert doubling.special is Kind.PERIOD_DOUBLING
+    assert doubling.value == pytest.approx(0.63030200616, abs=1e-10)

@@ -326,8 +326,8 @@ def _hopf_form(system: Autonomous, x: Array, matrix: Array, frequency: float) ->
 
 
 def hopf_cycle(family: Family, point: BifurcationPoint) -> tuple[float, Orbit, Array]:
-    """A small cycle beside a Hopf point, with the parameter that it is at, and the direction of its state in which
-    cycles grow, shape (n,).
+    """A small cycle beside a Hopf point, with the parameter that it is at, and the displacement of its state from the
+    equilibrium over the root of that of the parameter, shape (n,).
 
     Raises
     ------
@@ -376,4 +376,4 @@ def _cycle(
     missed = float(np.linalg.norm((found.state - rest - moved) / units))
     if not missed <= _MISSED * float(np.linalg.norm(moved / units)):
         raise AnalysisError("the orbit that is found is another one", field="orbit")
-    return value, found, found.state - rest
+    return value, found, (found.state - rest) / np.sqrt(abs(shift))

@@ -28,7 +28,7 @@ from chilopod.stability.branches.curve import PRECISION, Curve
 from chilopod.stability.branches.inspection import Found, inspect
 from chilopod.stability.branches.stepping import taken
 from chilopod.stability.budget import Budget
-from chilopod.stability.capabilities import Family
+from chilopod.stability.capabilities import Family, given_scale
 from chilopod.stability.matrix_errors import VERDICTS
 from chilopod.stability.orbits import Orbit
 from chilopod.stability.points import BifurcationPoint, Kind
@@ -336,6 +336,10 @@ def _anchored(
         curve.periods = start.periods
         section = curve.section_at(start.orbit, start.value, start.period)
         curve.sizes = branch_sizes(curve, start.orbit, start.value, section)
+        if start.outward is not None and given_scale(curve.system(start.value)) is None:
+            # A small cycle tells nothing of those that it grows into, by the root of the parameter.
+            grown = np.abs(start.outward) * math.sqrt(curve.scale)
+            curve.sizes = curve.sizes * max(1.0, float((grown / curve.sizes).max()))
         return anchored(curve, start, step)
     section = curve.section_at(start.orbit, start.value, start.period)
     curve.sizes = branch_sizes(curve, start.orbit, start.value, section)
