@@ -16,10 +16,11 @@ from scipy.optimize import linear_sum_assignment
 Array = NDArray[np.float64]
 
 _CLOSES = 1e-10  # of the sizes, times what a return magnifies
+_PRECISION = 1e-11  # of the sizes of the branch: ten times what is asked for
 _ROUNDING = 3e-14
 _SMALL = 1e-6  # multipliers of this modulus have no bound
 _SPECIAL = 0.03  # of a segment: the first orbits behind a point where branches meet
-_LARGEST = 1e6  # a return that magnifies more is beyond this program
+_LARGEST = 2e4  # a return that magnifies more is beyond this program
 _TESTS = {"period doubling": 1, "Neimark-Sacker": 2, "Krein collision": 2}
 _PARTS = 16
 
@@ -85,12 +86,15 @@ def _orbit(found: Verdict, orbits: Orbits, point: Any) -> Solved | None:
     here = orbits.returned(z)
     norm = float(np.linalg.norm(here.matrix, 2))
     if norm > _LARGEST:
-        found.own.append(f"a return magnifies {norm:.1e} times at {point.value!r}")
+        found.counts["beyond"] += 1
         return None
     found.counts["orbits"] += 1
     off = float(np.abs(here.off).max())
     own = float(np.abs(here.off - orbits.returned(z, COARSE).off).max())
-    if off > _CLOSES * max(1.0, norm) + 3.0 * own:
+    # Orbits are solved for to a precision of the branch's own sizes, which may be larger than they are.
+    coarse = _PRECISION * float((point.units[:-1] / orbits.sizes).max())
+    found.counts["coarse"] += off > _CLOSES * max(1.0, norm) + 3.0 * own
+    if off > max(_CLOSES, coarse) * max(1.0, norm) + 3.0 * own:
         found.fault("not closed", f"at {point.value!r} the orbit misses its start by {off:.1e} (own error {own:.1e})")
         return None
     tangent = np.append(point.tangent[:-1] * point.units[:-1] / orbits.sizes, point.tangent[-1])

@@ -15,6 +15,7 @@ from own_flow import METHOD, Surface, Term, Terms, flow, packed
 Array = NDArray[np.float64]
 
 _SAMPLES = 1500  # of an orbit that is looked for
+_WILD = 300.0  # states: where motions of no interest go
 _RETURNED = 0.15  # of the motion: so near, it is a return
 
 
@@ -74,11 +75,11 @@ def varied(chance: Random, terms: list[Term], among: list[int]) -> tuple[Term, .
 
 
 def _interval(chance: Random, widest: float = 1.0) -> dict[str, Any]:
-    width = _log(chance, 0.1, 3.0 * widest)
+    width = _log(chance, 0.3, 6.0 * widest)
     way = chance.randrange(3)
     between = ((1.0, 1.0 + width), (1.0 - min(width, 0.9), 1.0), (1.0 - 0.4 * min(width, 0.9), 1.0 + 0.6 * width))[way]
     rising = (True, False, chance.random() < 0.7)[way]
-    options: dict[str, Any] = {"points": chance.choice((10, 25, 50)), "budget": 20_000}
+    options: dict[str, Any] = {"points": chance.choice((20, 40, 80)), "budget": 15_000}
     if chance.random() < 0.5:
         options["step"] = _log(chance, 1e-3, 0.2)
     if chance.random() < 0.3:
@@ -105,6 +106,8 @@ def _settled(chance: Random, system: Terms, width: float = 1.0) -> Array:
     assert system.period is not None
     rounds = chance.choice((5, 20, 100))
     x = moved(system, x, 1.0, rounds * system.period, rounds)[-1]
+    if np.abs(x).max() > _WILD:
+        raise ValueError("it goes far away")
     return np.asarray(x * (1.0 + 1e-3 * chance.gauss(0.0, 1.0)))
 
 
@@ -126,7 +129,7 @@ def _cycle(chance: Random, system: Terms, time: float, width: float = 1.0) -> tu
 
 
 def _driven(chance: Random, n: int, frequency: float, odd: bool) -> list[Term]:
-    terms = [_term(n, 1, _log(chance, 0.3, 10.0), turns=frequency, phase=chance.uniform(0, 6))]
+    terms = [_term(n, 1, _log(chance, 0.3, 30.0), turns=frequency, phase=chance.uniform(0, 6))]
     if not odd and chance.random() < 0.5:
         terms.append(_term(n, 1, _log(chance, 0.05, 2.0), turns=2.0 * frequency, phase=chance.uniform(0, 6)))
     return terms
@@ -251,7 +254,7 @@ def conservative(chance: Random) -> Drawn:
     damping = chance.choice((0.0, 0.0, 1e-3, 1e-5, -1e-4))
     terms, period = _duffing(chance, chance.random() < 0.5, damping)
     system = Terms(2, varied(chance, terms, [3, 4]), period)
-    guess = np.array([chance.gauss(0.0, 1.0), chance.gauss(0.0, 1.0)])
+    guess = np.array([chance.gauss(0.0, 0.5), chance.gauss(0.0, 0.5)])
     return Drawn(system, guess=guess, **_interval(chance))
 
 

@@ -30,6 +30,7 @@ from own_flow import Surface, guard
 
 _FAULTS = ("not closed", "multipliers", "period", "not there", "off", "kind", "missed", "end", "raised")
 _COLUMNS = ("branches", "no start", "refused", "orbits", "confirmed", "not there", "missed", "other faults", "gaps", "own failures")
+_DRAWS = 4  # until there is a branch, and one that leaves another where that is asked for
 _FIRST = {"points": 15, "budget": 20_000}  # of the branch that another one leaves
 
 
@@ -83,8 +84,8 @@ def _reset(surface: Surface) -> Any:
     return reset
 
 
-def branch_of(asked: Drawn) -> Any:
-    """The branch that is asked for; None where there is none to start with.
+def branch_of(asked: Drawn) -> tuple[Any, bool]:
+    """The branch, None where there is none to start with, and whether it is the one that is asked for.
 
     Raises
     ------
@@ -101,39 +102,44 @@ def branch_of(asked: Drawn) -> Any:
         try:
             located = locate_hopf(family, asked.between, asked.guess)
         except AnalysisError:
-            return None
+            return None, False
         points = [point for point in located if point.criticality.known]
         if not points:
-            return None
+            return None, False
         try:
             (start,) = switch(family, points[0])
         except AnalysisError:
-            return None
+            return None, False
         if not asked.between[0] <= start.value <= asked.between[1]:
-            return None
-        return follow(family, start, asked.between, **asked.options)
+            return None, False
+        return follow(family, start, asked.between, **asked.options), True
     try:
         start = begin(family, asked.at, asked.guess, asked.rising, **symmetric)
     except AnalysisError:
-        return None
+        return None, False
     if not asked.then:
-        return follow(family, start, asked.between, **symmetric, **asked.options)
+        return follow(family, start, asked.between, **symmetric, **asked.options), True
     wanted = Special.PERIOD_DOUBLING if asked.then == "doubling" else Special.PITCHFORK
     first = follow(family, start, asked.between, **_FIRST)
     points = [point for point in first.special_points if point.special is wanted]
     if not points:
-        return first
-    return follow(family, switch(family, points[0])[0], asked.between, **asked.options)
+        return first, False
+    starts = switch(family, points[0])
+    return follow(family, starts[0], asked.between, **asked.options), True
 
 
 def followed(kind: str, chance: Random) -> dict[str, Any]:
     """What came of a branch, as plain values."""
-    asked, begun = drawn(kind, chance), time.monotonic()
+    begun = time.monotonic()
     result: dict[str, Any] = {"faults": [], "gaps": [], "own": [], "counts": {}}
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            branch = branch_of(asked)
+            for _ in range(_DRAWS):
+                asked = drawn(kind, chance)
+                branch, wanted = branch_of(asked)
+                if wanted:
+                    break
     except Exception as error:
         name, seconds = "refused" if _is_ours(error) else "raised", time.monotonic() - begun
         said = f"{error}" if _is_ours(error) else traceback.format_exc()[-700:]
