@@ -10,9 +10,7 @@ import numpy as np
 import pytest
 
 sys.path.append(str(Path(__file__).parent.parent / "torture"))
-branches, checks, kinds, own = map(
-    importlib.import_module, ("branches", "branch_checks", "branch_kinds", "own_flow")
-)
+branches, checks, kinds, own = map(importlib.import_module, ("branches", "branch_checks", "branch_kinds", "own_flow"))
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
 from own_flow import METHOD, Surface, Term, Terms, flow, packed
 
 Array = NDArray[np.float64]
@@ -53,7 +54,9 @@ class Drawn:
     options: dict[str, Any] = field(default_factory=dict)
 
 
-def _term(n: int, equation: int, factor: float, *states: int, turns: float = 0.0, phase: float = 0.0, side: int = 0) -> Term:
+def _term(
+    n: int, equation: int, factor: float, *states: int, turns: float = 0.0, phase: float = 0.0, side: int = 0
+) -> Term:
     powers = tuple(states.count(state) for state in range(n))
     return Term(equation, factor, powers, 0.0, turns, phase, side)
 
@@ -120,7 +123,7 @@ def _cycle(chance: Random, system: Terms, time: float, width: float = 1.0) -> tu
         raise ValueError("it rests")
     off = np.abs((states - x) / size).max(axis=1)
     away = int(np.argmax(off > 2 * _RETURNED))
-    back = np.flatnonzero((off[away:] < _RETURNED))
+    back = np.flatnonzero(off[away:] < _RETURNED)
     if not away or not back.size:
         raise ValueError("it does not come back")
     first = away + int(back[0])
@@ -225,9 +228,7 @@ def symmetric(chance: Random) -> Drawn:
         system = Terms(2, varied(chance, terms, [1, 3, 4]), period)
         half, only = -np.eye(2) if declared else None, declared and chance.random() < 0.4
         guess = _settled(chance, system)
-        return Drawn(
-            system, guess=guess, symmetry=half, symmetric=only, then="" if only else then, **_interval(chance)
-        )
+        return Drawn(system, guess=guess, symmetry=half, symmetric=only, then="" if only else then, **_interval(chance))
     one, period = _duffing(chance, False, _log(chance, 0.1, 0.5))
     coupling = chance.gauss(0.0, 0.5)
     terms = []
@@ -261,12 +262,14 @@ def conservative(chance: Random) -> Drawn:
 def stiff(chance: Random) -> Drawn:
     """An oscillator with a state that decays much faster than it moves."""
     terms, period = _duffing(chance, False, _log(chance, 0.05, 0.5), 3)
-    rate = _log(chance, 20.0, 600.0)
+    rate = _log(chance, 20.0, 250.0)
     terms += [_term(3, 2, -rate, 2), _term(3, 2, rate * chance.gauss(0.0, 1.0), 0, 0), _term(3, 2, rate * 0.3, 1)]
     terms.append(_term(3, 1, chance.gauss(0.0, 0.5), 2))
     system = Terms(3, varied(chance, terms, [1, 3, 4]), period)
-    method = "implicit" if rate > 150.0 or chance.random() < 0.3 else "taylor"
-    return Drawn(system, guess=_settled(chance, system), method=method, **_interval(chance))
+    method = "implicit" if rate > 100.0 or chance.random() < 0.3 else "taylor"
+    asked = _interval(chance)
+    asked["options"] |= {"points": chance.choice((8, 15)), "budget": 3000}
+    return Drawn(system, guess=_settled(chance, system), method=method, **asked)
 
 
 def ring(chance: Random) -> Drawn:

@@ -22,6 +22,7 @@ from random import Random
 from typing import Any
 
 import numpy as np
+
 from branch_checks import checked
 from branch_kinds import KINDS, Drawn, drawn
 from in_process import Place
@@ -29,7 +30,18 @@ from outcomes import FoundFault, Kind, Outcome
 from own_flow import Surface, guard
 
 _FAULTS = ("not closed", "multipliers", "period", "not there", "off", "kind", "missed", "end", "raised")
-_COLUMNS = ("branches", "no start", "refused", "orbits", "confirmed", "not there", "missed", "other faults", "gaps", "own failures")
+_COLUMNS = (
+    "branches",
+    "no start",
+    "refused",
+    "orbits",
+    "confirmed",
+    "not there",
+    "missed",
+    "other faults",
+    "gaps",
+    "own failures",
+)
 _DRAWS = 4  # until there is a branch, and one that leaves another where that is asked for
 _FIRST = {"points": 15, "budget": 20_000}  # of the branch that another one leaves
 
@@ -56,9 +68,7 @@ def family_of(asked: Drawn) -> Any:
 
     system = asked.system
     rhs = system.rhs()
-    events = [
-        Event(guard(each), _reset(each), each.direction) for each in system.surfaces if each.matrix is not None
-    ]
+    events = [Event(guard(each), _reset(each), each.direction) for each in system.surfaces if each.matrix is not None]
 
     def family(p: float) -> Any:
         return from_rhs(
@@ -204,7 +214,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     kinds = asked.kinds.split(",") if asked.kinds else list(KINDS)
     numbers = range(asked.first, asked.first + -(-asked.count // len(kinds)))
     tasks = [(asked.seed, kind, number) for number in numbers for kind in kinds][: asked.count]
-    known = [json.loads(line) for line in asked.kept.read_text().splitlines()] if asked.kept and asked.kept.exists() else []
+    known = (
+        [json.loads(line) for line in asked.kept.read_text().splitlines()] if asked.kept and asked.kept.exists() else []
+    )
     results = [each for each in known if (each["seed"], each["kind"], each["number"]) in set(tasks)]
     done = {(each["seed"], each["kind"], each["number"]) for each in results}
     tasks = [task for task in tasks if task not in done]
@@ -222,7 +234,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _say(each: dict[str, Any], count: int, of: int, verbose: bool) -> None:
-    again = f"python torture/branches.py --seed {each['seed']} --kinds {each['kind']} --first {each['number']} --count 1"
+    again = (
+        f"python torture/branches.py --seed {each['seed']} --kinds {each['kind']} --first {each['number']} --count 1"
+    )
     if each["faults"] or verbose:
         print(f"{each['kind']} {each['number']}: {each['counts']}, {each['seconds']:.1f} s", flush=True)
         for name in ("faults", "gaps", "own"):

@@ -302,7 +302,9 @@ def _cross(g: int, y: Array, t: float, n: int, p: float, s: Any, mode: Any, befo
 
 
 @njit(cache=True)
-def _place(t: float, y: Array, h: float, g: int, n: int, p: float, s: Any, mode: Any, k: Array, new: Array, ms: Any) -> float:
+def _place(
+    t: float, y: Array, h: float, g: int, n: int, p: float, s: Any, mode: Any, k: Array, new: Array, ms: Any
+) -> float:
     """Length of the step that ends on a surface, by bisection sped up by secants."""
     a, b = 0.0, h
     _step(t, y, b, n, p, s, mode, k, new, ms)
@@ -326,9 +328,7 @@ def _place(t: float, y: Array, h: float, g: int, n: int, p: float, s: Any, mode:
 
 
 @njit(cache=True)
-def flow(
-    y: Array, end: float, n: int, p: float, s: Any, floor: Array, tolerance: float, ms: Any
-) -> tuple[int, int]:
+def flow(y: Array, end: float, n: int, p: float, s: Any, floor: Array, tolerance: float, ms: Any) -> tuple[int, int]:
     """Integrate in place from time 0; returns the number of steps, negative if they were too many, and of crossings."""
     surfaces = s[8].size
     mode = np.ones(max(surfaces, 1), dtype=np.int64)

@@ -1,4 +1,4 @@
-"""A second program for branches: orbits by Newton's method, and all crossings of the unit circle between two of them."""
+"""A second program for branches: orbits by Newton's method, all crossings of the unit circle between two of them."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from own_flow import METHOD, Terms, flow, packed
 from scipy.optimize import brentq
+
+from own_flow import METHOD, Terms, flow, packed
 
 Array = NDArray[np.float64]
 
@@ -17,6 +18,7 @@ FINE, COARSE = 1e-13, 1e-12
 _ROUNDS = 12
 _SOLVED = 1e-11  # of the sizes: the last correction of an orbit
 _ON = 1e-7  # off the circle: nearer, a multiplier is on it
+_ROUND = 1e-14  # of what a return magnifies: an orbit beside a point where branches meet is no better
 _NODES = 8  # of a segment
 _DEEPER = 2  # times that a touch of the circle is looked at with finer nodes
 _BESIDE = 1e-4  # of a segment: where rates are taken at a crossing
@@ -144,10 +146,11 @@ class Orbits:
             except np.linalg.LinAlgError:
                 raise NoOrbit("singular") from None
             before, moved = moved, float(np.abs(step).max())
+            settled = float(np.abs(right).max()) < _ROUND * (1.0 + float(np.abs(rows).max()))
             if not np.isfinite(moved) or moved > 1e3:
                 raise NoOrbit("Newton's method diverges")
             z = z - step
-            if moved < _SOLVED or (moved < 1e-8 and moved > 0.3 * before):
+            if moved < _SOLVED or (moved < 1e-5 and (settled or (moved < 1e-8 and moved > 0.3 * before))):
                 break
         else:
             raise NoOrbit(f"Newton's method does not converge: {moved:.1e}")
@@ -240,9 +243,7 @@ class Segment:
         if self._tangents is None:
             return np.asarray(self.start + t * chord)
         a, b = self._tangents
-        return np.asarray(
-            self.start + t * t * (3 - 2 * t) * chord + t * (1 - t) ** 2 * a - t * t * (1 - t) * b
-        )
+        return np.asarray(self.start + t * t * (3 - 2 * t) * chord + t * (1 - t) ** 2 * a - t * t * (1 - t) * b)
 
     def strays(self, place: float) -> float:
         """How far an orbit is from what the ends foresee, of the length."""
