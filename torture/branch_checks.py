@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from branch_kinds import Drawn
-from own_orbits import COARSE, Crossing, NoOrbit, Orbits, Segment, Solved
+from own_orbits import COARSE, Crossing, NoOrbit, Orbits, Segment, Solved, real_roots
 
 Array = NDArray[np.float64]
 
@@ -266,7 +266,7 @@ def _touches(found: Verdict, segment: Segment, point: Any, place: float) -> bool
         if nodes[0].tangent[n] * nodes[-1].tangent[n] > 0.0 or near > 0.1:
             return False
         course = np.polynomial.Polynomial.fit(sides, [segment.orbits.value(node.z) for node in nodes], 5)
-        turns = [each.real for each in course.deriv().roots() if abs(each.imag) < 1e-9 and abs(each) < 3 * width]
+        turns = real_roots(course.deriv(), 3 * width)
         if not turns:
             return False
         values.append(float(course(min(turns, key=abs))))

@@ -43,7 +43,7 @@ _COLUMNS = (
     "own failures",
 )
 _DRAWS = 4  # until there is a branch, and one that leaves another where that is asked for
-_FIRST = {"points": 15, "budget": 20_000}  # of the branch that another one leaves
+_FIRST: dict[str, Any] = {"points": 15, "budget": 20_000}  # of the branch that another one leaves
 
 
 class Branches:
@@ -107,28 +107,27 @@ def branch_of(asked: Drawn) -> tuple[Any, bool]:
     from chilopod.stability import begin, follow, locate_hopf, switch
 
     family = family_of(asked)
-    symmetric = {"symmetric": True} if asked.symmetric else {}
     if asked.then == "Hopf":
         try:
             located = locate_hopf(family, asked.between, asked.guess)
         except AnalysisError:
             return None, False
-        points = [point for point in located if point.criticality.known]
-        if not points:
+        born = [point for point in located if point.criticality.known]
+        if not born:
             return None, False
         try:
-            (start,) = switch(family, points[0])
+            (start,) = switch(family, born[0])
         except AnalysisError:
             return None, False
         if not asked.between[0] <= start.value <= asked.between[1]:
             return None, False
         return follow(family, start, asked.between, **asked.options), True
     try:
-        start = begin(family, asked.at, asked.guess, asked.rising, **symmetric)
+        start = begin(family, asked.at, asked.guess, asked.rising, symmetric=asked.symmetric)
     except AnalysisError:
         return None, False
     if not asked.then:
-        return follow(family, start, asked.between, **symmetric, **asked.options), True
+        return follow(family, start, asked.between, symmetric=asked.symmetric, **asked.options), True
     wanted = Special.PERIOD_DOUBLING if asked.then == "doubling" else Special.PITCHFORK
     first = follow(family, start, asked.between, **_FIRST)
     points = [point for point in first.special_points if point.special is wanted]

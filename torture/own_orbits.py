@@ -179,6 +179,12 @@ class Orbits:
         return self.solved(self.z(x, p, period), np.append(np.zeros(self.n), 1.0))
 
 
+def real_roots(polynomial: np.polynomial.Polynomial, within: float) -> list[float]:
+    """Its real roots up to a distance from zero."""
+    roots = np.asarray(polynomial.roots(), dtype=np.complex128)
+    return [float(each.real) for each in roots if abs(each.imag) < 1e-9 * within and abs(each) < within]
+
+
 def tests(solved: Solved) -> Array:
     """What passes zero where a multiplier is +1, -1, or a pair is on the circle."""
     nu = solved.multipliers
@@ -338,7 +344,7 @@ class Segment:
         at_root = np.polynomial.Polynomial.fit(sides, course, 3)
         place = shift
         if fold:  # its value does not depend on where exactly the curve turns
-            turns = [r.real for r in at_root.deriv().roots() if abs(r.imag) < 1e-12 and abs(r) < 2 * beside]
+            turns = real_roots(at_root.deriv(), 2 * beside)
             place = min(turns, key=abs) if turns else shift
         error = abs(slope) * (0.0 if fold else uncertain) + abs(curvature) * uncertain**2
         error += 2.0 * abs(coarse - course[2]) + 1e-14 * abs(course[1])
