@@ -127,3 +127,22 @@ def test_bad_arguments_are_named():
         follow(gentle, start, (0.2, 0.1))
     with pytest.raises(ParameterError, match="points"):
         follow(gentle, start, (0.0, 0.2), points=0)
+
+
+@pytest.mark.parametrize("start", [-0.5, -0.6, 0.5])
+@pytest.mark.parametrize("longest", [0.15, 0.3])
+def test_a_fold_without_damping(start, longest):
+    """The map of Henon that keeps areas has orbits a x^2 + 2 x = 1, a fold at a = -1, x = 1: beyond it both multipliers
+    lie on the circle, before it one lies on either side of +1."""
+
+    def henon(a):
+        def image(x):
+            return np.array([1 - a * x[0] ** 2 + x[1], -x[0]]), np.array([[-2 * a * x[0], 1], [-1, 0]])
+
+        return PeriodicSystem(2, 1.0, lambda x, t0, t1: image(x), flow_with_error=lambda x, t0, t1: (*image(x), 1e-15))
+
+    x = (np.sqrt(1 + start) - 1) / start
+    branch = follow(henon, begin(henon, start, [x, -x], rising=False), (-2.0, 1.0), longest=longest, points=20)
+    folds = [point.value for point in branch.special_points if point.special is Kind.FOLD]
+    assert folds == pytest.approx([-1.0], abs=1e-9)
+    assert not any("no event" in remark for remark in branch.remarks)
