@@ -24,6 +24,7 @@ _SMALL = 1e-6  # multipliers of this modulus have no bound
 _SPECIAL = 0.03  # of a segment: the first orbits behind a point where branches meet
 _LARGEST = 2e4  # a return that magnifies more is beyond this program
 _TESTS = {"period doubling": 1, "Neimark-Sacker": 2, "Krein collision": 2}
+_VAGUE = 0.03  # of a segment: a crossing of this program so uncertain is none
 _PARTS = 16
 
 
@@ -244,6 +245,9 @@ def _compared(
             found.counts["confirmed"] += 1
             found.counts["loose"] += bool(mine.error > 1e-6 * orbits.scale)
     for each in rest:
+        if each.error > _VAGUE * abs(orbits.value(segment.end - segment.start)):
+            found.own.append(f"a crossing at {each.value!r} is uncertain by {each.error:.1e}")
+            continue
         remark = _remark(branch, orbits, segment, each)
         name = ("+1", "-1", "pair")[each.test]
         if remark:

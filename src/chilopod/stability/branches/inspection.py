@@ -137,7 +137,8 @@ def _confirmed(within: Within, place: Place) -> bool:
     """Whether what passes at a place is on the other side behind it, by more than the errors of the multipliers.
 
     Where two meet at +1 or -1 and leave along the circle, as without damping, either of them is on any side: that one
-    passed is told by the product of their distances. Beside a point where branches meet a multiplier is critical within its error, and rounding makes it cross.
+    passed is told by the product of their distances. Beside a point where branches meet a multiplier is critical within
+    its error, and rounding makes it cross.
     """
     crossing = place.crossing
     if crossing.collision or crossing.change == 0:
