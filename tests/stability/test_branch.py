@@ -146,3 +146,25 @@ def test_a_fold_without_damping(start, longest):
     folds = [point.value for point in branch.special_points if point.special is Kind.FOLD]
     assert folds == pytest.approx([-1.0], abs=1e-9)
     assert not any("no event" in remark for remark in branch.remarks)
+
+
+def test_a_real_double_multiplier_is_no_pair():
+    """Three cells in a ring, in step: two real multipliers pass +1 as one, where others are a complex pair."""
+    shift = np.kron(np.eye(3)[[1, 2, 0]], np.eye(2))
+
+    def ring(p):
+        def rhs(t, x, p):
+            q, v = x[0::2], x[1::2]
+            pulls = [0.5 * (q[i - 1] + q[(i + 1) % 3] - 2.0 * q[i]) for i in range(3)]
+            drive = 4.5 * p * np.cos(1.2447113844654425 * t)
+            forces = [drive - 0.28783 * v[i] - 0.45515 * q[i] - 0.69746 * q[i] ** 3 + pulls[i] for i in range(3)]
+            return [each for i in range(3) for each in (v[i], forces[i])]
+
+        return from_rhs(rhs, 6, 2 * np.pi / 1.2447113844654425, args=(p,), spatial_symmetry=shift)
+
+    start = begin(ring, 1.19, [2.60, 1.113] * 3)
+    branch = follow(ring, start, (1.1, 1.35), step=0.05, longest=0.05, points=3)
+    (point,) = branch.special_points
+    assert point.value == pytest.approx(1.1976250148166, abs=1e-9)
+    assert point.bifurcation.multiplicity == 2
+    assert not branch.remarks

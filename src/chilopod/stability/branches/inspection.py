@@ -281,6 +281,8 @@ def _root(within: Within, event: Event, a: float, b: float) -> Crossing | None:
         if not nu.size:
             return None
         away = np.abs(np.abs(nu) - 1.0)
+        if not away.min() <= _COMPLEX:  # those that cross are real, and others complex
+            return None
     else:
         away = np.abs(nu - TARGETS[event])
     multiplier = complex(nu[away.argmin()])
