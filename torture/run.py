@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from arguments import Arguments
+from branches import Branches
 from broken_engines import BrokenEngines
 from disks import Disks
 from edited_controllers import EditedControllers
@@ -40,7 +41,7 @@ from workers import Attacks, tried
 RESULTS = Path(__file__).with_name("results.json")
 _KINDS = (
     *(RobotFiles, Arguments, SavedTrials, SavedBranches, Kills, KillChains, Disks, Streams, Environments),
-    *(SameBits, Verbs, Invariances, Processors, LiveClients, EditedControllers, BrokenEngines),
+    *(SameBits, Verbs, Invariances, Processors, LiveClients, EditedControllers, BrokenEngines, Branches),
 )
 CLASSES: dict[str, Callable[[], Attacks]] = {each.name: each for each in _KINDS}
 _SHOWN = 12  # different faults of a class that are printed

@@ -127,3 +127,44 @@ def test_bad_arguments_are_named():
         follow(gentle, start, (0.2, 0.1))
     with pytest.raises(ParameterError, match="points"):
         follow(gentle, start, (0.0, 0.2), points=0)
+
+
+@pytest.mark.parametrize("start", [-0.5, -0.6, 0.5])
+@pytest.mark.parametrize("longest", [0.15, 0.3])
+def test_a_fold_without_damping(start, longest):
+    """The map of Henon that keeps areas has orbits a x^2 + 2 x = 1, a fold at a = -1, x = 1: beyond it both multipliers
+    lie on the circle, before it one lies on either side of +1."""
+
+    def henon(a):
+        def image(x):
+            return np.array([1 - a * x[0] ** 2 + x[1], -x[0]]), np.array([[-2 * a * x[0], 1], [-1, 0]])
+
+        return PeriodicSystem(2, 1.0, lambda x, t0, t1: image(x), flow_with_error=lambda x, t0, t1: (*image(x), 1e-15))
+
+    x = (np.sqrt(1 + start) - 1) / start
+    branch = follow(henon, begin(henon, start, [x, -x], rising=False), (-2.0, 1.0), longest=longest, points=20)
+    folds = [point.value for point in branch.special_points if point.special is Kind.FOLD]
+    assert folds == pytest.approx([-1.0], abs=1e-9)
+    assert not any("no event" in remark for remark in branch.remarks)
+
+
+def test_a_real_double_multiplier_is_no_pair():
+    """Three cells in a ring, in step: two real multipliers pass +1 as one, where others are a complex pair."""
+    shift = np.kron(np.eye(3)[[1, 2, 0]], np.eye(2))
+
+    def ring(p):
+        def rhs(t, x, p):
+            q, v = x[0::2], x[1::2]
+            pulls = [0.5 * (q[i - 1] + q[(i + 1) % 3] - 2.0 * q[i]) for i in range(3)]
+            drive = 4.5 * p * np.cos(1.2447113844654425 * t)
+            forces = [drive - 0.28783 * v[i] - 0.45515 * q[i] - 0.69746 * q[i] ** 3 + pulls[i] for i in range(3)]
+            return [each for i in range(3) for each in (v[i], forces[i])]
+
+        return from_rhs(rhs, 6, 2 * np.pi / 1.2447113844654425, args=(p,), spatial_symmetry=shift)
+
+    start = begin(ring, 1.19, [2.60, 1.113] * 3)
+    branch = follow(ring, start, (1.1, 1.35), step=0.05, longest=0.05, points=3)
+    (point,) = branch.special_points
+    assert point.value == pytest.approx(1.1976250148166, abs=1e-9)
+    assert point.bifurcation.multiplicity == 2
+    assert not branch.remarks

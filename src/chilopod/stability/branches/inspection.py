@@ -136,7 +136,9 @@ def inspect(curve: Curve, step: Step, closely: bool) -> Found:
 def _confirmed(within: Within, place: Place) -> bool:
     """Whether what passes at a place is on the other side behind it, by more than the errors of the multipliers.
 
-    Beside a point where branches meet a multiplier is critical within its error, and rounding makes it cross.
+    Where two meet at +1 or -1 and leave along the circle, as without damping, either of them is on any side: that one
+    passed is told by the product of their distances. Beside a point where branches meet a multiplier is critical within
+    its error, and rounding makes it cross.
     """
     crossing = place.crossing
     if crossing.collision or crossing.change == 0:
@@ -145,35 +147,44 @@ def _confirmed(within: Within, place: Place) -> bool:
         beside = part * within.step.size
         sides = max(crossing.value - beside, within.low), min(crossing.value + beside, within.step.size)
         before, after = (_side(within, each, place) for each in sides)
-        if before and after:
-            return before != after
+        known = [(a, b) for a, b in zip(before, after, strict=True) if a and b]
+        if any(a != b for a, b in known):
+            return True
+        if before[0] and after[0] and len(known) == len(before):
+            return False
     return False
 
 
-def _side(within: Within, at: float, place: Place) -> float:
-    """On which side of the circle the critical multiplier is; 0 if its error and that of the orbit do not tell."""
+def _side(within: Within, at: float, place: Place) -> tuple[float, ...]:
+    """On which side of the circle the critical multiplier is, and of a real one the sign of the product of all
+    distances from it; 0 each if the errors of multipliers and orbit do not tell."""
     curve, step, crossing = within.curve, within.at(at), place.crossing
     last, section = step.end.last, within.step.start.section
     units = curve.units(last.orbit.size)
 
-    def off(x: Array, value: float) -> tuple[float, float, ReturnMap]:
+    def off(x: Array, value: float) -> tuple[Array, Array, ReturnMap]:
         image = curve.image(x, value, section, with_error=True)
         spec = spectrum(image)
         index = int(np.abs(spec.values - crossing.multiplier).argmin())
         nu = spec.values[index]
-        away = abs(nu) - 1.0 if crossing.event is Event.PAIR else nu.real - TARGETS[crossing.event]
-        return float(away), float(spec.error[index]), image
+        if crossing.event is Event.PAIR:
+            return np.array([abs(nu) - 1.0]), spec.error[[index]], image
+        target = TARGETS[crossing.event]
+        distances = np.abs(spec.values - target)
+        others = np.array([np.delete(distances, i).prod() for i in range(distances.size)])
+        away = np.array([nu.real - target, (spec.values - target).prod().real])
+        return away, np.array([spec.error[index], spec.error @ others]), image
 
     away, error, image = off(last.orbit, last.value)
     # The orbit is least sure in the direction in which the matrix is weakest: along it the margin is asked anew.
     wrong = np.abs(image.state - last.orbit) + np.broadcast_to(image.error, step.image.jacobian.shape) @ units[:-1]
     left, sizes, right = np.linalg.svd(step.matrix)
     if not sizes[-1] > 0.0:
-        return 0.0
+        return (0.0,) * away.size
     shift = units * right[-1] * float(np.abs(left[:-1, -1]) @ (wrong / units[:-1])) / sizes[-1]
     beside, other, _ = off(last.orbit + shift[:-1], last.value + float(shift[-1]))
-    uncertain = _SURE * (max(error, other) + abs(beside - away))
-    return float(np.sign(away)) if abs(away) > uncertain else 0.0
+    uncertain = _SURE * (np.maximum(error, other) + np.abs(beside - away))
+    return tuple(np.where(np.abs(away) > uncertain, np.sign(away), 0.0).tolist())
 
 
 def _places(within: Within, brackets: list[Bracket] | None, turned: bool) -> tuple[list[Place], tuple[str, ...]]:
@@ -270,6 +281,8 @@ def _root(within: Within, event: Event, a: float, b: float) -> Crossing | None:
         if not nu.size:
             return None
         away = np.abs(np.abs(nu) - 1.0)
+        if not away.min() <= _COMPLEX:  # those that cross are real, and others complex
+            return None
     else:
         away = np.abs(nu - TARGETS[event])
     multiplier = complex(nu[away.argmin()])
