@@ -24,7 +24,7 @@ guess = [2.32, -1.27, 2.80]  # a state of a simulation that has settled
 # Upwards the cycle meets an unstable one and both vanish: a fold, round which the branch goes on.
 
 upward = follow(system, begin(system, 5.0, guess), (4.85, 6.0))
-upward
+print(upward)
 
 # %%
 # Downwards its period doubles. The new orbits, of two rounds, are stable: what comes below 4.945 is no longer this
@@ -34,7 +34,7 @@ downward = follow(system, begin(system, 5.0, guess, rising=False), (4.85, 6.0))
 (doubling,) = downward.special_points
 (start,) = switch(system, doubling)
 doubled = follow(system, start, (4.85, 6.0))
-doubled
+print(doubled)
 
 # %%
 
