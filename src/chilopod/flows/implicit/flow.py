@@ -113,7 +113,7 @@ class ImplicitFlow(ReadOnlyArrays):
 
     def flow(self, x: Array, t0: float, t1: float) -> tuple[Array, Array]:
         """State at t1 and its derivative with respect to the state at t0."""
-        return self._run(x, t0, t1, _STAGES, self.tolerance)
+        return self._run(x, (t0, t1), _STAGES, self.tolerance)
 
     def flow_with_error(self, x: Array, t0: float, t1: float) -> tuple[Array, Array, Array]:
         """The same with a bound on the error of every entry of the derivative.
@@ -122,10 +122,10 @@ class ImplicitFlow(ReadOnlyArrays):
         starts that are off by round-off. Two, because with one of them an entry may agree by chance; and round-off of
         the entry and of what it may be a difference of.
         """
-        state, derivative = self._run(x, t0, t1, _STAGES, self.tolerance)
+        state, derivative = self._run(x, (t0, t1), _STAGES, self.tolerance)
         shake = _SHAKE * np.sign(np.cos(3.0 * np.arange(x.size) + 1.0))
-        _, lower = self._run(x * (1.0 + shake), t0, t1, _OTHER_STAGES, self.tolerance)
-        _, finer = self._run(x * (1.0 - shake), t0, t1, _STAGES, _FINER * self.tolerance)
+        _, lower = self._run(x * (1.0 + shake), (t0, t1), _OTHER_STAGES, self.tolerance)
+        _, finer = self._run(x * (1.0 - shake), (t0, t1), _STAGES, _FINER * self.tolerance)
         difference = np.maximum(np.abs(lower - derivative), np.abs(finer - derivative))
         size = np.abs(derivative)
         return state, derivative, _OWN * difference + _ROUNDING * (size + size @ size)
@@ -135,7 +135,7 @@ class ImplicitFlow(ReadOnlyArrays):
         states, stop = np.array(states, dtype=np.float64), deadline.stop()
 
         def carry(i: int) -> Array:
-            return self._run(states[i], t0, t1, _STAGES, self.tolerance, derived=False, stop=stop)[0]
+            return self._run(states[i], (t0, t1), _STAGES, self.tolerance, derived=False, stop=stop)[0]
 
         threads = min(cores(), len(states) // _FEWEST_PER_THREAD)
         if threads > 1:
@@ -154,14 +154,13 @@ class ImplicitFlow(ReadOnlyArrays):
     ) -> tuple[Array, tuple[Array, Array, Array]]:
         n = x.size
         frame, stretch, turned = np.array(frame, order="C"), np.zeros(n), np.ones(n)
-        state, _ = self._run(x, t0, t1, stages, self.tolerance, units=units, carried=(frame, stretch, turned))
+        state, _ = self._run(x, (t0, t1), stages, self.tolerance, units=units, carried=(frame, stretch, turned))
         return stretch, (state, frame, turned)
 
     def _run(
         self,
         x: Array,
-        t0: float,
-        t1: float,
+        span: tuple[float, float],
         stages: int,
         tolerance: float,
         derived: bool = True,
@@ -178,7 +177,7 @@ class ImplicitFlow(ReadOnlyArrays):
             raise ParameterError("has the wrong shape", field="x", value=x.shape, allowed=f"({n},)")
         if not np.isfinite(x).all():
             raise AnalysisError("the state is not finite", field="rhs")
-        balanced, near = self._coupling(x, 0.5 * (t0 + t1))
+        balanced, near = self._coupling(x, 0.5 * sum(span))
         units = balanced if units is None else np.array(units)
         x = x / units
         size = n if derived else 0
@@ -186,7 +185,7 @@ class ImplicitFlow(ReadOnlyArrays):
         kernels, method = _compiled(), _method(stages)
         result = kernels.Outcome(derivative, np.zeros(n), np.eye(size), *carried, report)
         budget = max(_FEWEST_STEPS, int(_MOST_WORK / (n * stages) ** 3))
-        for a, b in pieces(self._cuts, float(self.edges[-1]), t0, t1):
+        for a, b in pieces(self._cuts, float(self.edges[-1]), *span):
             interval = kernels.Interval(a, b, self._longest(a, b), self._branches(a, b))
             control = kernels.Control(tolerance, budget, units, near, stop)
             status = kernels.advance(self.tape, method, params, x, interval, control, result)

@@ -182,7 +182,7 @@ class TaylorFlow(ReadOnlyArrays):
         other_x = x.copy()
         derivative, bound, other = np.eye(n), np.zeros((n, n)), np.eye(n)
         events, steps = self._run(x, (t0, t1), params, derivative, bound)
-        self._run(other_x * self._shaken, (t0, t1), params, other, lower=_OTHER_ORDER, shake=_SHAKE)
+        self._run(other_x * self._shaken, (t0, t1), params, other, other=True)
         difference = np.abs(other - derivative)
         # An entry that is zero but for round-off says nothing of how much the others differ.
         beside = np.sqrt(bound.max(axis=1)[:, None]) * np.sqrt(bound.max(axis=0))
@@ -230,12 +230,12 @@ class TaylorFlow(ReadOnlyArrays):
         derivative: Array,
         bound: Array = _NOTHING,
         *,
-        lower: int = 0,
-        shake: float = 0.0,
+        other: bool = False,
         stepwise: bool = True,
         stop: Array | None = None,
     ) -> tuple[Array, int]:
-        """Carry state, derivative and bound over an interval in place; events and number of steps."""
+        """Carry state, derivative and bound over an interval in place, by the first computation or the other one; events
+        and number of steps."""
         kernels = _compiled()
         stop = deadline.stop() if stop is None else stop
         n, parameters = int(self.tape.layout[0]), int(self.tape.layout[1])
@@ -243,9 +243,8 @@ class TaylorFlow(ReadOnlyArrays):
             # Compiled code would read beyond them.
             raise ParameterError("has the wrong shape", field="x", value=x.shape, allowed=f"({n},)")
         events, report = np.empty((_MOST_EVENTS if self.directions else 0, 2)), np.zeros(4)
-        control = kernels.Control(
-            self._epsilon, self.order - lower, self.most_steps, self.patience, shake, stepwise, stop
-        )
+        order, shake = (self.order - _OTHER_ORDER, _SHAKE) if other else (self.order, 0.0)
+        control = kernels.Control(self._epsilon, order, self.most_steps, self.patience, shake, stepwise, stop)
         outcome = kernels.Outcome(derivative, bound, events, report)
         seen = []
         steps = 0

@@ -270,14 +270,16 @@ def _chosen(
 
 
 @fused_njit(error_model="numpy", inline="always")
-def _is_spent(control: Any, steps: int, done: float, whole: float) -> bool:
-    """Whether a step is beyond the budget, or would be at the end of the interval, of which a part is done."""
-    if steps > control.most_steps:
-        return True
+def _spent(control: Any, steps: int, done: float, whole: float) -> int:
+    """Whether there is time for a step, and it is within the budget, at the end of the interval too, of which a part is
+    done: DONE if so."""
+    if control.stop[0] != 0.0:
+        return TIME_OVER
     check = control.patience
     while 0 < check < steps:
         check *= 2
-    return check == steps and steps * whole > control.most_steps * done
+    beyond = check == steps and steps * whole > control.most_steps * done
+    return BUDGET if beyond or steps > control.most_steps else DONE
 
 
 @fused_njit(error_model="numpy")
@@ -339,11 +341,8 @@ def advance(tape: Any, directions: Any, clock: Any, params: Any, x: Any, span: A
         await_events(tape, directions, motion, unit, at_once / unit, t)
     while t < t1 and status == DONE:
         steps += 1
-        if _is_spent(control, steps, t - t0, t1 - t0):
-            status = BUDGET
-            break
-        if control.stop[0] != 0.0:
-            status = TIME_OVER
+        status = _spent(control, steps, t - t0, t1 - t0)
+        if status != DONE:
             break
         finite, unit = _expanded(tape, motion, control, t, steps, unit)
         if not finite:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.errors import ChilopodError, ParameterError
+from chilopod.errors import ParameterError
 from chilopod.flows.arguments import checked_count
 from chilopod.notebook import picture
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, Step
@@ -382,10 +382,6 @@ class _Orbits:
         self.found += [*step.within.points, step.taken.end.last]
         self.remarks += step.within.remarks
         self.anchor = step.taken.end
-        if self.curve.relative_error is None:
-            _take_error(self.curve, self.found)
-            self.found[-1] = replace(self.found[-1], error_bound=self.curve.multipliers(step.taken.image)[1])
-            self.anchor = replace(self.anchor, last=self.found[-1])
         self.progress(count, self.found[-1])
         return step.ending
 
@@ -402,7 +398,6 @@ def _followed(
     curve: Curve, branch: Branch, anchor: Anchor, points: int | None, longest: float, closely: bool, progress: Progress
 ) -> Branch:
     orbits = _Orbits(curve, anchor, list(branch.points), list(branch.remarks), closely, progress)
-    _take_error(curve, orbits.found)
     ending, reason, size = Ending.LEFT_INTERVAL, "", branch.step
     if not _outward(orbits.found[-1], curve.between):
         with curve.budget:
@@ -423,19 +418,3 @@ def _before(point: BranchPoint, closed: Step, step: Step) -> bool:
     assert start.units is not None
     moved = np.append(point.orbit - start.orbit, point.value - start.value) / start.units
     return float(start.tangent @ moved) <= closed.size
-
-
-def _take_error(curve: Curve, found: list[BranchPoint]) -> None:
-    """The error of the flow, at the first point that is not special."""
-    point = next((point for point in found if point.special is None), None)
-    if point is None or curve.relative_error is not None:
-        return
-    try:
-        image = curve.image(point.orbit, point.value, curve.section(point), with_error=True)
-    except ChilopodError:
-        return
-    sizes = curve.units(point.orbit.size)[:-1]
-    wrong = image.error * sizes / sizes[:, None] if isinstance(image.error, np.ndarray) else image.error
-    # Of the first orbit hardly a trace may be left after a return; of others there is more.
-    size = max(1.0, float(np.linalg.norm(image.jacobian * sizes / sizes[:, None])))
-    curve.relative_error = float(np.max(wrong)) / size

@@ -38,8 +38,8 @@ class BranchPoint(ReadOnlyArrays):
     period
         The full period of the orbit; None where it was not asked for.
     error_bound
-        On the absolute error of the multipliers that are not small, by the error of the flow at the branch's first
-        point; 0 where that is not known.
+        Bound on the absolute error of the multipliers that are not small (below 0.5, and below the largest): by the
+        error of the flow there, and by that of the orbit.
     bifurcation
         What is known of the special point: bound, mode, multiplier, normal form.
     """

@@ -15,7 +15,7 @@ from chilopod.stability.branches.curve import Curve
 from chilopod.stability.budget import UserCode
 from chilopod.stability.capabilities import Family, SystemLike, given_scale, is_autonomous, known_orbit
 from chilopod.stability.equilibria import find_equilibrium, hopf_cycle
-from chilopod.stability.orbits import find_orbit, known_state
+from chilopod.stability.orbits import bounded, find_orbit, known_state
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import Section, returned_states, whole_period
 from chilopod.stability.scales import sizes
@@ -260,7 +260,7 @@ def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
         If the branch has no direction of its own there.
     """
     section = curve.section_at(start.orbit, start.value, start.period)
-    image = curve.image(start.orbit, start.value, section)
+    image = curve.image(start.orbit, start.value, section, with_error=True)
     derivative = curve.parameter_derivative(start.orbit, start.value, section)
     n = start.orbit.size
     units = curve.units(n)
@@ -280,10 +280,11 @@ def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
     else:
         tangent = np.append(start.mode / units[:-1], 0.0)
         tangent /= np.linalg.norm(tangent)
-    values, _ = curve.multipliers(image)
+    known = image if start.mode is not None else bounded(curve.system(start.value), start.orbit, image).image
+    values, bound = curve.multipliers(known)
     special = start.bifurcation.kind if start.bifurcation is not None else None
     point = BranchPoint(
-        start.value, start.orbit, values, tangent, special, units, image.period, bifurcation=start.bifurcation
+        start.value, start.orbit, values, tangent, special, units, image.period, bound, start.bifurcation
     )
     leaving = start.mode is not None
     if not leaving:

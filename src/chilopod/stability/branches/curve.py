@@ -63,6 +63,8 @@ _RETRIES, _STEEPER = 1, 100.0  # with a smaller difference, and how much smaller
 _SOONER, _LATER = 0.2, 0.5  # of a return: the time of the next one is foreseen to differ by so much at most
 _SHARPEST_TURN = 0.5  # cosine between two tangents: beyond it the step may have landed on another curve
 _SHRUNK = 10.0  # cube roots of the precision, of the largest motion so far
+_NOT_SMALL = 0.5  # modulus of a multiplier
+_ROUNDING = 16.0 * float(np.finfo(float).eps)  # of eigenvalues
 _KEPT = 8  # systems: making one may cost more than a flow
 
 
@@ -112,7 +114,7 @@ class Curve:
         self.symmetric = symmetric
         self.precision = precision
         self.budget = Budget(math.inf) if budget is None else budget
-        self.relative_error: float | None = None
+        self._flow_error = 0.0  # of a return's derivative, relative to its norm, where it was last bounded
         self._motion = 0.0  # the largest within a period so far
         self._steepness = 1.0  # of the return map over the parameter, where the step starts, in units
         self._known: dict[float, tuple[SystemLike, SystemLike]] = {}
@@ -201,7 +203,7 @@ class Curve:
             If the corrections do not converge, or end where the curve would have turned too sharply.
         """
         moved, matrix = self.predicted(anchor, size)
-        return self._stepped(anchor, moved, matrix, anchor.last.tangent, size)
+        return self._stepped(anchor, moved, matrix, anchor.last.tangent, size, bounded=True)
 
     def within(self, step: Step, place: float) -> Step:
         """As much of a step as leads to a place within it."""
@@ -212,7 +214,8 @@ class Curve:
         """A step that ends at a value of the parameter exactly, from a guess of the displacement."""
         row = np.zeros(guess.size)
         row[-1] = 1.0
-        return self._stepped(anchor, guess, matrix, row, (value - anchor.last.value) / self.scale, value)
+        target = (value - anchor.last.value) / self.scale
+        return self._stepped(anchor, guess, matrix, row, target, value, bounded=True)
 
     def predicted(self, anchor: Anchor, size: float) -> tuple[Array, Array]:
         """Displacement at which a step should end, in units, and the matrix there: by the cubic through the last two
@@ -250,10 +253,19 @@ class Curve:
         return np.eye(velocity.size) - np.outer(velocity / sizes, normal) / float(section.normal @ velocity)
 
     def _stepped(
-        self, anchor: Anchor, guess: Array, matrix: Array, row: Array, target: float, value: float | None = None
+        self,
+        anchor: Anchor,
+        guess: Array,
+        matrix: Array,
+        row: Array,
+        target: float,
+        value: float | None = None,
+        *,
+        bounded: bool = False,
     ) -> Step:
         """Correct a guess to H = x and row . moved = target; by multiple shooting where a return magnifies so much that
-        the guess is none, or that rounding is magnified to more than an orbit is solved for."""
+        the guess is none, or that rounding is magnified to more than an orbit is solved for. ``bounded``: with a bound
+        on the error of the multipliers at its end."""
         last, n = anchor.last, anchor.last.orbit.size
         self._steepness = max(1.0, float(np.abs(anchor.matrix[:n, n]).max()))
         section = self._timed(anchor, float(np.linalg.norm(guess)))
@@ -261,7 +273,7 @@ class Curve:
         fixed = symmetric_space(self.system(last.value), last.orbit, self.units(n)[:n], mode)
         where = _Where(anchor, section, fixed, row, target, value)
         count = node_count(matrix[:n, :n] + np.eye(n), np.ones(n)) if fixed is None else 0
-        rounds = 0
+        rounds, off = 0, self.precision
         if count >= _MANY_NODES:
             moved, x, here, image, derivative = self._shot(where, count)
         else:
@@ -277,15 +289,18 @@ class Curve:
                     duration = there[3].period / there[3].returns
                     where = replace(where, section=replace(section, duration=duration))
                 found = self._corrected(where, there[0], matrix)
-            moved, x, here, rounds = found.moved, found.x, found.value, found.rounds
-            image = self.image(x, here, where.section)
+            moved, x, here, rounds, off = found.moved, found.x, found.value, found.rounds, found.off
+            image = self.image(x, here, where.section, bounded)
             derivative = self._difference(x, here, where.section, found.mapped, found.beside)
         bordered = self.matrix(image.jacobian, derivative, last.tangent)
         tangent = null_vector(within_space(fixed, bordered))
         if not tangent @ last.tangent >= _SHARPEST_TURN:
             raise AnalysisError("the curve turns too sharply", field="step")
         bordered[n] = tangent
-        end = self._end(anchor, x, here, image, tangent, bordered)
+        # The derivative is that of a state so far off.
+        length = max(float(np.linalg.norm(moved)), float(np.finfo(float).tiny))
+        bend = float(np.linalg.norm(bordered[:n] - anchor.matrix[:n])) / length
+        end = self._end(anchor, x, here, image, tangent, bordered, _CLEAR * bend * off if bounded else np.inf)
         missed = float(np.linalg.norm(moved - guess))
         return Step(anchor, end, float(last.tangent @ moved), moved, tangent, bordered, image, rounds, missed)
 
@@ -383,11 +398,15 @@ class Curve:
             corrections += now > _COUNTED * size
         if abs(strays) > self.precision:
             raise OutsideIntervalError("leaves the interval", field="parameter", value=wanted)
-        return _Corrected(x, here, moved, mapped, beside, corrections)
+        flow = self._flow_error * max(1.0, float(np.abs(x / units[:n]).max()))
+        uncertain = float(np.linalg.norm(inverse @ residual) + np.linalg.norm(inverse, 2) * flow)
+        return _Corrected(x, here, moved, mapped, beside, corrections, uncertain)
 
-    def _end(self, anchor: Anchor, x: Array, value: float, image: ReturnMap, tangent: Array, matrix: Array) -> Anchor:
-        """Where the next step starts."""
-        values, bound = self.multipliers(image)
+    def _end(
+        self, anchor: Anchor, x: Array, value: float, image: ReturnMap, tangent: Array, matrix: Array, wrong: float
+    ) -> Anchor:
+        """Where the next step starts; the derivative is ``wrong`` by so much, in units, beside its own error."""
+        values, bound = self.multipliers(image, wrong)
         before = None if anchor.leaving or anchor.last.special is not None else (anchor.last, anchor.matrix)
         section = None
         if anchor.section is not None:
@@ -416,25 +435,39 @@ class Curve:
         point = BranchPoint(value, x, values, tangent, units=self.units(x.size), period=image.period, error_bound=bound)
         return Anchor(point, matrix, before, section)
 
-    def multipliers(self, image: ReturnMap) -> tuple[ComplexArray, float]:
-        """Of the full period, by falling modulus, and a bound on their errors."""
+    def multipliers(self, image: ReturnMap, wrong: float = 0.0) -> tuple[ComplexArray, float]:
+        """Multipliers of the full period, by falling modulus, and a bound on the errors of those that are not small.
+
+        Parameters
+        ----------
+        image
+            Return map on the orbit.
+        wrong
+            How much its derivative is off beside its own error, in units; infinite if no bound is wanted.
+        """
         nu = return_multipliers(image)
         values = nu**image.returns if image.returns > 1 else nu
-        if not self.relative_error:
-            return values, 0.0
+        if not np.isfinite(wrong) or not nu.any():
+            return values, np.inf if nu.any() else 0.0
         sizes = self.units(image.state.size)[:-1]
         scaled = image.jacobian * sizes / sizes[:, None]
+        size = float(np.linalg.norm(scaled))
+        off = np.broadcast_to(image.error, scaled.shape) * sizes / sizes[:, None]
+        if np.isfinite(off).all():
+            self._flow_error = float(off.max()) / max(1.0, size)
+            error = float(np.linalg.norm(off))
+        else:  # by multiple shooting
+            error = self._flow_error * size * len(scaled)
         eigenvalues, right = np.linalg.eig(scaled)
         with np.errstate(all="ignore"):
             try:
                 left = np.linalg.inv(right)
             except np.linalg.LinAlgError:
-                return values, float(np.sqrt(self.relative_error))
-        condition = np.linalg.norm(left, axis=1)[np.abs(eigenvalues) > 0.5]
-        if not condition.size:
-            return values, 0.0
-        error = self.relative_error * float(np.linalg.norm(scaled)) * float(condition.max())
-        return values, image.returns * error * max(1.0, float(np.abs(nu[0]))) ** (image.returns - 1)
+                return values, float(np.sqrt(error + wrong))
+        moduli = np.abs(eigenvalues)
+        condition = float(np.linalg.norm(left, axis=1)[moduli >= min(_NOT_SMALL, float(moduli.max()))].max())
+        bound = (error + wrong + _ROUNDING * size) * condition
+        return values, image.returns * bound * max(1.0, float(np.abs(nu[0]))) ** (image.returns - 1)
 
     def _mapped(self, x: Array, value: float, section: Section | None) -> tuple[Array, Array | None]:
         """H at a state, and at a neighbouring value of the parameter if that costs no time."""
@@ -529,7 +562,8 @@ class _Where:
 
 @dataclass(frozen=True)
 class _Corrected:
-    """A solution: state, parameter, displacement in units, return of the state, that beside it, corrections needed."""
+    """A solution: state, parameter, displacement in units, return of the state, that beside it, corrections needed, how
+    far off it may be, in units."""
 
     x: Array
     value: float
@@ -537,6 +571,7 @@ class _Corrected:
     mapped: Array
     beside: Array | None
     rounds: int
+    off: float
 
 
 def _updated(inverse: Array, move: Array, change: Array) -> Array:

@@ -93,7 +93,8 @@ def special_point(
     off = abs(abs(nu) - 1.0) if crossing.event is Event.PAIR else abs(nu - TARGETS[crossing.event])
     if off > _CRITICAL and not crossing.collision:
         return None
-    return replace(point, orbit=orbit.state, special=found.kind, bifurcation=found)
+    bound = curve.multipliers(orbit.image)[1]
+    return replace(point, orbit=orbit.state, special=found.kind, error_bound=bound, bifurcation=found)
 
 
 def blocks_along(curve: Curve, step: Step) -> Blocks:
