@@ -234,8 +234,8 @@ class TaylorFlow(ReadOnlyArrays):
         stepwise: bool = True,
         stop: Array | None = None,
     ) -> tuple[Array, int]:
-        """Carry state, derivative and bound over an interval in place, by the first computation or the other one; events
-        and number of steps."""
+        """Carry state, derivative and bound over an interval in place; events and number of steps. The ``other`` of two
+        computations has another order and other steps."""
         kernels = _compiled()
         stop = deadline.stop() if stop is None else stop
         n, parameters = int(self.tape.layout[0]), int(self.tape.layout[1])

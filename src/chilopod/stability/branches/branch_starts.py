@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
+from chilopod.flows.deadline import Deadline
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.branches.bordered_matrices import symmetric_space, within_space
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint
@@ -80,6 +82,7 @@ def begin(
     *,
     periods: int = 1,
     symmetric: bool = False,
+    seconds: float = math.inf,
 ) -> Start:
     """The start of a branch at an orbit, towards a rising or falling parameter.
 
@@ -95,13 +98,15 @@ def begin(
         The direction to start in.
     periods, symmetric
         As for :func:`chilopod.stability.follow`.
+    seconds
+        Time, s, after which the search for the orbit ends.
 
     Raises
     ------
     AnalysisError
         If there is no orbit near the guess, or ``family`` raises an exception.
     """
-    with UserCode("family", value):
+    with Deadline(seconds), UserCode("family", value):
         system = family(value)
         guess = known_state(system) if orbit is None else orbit
         studied = system if symmetric else whole_period(system, periods)
