@@ -23,6 +23,7 @@ from chilopod.stability.capabilities import (
     known_orbit,
     spatial_symmetries,
 )
+from chilopod.stability.convergence import RETURN
 from chilopod.stability.krylov.closing import LARGE, closed_orbit
 from chilopod.stability.krylov.tangent_map import TangentMap, tangent_map, tangent_sizes
 from chilopod.stability.matrix_errors import DRAWN
@@ -45,9 +46,7 @@ from chilopod.stability.symmetry.mirrored import symmetric_states
 Array = NDArray[np.float64]
 
 _ROUNDS = 30
-_ROUND_OFF = 8e-16
 _NOTHING = 1e-13  # of the sizes of the states around a guess: a state that small may be zero
-_SETTLED = 1e-10  # residual, of the sizes of the states, below which it may stop falling
 _RESTS = 1e-8  # of the sizes at the guess: a motion that short is none
 _RETURNED = 1e-12  # of a known orbit: it is exact
 _SINGULAR, _FAMILY = 1e-13, 1e-8  # singular values of H - 1 that count as zero, the largest being one
@@ -307,7 +306,7 @@ def _newton(system: SystemLike, x: Array, with_error: bool, section: Section | N
         size = np.maximum(size, np.maximum(np.abs(x), np.abs(image.state)) if x.any() else 0.0)
         residual = image.state - x
         off = _relative(residual, size)
-        if off <= _ROUND_OFF or (off <= _SETTLED and off >= 0.5 * best):
+        if RETURN.met(off, best):
             if image.velocity is not None and _relative(image.velocity * image.period / image.returns, size) <= _RESTS:
                 raise AnalysisError(
                     "the motion rests in an equilibrium near the guess",
@@ -318,7 +317,7 @@ def _newton(system: SystemLike, x: Array, with_error: bool, section: Section | N
             return _found(system, x, image, with_error)
         if rounds > 4 and off > 10.0 * best:
             break
-        if off > best and best < _SETTLED and cutoff == _SINGULAR:
+        if off > best and best < RETURN.settled and cutoff == _SINGULAR:
             # The last move followed round-off, along a family of orbits: without that direction it converges.
             x, cutoff, best = before, _FAMILY, np.inf
             continue
@@ -350,7 +349,7 @@ def _cleared(
     cleared = np.where(small, 0.0, x)
     there = return_map(system, cleared, with_error=False, section=section)
     off = _relative(there.state - cleared, size)
-    return (cleared, there) if off <= max(_ROUND_OFF, _relative(image.state - x, size)) else (x, image)
+    return (cleared, there) if off <= max(RETURN.round_off, _relative(image.state - x, size)) else (x, image)
 
 
 def _shared(system: SystemLike, x: Array, size: Array) -> Array | None:

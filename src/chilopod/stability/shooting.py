@@ -20,14 +20,13 @@ from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.arguments import finite_array
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.capabilities import SystemLike, is_autonomous, returns_per_period
+from chilopod.stability.convergence import NODES
 from chilopod.stability.returns import Section, carried, return_duration
 
 Array = NDArray[np.float64]
 
 _ROUNDS, FEW_ROUNDS = 40, 12  # where corrections are damped, and on a curve, whose points are near
 _LONGEST = 3.0  # times the time of a return that was guessed
-_CLOSED = 1e-13  # residual, of the sizes of the states
-_SETTLED = 1e-9  # residual below which it may stop falling
 _SHORTEST = 2.0**-8  # of a correction
 _DIFFERENCE = 1e-7  # of the parameter's scale
 _QUICKEST = 0.3  # of the time of a return: its largest correction
@@ -183,7 +182,7 @@ def shot(
     best, before = np.inf, 1.0
     for _ in range(_ROUNDS if free is None else FEW_ROUNDS):
         off = linear.residual
-        if off <= _CLOSED or (off <= _SETTLED and off >= 0.5 * best):
+        if NODES.met(off, best):
             return linear.closed()
         best = min(best, off)
         linear, before = _damped(linear, min(1.0, 2.0 * before)) if free is None else (linear.moved(1.0), 1.0)
@@ -198,7 +197,9 @@ def _damped(linear: _Linear, part: float) -> tuple[_Linear, float]:
     while part >= _SHORTEST:
         with contextlib.suppress(AnalysisError):
             there = linear.moved(part)
-            if linear.correction_left(there) <= max((1.0 - 0.25 * part) * linear.correction_left(linear), _SETTLED):
+            if linear.correction_left(there) <= max(
+                (1.0 - 0.25 * part) * linear.correction_left(linear), NODES.settled
+            ):
                 return there, part
         part *= 0.5
     raise AnalysisError("corrections of the orbit's nodes do not converge", field="orbit")

@@ -28,6 +28,7 @@ from chilopod.stability.capabilities import (
     is_autonomous,
     returns_per_period,
 )
+from chilopod.stability.convergence import CURVE
 from chilopod.stability.floquet import return_multipliers
 from chilopod.stability.returns import (
     CUTS,
@@ -50,8 +51,6 @@ PRECISION = 1e-12
 """How closely orbits are solved for by default, of the sizes of the states; where the flow is not as good, as it is."""
 
 _COUNTED = 1e-10  # residuals above it count as corrections, by which steps grow or shrink
-_SETTLED = 1e-8  # residual below which it may stop falling
-_FALLING = 0.5
 _CLEAR = 10.0  # times the difference of two computations: a residual that may be the flow's error
 _LOOSE = 1e-6  # of a step: an orbit that may be so far off is corrected with a matrix of its own
 _MOST_CORRECTIONS = 12
@@ -370,12 +369,12 @@ class Curve:
                 off = fixed @ off
             residual = np.append(off + strays * by_parameter, row @ moved - where.target)
             now = float(np.abs(residual).max())
-            if not np.isfinite(now) or (now > 10.0 * largest and now > _SETTLED):
+            if not np.isfinite(now) or (now > 10.0 * largest and now > CURVE.settled):
                 raise AnalysisError("corrections diverge", field="step")
             size = max(1.0, float(np.abs(x / units[:n]).max()))
             closed = now <= self.precision * size
             # A residual that no longer falls is what the flow is good to, if the matrix can make it fall.
-            settled = not closed and now <= _SETTLED * size and now >= _FALLING * largest and not singular
+            settled = not closed and CURVE.stays(now / size, largest / size) and not singular
             settled = settled and now <= _CLEAR * self._noise(x, here, section)
             if closed or settled:
                 # Where it leaves another curve the matrix is so weak that a small residual is far from an orbit.

@@ -27,6 +27,7 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.budget import Budget, UserCode
 from chilopod.stability.capabilities import KnowsOrbit, Scaled, SystemLike
+from chilopod.stability.convergence import BORDERED
 from chilopod.stability.orbits import from_known, known_state
 from chilopod.stability.returns import ReturnMap, Section, return_map, section_at
 from chilopod.stability.scales import sizes
@@ -39,8 +40,6 @@ Family2 = Callable[[float, float], SystemLike]
 
 _STEP = 1e-6  # of differences, in units of the frame: it sets how fast Newton's method converges, not where to
 _ROUNDS = 14
-_ROUND_OFF = 4e-15  # of a correction, in units of the frame
-_SETTLED = 1e-8  # of the same, below which it may stop falling
 
 
 @dataclass(frozen=True)
@@ -214,7 +213,7 @@ class Equations:
             matrix = self._derivative(at, frame)
             move = np.asarray(-np.linalg.lstsq(matrix, at.residual)[0], dtype=np.float64)
             off = float(np.abs(move).max())
-            if off <= _ROUND_OFF or (off <= _SETTLED and off >= 0.5 * best):
+            if BORDERED.met(off, best):
                 return self.spot(place, frame, None)
             if not off < 1.0:
                 break
@@ -256,7 +255,7 @@ class Equations:
         for corrections in range(_ROUNDS):
             move = -inverse @ residual
             off = float(np.abs(move).max())
-            if off <= _ROUND_OFF or (off <= _SETTLED and off >= 0.5 * best):
+            if BORDERED.met(off, best):
                 return at, corrections
             if not off < 10.0 * best:
                 break

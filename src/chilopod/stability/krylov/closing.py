@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from chilopod.errors import AnalysisError
 from chilopod.stability.budget import Budget
 from chilopod.stability.capabilities import FlowsTangents
+from chilopod.stability.convergence import RETURN
 from chilopod.stability.krylov.arnoldi import krylov_subspaces
 from chilopod.stability.krylov.tangent_map import TangentMap, tangent_map, tangent_sizes
 from chilopod.stability.returns import Section, return_duration, section_at
@@ -26,8 +27,6 @@ LARGE = 100
 """States from which on a few directions are cheaper than the whole derivative."""
 
 _ROUNDS = 30
-_ROUND_OFF = 4e-16
-_SETTLED = 1e-10  # residual, of the sizes of the states, below which it may stop falling
 _WORSE = 10.0  # residuals may grow by so much
 _RESTS = 1e-8  # of the sizes: a motion that short is none
 _BLOCK = 4  # columns: as many as the compiled code carries at once
@@ -71,7 +70,7 @@ def closed_orbit(
         size = np.maximum(size, np.maximum(np.abs(x), np.abs(image.state)) if x.any() else 0.0)
         residual = (image.state - x) / size
         off = float(np.abs(residual).max())
-        if off <= _ROUND_OFF or (off <= _SETTLED and off >= 0.5 * best):
+        if RETURN.met(off, best):
             if image.velocity is not None and np.abs(image.velocity * image.duration / size).max() <= _RESTS:
                 break
             if section is not None:
