@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 from collections.abc import Sized
 from dataclasses import fields, is_dataclass
 from typing import Any, TypeVar
@@ -54,6 +55,8 @@ def _short(result: Any) -> str:
 def in_one_line(value: Any) -> str:
     """A field in one line: large parts are named with their size."""
     kind = type(value).__name__
+    if isinstance(value, enum.Enum):
+        return str(getattr(value, "label", value.name))
     if isinstance(value, np.ndarray):
         if value.size > _FEW or value.dtype == object:
             return f"<{value.dtype} array of shape {value.shape}>"

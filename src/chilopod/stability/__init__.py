@@ -34,6 +34,7 @@ from chilopod.stability.equilibria import Equilibrium, find_equilibrium
 from chilopod.stability.floquet import Exponents, Multipliers, exponents, multipliers, sweep
 from chilopod.stability.hopf import locate_hopf
 from chilopod.stability.locate import Located, locate
+from chilopod.stability.maps import from_map
 from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.normal_form import NormalForm
 from chilopod.stability.orbits import Orbit, find_orbit
@@ -96,6 +97,7 @@ __all__ = [
     "find_orbit",
     "follow",
     "follow2",
+    "from_map",
     "from_rhs",
     "locate",
     "locate_hopf",

@@ -216,7 +216,8 @@ def linear_part(system: Autonomous, x: Array) -> tuple[Array, Array, Array]:
     size = size if given_scale(system) is None else np.asarray(given_scale(system))
     curves = np.stack([np.broadcast_to(x, (x.size, x.size)), np.diag(size)], axis=1)
     found, wrong = _expanded(system, curves)
-    velocity, matrix = found[0, 0], found[:, 1].T / size
+    with np.errstate(all="ignore"):
+        velocity, matrix = found[0, 0], found[:, 1].T / size
     if not (np.isfinite(velocity).all() and np.isfinite(matrix).all()):
         raise AnalysisError("the right-hand side is not finite", field="rhs", allowed="another guess")
     return velocity, matrix, wrong[:, 1].T / size

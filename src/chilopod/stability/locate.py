@@ -27,6 +27,7 @@ from chilopod.stability.returns import ReturnMap, returned_states
 from chilopod.stability.samples import Samples
 from chilopod.stability.scales import sizes
 from chilopod.stability.shown import Result, axes_for, columns, dataset, rows, said
+from chilopod.stability.shown import bounded as bounded_text
 from chilopod.stability.singular import past_singular
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.crossings import Crossing, Crossings, SearchStatus, find_crossings
@@ -41,6 +42,7 @@ Array = NDArray[np.float64]
 BUDGET = 5000
 """Orbits that a search may compute, if not told otherwise."""
 
+_TOUCH = "at {value} a multiplier only touches the unit circle and goes back: nothing changes"
 _GRACE = 0.7  # s, to describe what was found when the time is over
 _DESCRIBING = 400  # return maps to solve for the orbits beside a point
 
@@ -183,12 +185,16 @@ def locate(
                     samples.allow(_DESCRIBING)
                     try:
                         with UserCode("family", crossing.value):
-                            point = _described(samples, crossing, block, normal_form)
+                            touch = _touches(samples, crossing)
+                            point = _described(samples, crossing, block, normal_form and not touch, touch)
                         if not point.error_bound < samples.width:
                             raise AnalysisError(
                                 f"its error bound of {point.error_bound:.1e} tells nothing", field="value"
                             )
-                        points.append(point)
+                        if touch:
+                            remarks.append(_TOUCH.format(value=bounded_text(point.value, point.error_bound)))
+                        else:
+                            points.append(point)
                     except AnalysisError as error:
                         status = max(status, SearchStatus.INCOMPLETE, key=GRAVITY.index)
                         remarks.append(f"what crosses at {crossing.value:.9g} could not be described: {error}")
@@ -233,7 +239,15 @@ def _searched(samples: Samples, here: Extent, budget: int) -> tuple[list[tuple[B
     return [(block, crossings_in(block, whole, search)) for block in blocks], list(remarks)
 
 
-def _described(samples: Samples, crossing: Crossing, block: Block | None, with_normal_form: bool) -> BifurcationPoint:
+def _touches(samples: Samples, crossing: Crossing) -> bool:
+    """Whether one multiplier, or one pair, comes to the circle within the interval and goes back."""
+    simple = crossing.multiplicity <= (2 if crossing.event is Event.PAIR else 1)
+    return simple and crossing.change == 0 and not crossing.collision and samples.low < crossing.value < samples.high
+
+
+def _described(
+    samples: Samples, crossing: Crossing, block: Block | None, with_normal_form: bool, touch: bool
+) -> BifurcationPoint:
     """What happens at a crossing of an orbit that is known, or followed."""
 
     def bounded_at(value: float, state: Array, error: Array, image: ReturnMap) -> Orbit:
@@ -257,7 +271,7 @@ def _described(samples: Samples, crossing: Crossing, block: Block | None, with_n
         crossing,
         block,
         _formed(samples, value, orbit),
-        kind=Kind.BRANCH_POINT if lost and trivial and crossing.event is Event.PLUS else None,
+        kind=Kind.BRANCH_POINT if (touch or (lost and trivial)) and crossing.event is Event.PLUS else None,
         with_normal_form=with_normal_form,
     )
 

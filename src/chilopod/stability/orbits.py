@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.errors import AnalysisError
+from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.arguments import finite_array
 from chilopod.frozen import ReadOnlyArrays, in_one_line
 from chilopod.stability.budget import Budget, SpentError
@@ -161,6 +161,8 @@ def find_orbit(
     AnalysisError
         If neither helps.
     """
+    if not hasattr(system, "flow"):
+        raise ParameterError("is no system", field="system", value=system, allowed="what `from_rhs` gives")
     if guess is None:
         return from_known(system, known_state(system), with_error, budget=budget)
     whole = nodes_of(guess, system)

@@ -237,7 +237,8 @@ class _Linear:
             try:
                 ends[i], self._factors[i] = system.flow(np.array(x), a, b)
                 if beside is not None:
-                    self._by_value[i] = (carried(beside, x[None], a, b)[0] - ends[i]) / step
+                    with np.errstate(all="ignore"):  # what is not finite is refused below
+                        self._by_value[i] = (carried(beside, x[None], a, b)[0] - ends[i]) / step
             except AnalysisError as error:
                 raise AnalysisError(f"node {i} of {m}: {error.problem}", field="orbit") from error
             if is_autonomous(system):

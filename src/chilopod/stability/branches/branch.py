@@ -259,7 +259,8 @@ def proceed(
     seconds: float = math.inf,
     progress: Progress = _silent,
 ) -> Branch:
-    """Follow a branch on from where it ends; in pieces it has the same points as in one.
+    """Follow a branch on from where it ends. In pieces it has the same points as in one; where the system has no period
+    of its own, points of the same curve, for the last section is taken anew.
 
     Parameters
     ----------
@@ -280,6 +281,8 @@ def proceed(
         As :func:`follow`, and if the branch leaves the interval where it ends.
     """
     low, high = _checked(between, points, longest)
+    if not isinstance(branch, Branch):
+        raise ParameterError("is no branch", field="branch", value=branch, allowed="what `follow` gives")
     end = branch.points[-1]
     if not low <= end.value <= high or _outward(end, between):
         raise ParameterError(

@@ -166,6 +166,8 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
             raise ParameterError("is no special point", field="point", value=point.value)
         old = None if point.units is None else point.tangent * point.units
         point = point.bifurcation
+    if not isinstance(point, BifurcationPoint):
+        raise ParameterError("is no located point", field="point", value=point, allowed="one that `locate` gives")
     kind = point.kind
     if kind is Kind.HOPF:
         value, cycle, outward = hopf_cycle(family, point)

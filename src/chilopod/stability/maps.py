@@ -1,0 +1,79 @@
+"""A periodic system from a map."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chilopod.errors import ParameterError
+from chilopod.flows.arguments import checked_count, finite_array, numbers
+from chilopod.stability.system import PeriodicSystem
+
+Array = NDArray[np.float64]
+
+_SHAKE = 2.0**-52
+_OWN = 10.0  # two independent errors differ by less than a tenth of them rarely enough
+_ROUNDING = 8.0 * float(np.finfo(float).eps)
+_LARGEST = 100_000
+
+
+def from_map(
+    image: Callable[[Array], tuple[ArrayLike, ArrayLike]],
+    dimension: int,
+    *,
+    orbit: ArrayLike | None = None,
+    spatial_symmetry: ArrayLike | None = None,
+    scale: ArrayLike | None = None,
+) -> PeriodicSystem:
+    """Build a :class:`PeriodicSystem` of period 1 from a map, whose image is taken at every whole time.
+
+    Parameters
+    ----------
+    image
+        ``image(x)`` -> state after one iteration, shape (n,), and its derivative with respect to x, shape (n, n).
+    dimension
+        Number of states n.
+    orbit, spatial_symmetry, scale
+        See :class:`PeriodicSystem`.
+
+    Raises
+    ------
+    ParameterError
+        If ``image`` is no function, or returns arrays of another shape.
+    """
+    if not callable(image):
+        raise ParameterError("must be a function", field="image", value=image, allowed="image(x)")
+    n = checked_count("dimension", dimension, _LARGEST)
+
+    def iterated(x: Array, t0: float, t1: float) -> tuple[Array, Array, Array]:
+        derivative, reach = np.eye(n), np.eye(n)
+        for _ in range(math.ceil(t1) - math.ceil(t0)):
+            pair: Any = image(x)
+            if not (isinstance(pair, tuple | list) and len(pair) == 2):
+                raise ParameterError(
+                    "returns no pair", field="image", value=type(pair).__name__, allowed="(state, derivative)"
+                )
+            x, factor = numbers(pair[0], (n,), "image"), numbers(pair[1], (n, n), "image")
+            derivative, reach = factor @ derivative, np.abs(factor) @ reach
+        return x, derivative, reach
+
+    def flow_with_error(x: Array, t0: float, t1: float) -> tuple[Array, Array, Array]:
+        state, derivative, reach = iterated(x, t0, t1)
+        shaken = x * (1.0 + _SHAKE * np.sign(np.cos(3.0 * np.arange(n) + 1.0)))
+        other = iterated(shaken, t0, t1)[1]
+        rounding = _ROUNDING * n * max(1, math.ceil(t1) - math.ceil(t0)) * reach
+        return state, derivative, _OWN * np.abs(other - derivative) + rounding
+
+    return PeriodicSystem(
+        n,
+        1.0,
+        lambda x, t0, t1: iterated(x, t0, t1)[:2],
+        orbit=None if orbit is None else finite_array(orbit, (n,), "orbit"),
+        spatial_symmetry=None if spatial_symmetry is None else np.asarray(spatial_symmetry, dtype=np.float64),
+        scale=None if scale is None else np.asarray(scale, dtype=np.float64),
+        flow_with_error=flow_with_error,
+    )

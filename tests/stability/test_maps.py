@@ -1,0 +1,88 @@
+"""Maps as periodic systems, against what is known of them."""
+
+import math
+
+import numpy as np
+import pytest
+
+from chilopod.errors import ParameterError
+from chilopod.stability import Kind, find_orbit, follow, from_map, from_rhs, locate, multipliers, proceed, switch
+
+
+def logistic(r):
+    return from_map(lambda x: ([r * x[0] * (1.0 - x[0])], [[r * (1.0 - 2.0 * x[0])]]), 1)
+
+
+def test_the_cascade_of_the_logistic_map():
+    (doubling,) = locate(logistic, (2.5, 3.2), [0.6])
+    assert abs(doubling.value - 3.0) <= doubling.error_bound < 1e-11
+    (start,) = switch(logistic, doubling)
+    branch = follow(logistic, start, (2.5, 3.6))
+    first, second = branch.special_points
+    assert first.special is second.special is Kind.PERIOD_DOUBLING
+    assert abs(second.value - (1.0 + math.sqrt(6.0))) <= second.bifurcation.error_bound < 1e-9
+
+
+def test_images_are_taken_at_whole_times():
+    system = logistic(3.2)
+    x = np.array([0.3])
+    for t0, t1, times in ((0.0, 0.5, 1), (0.5, 1.0, 0), (0.0, 2.0, 2), (1.0, 1.0, 0), (2.5, 6.0, 3)):
+        right = x
+        for _ in range(times):
+            right = 3.2 * right * (1.0 - right)
+        assert np.array_equal(system.flow(x, t0, t1)[0], right)
+
+
+def test_the_derivative_is_within_its_bound():
+    """In exact arithmetic, of a map that magnifies."""
+    from fractions import Fraction
+
+    system, x, steps = logistic(3.9), np.array([0.37]), 12
+    _, derivative, bound = system.flow_with_error(x, 0.0, float(steps))
+    exact, slope = Fraction(0.37), Fraction(1)
+    for _ in range(steps):
+        slope *= Fraction(3.9) * (1 - 2 * exact)
+        exact = Fraction(3.9) * exact * (1 - exact)
+    assert abs(derivative[0, 0] - float(slope)) <= bound[0, 0] < 1e-9 * abs(float(slope))
+
+
+@pytest.mark.parametrize(
+    ("build", "said"),
+    [
+        (lambda: from_map(3, 1), r"image = 3: must be a function"),
+        (lambda: from_map(lambda x: x, 0), r"dimension = 0: must be a whole number"),
+        (lambda: multipliers(from_map(lambda x: x, 1), [0.5]), r"image = 'ndarray': returns no pair"),
+        (lambda: multipliers(from_map(lambda x: (x, x), 1), [0.5]), r"image: returns an array of shape \(1,\)"),
+        (lambda: switch(logistic, 3), r"point = 3: is no located point"),
+        (lambda: proceed(logistic, None, (1.0, 2.0)), r"branch: is no branch"),
+        (lambda: find_orbit(None, [1.0]), r"system: is no system"),
+        (
+            lambda: from_rhs(lambda t, x: [-x[0] + np.cos(1.3 * t)], 1, 2.0 * math.pi),
+            r"period = 6\.28\d*: is not the period of the right-hand side; .*differ at t = ",
+        ),
+    ],
+)
+def test_what_is_none_is_refused_in_one_line(build, said):
+    with pytest.raises(ParameterError, match=said) as refused:
+        build()
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "family",
+    [
+        lambda p: from_rhs(lambda t, x: [-((p - 0.5) ** 2) * x[0] - x[0] ** 3], 1, 2.0 * math.pi, orbit=[0.0]),
+        lambda p: from_map(
+            lambda x: ([-(1.0 - (p - 0.5) ** 2) * x[0] + x[0] ** 3], [[-(1.0 - (p - 0.5) ** 2) + 3.0 * x[0] ** 2]]),
+            1,
+            orbit=[0.0],
+        ),
+    ],
+)
+def test_a_multiplier_that_only_touches_the_circle_is_a_remark(family):
+    found = locate(family, (0.0, 1.2))
+    assert len(found) == 0
+    assert found.complete
+    (remark,) = found.remarks
+    assert "only touches the unit circle" in remark
+    assert float(remark.split()[1]) == pytest.approx(0.5, abs=1e-5)
