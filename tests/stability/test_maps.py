@@ -56,10 +56,6 @@ def test_the_derivative_is_within_its_bound():
         (lambda: switch(logistic, 3), r"point = 3: is no located point"),
         (lambda: proceed(logistic, None, (1.0, 2.0)), r"branch: is no branch"),
         (lambda: find_orbit(None, [1.0]), r"system: is no system"),
-        (
-            lambda: from_rhs(lambda t, x: [-x[0] + np.cos(1.3 * t)], 1, 2.0 * math.pi),
-            r"period = 6\.28\d*: is not the period of the right-hand side; .*differ at t = ",
-        ),
     ],
 )
 def test_what_is_none_is_refused_in_one_line(build, said):

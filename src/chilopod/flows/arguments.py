@@ -155,23 +155,6 @@ def check_symmetry(
         )
 
 
-def check_periodic(slopes: Slopes, times: Array, base: Array, period: float) -> None:
-    """See that a right-hand side is what it was a period before."""
-    x = np.tile(base[:, None] + _waves(base.size), times.size)
-    t = np.repeat(times, x.shape[1] // times.size)
-    here, later = slopes(t, x), slopes(t + period, x)
-    off = np.abs(here - later)
-    wrong = np.isfinite(off) & (off > _SAME * np.abs(here).max(axis=1, keepdims=True))
-    if wrong.any():
-        at = float(t[wrong.any(axis=0)][0])
-        raise ParameterError(
-            "is not the period of the right-hand side",
-            field="period",
-            value=period,
-            allowed=f"T with f(t + T, x) = f(t, x), which differ at t = {at:g}",
-        )
-
-
 def check_timeless(slopes: Slopes, base: Array, duration: float) -> None:
     """See that a right-hand side without a period does not depend on time."""
     n = base.size

@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import ParameterError
 from chilopod.flows.arguments import (
     Slopes,
-    check_periodic,
     check_shape,
     check_timeless,
     checked_arguments,
@@ -143,8 +142,6 @@ class RightHandSide:
             flows = self._traced(traced)
         if self.autonomous:
             check_timeless(flows.slopes, self.base, self.duration)
-        else:
-            check_periodic(flows.slopes, self.times, self.base, self.duration)
         return flows
 
     def _check_shapes(self) -> None:

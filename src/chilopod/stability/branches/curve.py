@@ -299,7 +299,7 @@ class Curve:
         # The derivative is that of a state so far off.
         length = max(float(np.linalg.norm(moved)), float(np.finfo(float).tiny))
         bend = float(np.linalg.norm(bordered[:n] - anchor.matrix[:n])) / length
-        end = self._end(anchor, x, here, image, tangent, bordered, _CLEAR * bend * off if bounded else np.inf)
+        end = self._end(anchor, x, here, image, tangent, bordered, bend * off if bounded else np.inf)
         missed = float(np.linalg.norm(moved - guess))
         return Step(anchor, end, float(last.tangent @ moved), moved, tangent, bordered, image, rounds, missed)
 
@@ -398,7 +398,8 @@ class Curve:
         if abs(strays) > self.precision:
             raise OutsideIntervalError("leaves the interval", field="parameter", value=wanted)
         flow = self._flow_error * max(1.0, float(np.abs(x / units[:n]).max()))
-        uncertain = float(np.linalg.norm(inverse @ residual) + np.linalg.norm(inverse, 2) * flow)
+        # The residual shows one direction; the error of the flow is a bound already.
+        uncertain = float(_CLEAR * np.linalg.norm(inverse @ residual) + np.linalg.norm(inverse, 2) * flow)
         return _Corrected(x, here, moved, mapped, beside, corrections, uncertain)
 
     def _end(
