@@ -189,7 +189,8 @@ class Curve:
 
     def _matrix_at(self, point: BranchPoint, ahead: float, section: Section | None) -> Array:
         x = point.orbit + ahead * point.tangent[:-1] * self.units(point.orbit.size)[:-1]
-        jacobian = self.image(x, point.value, section).jacobian
+        # As at the end of a step, to the bit.
+        jacobian = self.image(x, point.value, section, with_error=True).jacobian
         derivative = self.parameter_derivative(x, point.value, section)
         return self.matrix(jacobian, derivative, point.tangent)
 
