@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.labels import Labelled
-from chilopod.stability.points import Kind
+from chilopod.stability.points import BifurcationPoint, Kind
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -84,6 +84,28 @@ class Codimension2(ReadOnlyArrays):
     multipliers: ComplexArray
     next_coefficient: float | None = None
     next_coefficient_error: float | None = None
+
+
+@dataclass(frozen=True)
+class Start2(ReadOnlyArrays):
+    """Where a curve starts that leaves a point of codimension two.
+
+    Attributes
+    ----------
+    point
+        A bifurcation point on the curve, beside the one that is left.
+    second
+        The value of the second parameter there.
+    periods
+        How many periods its orbits take. They need not have the systems' symmetry in time.
+    origin
+        The point of codimension two that is left.
+    """
+
+    point: BifurcationPoint
+    second: float
+    periods: int
+    origin: Codimension2
 
 
 DEGENERATE = {
