@@ -96,16 +96,16 @@ class Start2(ReadOnlyArrays):
         A bifurcation point on the curve, beside the one that is left.
     second
         The value of the second parameter there.
+    outward
+        Direction in which the curve leaves, shape (n + 2,): of the state, and of both parameters.
     periods
         How many periods its orbits take. They need not have the systems' symmetry in time.
-    origin
-        The point of codimension two that is left.
     """
 
     point: BifurcationPoint
     second: float
+    outward: Array
     periods: int
-    origin: Codimension2
 
 
 DEGENERATE = {

@@ -9,7 +9,6 @@ Where the cubic coefficient c of a -> (1 + b) a + c a^3 + e a^5 vanishes on a cu
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,9 +18,9 @@ from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.stability.budget import Budget, SpentError
 from chilopod.stability.codimension_two.bordered import Equations, Family2, Place, Spot, knows_orbit
 from chilopod.stability.codimension_two.codimension2 import Codimension2, CodimensionTwo, Start2
-from chilopod.stability.codimension_two.detection import Critical, Detector, across, critical
+from chilopod.stability.codimension_two.detection import Detector, across, critical
 from chilopod.stability.codimension_two.two_parameters import BUDGET, checked_box, over_periods
-from chilopod.stability.normal_forms.center_manifold import displacements
+from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, displacements
 from chilopod.stability.normal_forms.quintic import Quintic
 from chilopod.stability.points import BifurcationPoint, Kind
 
@@ -30,6 +29,7 @@ Array = NDArray[np.float64]
 _BESIDE = 1e-3  # in units of the box and of the states: over which the cubic coefficient is differentiated
 _FARTHEST = 0.1  # of the same: how far along the curve a fold may be
 _HALVINGS = 12  # of the amplitude
+_BEFORE = 0.9  # of an amplitude, seen from which a curve goes outward
 _NEAR = 0.25  # of the amplitude and of the way from the point: how far off a fold may be predicted
 
 _CURVES = {
@@ -83,7 +83,7 @@ def switch2(
     periods = 2 if kind is Kind.PERIOD_DOUBLING else 1
     folds = Equations(over_periods(family2, periods), 1, False, box, allowed)
     signs = (1.0,) if kind is Kind.PERIOD_DOUBLING else (1.0, -1.0)
-    return tuple(_start(there, folds, sign, periods, point) for sign in signs)
+    return tuple(_start(there, folds, sign, periods) for sign in signs)
 
 
 @dataclass(frozen=True)
@@ -92,41 +92,38 @@ class _Unfolding:
 
     Attributes
     ----------
-    equations, spot, own
-        The curve, the point, and its critical multiplier.
+    equations, spot, at
+        The curve, the point, and its critical orbit.
     fifth
         Terms of fifth order.
     slope
         Change of the cubic coefficient along the curve, by the length of ``spot.tangent``.
     response
-        Change of the coordinates of the orbit that is on the curve with the multiplier's modulus, across the curve.
+        Change of the orbit and of the parameters, in coordinates of the frame, with the modulus of the multiplier.
     times
         How many returns the coefficients are of.
     """
 
     equations: Equations
     spot: Spot
-    own: Critical
+    at: CriticalOrbit
     fifth: Quintic
     slope: float
     response: Array
     times: int
 
-    def folds(self, sign: float) -> Iterator[tuple[float, Place]]:
-        """Amplitudes, falling, and where folds are predicted at them."""
+    def fold(self, a: float) -> Place | None:
+        """Where a fold is predicted at an amplitude along the mode, negative against it; None if that is too far."""
         spot, fifth = self.spot, self.fifth
-        _, at = Detector(self.equations, Kind.PITCHFORK, True).sampled(self.own, spot.at, spot.frame)
-        for k in range(_HALVINGS):
-            a = fifth.amplitude * 0.5**k
-            away = -2.0 * fifth.coefficient * a * a / self.slope
-            across = fifth.coefficient * a**4 / self.times
-            if not (abs(away) <= _FARTHEST and np.abs(across * self.response).max() <= _FARTHEST):
-                continue
-            guess = spot.frame.moved(spot.place, away * spot.tangent)
-            base = self.equations.corrected(spot, guess, spot.tangent, away)[0].place
-            place = spot.frame.moved(base, across * self.response)
-            bent = displacements(at, fifth.curve, np.array(sign * a, dtype=np.complex128))
-            yield a, Place(place.state + bent, place.values, 0.0)
+        away = -2.0 * fifth.coefficient * a * a / self.slope
+        across = fifth.coefficient * a**4 / self.times
+        if not (abs(away) <= _FARTHEST and np.abs(across * self.response).max() <= _FARTHEST):
+            return None
+        guess = spot.frame.moved(spot.place, away * spot.tangent)
+        base = self.equations.corrected(spot, guess, spot.tangent, away)[0].place
+        place = spot.frame.moved(base, across * self.response)
+        bent = displacements(self.at, fifth.curve, np.array(a, dtype=np.complex128))
+        return Place(place.state + bent, place.values, 0.0)
 
 
 def _unfolding(family2: Family2, point: Codimension2, kind: Kind, box: Array, budget: Budget) -> _Unfolding:
@@ -140,6 +137,7 @@ def _unfolding(family2: Family2, point: Codimension2, kind: Kind, box: Array, bu
     fifth = detector.fifth(own, spot.at, spot.frame, detector.form(own, spot.at, spot.frame, None))
     if fifth is None or abs(fifth.coefficient) <= fifth.error:
         raise AnalysisError("the coefficient of fifth order is zero within its error", field="point")
+    _, at_point = detector.sampled(own, spot.at, spot.frame)
     cubic = []
     for s in (-_BESIDE, _BESIDE):
         at, _ = equations.corrected(spot, spot.frame.moved(spot.place, s * spot.tangent), spot.tangent, s)
@@ -147,15 +145,15 @@ def _unfolding(family2: Family2, point: Codimension2, kind: Kind, box: Array, bu
         cubic.append((form.cubic, form.cubic_error))
     (low, low_error), (high, high_error) = cubic
     if not abs(high - low) > low_error + high_error:
-        raise AnalysisError("the cubic coefficient does not change its sign along the curve", field="point")
+        raise AnalysisError("the cubic coefficient is not seen to change along the curve", field="point")
     returns = spot.at.image.returns
     times = returns if target > 0 or returns % 2 == 0 else 2 * returns
-    return _Unfolding(equations, spot, own, fifth, (high - low) / (2.0 * _BESIDE), _across(spot, target), times)
+    return _Unfolding(equations, spot, at_point, fifth, (high - low) / (2.0 * _BESIDE), _across(spot, target), times)
 
 
 def _across(spot: Spot, target: int) -> Array:
-    """Change of the coordinates with the modulus of the critical multiplier, along orbits, by the shortest way in the
-    plane of the parameters; g changes by -(w . v) of what the multiplier does."""
+    """``response`` of an unfolding, by the shortest way in the plane of the parameters; g changes by -(w . v) of what
+    the multiplier does."""
     m = spot.frame.basis.shape[1]
     matrix, overlap = spot.matrix, float(spot.at.left[:, 0] @ spot.at.right[:, 0])
     orbit = -np.linalg.solve(matrix[:m, :m], matrix[:m, m:])
@@ -164,36 +162,36 @@ def _across(spot: Spot, target: int) -> Array:
     return np.concatenate([orbit @ along, along])
 
 
-def _start(there: _Unfolding, folds: Equations, sign: float, periods: int, point: Codimension2) -> Start2:
+def _start(there: _Unfolding, folds: Equations, sign: float, periods: int) -> Start2:
     """The fold at the largest amplitude at which it is found near where it was predicted."""
-    left, widths = there.own.left.real, there.spot.frame.widths
-    reason = ""
-    try:
-        for amplitude, place in there.folds(sign):
-            try:
-                found = folds.begin(place)
-            except SpentError:
-                raise
-            except (ChilopodError, ArithmeticError, ValueError) as error:
-                reason = str(error)
+    left, widths = there.at.left.real, there.spot.frame.widths
+    reason = "none is predicted near it"
+    for k in range(_HALVINGS):
+        amplitude = there.fifth.amplitude * 0.5**k
+        try:
+            place, before = (there.fold(share * sign * amplitude) for share in (1.0, _BEFORE))
+            if place is None or before is None:
                 continue
-            off = abs(float(left @ (found.place.state - place.state))) / amplitude
-            way = float(np.linalg.norm((found.place.values - point.values) / widths))
-            missed = float(np.linalg.norm((found.place.values - place.values) / widths))
-            inside = (folds.box[:, 0] <= found.place.values) & (found.place.values <= folds.box[:, 1])
-            if off <= _NEAR and missed <= _NEAR * way and inside.all():
-                return _described(found, periods, point)
-            reason = "none is near where it was predicted"
-    except SpentError as error:
-        reason = str(error)
+            found = folds.begin(place)
+        except SpentError:
+            raise
+        except (ChilopodError, ArithmeticError, ValueError) as error:
+            reason = str(error)
+            continue
+        values, origin = found.place.values, there.spot.place.values
+        off = abs(float(left @ (found.place.state - place.state))) / amplitude
+        missed, way = (float(np.linalg.norm((values - one) / widths)) for one in (place.values, origin))
+        inside = (folds.box[:, 0] <= values) & (values <= folds.box[:, 1])
+        if off <= _NEAR and missed <= _NEAR * way and inside.all():
+            outward = np.concatenate([place.state - before.state, place.values - before.values])
+            mode, bound, period = (
+                critical(1, found.at, found.frame).mode,
+                float(across(found)[0]),
+                found.at.image.period,
+            )
+            fold = BifurcationPoint(
+                Kind.FOLD, float(values[0]), bound, found.place.state, mode, 1.0 + 0j, 0.0, period=period
+            )
+            return Start2(fold, float(values[1]), outward, periods)
+        reason = "none is near where it was predicted"
     raise AnalysisError(f"no curve of folds was found to leave it: {reason}", field="point")
-
-
-def _described(found: Spot, periods: int, point: Codimension2) -> Start2:
-    p, q = found.place.values.tolist()
-    mode = critical(1, found.at, found.frame).mode
-    period = found.at.image.period
-    fold = BifurcationPoint(
-        Kind.FOLD, p, float(across(found)[0]), found.place.state, mode, 1.0 + 0j, 0.0, period=period
-    )
-    return Start2(fold, q, periods, point)

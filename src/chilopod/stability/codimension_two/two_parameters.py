@@ -101,9 +101,9 @@ def follow2(
     for name, number in (("points", points), ("step", step), ("longest", longest), ("budget", budget)):
         if not number > 0:
             raise ParameterError("must be positive", field=name, value=number)
-    left, periods = None, 1
+    outward, periods = None, 1
     if isinstance(start, Start2):
-        left, periods, second = start.origin, start.periods, start.second
+        outward, periods, second = start.outward, start.periods, start.second
         family2, start = over_periods(family2, periods), start.point
     if not isinstance(start, BifurcationPoint):
         raise ParameterError("is no located point", field="start", value=start, allowed="one that `locate` gives")
@@ -119,9 +119,10 @@ def follow2(
         first = equations.begin(Place(start.orbit, values, 0.0 if target else nu.real / abs(nu)))
     curve, pace = _Critical(equations, start.kind, coefficients, progress), Pace(longest, _FEW, _MANY)
     origin = curve.station(first)
-    if left is not None:
-        away = first.frame.between(Place(left.orbit, left.values, 0.0), first.place) @ first.tangent
-        half = curve.traced(origin, math.copysign(1.0, away), step, pace, points)
+    if outward is not None:
+        beside = Place(first.place.state + outward[:-2], first.place.values + outward[-2:], 0.0)
+        along = float(first.frame.between(first.place, beside) @ first.tangent)
+        half = curve.traced(origin, math.copysign(1.0, along), step, pace, points)
         joined = _joined(start.kind, origin, _Half((), (), Ending.START, ""), half)
         return replace(joined, periods=periods)
     upward = float(np.sign(first.tangent[first.frame.parameters][1]) or 1.0)

@@ -74,27 +74,17 @@ def quintic(mapped: ReturnedStates, at: CriticalOrbit, amplitude: float, noise: 
     The coefficient from the amplitude at which its error is smallest; None if the map exists at none.
     """
     best: Quintic | None = None
-    for factor, start in ((_STEP, amplitude), (1.0 / _STEP, amplitude / _STEP)):
-        radius, worse = start, 0
-        curve = _unbent(at) if best is None else best.curve
-        for _ in range(_TRIES):
+    nothing = np.zeros(at.state.size, dtype=np.complex128)
+    curve: Curve = {(1, 0): at.right.astype(np.complex128), **dict.fromkeys(_resonant(at), nothing)}
+    for factor, radius in ((_STEP, amplitude), (1.0 / _STEP, amplitude / _STEP)):
+        worse, tries = 0, 0
+        while worse < _WORSE and tries < _TRIES:
             with np.errstate(all="ignore"):
-                found = _measured(mapped, at, curve, radius, noise)
-            if found is not None and not (best is not None and found.error >= best.error):
+                found = _measured(mapped, at, curve, radius * factor**tries, noise)
+            tries, worse = tries + 1, worse + 1
+            if found is not None and (best is None or found.error < best.error):
                 best, curve, worse = found, found.curve, 0
-            else:
-                worse += 1
-            if worse == _WORSE:
-                break
-            radius *= factor
     return best
-
-
-def _unbent(at: CriticalOrbit) -> Curve:
-    curve: dict[Powers, ComplexArray] = {(1, 0): at.right.astype(np.complex128)}
-    for powers in _resonant(at):
-        curve[powers] = np.zeros(at.state.size, dtype=np.complex128)
-    return curve
 
 
 def _resonant(at: CriticalOrbit) -> dict[Powers, bool]:
