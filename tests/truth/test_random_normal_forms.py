@@ -142,7 +142,7 @@ def test_errors_of_fifth_order_hold(kind, monkeypatch):
         sys.modules[__name__], "on_critical_space", lambda kind, b, c, *rest: core(kind, 0, 1j * c.imag, *rest)
     )
     used = []
-    for case in range(CASES // 2):
+    for case in range(CASES // 3):
         random = np.random.default_rng([8, case])
         mapped, at, _, cubic, fifth = random_map(kind, random)
         at = replace(at, returns=int(random.integers(1, 4)))
@@ -154,5 +154,5 @@ def test_errors_of_fifth_order_hold(kind, monkeypatch):
         times = at.returns // 2 if kind == "flip" and at.returns == 2 else at.returns
         assert abs(found.coefficient - times * once) <= found.error, case
         used.append(abs(found.coefficient - times * once) / found.error)
-    assert len(used) >= 0.45 * CASES
+    assert len(used) >= 0.3 * CASES
     assert np.median(used) > 1e-4

@@ -170,7 +170,7 @@ class Detector:
 
     def fifth(self, own: Critical, at: Evaluated, frame: Frame, form: NormalForm) -> Quintic | None:
         """The terms of fifth order at a place, given those of third order."""
-        if form.status is not NormalFormStatus.FOUND:
+        if not np.isfinite(form.amplitude):
             return None
         return quintic(*self.sampled(own, at, frame), form.amplitude)
 
