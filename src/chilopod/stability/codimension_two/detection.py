@@ -168,11 +168,10 @@ class Detector:
         orbit = CriticalOrbit(at.place.state, image.jacobian, own.multiplier, own.mode, own.left, image.returns)
         return lambda states: returned_states(system, states, frame.section), orbit
 
-    def fifth(self, own: Critical, at: Evaluated, frame: Frame, form: NormalForm) -> Quintic | None:
-        """The terms of fifth order at a place, given those of third order."""
-        if not np.isfinite(form.amplitude):
-            return None
-        return quintic(*self.sampled(own, at, frame), form.amplitude)
+    def fifth(self, own: Critical, at: Evaluated, frame: Frame, *forms: NormalForm) -> Quintic | None:
+        """The terms of fifth order at a place, given those of third order there or beside it."""
+        amplitude = next((form.amplitude for form in forms if np.isfinite(form.amplitude)), np.nan)
+        return None if np.isnan(amplitude) else quintic(*self.sampled(own, at, frame), amplitude)
 
     def coefficient(self, form: NormalForm) -> tuple[float, float]:
         """The coefficient that decides what happens on a curve of this kind, and its error; NaN where there is none."""
@@ -305,13 +304,14 @@ class Detector:
     ) -> Codimension2:
         """A point with the coefficient that does not vanish there, whose error has a share of its change to a place
         ``beside``: the point itself may be as far off."""
-        terms = []
-        for at, written, shift in ((spot.at, spot.frame, spot.shift), (beside, frame, None)):
-            own = critical(self._equations.target, at, written)
-            form = self.form(own, at, written, shift)
+        target, terms = self._equations.target, []
+        places = ((spot.at, spot.frame, spot.shift), (beside, frame, None))
+        critical_there = [critical(target, at, written) for at, written, _ in places]
+        forms = [self.form(own, *place) for own, place in zip(critical_there, places, strict=True)]
+        for own, (at, written, _), form in zip(critical_there, places, forms, strict=True):
             value, error = form.cubic, form.cubic_error
             if self._kind not in WITHOUT_CRITICALITY:
-                fifth = self.fifth(own, at, written, form)
+                fifth = self.fifth(own, at, written, form, *forms)
                 value, error = (np.nan, np.nan) if fifth is None else (fifth.coefficient, fifth.error)
             terms.append((value, error))
         (value, error), (other, unsure) = terms

@@ -134,21 +134,23 @@ def _unfolding(family2: Family2, point: Codimension2, kind: Kind, box: Array, bu
     spot = equations.begin(Place(point.orbit, point.values, 0.0))
     detector = Detector(equations, kind, True)
     own = critical(target, spot.at, spot.frame)
-    fifth = detector.fifth(own, spot.at, spot.frame, detector.form(own, spot.at, spot.frame, None))
-    if fifth is None or abs(fifth.coefficient) <= fifth.error:
-        raise AnalysisError("the coefficient of fifth order is zero within its error", field="point")
-    _, at_point = detector.sampled(own, spot.at, spot.frame)
-    cubic = []
+    forms = [detector.form(own, spot.at, spot.frame, None)]
     for s in (-_BESIDE, _BESIDE):
         at, _ = equations.corrected(spot, spot.frame.moved(spot.place, s * spot.tangent), spot.tangent, s)
-        form = detector.form(critical(target, at, spot.frame), at, spot.frame, None)
-        cubic.append((form.cubic, form.cubic_error))
-    (low, low_error), (high, high_error) = cubic
-    if not abs(high - low) > low_error + high_error:
+        forms.append(detector.form(critical(target, at, spot.frame), at, spot.frame, None))
+    low, high = forms[1:]
+    if not abs(high.cubic - low.cubic) > low.cubic_error + high.cubic_error:
         raise AnalysisError("the cubic coefficient is not seen to change along the curve", field="point")
+    fifth = detector.fifth(own, spot.at, spot.frame, *forms)
+    if fifth is None:
+        raise AnalysisError("no coefficient of fifth order was found", field="point")
+    if abs(fifth.coefficient) <= fifth.error:
+        raise AnalysisError("the coefficient of fifth order is zero within its error", field="point")
     returns = spot.at.image.returns
     times = returns if target > 0 or returns % 2 == 0 else 2 * returns
-    return _Unfolding(equations, spot, at_point, fifth, (high - low) / (2.0 * _BESIDE), _across(spot, target), times)
+    slope = (high.cubic - low.cubic) / (2.0 * _BESIDE)
+    _, orbit = detector.sampled(own, spot.at, spot.frame)
+    return _Unfolding(equations, spot, orbit, fifth, slope, _across(spot, target), times)
 
 
 def _across(spot: Spot, target: int) -> Array:
@@ -165,7 +167,7 @@ def _across(spot: Spot, target: int) -> Array:
 def _start(there: _Unfolding, folds: Equations, sign: float, periods: int) -> Start2:
     """The fold at the largest amplitude at which it is found near where it was predicted."""
     left, widths = there.at.left.real, there.spot.frame.widths
-    reason = "none is predicted near it"
+    cause: Exception | None = None
     for k in range(_HALVINGS):
         amplitude = there.fifth.amplitude * 0.5**k
         try:
@@ -176,7 +178,7 @@ def _start(there: _Unfolding, folds: Equations, sign: float, periods: int) -> St
         except SpentError:
             raise
         except (ChilopodError, ArithmeticError, ValueError) as error:
-            reason = str(error)
+            cause = error
             continue
         values, origin = found.place.values, there.spot.place.values
         off = abs(float(left @ (found.place.state - place.state))) / amplitude
@@ -193,5 +195,4 @@ def _start(there: _Unfolding, folds: Equations, sign: float, periods: int) -> St
                 Kind.FOLD, float(values[0]), bound, found.place.state, mode, 1.0 + 0j, 0.0, period=period
             )
             return Start2(fold, float(values[1]), outward, periods)
-        reason = "none is near where it was predicted"
-    raise AnalysisError(f"no curve of folds was found to leave it: {reason}", field="point")
+    raise AnalysisError("no curve of folds was found where one is predicted to leave", field="point") from cause
