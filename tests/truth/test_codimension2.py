@@ -70,6 +70,10 @@ def check_special(curve, *expected):
         assert (point.error_bound <= 1e-9 * (1.0 + np.abs(values))).all()
 
 
+def check_next(point, expected):
+    assert abs(point.next_coefficient - expected) <= point.next_coefficient_error < 1e-6 * abs(expected)
+
+
 def check_curve(curve, across):
     """``across(values)``, a function that is zero on the curve, is so within the bounds of all points."""
     for point in curve.points:
@@ -98,6 +102,7 @@ def test_cusp(unit):
     (cusp,) = curve.special
     assert (np.abs(cusp.values) <= cusp.error_bound).all()
     assert (cusp.error_bound <= 1e-13 * np.array([unit, 1.0])).all()
+    check_next(cusp, -(unit**-2.0))
     assert curve.endings == (Ending.LEFT_INTERVAL, Ending.LEFT_INTERVAL)
     assert curve.values[0][1] == curve.values[-1][1] == 1.0
     assert curve.values[0][0] == pytest.approx(-curve.values[-1][0], rel=1e-12)
@@ -190,6 +195,8 @@ def test_generalised_period_doubling():
     curve = follow2(family2, start, ((-0.5, 0.5), (-0.6, 0.6)), second=0.1)
     check_curve(curve, lambda values: values[0] - values[1] ** 2)
     check_special(curve, (CodimensionTwo.GENERALISED_PERIOD_DOUBLING, (0.36**2, -0.36)))
+    # a = u + s u^2 + t u^4, for the s and t with which u has no square and no fourth power, goes to -u - 2 c^2 u^5.
+    check_next(curve.special[0], 4.0 * 0.36**2)
     for point in curve.points:
         assert point.coefficient == pytest.approx(-2.0 * (point.values[1] + 0.36), abs=1e-7)
 
@@ -237,6 +244,7 @@ def test_chenciner():
     curve = follow2(family2, start, ((-0.5, 0.5), (-0.6, 0.6)), second=0.1)
     check_curve(curve, lambda values: values[0] - values[1] ** 2)
     check_special(curve, (CodimensionTwo.CHENCINER, (0.09, 0.3)))
+    check_next(curve.special[0], -0.5 * 2.0**2)  # |z| is sqrt(2) of the amplitude along the unit mode
 
 
 def turning(angle, size):
@@ -363,6 +371,7 @@ def test_folds_of_cycles_of_an_autonomous_system():
     assert cusp.kind is CodimensionTwo.CUSP
     assert (np.abs(cusp.values - [0.1, 0.2]) <= cusp.error_bound).all()
     assert (cusp.error_bound < 1e-9).all()
+    check_next(cusp, -2.0 * np.pi)
 
 
 @numba.njit

@@ -4,7 +4,8 @@ A map in its normal form on the critical space, with contracting states beside i
 inverses are polynomials too, a linear map, and units that differ by up to 1e18.
 """
 
-from dataclasses import dataclass
+import sys
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import pytest
 from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import normal_form
+from chilopod.stability.normal_forms.quintic import quintic
 
 CASES = 60
 SHEARS = 3
@@ -67,7 +69,7 @@ def on_critical_space(kind, b, c, e, angle):
 
 
 def random_map(kind, random):
-    """A map, its critical orbit, and its coefficients of second and third order for one return."""
+    """A map, its critical orbit, and its coefficients of second, third and fifth order for one return."""
     critical = 2 if kind == "pair" else 1
     n = int(random.integers(critical, 6))
     b, c, e = random.normal(), complex(*random.normal(size=2)), complex(*random.normal(size=2))
@@ -106,7 +108,7 @@ def random_map(kind, random):
     jacobian = units[:, None] * (basis @ linear @ inverse) / units
     at = CriticalOrbit(orbit * units, jacobian, multiplier, right / length, left * length)
     per_amplitude = (2.0 if kind == "pair" else 1.0) / length
-    return mapped, at, b * per_amplitude, c * per_amplitude**2
+    return mapped, at, b * per_amplitude, c * per_amplitude**2, e * per_amplitude**4
 
 
 @pytest.mark.parametrize("kind", ["flip", "fold", "saturating", "pair"])
@@ -114,7 +116,7 @@ def test_errors_hold(kind):
     found = 0
     used = []  # share of the bound that the true error has
     for case in range(CASES):
-        mapped, at, quadratic, cubic = random_map(kind, np.random.default_rng([7, case]))
+        mapped, at, quadratic, cubic, _ = random_map(kind, np.random.default_rng([7, case]))
         form = normal_form(mapped, at, orbit_error=0.0)
         if form.status is not NormalFormStatus.FOUND:
             continue
@@ -130,3 +132,27 @@ def test_errors_hold(kind):
                 used.append(abs(value - expected) / error)
     assert found >= 0.95 * CASES
     assert np.median(used) > 1e-3
+
+
+@pytest.mark.parametrize("kind", ["flip", "fold", "pair"])
+def test_errors_of_fifth_order_hold(kind, monkeypatch):
+    """Where the cubic coefficient is zero; at a fold where the quadratic one is, too."""
+    core = on_critical_space
+    monkeypatch.setattr(
+        sys.modules[__name__], "on_critical_space", lambda kind, b, c, *rest: core(kind, 0, 1j * c.imag, *rest)
+    )
+    used = []
+    for case in range(CASES // 3):
+        random = np.random.default_rng([8, case])
+        mapped, at, _, cubic, fifth = random_map(kind, random)
+        at = replace(at, returns=int(random.integers(1, 4)))
+        form = normal_form(mapped, at, orbit_error=0.0)
+        if form.status is not NormalFormStatus.FOUND:
+            continue
+        found = quintic(mapped, at, form.amplitude)
+        once = {"flip": -2.0 * fifth.real, "fold": fifth.real, "pair": fifth.real + 0.5 * cubic.imag**2}[kind]
+        times = at.returns // 2 if kind == "flip" and at.returns == 2 else at.returns
+        assert abs(found.coefficient - times * once) <= found.error, case
+        used.append(abs(found.coefficient - times * once) / found.error)
+    assert len(used) >= 0.3 * CASES
+    assert np.median(used) > 1e-4

@@ -27,8 +27,9 @@ from chilopod.stability.capabilities import (
     SpatiallySymmetric,
     SystemLike,
 )
-from chilopod.stability.codimension_two.codimension2 import Codimension2, CodimensionTwo
+from chilopod.stability.codimension_two.codimension2 import Codimension2, CodimensionTwo, Start2
 from chilopod.stability.codimension_two.curve2 import Curve2, Point2
+from chilopod.stability.codimension_two.switching import switch2
 from chilopod.stability.codimension_two.two_parameters import follow2
 from chilopod.stability.equilibria import Equilibrium, find_equilibrium
 from chilopod.stability.floquet import Exponents, Multipliers, exponents, multipliers, sweep
@@ -86,6 +87,7 @@ __all__ = [
     "Section",
     "SpatiallySymmetric",
     "Start",
+    "Start2",
     "Stretched",
     "SymmetricCrossing",
     "SymmetricKind",
@@ -105,4 +107,5 @@ __all__ = [
     "proceed",
     "sweep",
     "switch",
+    "switch2",
 ]

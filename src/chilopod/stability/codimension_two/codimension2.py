@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.labels import Labelled
-from chilopod.stability.points import Kind
+from chilopod.stability.points import BifurcationPoint, Kind
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -70,6 +70,11 @@ class Codimension2(ReadOnlyArrays):
         State on the orbit at time 0, shape (n,).
     multipliers
         Of the return map, by falling modulus.
+    next_coefficient, next_coefficient_error
+        Where the coefficient of the curve's normal form vanishes: the first one after it, of the same map and in the
+        same amplitude, and a bound on its error. That is c of a -> a + c a^3 at a cusp and a degenerate transcritical
+        point; e of a -> a + e a^5 at a degenerate pitchfork and, over two periods, at a generalised period doubling;
+        the second Lyapunov coefficient e of |a| -> |a| + e |a|^5 over one period at a Chenciner point. None elsewhere.
     """
 
     kind: CodimensionTwo
@@ -77,6 +82,30 @@ class Codimension2(ReadOnlyArrays):
     error_bound: Array
     orbit: Array
     multipliers: ComplexArray
+    next_coefficient: float | None = None
+    next_coefficient_error: float | None = None
+
+
+@dataclass(frozen=True)
+class Start2(ReadOnlyArrays):
+    """Where a curve starts that leaves a point of codimension two.
+
+    Attributes
+    ----------
+    point
+        A bifurcation point on the curve, beside the one that is left.
+    second
+        The value of the second parameter there.
+    outward
+        Direction in which the curve leaves, shape (n + 2,): of the state, and of both parameters.
+    periods
+        How many periods its orbits take. They need not have the systems' symmetry in time.
+    """
+
+    point: BifurcationPoint
+    second: float
+    outward: Array
+    periods: int
 
 
 DEGENERATE = {

@@ -75,6 +75,8 @@ class Curve2(Result):
         Why it ends, at its first point and at its last.
     reasons
         What was the matter where it was lost, else empty: one for each end.
+    periods
+        How many periods its orbits take.
     """
 
     kind: Kind
@@ -82,6 +84,7 @@ class Curve2(Result):
     special: tuple[Codimension2, ...]
     endings: tuple[Ending, Ending]
     reasons: tuple[str, str] = ("", "")
+    periods: int = 1
 
     @property
     def values(self) -> Array:

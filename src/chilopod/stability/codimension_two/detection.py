@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import enum
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +21,10 @@ from chilopod.stability.codimension_two.bordered import Equations, Evaluated, Fr
 from chilopod.stability.codimension_two.codimension2 import DEGENERATE, Codimension2, CodimensionTwo, together
 from chilopod.stability.floquet import Spectrum, spectrum
 from chilopod.stability.normal_forms.amplitude import NormalFormStatus
-from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
+from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, ReturnedStates
 from chilopod.stability.normal_forms.normal_form import NormalForm, normal_form
-from chilopod.stability.points import Kind
+from chilopod.stability.normal_forms.quintic import Quintic, quintic
+from chilopod.stability.points import WITHOUT_CRITICALITY, Kind
 from chilopod.stability.returns import returned_states
 from chilopod.stability.symmetry.mirrored import reverses
 
@@ -150,19 +151,27 @@ class Detector:
 
     def form(self, own: Critical, at: Evaluated, frame: Frame, shift: Array | None) -> NormalForm:
         """The normal form at a place; ``shift`` is how far its coordinates may be off, if that is to count."""
-        image = at.image
         orbit_error = 0.0
         if shift is not None:
             orbit_error = float(np.abs(own.left) @ (frame.size * (np.abs(frame.basis) @ shift[: frame.basis.shape[1]])))
-        error = 0.0 if shift is None else float(np.max(image.error * frame.size / frame.size[:, None]))
-        system = self._equations.system(at.place.values)
+        error = 0.0 if shift is None else float(np.max(at.image.error * frame.size / frame.size[:, None]))
         return normal_form(
-            lambda states: returned_states(system, states, frame.section),
-            CriticalOrbit(at.place.state, image.jacobian, own.multiplier, own.mode, own.left, image.returns),
+            *self.sampled(own, at, frame),
             uncertainty=error / float(np.linalg.norm(at.jacobian)),
             scale=frame.size,
             orbit_error=orbit_error,
         )
+
+    def sampled(self, own: Critical, at: Evaluated, frame: Frame) -> tuple[ReturnedStates, CriticalOrbit]:
+        """What a normal form at a place is computed from."""
+        system, image = self._equations.system(at.place.values), at.image
+        orbit = CriticalOrbit(at.place.state, image.jacobian, own.multiplier, own.mode, own.left, image.returns)
+        return lambda states: returned_states(system, states, frame.section), orbit
+
+    def fifth(self, own: Critical, at: Evaluated, frame: Frame, *forms: NormalForm) -> Quintic | None:
+        """The terms of fifth order at a place, given those of third order there or beside it."""
+        amplitude = next((form.amplitude for form in forms if np.isfinite(form.amplitude)), np.nan)
+        return None if np.isnan(amplitude) else quintic(*self.sampled(own, at, frame), amplitude)
 
     def coefficient(self, form: NormalForm) -> tuple[float, float]:
         """The coefficient that decides what happens on a curve of this kind, and its error; NaN where there is none."""
@@ -284,7 +293,30 @@ class Detector:
         if not (bound < np.ptp(equations.box, axis=1)).all():  # which tells nothing
             return None
         found = Codimension2(kind, spot.place.values, bound, spot.place.state, own.spectrum.values)
+        if signal is Signal.COEFFICIENT:
+            slope = abs(test(root + beside) - test(root - beside)) / 2.0
+            share = _SAFETY * (abs(value) + error + unsure) / slope
+            found = self._with_next_term(found, spot, at(root + beside), frame, share)
         return root, spot, found
+
+    def _with_next_term(
+        self, found: Codimension2, spot: Spot, beside: Evaluated, frame: Frame, share: float
+    ) -> Codimension2:
+        """A point with the coefficient that does not vanish there, whose error has a share of its change to a place
+        ``beside``: the point itself may be as far off."""
+        target, terms = self._equations.target, []
+        places = ((spot.at, spot.frame, spot.shift), (beside, frame, None))
+        critical_there = [critical(target, at, written) for at, written, _ in places]
+        forms = [self.form(own, *place) for own, place in zip(critical_there, places, strict=True)]
+        for own, (at, written, _), form in zip(critical_there, places, forms, strict=True):
+            value, error = form.cubic, form.cubic_error
+            if self._kind not in WITHOUT_CRITICALITY:
+                fifth = self.fifth(own, at, written, form, *forms)
+                value, error = (np.nan, np.nan) if fifth is None else (fifth.coefficient, fifth.error)
+            terms.append((value, error))
+        (value, error), (other, unsure) = terms
+        error += share * (abs(other - value) + error + unsure)
+        return replace(found, next_coefficient=value, next_coefficient_error=error) if np.isfinite(error) else found
 
     def _named(self, signal: Signal, spot: Spot, own: Critical) -> CodimensionTwo | None:
         """What a zero of a test function is; None where it means nothing."""

@@ -19,11 +19,11 @@ from scipy.optimize import brentq
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability.budget import Budget
 from chilopod.stability.codimension_two.bordered import Equations, Family2, Place, Spot, knows_orbit
-from chilopod.stability.codimension_two.codimension2 import Codimension2, CodimensionTwo
+from chilopod.stability.codimension_two.codimension2 import Codimension2, CodimensionTwo, Start2
 from chilopod.stability.codimension_two.curve2 import Curve2, Point2
 from chilopod.stability.codimension_two.detection import Detector, Signals, across, critical
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.returns import return_duration
+from chilopod.stability.returns import return_duration, whole_period
 from chilopod.stability.scales import sizes
 from chilopod.stability.symmetry.mirrored import reverses
 from chilopod.stability.tracing.ending import Ending
@@ -47,10 +47,10 @@ Progress2 = Callable[[int, Point2], None]
 
 def follow2(
     family2: Family2,
-    start: BifurcationPoint,
+    start: BifurcationPoint | Start2,
     between: tuple[tuple[float, float], tuple[float, float]],
     *,
-    second: float,
+    second: float | None = None,
     rising: bool | None = None,
     points: int = 100,
     step: float = 0.01,
@@ -67,13 +67,16 @@ def follow2(
     family2
         ``family2(p, q)`` is the system at values of both parameters.
     start
-        A point that :func:`chilopod.stability.locate` found in the family of p with q = ``second``.
+        A point that :func:`chilopod.stability.locate` found in the family of p with q = ``second``; or one that
+        :func:`chilopod.stability.switch2` gives, from which the curve goes away from the point that it leaves, and
+        which knows its q.
     between
         Intervals of both parameters: the box in which the curve is followed. Their widths are the parameters' units.
     second
         The value of q at the start.
     rising
-        Whether to start towards rising or falling q; None for both, which makes one curve of the two halves.
+        Whether to start towards rising or falling q; None for both, which makes one curve of the two halves. It means
+        nothing for a curve that leaves another one.
     points
         At most so many, in each direction.
     step, longest
@@ -94,9 +97,18 @@ def follow2(
     AnalysisError
         If no point of a curve is found at the start.
     """
-    box = _checked(between, points, step, longest, budget)
+    box = checked_box(between)
+    for name, number in (("points", points), ("step", step), ("longest", longest), ("budget", budget)):
+        if not number > 0:
+            raise ParameterError("must be positive", field=name, value=number)
+    outward, periods = None, 1
+    if isinstance(start, Start2):
+        outward, periods, second = start.outward, start.periods, start.second
+        family2, start = over_periods(family2, periods), start.point
     if not isinstance(start, BifurcationPoint):
         raise ParameterError("is no located point", field="start", value=start, allowed="one that `locate` gives")
+    if second is None:
+        raise ParameterError("must be given", field="second", allowed="the value of q at the start")
     values = np.array([start.value, second], dtype=np.float64)
     if not ((box[:, 0] <= values) & (values <= box[:, 1])).all():
         raise ParameterError("does not hold the start", field="between", value=between, allowed=f"{values} within")
@@ -107,6 +119,12 @@ def follow2(
         first = equations.begin(Place(start.orbit, values, 0.0 if target else nu.real / abs(nu)))
     curve, pace = _Critical(equations, start.kind, coefficients, progress), Pace(longest, _FEW, _MANY)
     origin = curve.station(first)
+    if outward is not None:
+        beside = Place(first.place.state + outward[:-2], first.place.values + outward[-2:], 0.0)
+        along = float(first.frame.between(first.place, beside) @ first.tangent)
+        half = curve.traced(origin, math.copysign(1.0, along), step, pace, points)
+        joined = _joined(start.kind, origin, _Half((), (), Ending.START, ""), half)
+        return replace(joined, periods=periods)
     upward = float(np.sign(first.tangent[first.frame.parameters][1]) or 1.0)
     signs = (1.0, -1.0) if rising is None else (1.0,) if rising else (-1.0,)
     halves = []
@@ -119,7 +137,8 @@ def follow2(
     return _joined(start.kind, origin, _Half((), (), Ending.START, ""), halves[0])
 
 
-def _checked(between: object, points: int, step: float, longest: float, budget: int) -> Array:
+def checked_box(between: object) -> Array:
+    """Intervals of both parameters, shape (2, 2)."""
     try:
         box = np.array(between, dtype=np.float64)
     except (TypeError, ValueError):
@@ -128,10 +147,12 @@ def _checked(between: object, points: int, step: float, longest: float, budget: 
         raise ParameterError(
             "must be two intervals", field="between", value=between, allowed="((p_low, p_high), (q_low, q_high))"
         )
-    for name, value in (("points", points), ("step", step), ("longest", longest), ("budget", budget)):
-        if not value > 0:
-            raise ParameterError("must be positive", field=name, value=value)
     return box
+
+
+def over_periods(family2: Family2, periods: int) -> Family2:
+    """The same systems for orbits that take several periods, or do not have their symmetry in time."""
+    return lambda p, q: whole_period(family2(p, q), periods)
 
 
 def _what(family2: Family2, start: BifurcationPoint, second: float) -> tuple[int, bool]:

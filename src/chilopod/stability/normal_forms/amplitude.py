@@ -199,19 +199,20 @@ class Search:
         for powers in self._second:
             excess, uncertain = self._excess(found, powers)
             off[powers] = np.abs(excess) + uncertain
-        bend = _effect_of_bend(self._mapped, self._at, self._curve, found, off, self._second)
+        bend = effect_of_bend(self._mapped, self._at, self._curve, found, off, self._second, order=3)
         return Fit(status, found, complex(value[-1]), float(error[-1]) + bend)
 
 
-def _effect_of_bend(
+def effect_of_bend(
     mapped: ReturnedStates,
     at: CriticalOrbit,
     curve: Curve,
     found: Sampled,
     off: Mapping[Powers, Array],
     resonant: Mapping[Powers, bool],
+    order: int,
 ) -> float:
-    """How far the cubic coefficient may be off because the sampled curve is not quite the centre manifold.
+    """How far a coefficient of odd order may be off because the sampled curve is not quite the centre manifold.
 
     Parameters
     ----------
@@ -222,6 +223,8 @@ def _effect_of_bend(
         random, are sampled as well.
     resonant
         As in :func:`solve_homological`, of every monomial.
+    order
+        Of the coefficient.
     """
     n = at.state.size
     if n == (1 if at.real else 2):
@@ -246,7 +249,7 @@ def _effect_of_bend(
         if image is None:
             return np.inf
         harmonic = np.fft.fft(image @ at.left.conj())[1] / directions.size
-        worst = max(worst, float(abs(harmonic - found.outermost[1])) / (times * largest**3))
+        worst = max(worst, float(abs(harmonic - found.outermost[1])) / (times * largest**order))
     return _SURE * worst
 
 

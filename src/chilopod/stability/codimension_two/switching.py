@@ -1,0 +1,198 @@
+"""Curves of folds that leave points of codimension two.
+
+Where the cubic coefficient c of a -> (1 + b) a + c a^3 + e a^5 vanishes on a curve of period doublings or pitchforks
+(b = 0), the orbits that branch off have folds at c = -2 e a^2, b = e a^4, the curve b = c^2 / (4 e) (Kuznetsov,
+*Elements of Applied Bifurcation Theory*, section 9.3; Govaerts, Ghaziani, Kuznetsov & Meijer, SIAM J. Sci. Comput. 29,
+2007). How b and c change with the parameters is measured, and the fold so predicted at some amplitude is corrected.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.errors import AnalysisError, ChilopodError, ParameterError
+from chilopod.stability.budget import Budget, SpentError
+from chilopod.stability.codimension_two.bordered import Equations, Family2, Place, Spot, knows_orbit
+from chilopod.stability.codimension_two.codimension2 import Codimension2, CodimensionTwo, Start2
+from chilopod.stability.codimension_two.detection import Detector, across, critical
+from chilopod.stability.codimension_two.two_parameters import BUDGET, checked_box, over_periods
+from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, displacements
+from chilopod.stability.normal_forms.quintic import Quintic
+from chilopod.stability.points import BifurcationPoint, Kind
+
+Array = NDArray[np.float64]
+
+_BESIDE = 1e-3  # in units of the box and of the states: over which the cubic coefficient is differentiated
+_FARTHEST = 0.1  # of the same: how far along the curve a fold may be
+_HALVINGS = 12  # of the amplitude
+_BEFORE = 0.9  # of an amplitude, seen from which a curve goes outward
+_NEAR = 0.25  # of the amplitude and of the way from the point: how far off a fold may be predicted
+
+_CURVES = {
+    CodimensionTwo.GENERALISED_PERIOD_DOUBLING: Kind.PERIOD_DOUBLING,
+    CodimensionTwo.DEGENERATE_PITCHFORK: Kind.PITCHFORK,
+}
+_OTHERS = {
+    CodimensionTwo.CUSP: "is a cusp: the curve of folds itself goes through it",
+    CodimensionTwo.CHENCINER: "is a Chenciner point: what leaves it are folds of tori, which are not followed",
+}
+
+
+def switch2(
+    family2: Family2,
+    point: Codimension2,
+    between: tuple[tuple[float, float], tuple[float, float]],
+    *,
+    budget: int = BUDGET,
+    seconds: float = math.inf,
+) -> tuple[Start2, ...]:
+    """The starts of the curves of folds that leave a point of codimension two, for :func:`chilopod.stability.follow2`.
+
+    Parameters
+    ----------
+    family2, between
+        As they were given to :func:`chilopod.stability.follow2`, which found the point.
+    point
+        One of the ``special`` points of its curve: a generalised period doubling or a degenerate pitchfork.
+    budget, seconds
+        Number of return maps with derivatives, and time in s, that may be taken.
+
+    Returns
+    -------
+    Of a generalised period doubling one, at a fold of orbits of twice the period. Of a degenerate pitchfork two, at
+    folds of the orbits that branch off along the critical mode and against it.
+
+    Raises
+    ------
+    ParameterError
+        If no curve of folds leaves a point of this kind.
+    AnalysisError
+        If the coefficient of fifth order is zero within its error, or no fold is found where it says that there is one.
+    """
+    box = checked_box(between)
+    kind = _CURVES.get(point.kind)
+    if kind is None:
+        why = _OTHERS.get(point.kind, f"is a {point.kind.label} point, which no curve is known to leave here")
+        raise ParameterError(why, field="point", allowed="a generalised period doubling or a degenerate pitchfork")
+    allowed = Budget(budget, seconds)
+    there = _unfolding(family2, point, kind, box, allowed)
+    periods = 2 if kind is Kind.PERIOD_DOUBLING else 1
+    folds = Equations(over_periods(family2, periods), 1, False, box, allowed)
+    signs = (1.0,) if kind is Kind.PERIOD_DOUBLING else (1.0, -1.0)
+    return tuple(_start(there, folds, sign, periods) for sign in signs)
+
+
+@dataclass(frozen=True)
+class _Unfolding:
+    """What happens beside a degenerate point on a curve.
+
+    Attributes
+    ----------
+    equations, spot, at
+        The curve, the point, and its critical orbit.
+    fifth
+        Terms of fifth order.
+    slope
+        Change of the cubic coefficient along the curve, by the length of ``spot.tangent``.
+    response
+        Change of the orbit and of the parameters, in coordinates of the frame, with the modulus of the multiplier.
+    times
+        How many returns the coefficients are of.
+    """
+
+    equations: Equations
+    spot: Spot
+    at: CriticalOrbit
+    fifth: Quintic
+    slope: float
+    response: Array
+    times: int
+
+    def fold(self, a: float) -> Place | None:
+        """Where a fold is predicted at an amplitude along the mode, negative against it; None if that is too far."""
+        spot, fifth = self.spot, self.fifth
+        away = -2.0 * fifth.coefficient * a * a / self.slope
+        across = fifth.coefficient * a**4 / self.times
+        if not (abs(away) <= _FARTHEST and np.abs(across * self.response).max() <= _FARTHEST):
+            return None
+        guess = spot.frame.moved(spot.place, away * spot.tangent)
+        base = self.equations.corrected(spot, guess, spot.tangent, away)[0].place
+        place = spot.frame.moved(base, across * self.response)
+        bent = displacements(self.at, fifth.curve, np.array(a, dtype=np.complex128))
+        return Place(place.state + bent, place.values, 0.0)
+
+
+def _unfolding(family2: Family2, point: Codimension2, kind: Kind, box: Array, budget: Budget) -> _Unfolding:
+    system = family2(*point.values.tolist())
+    targets = (-1,) if kind is Kind.PERIOD_DOUBLING else (1,) if system.symmetry is None else (1, -1)
+    target = min(targets, key=lambda one: float(np.abs(point.multipliers - one).min()))
+    equations = Equations(family2, target, knows_orbit(system), box, budget)
+    spot = equations.begin(Place(point.orbit, point.values, 0.0))
+    detector = Detector(equations, kind, True)
+    own = critical(target, spot.at, spot.frame)
+    forms = [detector.form(own, spot.at, spot.frame, None)]
+    for s in (-_BESIDE, _BESIDE):
+        at, _ = equations.corrected(spot, spot.frame.moved(spot.place, s * spot.tangent), spot.tangent, s)
+        forms.append(detector.form(critical(target, at, spot.frame), at, spot.frame, None))
+    low, high = forms[1:]
+    if not abs(high.cubic - low.cubic) > low.cubic_error + high.cubic_error:
+        raise AnalysisError("the cubic coefficient is not seen to change along the curve", field="point")
+    fifth = detector.fifth(own, spot.at, spot.frame, *forms)
+    if fifth is None:
+        raise AnalysisError("no coefficient of fifth order was found", field="point")
+    if abs(fifth.coefficient) <= fifth.error:
+        raise AnalysisError("the coefficient of fifth order is zero within its error", field="point")
+    returns = spot.at.image.returns
+    times = returns if target > 0 or returns % 2 == 0 else 2 * returns
+    slope = (high.cubic - low.cubic) / (2.0 * _BESIDE)
+    _, orbit = detector.sampled(own, spot.at, spot.frame)
+    return _Unfolding(equations, spot, orbit, fifth, slope, _across(spot, target), times)
+
+
+def _across(spot: Spot, target: int) -> Array:
+    """``response`` of an unfolding, by the shortest way in the plane of the parameters; g changes by -(w . v) of what
+    the multiplier does."""
+    m = spot.frame.basis.shape[1]
+    matrix, overlap = spot.matrix, float(spot.at.left[:, 0] @ spot.at.right[:, 0])
+    orbit = -np.linalg.solve(matrix[:m, :m], matrix[:m, m:])
+    modulus = -target / overlap * (matrix[m, m:] + matrix[m, :m] @ orbit)
+    along = modulus / float(modulus @ modulus)
+    return np.concatenate([orbit @ along, along])
+
+
+def _start(there: _Unfolding, folds: Equations, sign: float, periods: int) -> Start2:
+    """The fold at the largest amplitude at which it is found near where it was predicted."""
+    left, widths = there.at.left.real, there.spot.frame.widths
+    cause: Exception | None = None
+    for k in range(_HALVINGS):
+        amplitude = there.fifth.amplitude * 0.5**k
+        try:
+            place, before = (there.fold(share * sign * amplitude) for share in (1.0, _BEFORE))
+            if place is None or before is None:
+                continue
+            found = folds.begin(place)
+        except SpentError:
+            raise
+        except (ChilopodError, ArithmeticError, ValueError) as error:
+            cause = error
+            continue
+        values, origin = found.place.values, there.spot.place.values
+        off = abs(float(left @ (found.place.state - place.state))) / amplitude
+        missed, way = (float(np.linalg.norm((values - one) / widths)) for one in (place.values, origin))
+        inside = (folds.box[:, 0] <= values) & (values <= folds.box[:, 1])
+        if off <= _NEAR and missed <= _NEAR * way and inside.all():
+            outward = np.concatenate([place.state - before.state, place.values - before.values])
+            mode, bound, period = (
+                critical(1, found.at, found.frame).mode,
+                float(across(found)[0]),
+                found.at.image.period,
+            )
+            fold = BifurcationPoint(
+                Kind.FOLD, float(values[0]), bound, found.place.state, mode, 1.0 + 0j, 0.0, period=period
+            )
+            return Start2(fold, float(values[1]), outward, periods)
+    raise AnalysisError("no curve of folds was found where one is predicted to leave", field="point") from cause
