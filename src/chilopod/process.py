@@ -150,7 +150,7 @@ _pressed: list[int] = []
 def _interrupted(number: int, frame: FrameType | None) -> None:
     first = not _pressed
     _pressed.append(number)
-    if _importing(frame) or not (first or number != signal.SIGINT):
+    if _importing(frame) or (number == signal.SIGINT and not first):
         leave()
     if first:  # a terminal that is closed says so twice
         raise KeyboardInterrupt

@@ -60,7 +60,7 @@ class Flows(NamedTuple):
     velocity_series
         Taylor coefficients of f along curves; None where f cannot be traced, or depends on time.
     concurrent
-        Whether flows may run in several threads at once.
+        True if flows may run in several threads at once.
     """
 
     slopes: Slopes

@@ -63,7 +63,7 @@ class Control(NamedTuple):
     shake
         Relative error made in every state after every step, and in the time before it: round-off, enlarged.
     stepwise
-        Whether every step computes its own derivative, by which that so far is then multiplied; else it carries the
+        True if every step computes its own derivative, by which that so far is then multiplied; else it carries the
         columns of the derivative along, of which there may be any number: directions.
     stop
         Shape (1,); not zero once there is no more time.

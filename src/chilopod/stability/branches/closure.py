@@ -39,7 +39,7 @@ def _part(curve: Curve, step: Step, place: float) -> Step | None:
     if place == step.size:
         return step
     try:
-        return curve.within(step, place)
+        return curve.within(step, place, bounded=True)
     except ChilopodError:
         return None
 

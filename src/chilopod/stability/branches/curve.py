@@ -8,10 +8,9 @@ has the section across the motion where it starts.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+import contextlib
 from dataclasses import dataclass, replace
-from typing import TypeGuard
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,27 +19,20 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import read_only
 from chilopod.stability.branches.bordered_matrices import inverted, null_vector, symmetric_space, within_space
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, Step
-from chilopod.stability.budget import Budget, SpentError, UserCode
+from chilopod.stability.branches.family_returns import FamilyReturns
+from chilopod.stability.budget import SpentError, UserCode
 from chilopod.stability.capabilities import (
     Family,
-    FlowsEach,
-    SystemLike,
     is_autonomous,
     returns_per_period,
 )
 from chilopod.stability.convergence import CURVE
 from chilopod.stability.floquet import return_multipliers
 from chilopod.stability.returns import (
-    CUTS,
     ReturnMap,
     Section,
-    carried,
     return_duration,
-    return_map,
-    returned_states,
     section_at,
-    turned,
-    whole_period,
 )
 from chilopod.stability.shooting import FEW_ROUNDS, Free, node_count, nodes_along, shot
 
@@ -56,109 +48,30 @@ _LOOSE = 1e-6  # of a step: an orbit that may be so far off is corrected with a 
 _MOST_CORRECTIONS = 12
 _FEWEST_NODES, _MANY_NODES = 3, 6  # a return that magnifies less is as good in one; that magnifies more is none
 _STRAYS = 0.1  # of a step: so far beyond the interval a curve is sought that ends within it
-_PARAMETER_STEP = 1e-6  # of the difference, in units of the scale
-_STEEP = 10.0  # times as far, in units, the difference moves the return, about
-_RETRIES, _STEEPER = 1, 100.0  # with a smaller difference, and how much smaller where there is no return
 _SOONER, _LATER = 0.2, 0.5  # of a return: the time of the next one is foreseen to differ by so much at most
 _SHARPEST_TURN = 0.5  # cosine between two tangents: beyond it the step may have landed on another curve
 _SHRUNK = 10.0  # cube roots of the precision, of the largest motion so far
 _NOT_SMALL = 0.5  # modulus of a multiplier
 _ROUNDING = 16.0 * float(np.finfo(float).eps)  # of eigenvalues
-_KEPT = 8  # systems: making one may cost more than a flow
 
 
-class Curve:
+class Curve(FamilyReturns):
     """The curve H(x, p) = x of a family.
-
-    Where its systems flow each (see :class:`chilopod.stability.capabilities.FlowsEach`), the derivative with respect to
-    the parameter costs next to nothing on two cores.
 
     Parameters
     ----------
-    family
-        ``family(value)`` is the system.
-    scale
-        Of the parameter along the curve.
-    sizes
-        Of the states along the curve, shape (n,); None: their own units.
-    between
-        Values of the parameter that the family is asked for at most.
-    periods
-        How many periods an orbit takes.
-    symmetric
-        Whether to stay among the orbits that have the systems' symmetry in time.
+    family, scale, sizes, returns
+        See :class:`FamilyReturns`.
     precision
         How closely orbits are solved for, of the sizes of the states.
-    budget
-        Flows and time that may be taken; None for any.
     """
 
     def __init__(
-        self,
-        family: Family,
-        scale: float,
-        sizes: Array | None = None,
-        *,
-        between: tuple[float, float] = (-np.inf, np.inf),
-        periods: int = 1,
-        symmetric: bool = False,
-        precision: float = PRECISION,
-        budget: Budget | None = None,
+        self, family: Family, scale: float, sizes: Array | None = None, *, precision: float = PRECISION, **returns: Any
     ) -> None:
-        self._family = family
-        self.scale = scale
-        self.sizes = sizes
-        self.between = between
-        self.periods = periods
-        self.symmetric = symmetric
+        super().__init__(family, scale, sizes, **returns)
         self.precision = precision
-        self.budget = Budget(math.inf) if budget is None else budget
-        self._flow_error = 0.0  # of a return's derivative, relative to its norm, where it was last bounded
         self._motion = 0.0  # the largest within a period so far
-        self._steepness = 1.0  # of the return map over the parameter, where the step starts, in units
-        self._known: dict[float, tuple[SystemLike, SystemLike]] = {}
-        self._each: dict[type, bool] = {}
-        self._dimension = 0
-
-    def system(self, value: float) -> SystemLike:
-        """What is studied: over the full period, or as many as the orbits take."""
-        return self._systems(value)[1]
-
-    def _systems(self, value: float) -> tuple[SystemLike, SystemLike]:
-        """The family's system, and what is studied of it."""
-        known = self._known.get(value)
-        if known is None:
-            with UserCode("family", value):
-                own = self._family(value)
-            self._dimension = self._dimension or own.dimension
-            if own.dimension != self._dimension:
-                raise AnalysisError(
-                    "changes its dimension", field="family", value=value, allowed=f"{self._dimension} states"
-                )
-            whole = self.symmetric or (own.symmetry is None and self.periods == 1)
-            known = own, own if whole else whole_period(own, self.periods)
-            if len(self._known) >= _KEPT:
-                self._known.clear()
-            self._known[value] = known
-        return known
-
-    def units(self, count: int) -> Array:
-        """Sizes of the states and scale of the parameter, shape (n+1,)."""
-        return np.append(np.ones(count) if self.sizes is None else self.sizes, self.scale)
-
-    def image(self, x: Array, value: float, section: Section | None = None, with_error: bool = False) -> ReturnMap:
-        """The return map and its derivative."""
-        system = self.system(value)
-        self.budget.take()
-        with UserCode("flow", value):
-            if section is None and system.period is None:
-                section = section_at(system, x, self.sizes)
-            return return_map(system, x, with_error, section)
-
-    def parameter_derivative(self, x: Array, value: float, section: Section | None = None) -> Array:
-        """dH/dp at a state, per scale, shape (n,)."""
-        mapped, beside = self._mapped(x, value, section)
-        return self._difference(x, value, section, mapped, beside)
 
     def matrix(self, jacobian: Array, derivative: Array, tangent: Array) -> Array:
         """Jacobian of [H - x; tangent . step] with respect to state and parameter, in units."""
@@ -181,12 +94,6 @@ class Curve:
         """Across the motion in a point, where returns need one."""
         return self.section_at(point.orbit, point.value, point.period)
 
-    def section_at(self, x: Array, value: float, period: float | None) -> Section | None:
-        """Across the motion in a state, where returns need one; the full period is a guess of the system if None."""
-        system = self.system(value)
-        duration = None if period is None else period / returns_per_period(system)
-        return section_at(system, x, self.sizes, duration)
-
     def _matrix_at(self, point: BranchPoint, ahead: float, section: Section | None) -> Array:
         x = point.orbit + ahead * point.tangent[:-1] * self.units(point.orbit.size)[:-1]
         # As at the end of a step, to the bit.
@@ -205,10 +112,10 @@ class Curve:
         moved, matrix = self.predicted(anchor, size)
         return self._stepped(anchor, moved, matrix, anchor.last.tangent, size, bounded=True)
 
-    def within(self, step: Step, place: float) -> Step:
-        """As much of a step as leads to a place within it."""
+    def within(self, step: Step, place: float, *, bounded: bool = False) -> Step:
+        """As much of a step as leads to a place within it; ``bounded``: with a bound on its multipliers."""
         moved, matrix = step.between(place)
-        return self._stepped(step.start, moved, matrix, step.start.last.tangent, place)
+        return self._stepped(step.start, moved, matrix, step.start.last.tangent, place, bounded=bounded)
 
     def to_value(self, anchor: Anchor, value: float, guess: Array, matrix: Array) -> Step:
         """A step that ends at a value of the parameter exactly, from a guess of the displacement."""
@@ -267,15 +174,18 @@ class Curve:
         the guess is none, or that rounding is magnified to more than an orbit is solved for. ``bounded``: with a bound
         on the error of the multipliers at its end."""
         last, n = anchor.last, anchor.last.orbit.size
-        self._steepness = max(1.0, float(np.abs(anchor.matrix[:n, n]).max()))
+        self.steepness = max(1.0, float(np.abs(anchor.matrix[:n, n]).max()))
         section = self._timed(anchor, float(np.linalg.norm(guess)))
         mode = last.tangent[:n] if anchor.leaving else None
         fixed = symmetric_space(self.system(last.value), last.orbit, self.units(n)[:n], mode)
         where = _Where(anchor, section, fixed, row, target, value)
         count = node_count(matrix[:n, :n] + np.eye(n), np.ones(n)) if fixed is None else 0
-        rounds, off = 0, self.precision
+        rounds, off, weakest = 0, self.precision, 0.0
         if count >= _MANY_NODES:
             moved, x, here, image, derivative = self._shot(where, count)
+            if bounded:
+                with contextlib.suppress(AnalysisError):  # over the whole return the flow may magnify too much
+                    image = replace(image, error=self.image(x, here, section, with_error=True).error)
         else:
             try:
                 found = self._corrected(where, guess, matrix)
@@ -289,9 +199,10 @@ class Curve:
                     duration = there[3].period / there[3].returns
                     where = replace(where, section=replace(section, duration=duration))
                 found = self._corrected(where, there[0], matrix)
-            moved, x, here, rounds, off = found.moved, found.x, found.value, found.rounds, found.off
+            moved, x, here, rounds = found.moved, found.x, found.value, found.rounds
+            off, weakest = found.off, found.weakest
             image = self.image(x, here, where.section, bounded)
-            derivative = self._difference(x, here, where.section, found.mapped, found.beside)
+            derivative = self.difference(x, here, where.section, found.mapped, found.beside)
         bordered = self.matrix(image.jacobian, derivative, last.tangent)
         tangent = null_vector(within_space(fixed, bordered))
         if not tangent @ last.tangent >= _SHARPEST_TURN:
@@ -300,6 +211,9 @@ class Curve:
         # The derivative is that of a state so far off.
         length = max(float(np.linalg.norm(moved)), float(np.finfo(float).tiny))
         bend = float(np.linalg.norm(bordered[:n] - anchor.matrix[:n])) / length
+        # The flow's error, relative to what it may magnify, is a bound already.
+        flow = float(self._scaled(image.error, n).max()) / max(1.0, float(np.linalg.norm(bordered[:n, :n])))
+        off += weakest * flow * max(1.0, float(np.abs(x / self.units(n)[:n]).max()))
         end = self._end(anchor, x, here, image, tangent, bordered, bend * off if bounded else np.inf)
         missed = float(np.linalg.norm(moved - guess))
         return Step(anchor, end, float(last.tangent @ moved), moved, tangent, bordered, image, rounds, missed)
@@ -364,7 +278,7 @@ class Curve:
             strays = (wanted - here) / self.scale
             if abs(strays) > _STRAYS * float(np.linalg.norm(guess)):
                 raise OutsideIntervalError("leaves the interval", field="parameter", value=wanted)
-            mapped, beside = self._mapped(x, here, section)
+            mapped, beside = self.mapped(x, here, section)
             off = (mapped - x) / units[:n]
             if fixed is not None:
                 off = fixed @ off
@@ -376,7 +290,7 @@ class Curve:
             closed = now <= self.precision * size
             # A residual that no longer falls is what the flow is good to, if the matrix can make it fall.
             settled = not closed and CURVE.stays(now / size, largest / size) and not singular
-            settled = settled and now <= _CLEAR * self._noise(x, here, section)
+            settled = settled and now <= _CLEAR * self.noise(x, here, section)
             if closed or settled:
                 # Where it leaves another curve the matrix is so weak that a small residual is far from an orbit.
                 far = float(np.linalg.norm(inverse @ residual)) > _LOOSE * float(np.linalg.norm(moved))
@@ -386,7 +300,7 @@ class Curve:
                 raise AnalysisError("corrections do not converge", field="step")
             if closed or settled:
                 jacobian, exact = self.image(x, here, section).jacobian, True
-                here_matrix = self.matrix(jacobian, self._difference(x, here, section, mapped, beside), row)
+                here_matrix = self.matrix(jacobian, self.difference(x, here, section, mapped, beside), row)
                 inverse, singular = inverted(within_space(fixed, here_matrix))
             elif rounds:
                 # Broyden's update keeps the matrix of the last point good enough for the whole step.
@@ -398,10 +312,9 @@ class Curve:
             corrections += now > _COUNTED * size
         if abs(strays) > self.precision:
             raise OutsideIntervalError("leaves the interval", field="parameter", value=wanted)
-        flow = self._flow_error * max(1.0, float(np.abs(x / units[:n]).max()))
-        # The residual shows one direction; the error of the flow is a bound already.
-        uncertain = float(_CLEAR * np.linalg.norm(inverse @ residual) + np.linalg.norm(inverse, 2) * flow)
-        return _Corrected(x, here, moved, mapped, beside, corrections, uncertain)
+        # The residual shows one direction.
+        left, weakest = float(np.linalg.norm(inverse @ residual)), float(np.linalg.norm(inverse, 2))
+        return _Corrected(x, here, moved, mapped, beside, corrections, _CLEAR * left, weakest)
 
     def _end(
         self, anchor: Anchor, x: Array, value: float, image: ReturnMap, tangent: Array, matrix: Array, wrong: float
@@ -450,15 +363,11 @@ class Curve:
         values = nu**image.returns if image.returns > 1 else nu
         if not np.isfinite(wrong) or not nu.any():
             return values, np.inf if nu.any() else 0.0
-        sizes = self.units(image.state.size)[:-1]
-        scaled = image.jacobian * sizes / sizes[:, None]
+        n = image.state.size
+        scaled, error = self._scaled(image.jacobian, n), float(np.linalg.norm(self._scaled(image.error, n)))
+        if not np.isfinite(error):
+            return values, np.inf
         size = float(np.linalg.norm(scaled))
-        off = np.broadcast_to(image.error, scaled.shape) * sizes / sizes[:, None]
-        if np.isfinite(off).all():
-            self._flow_error = float(off.max()) / max(1.0, size)
-            error = float(np.linalg.norm(off))
-        else:  # by multiple shooting
-            error = self._flow_error * size * len(scaled)
         eigenvalues, right = np.linalg.eig(scaled)
         with np.errstate(all="ignore"):
             try:
@@ -470,41 +379,10 @@ class Curve:
         bound = (error + wrong + _ROUNDING * size) * condition
         return values, image.returns * bound * max(1.0, float(np.abs(nu[0]))) ** (image.returns - 1)
 
-    def _mapped(self, x: Array, value: float, section: Section | None) -> tuple[Array, Array | None]:
-        """H at a state, and at a neighbouring value of the parameter if that costs no time."""
-        self.budget.take()
-        own, system = self._systems(value)
-        with UserCode("flow", value):
-            period = own.period
-            if section is None and period is not None and not self.symmetric and self.periods == 1:
-                beside = (
-                    self._systems(value + self._parameter_step(value, self._steepness))[0]
-                    if self._flows_each(own)
-                    else own
-                )
-                same = beside.period == period
-                if self._flows_each(own) and self._flows_each(beside):
-                    both: Sequence[FlowsEach] = [own, beside]
-                    mapped, moved = own.flow_each(both, np.array([x, x]), 0.0, period)
-                    return (mapped, moved) if same else (mapped, None)
-            return returned_states(system, x[None], section)[0], None
-
-    def _noise(self, x: Array, value: float, section: Section | None) -> float:
-        """How far apart two computations of a return end, in units: what the flow's error leaves of a residual."""
-        image, system = self.image(x, value, section), self.system(value)
-        duration, passing = image.period / image.returns, x[None]
-        times = [part * duration for part in CUTS] + [duration]
-        with UserCode("flow", value):
-            for a, b in zip(times, times[1:], strict=False):
-                passing = carried(system, passing, a, b)
-        return float(np.abs((turned(system, passing)[0] - image.state) / self.units(x.size)[:-1]).max())
-
-    def _flows_each(self, system: SystemLike) -> TypeGuard[FlowsEach]:
-        """Whether a system flows each; asked once for each class, for the answer takes longer than some flows."""
-        kind = type(system)
-        if kind not in self._each:
-            self._each[kind] = isinstance(system, FlowsEach)
-        return self._each[kind]
+    def _scaled(self, matrix: Array | float, n: int) -> Array:
+        """A derivative of the return map, or the bound of its error, in units, shape (n, n)."""
+        sizes = self.units(n)[:-1]
+        return np.asarray(np.broadcast_to(matrix, (n, n)) * sizes / sizes[:, None])
 
     def _timed(self, anchor: Anchor, ahead: float) -> Section | None:
         """The section of a step, with the time of a return so far ahead by those of the last two points."""
@@ -517,35 +395,6 @@ class Curve:
         away = np.append(last.orbit - before.orbit, last.value - before.value) / self.units(last.orbit.size)
         change = (last.period - before.period) / last.period * ahead / float(np.linalg.norm(away))
         return replace(section, duration=section.duration * (1.0 + min(max(change, -_SOONER), _LATER)))
-
-    def _parameter_step(self, value: float, steepness: float) -> float:
-        """A small change of the parameter that stays within the interval, as the numbers are that differ by it."""
-        step = _PARAMETER_STEP * self.scale / max(1.0, steepness / _STEEP)
-        return (value + step) - value if value + step <= self.between[1] else (value - step) - value
-
-    def _difference(
-        self, x: Array, value: float, section: Section | None, mapped: Array, beside: Array | None
-    ) -> Array:
-        units, steepness = self.units(x.size)[:-1], self._steepness
-        for last in (*[False] * _RETRIES, True):
-            step = self._parameter_step(value, steepness)
-            try:
-                if beside is None:
-                    self.budget.take()
-                    with UserCode("flow", value + step):
-                        beside = returned_states(self.system(value + step), x[None], section)[0]
-            except AnalysisError:
-                if last:
-                    raise
-                steepness *= _STEEPER
-                continue
-            difference: Array = (beside - mapped) / (step / self.scale)
-            found = float(np.abs(difference / units).max())
-            # A return that magnifies bends within less of the parameter.
-            if last or not 2.0 * max(_STEEP, steepness) < found < np.inf:
-                break
-            steepness, beside = found, None
-        return difference
 
 
 @dataclass(frozen=True)
@@ -564,7 +413,7 @@ class _Where:
 @dataclass(frozen=True)
 class _Corrected:
     """A solution: state, parameter, displacement in units, return of the state, that beside it, corrections needed, how
-    far off it may be, in units."""
+    far off it may be by the residual that is left, in units, and how much more by any other one."""
 
     x: Array
     value: float
@@ -573,6 +422,7 @@ class _Corrected:
     beside: Array | None
     rounds: int
     off: float
+    weakest: float
 
 
 def _updated(inverse: Array, move: Array, change: Array) -> Array:

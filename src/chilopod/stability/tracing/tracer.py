@@ -68,7 +68,7 @@ def trace(
     points
         Number of steps at most; None for any number.
     budget
-        What the curve may take.
+        Flows and time that the curve may take.
 
     Returns
     -------
