@@ -6,7 +6,18 @@ import numpy as np
 import pytest
 
 from chilopod.errors import ParameterError
-from chilopod.stability import Kind, find_orbit, follow, from_map, from_rhs, locate, multipliers, proceed, switch
+from chilopod.stability import (
+    Kind,
+    find_orbit,
+    follow,
+    from_map,
+    from_rhs,
+    locate,
+    multipliers,
+    proceed,
+    switch,
+    switch2,
+)
 
 
 def logistic(r):
@@ -56,6 +67,11 @@ def test_the_derivative_is_within_its_bound():
         (lambda: switch(logistic, 3), r"point = 3: is no located point"),
         (lambda: proceed(logistic, None, (1.0, 2.0)), r"branch: is no branch"),
         (lambda: find_orbit(None, [1.0]), r"system: is no system"),
+        (lambda: switch2(None, 3, ((0.0, 1.0), (0.0, 1.0))), r"point = 3: is no point of codimension two"),
+        *(
+            (lambda s=s: locate(logistic, (2.5, 3.2), [0.6], seconds=s), r"seconds.*: must be a number of seconds")
+            for s in (-1.0, math.nan, "3", True)
+        ),
     ],
 )
 def test_what_is_none_is_refused_in_one_line(build, said):

@@ -7,13 +7,14 @@ import sys
 import threading
 import time
 from contextvars import ContextVar, Token
+from numbers import Real
 from types import TracebackType
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chilopod.errors import AnalysisError
+from chilopod.errors import AnalysisError, ParameterError
 
 Array = NDArray[np.float64]
 
@@ -33,9 +34,17 @@ class Deadline:
     ----------
     seconds
         Time from now on, s; infinite for no limit.
+
+    Raises
+    ------
+    ParameterError
+        If it is no number, or negative.
     """
 
     def __init__(self, seconds: float = math.inf) -> None:
+        given: object = seconds
+        if isinstance(given, bool) or not isinstance(given, Real) or not seconds >= 0.0:
+            raise ParameterError("must be a number of seconds", field="seconds", value=seconds, allowed="0 or more")
         self._ends = _now() + seconds
         self._stop = np.zeros(1)
         self._token: Token[Array | None] | None = None

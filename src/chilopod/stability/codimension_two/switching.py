@@ -74,16 +74,21 @@ def switch2(
         If the coefficient of fifth order is zero within its error, or no fold is found where it says that there is one.
     """
     box = checked_box(between)
+    if not isinstance(point, Codimension2):
+        raise ParameterError(
+            "is no point of codimension two", field="point", value=point, allowed="one of `curve.special`"
+        )
     kind = _CURVES.get(point.kind)
     if kind is None:
         why = _OTHERS.get(point.kind, f"is a {point.kind.label} point, which no curve is known to leave here")
         raise ParameterError(why, field="point", allowed="a generalised period doubling or a degenerate pitchfork")
     allowed = Budget(budget, seconds)
-    there = _unfolding(family2, point, kind, box, allowed)
     periods = 2 if kind is Kind.PERIOD_DOUBLING else 1
     folds = Equations(over_periods(family2, periods), 1, False, box, allowed)
     signs = (1.0,) if kind is Kind.PERIOD_DOUBLING else (1.0, -1.0)
-    return tuple(_start(there, folds, sign, periods) for sign in signs)
+    with allowed:
+        there = _unfolding(family2, point, kind, box, allowed)
+        return tuple(_start(there, folds, sign, periods) for sign in signs)
 
 
 @dataclass(frozen=True)
