@@ -244,7 +244,7 @@ def test_a_small_multiplier_beside_a_huge_one_keeps_its_digits(order):
     rates = np.array([70.0, -0.3, -70.0])
     spectra = Spectra(diagonal(*(lambda p, rate=rate: rate for rate in rates[list(order)])), 10)
     found = spectra.disturbed(np.array([0.0]))[0]
-    np.testing.assert_allclose(np.log(np.abs(found)), [rates, rates], rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(np.log(np.abs(found)), np.broadcast_to(rates, found.shape), rtol=0.0, atol=1e-12)
 
 
 def test_tiny_multipliers_say_nothing_of_pairs_on_the_circle():

@@ -8,7 +8,7 @@ from scipy.linalg import expm
 
 from chilopod.errors import AnalysisError
 from chilopod.stability import PeriodicSystem, exponents
-from chilopod.stability.splitting import split_leading
+from chilopod.stability.spectrum.splitting import split_leading
 
 PERIOD = 2 * pi
 SKEW = np.array([[0.0, 0.5, -0.2, 0.3], [-0.5, 0.0, 0.4, 0.1], [0.2, -0.4, 0.0, -0.6], [-0.3, -0.1, 0.6, 0.0]])

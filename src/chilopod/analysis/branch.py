@@ -26,7 +26,7 @@ from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import Branch, BranchPoint, Criticality, Ending, Kind, follow, proceed, switch
 from chilopod.stability.branches.branch import LONGEST
-from chilopod.stability.matrix_errors import VERDICTS
+from chilopod.stability.spectrum.errors import VERDICTS
 
 Array = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from chilopod.notebook import block, table, words
 from chilopod.planar import PlanarModel
 from chilopod.robot import Robot
 from chilopod.stability import Kind
-from chilopod.stability.matrix_errors import VERDICTS
+from chilopod.stability.spectrum.errors import VERDICTS
 
 ComplexArray = NDArray[np.complex128]
 

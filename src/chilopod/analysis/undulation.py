@@ -23,8 +23,8 @@ from chilopod.planar.along import FollowedModel
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import BifurcationPoint, Criticality, Kind
-from chilopod.stability.floquet import spectrum
 from chilopod.stability.returns import return_map, whole_period
+from chilopod.stability.spectrum.eigenvalues import spectrum
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

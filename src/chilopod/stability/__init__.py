@@ -34,7 +34,6 @@ from chilopod.stability.codimension_two.two_parameters import follow2
 from chilopod.stability.equilibria import Equilibrium, find_equilibrium
 from chilopod.stability.floquet import Exponents, Multipliers, exponents, multipliers, sweep
 from chilopod.stability.hopf import locate_hopf
-from chilopod.stability.locate import Located, locate
 from chilopod.stability.maps import from_map
 from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.normal_form import NormalForm
@@ -42,6 +41,7 @@ from chilopod.stability.orbits import Orbit, find_orbit
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
 from chilopod.stability.returns import ReturnMap, Section
 from chilopod.stability.rhs import from_rhs
+from chilopod.stability.search.locate import Located, locate
 from chilopod.stability.shown import Result
 from chilopod.stability.symmetry.equivariants import AxialBranch, SymmetricCrossing, SymmetricKind
 from chilopod.stability.system import PeriodicSystem

@@ -27,11 +27,11 @@ from chilopod.stability.capabilities import (
     given_scale,
     is_autonomous,
 )
-from chilopod.stability.matrix_errors import DRAWN, eigenvalues_moved
 from chilopod.stability.normal_forms.extrapolation import radii, series
 from chilopod.stability.orbits import Orbit, find_orbit
 from chilopod.stability.points import BifurcationPoint, Criticality
 from chilopod.stability.returns import section_at
+from chilopod.stability.spectrum.errors import SAFETY, disturbed, eigenvalue_errors
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -45,7 +45,6 @@ _HALVINGS = 12  # of a step of Newton's method
 _SETTLED = 1e-9  # of the sizes of the states: a step that short may stop falling
 _NOTHING = 1e-13  # of the sizes of the states on the way: a state that small may be zero
 _SINGULAR = 1e-13  # singular value that counts as zero, the largest being one, in units that balance the matrix
-_DRAWS = 4  # of what is off by its error at random
 _ANGLES = 8  # on a circle: harmonics up to the third stay apart
 _SPANS = 10.0 ** -np.arange(0.0, 4.5, 0.5)  # of the sizes of the states: where f is sampled for differences
 _FIRST = 1e-4, 1e-6  # of the frequency, the cubic term of the first cycle: amplitudes of a hundredth and a thousandth
@@ -142,7 +141,7 @@ def find_equilibrium(system: SystemLike, guess: ArrayLike) -> Equilibrium:
     values = np.linalg.eigvals(matrix).astype(np.complex128)
     values = values[np.lexsort((-values.imag, -values.real))]
     off = np.inf if singular else matrix_error(checked, x, matrix, error)
-    return Equilibrium(x, error, matrix, values, eigenvalues_moved(values, matrix, np.zeros_like(matrix) + off))
+    return Equilibrium(x, error, matrix, values, eigenvalue_errors(values, matrix, np.zeros_like(matrix) + off))
 
 
 def autonomous(system: SystemLike) -> Autonomous:
@@ -226,17 +225,11 @@ def linear_part(system: Autonomous, x: Array) -> tuple[Array, Array, Array]:
 def matrix_error(system: Autonomous, x: Array, matrix: Array, error: Array) -> Array:
     """How far the derivative may be off, shape (n, n), in a state that is off by its error and by rounding. Where terms
     of f cancel, an entry may be nothing but the rounding of entries as large as the others, in units that balance."""
-    others = [linear_part(system, other)[1:] for other in _disturbed(x, error)]
+    others = [linear_part(system, other)[1:] for other in disturbed(x, error + 4.0 * _EPSILON * np.abs(x))]
     moved = np.max([np.abs(other - matrix) + wrong for other, wrong in others], axis=0)
     units = numerical_balance(matrix)
     ratios = units / units[:, None]
     return np.asarray(moved + 4.0 * _EPSILON * float(np.abs(matrix * ratios).max()) / ratios)
-
-
-def _disturbed(x: Array, error: Array) -> list[Array]:
-    random = np.random.default_rng(0)
-    reach = error + 4.0 * _EPSILON * np.abs(x)
-    return [x + random.choice([-1.0, 1.0], x.size) * reach for _ in range(_DRAWS)]
 
 
 def _expanded(system: Autonomous, curves: Array) -> tuple[Array, Array]:
@@ -281,10 +274,10 @@ def hopf_form(system: Autonomous, x: Array, error: Array, frequency: float) -> H
     form = _hopf_form(system, x, matrix, frequency)
     scatter = [
         _hopf_form(system, other, matrix + off * random.choice([-1.0, 1.0], off.shape), frequency).cubic
-        for other in _disturbed(x, error)
+        for other in disturbed(x, error + 4.0 * _EPSILON * np.abs(x))
     ]
     moved = float(np.abs(np.array(scatter).real - form.cubic.real).max())
-    return replace(form, error=form.error + DRAWN * moved)
+    return replace(form, error=form.error + SAFETY * moved)
 
 
 def _hopf_form(system: Autonomous, x: Array, matrix: Array, frequency: float) -> HopfForm:
@@ -319,8 +312,8 @@ def _hopf_form(system: Autonomous, x: Array, matrix: Array, frequency: float) ->
     second, mean, cubic, off = bent(quadratic[:, 2])
     error = float(np.abs(left) @ off)
     if wrong.any():
-        drawn = np.random.default_rng(0).choice([-1.0, 1.0], along.shape)
-        error += DRAWN * abs(bent(quadratic[:, 2] + wrong[:, 2] * drawn)[2] - cubic)
+        others = [bent(each)[2] for each in disturbed(quadratic[:, 2], wrong[:, 2])]
+        error += SAFETY * float(np.abs(np.array(others) - cubic).max())
     return HopfForm(
         complex(values[index]), mode, left, second / reach**2, mean / reach**2, cubic / reach**3, error / reach**3
     )

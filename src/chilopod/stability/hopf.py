@@ -21,7 +21,7 @@ from chilopod.errors import AnalysisError
 from chilopod.flows.balance import numerical_balance
 from chilopod.stability.budget import UserCode
 from chilopod.stability.capabilities import Autonomous, Family, SystemLike, expands_velocity, given_scale
-from chilopod.stability.course import Course, place_error
+from chilopod.stability.crossing_points.place import Course, place_error
 from chilopod.stability.equilibria import (
     ROUNDING,
     Equilibrium,
@@ -30,12 +30,13 @@ from chilopod.stability.equilibria import (
     hopf_form,
     linear_part,
 )
-from chilopod.stability.extent import Extent, extent
-from chilopod.stability.locate import BUDGET, GRAVITY, Located, checked_interval
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
-from chilopod.stability.samples import Samples
+from chilopod.stability.search.extent import Extent, extent
+from chilopod.stability.search.locate import BUDGET, GRAVITY, Located, checked_interval
+from chilopod.stability.search.samples import Samples
 from chilopod.stability.system import PeriodicSystem
-from chilopod.stability.unit_circle.crossings import Crossing, SearchStatus, find_crossings
+from chilopod.stability.unit_circle.critical import Crossing
+from chilopod.stability.unit_circle.crossings import SearchStatus, find_crossings
 from chilopod.stability.unit_circle.spectra import Event
 
 Array = NDArray[np.float64]

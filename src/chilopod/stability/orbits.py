@@ -24,11 +24,12 @@ from chilopod.stability.capabilities import (
     spatial_symmetries,
 )
 from chilopod.stability.convergence import RETURN
+from chilopod.stability.guesses import nearer_states
 from chilopod.stability.krylov.closing import LARGE, closed_orbit
 from chilopod.stability.krylov.tangent_map import TangentMap, tangent_map, tangent_sizes
-from chilopod.stability.matrix_errors import DRAWN
 from chilopod.stability.returns import (
     CUTS,
+    REPEATED,
     ReturnMap,
     Section,
     carried,
@@ -38,7 +39,6 @@ from chilopod.stability.returns import (
     turned,
 )
 from chilopod.stability.scales import sizes
-from chilopod.stability.settling import nearer_states
 from chilopod.stability.shooting import Nodes, nodes_of, shot
 from chilopod.stability.shown import Shown
 from chilopod.stability.symmetry.mirrored import symmetric_states
@@ -417,7 +417,7 @@ def bounded(system: SystemLike, x: Array, image: ReturnMap, error: Array | None 
         wrong = np.abs(image.state - x) + (_matrix(image.error, size) @ size)
         duration = image.period / image.returns
         if is_stiff(system, x, duration):  # its derivative may be nothing, and err by nothing
-            wrong += DRAWN * np.abs(_in_parts(system, x, duration) - image.state) + _CHANCE * size
+            wrong += REPEATED * np.abs(_in_parts(system, x, duration) - image.state) + _CHANCE * size
         inverse = basis @ np.linalg.pinv(basis.T @ scaled @ basis, rcond=_SINGULAR) @ basis.T
         error = size * (np.abs(inverse) @ (wrong / size)) + np.abs(x - given)
     # The derivative is that of a state so far off: along the direction in which the orbit is least sure.

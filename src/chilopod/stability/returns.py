@@ -40,6 +40,9 @@ CUTS = (0.0, 0.0477, 0.382)
 """Of an interval that is taken in parts: near the start as well, or the steps up to the cut would be the same, errors
 included."""
 
+REPEATED = 10.0
+"""Factor on the difference of two computations with steps of their own, for a bound on the error of one of them."""
+
 
 @dataclass(frozen=True)
 class Section(ReadOnlyArrays):
@@ -167,8 +170,8 @@ def _velocity(system: Autonomous, x: Array) -> Array:
 def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple[Array, Array, float | Array]:
     """The flow with an error bound; where the system gives none, one is estimated by taking the interval in parts.
 
-    A step-controlled integrator makes independent errors in the two computations, so ten times their difference is a
-    sound bound; a flow of fixed steps that ignores how it is called cannot be seen through this way and should bring
+    A step-controlled integrator makes independent errors in the two computations, so a multiple of their difference is
+    a sound bound; a flow of fixed steps that ignores how it is called cannot be seen through this way and should bring
     its own.
     """
     if flows_with_error(system):
@@ -186,7 +189,7 @@ def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple
     units = size[:, None] / size
     off = float((np.abs(product - derivative) / units).max())
     largest = float((np.abs(derivative) / units).max())
-    return state, derivative, (10.0 * off + 1e-15 * largest) * units
+    return state, derivative, (REPEATED * off + 1e-15 * largest) * units
 
 
 def _check_shapes(state: Array, derivative: Array, n: int) -> None:

@@ -29,10 +29,10 @@ from chilopod.stability.branches.inspection import Found, inspect
 from chilopod.stability.branches.stepping import taken
 from chilopod.stability.budget import Budget
 from chilopod.stability.capabilities import Family, given_scale
-from chilopod.stability.matrix_errors import VERDICTS
 from chilopod.stability.orbits import Orbit
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.shown import Result, axes_for, columns, dataset, mark, rows, said
+from chilopod.stability.spectrum.errors import VERDICTS
 from chilopod.stability.tracing.ending import Ending
 from chilopod.stability.tracing.tracer import Pace, trace
 

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.matrix_errors import stable_within
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import ReturnMap, Section
+from chilopod.stability.spectrum.errors import stable_within
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

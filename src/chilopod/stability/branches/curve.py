@@ -27,7 +27,6 @@ from chilopod.stability.capabilities import (
     returns_per_period,
 )
 from chilopod.stability.convergence import CURVE
-from chilopod.stability.floquet import return_multipliers
 from chilopod.stability.returns import (
     ReturnMap,
     Section,
@@ -35,6 +34,7 @@ from chilopod.stability.returns import (
     section_at,
 )
 from chilopod.stability.shooting import FEW_ROUNDS, Free, node_count, nodes_along, shot
+from chilopod.stability.spectrum.eigenvalues import return_multipliers
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

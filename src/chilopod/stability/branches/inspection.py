@@ -26,13 +26,13 @@ from chilopod.stability.branches.branch_points import BranchPoint, Step
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.special_points import Place, blocks_along, special_point
 from chilopod.stability.capabilities import flows_with_error
-from chilopod.stability.course import TARGETS
-from chilopod.stability.floquet import counts_outside, spectrum
 from chilopod.stability.orbit_blocks import Blocks, block_of, crossings_in
 from chilopod.stability.returns import ReturnMap
+from chilopod.stability.spectrum.eigenvalues import counts_outside, spectrum
 from chilopod.stability.symmetry.isotypic import Block
-from chilopod.stability.unit_circle.crossings import Crossing, Crossings, SearchStatus, find_crossings
-from chilopod.stability.unit_circle.spectra import Event, Matrices
+from chilopod.stability.unit_circle.critical import Crossing
+from chilopod.stability.unit_circle.crossings import Crossings, SearchStatus, find_crossings
+from chilopod.stability.unit_circle.spectra import TARGETS, Event, Matrices
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

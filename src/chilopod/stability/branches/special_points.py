@@ -11,19 +11,18 @@ from numpy.typing import NDArray
 from chilopod.errors import AnalysisError
 from chilopod.stability.branches.branch_points import BranchPoint, Step
 from chilopod.stability.branches.curve import Curve
-from chilopod.stability.course import SAFETY, TARGETS, Course, place_error
-from chilopod.stability.described import described
+from chilopod.stability.crossing_points.description import described
+from chilopod.stability.crossing_points.place import SAFETY, Course, Sample, place_error
+from chilopod.stability.crossing_points.singular import past_singular
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import NormalForm, normal_form
 from chilopod.stability.orbit_blocks import Blocks, orbit_blocks
 from chilopod.stability.orbits import Orbit, bounded, find_orbit
 from chilopod.stability.points import Kind
 from chilopod.stability.returns import ReturnMap, returned_states
-from chilopod.stability.samples import Sample
-from chilopod.stability.singular import past_singular
 from chilopod.stability.symmetry.isotypic import Block
-from chilopod.stability.unit_circle.crossings import Crossing
-from chilopod.stability.unit_circle.spectra import Event
+from chilopod.stability.unit_circle.critical import Crossing
+from chilopod.stability.unit_circle.spectra import TARGETS, Event
 
 Array = NDArray[np.float64]
 

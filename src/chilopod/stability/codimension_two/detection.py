@@ -19,13 +19,13 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.codimension_two.bordered import Equations, Evaluated, Frame, Spot
 from chilopod.stability.codimension_two.codimension2 import DEGENERATE, Codimension2, CodimensionTwo, together
-from chilopod.stability.floquet import Spectrum, spectrum
 from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, ReturnedStates
 from chilopod.stability.normal_forms.normal_form import NormalForm, normal_form
 from chilopod.stability.normal_forms.quintic import Quintic, quintic
 from chilopod.stability.points import WITHOUT_CRITICALITY, Kind
 from chilopod.stability.returns import returned_states
+from chilopod.stability.spectrum.eigenvalues import Spectrum, spectrum
 from chilopod.stability.symmetry.mirrored import reverses
 
 Array = NDArray[np.float64]

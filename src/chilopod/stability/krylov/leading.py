@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.krylov.arnoldi import KrylovSubspace, krylov_subspaces
 from chilopod.stability.krylov.tangent_map import TangentMap, tangent_map
-from chilopod.stability.matrix_errors import FIRST_ORDER, eigenvalues_moved
+from chilopod.stability.spectrum.errors import FIRST_ORDER, eigenvalue_errors, falling_order
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -90,16 +90,14 @@ def leading_multipliers(image: TangentMap, size: Array, count: int) -> LeadingMu
     error = ritz.condition[:chosen] * residual
     if (error > FIRST_ORDER * np.abs(values).max(initial=0.0)).any():
         wrong = np.full(subspace.matrix.shape, float(residual.max()))
-        error = np.minimum(error, eigenvalues_moved(ritz.values, subspace.matrix, wrong)[:chosen])
+        error = np.minimum(error, eigenvalue_errors(ritz.values, subspace.matrix, wrong)[:chosen])
     following = float(np.abs(ritz.values[chosen])) if chosen < ritz.values.size else 0.0
     return LeadingMultipliers(values, error, following, subspace.basis.shape[1])
 
 
 def _ritz(subspace: KrylovSubspace) -> _Ritz:
     values, vectors = np.linalg.eig(subspace.matrix)
-    # Moduli that differ by round-off are equal; the two of a pair stand together, positive frequency first.
-    moduli = np.round(np.abs(values) / max(float(np.abs(values).max()), 1e-300), 12)
-    order = np.lexsort((-values.imag, -np.round(np.abs(values.imag), 12), -moduli))
+    order = falling_order(values)
     values, vectors = values[order].astype(np.complex128), vectors[:, order].astype(np.complex128)
     try:
         left = np.linalg.inv(vectors)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.capabilities import FlowsTangents, given_scale, is_autonomous, returns_per_period
-from chilopod.stability.returns import CUTS, Section, carried, return_duration, return_time
+from chilopod.stability.returns import CUTS, REPEATED, Section, carried, return_duration, return_time
 
 Array = NDArray[np.float64]
 
@@ -19,7 +19,6 @@ _PARTS = 16  # of a return
 _SWEEPS, _MOST_SWEEPS = 3, 30
 _DRAWS = 4  # random directions a sweep: as many as the compiled code carries at once
 _STEADY = 2.0  # ratios of sizes that change by less are known well enough
-_SAFETY = 10.0  # on the difference of two computations with steps of their own
 
 
 @dataclass(frozen=True)
@@ -62,12 +61,12 @@ class TangentMap(ReadOnlyArrays):
         """The same, with bounds on the errors of the images, shape (n, m), and of ``state``, shape (n,): by their sizes
         as a whole, not of every entry.
 
-        As in :func:`chilopod.stability.returns.flow_with_error` they are ten times the difference to a second
+        As in :func:`chilopod.stability.returns.flow_with_error` they are a multiple of the difference to a second
         computation which takes the interval in parts.
         """
         state, images = self._in_parts(directions, (0.0,))
         other, parts = self._in_parts(directions, CUTS)
-        return images, _SAFETY * np.abs(parts - images), _SAFETY * np.abs(self._across(other - state))
+        return images, REPEATED * np.abs(parts - images), REPEATED * np.abs(self._across(other - state))
 
     def _in_parts(self, directions: Array, cuts: tuple[float, ...]) -> tuple[Array, Array]:
         times = [cut * self.duration for cut in cuts] + [self.duration]

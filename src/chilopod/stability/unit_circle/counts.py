@@ -6,13 +6,13 @@ from __future__ import annotations
 import bisect
 import itertools
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
-from chilopod.stability.unit_circle.critical import LOST, UNKNOWN, Critical, Group, Point, Root
+from chilopod.stability.unit_circle.critical import LOST, UNKNOWN, Critical, Crossing, Root, Throughout, rooted
 from chilopod.stability.unit_circle.spectra import Event, Spectra, margins
 from chilopod.stability.unit_circle.zeros import Interval, between
 
@@ -27,6 +27,30 @@ _JUMP = 0.5
 _SHADOW = 1.5  # widths of a touch within which a crossing explains it
 _WIDER = 100.0
 _EPSILON = float(np.finfo(float).eps)
+
+
+class Report:
+    """What a search says of itself.
+
+    Attributes
+    ----------
+    remarks
+        What else is to be said, a sentence each.
+    spent
+        Whether the budget ended the search.
+    open
+        Whether something is not accounted for.
+    """
+
+    def __init__(self) -> None:
+        self.remarks: list[str] = []
+        self.spent = False
+        self.open = False
+
+    def leave(self, remark: str) -> None:
+        """Say what is not accounted for."""
+        self.open = True
+        self.remarks.append(remark)
 
 
 class _Anew(NamedTuple):
@@ -44,53 +68,45 @@ class Accounts:
         Eigenvalues; all values at which they are known are used.
     ends
         The interval.
-    idle
-        For each event, how many factors of its function vanish throughout.
-    resting
-        How many multipliers are +1 or -1 throughout.
-    conservative
-        Whether multipliers may stay on the circle.
+    throughout
+        What is critical everywhere.
     parameter
         The parameter at a place, for remarks.
+    report
+        What is said of the search.
     """
 
     def __init__(
         self,
         spectra: Spectra,
         ends: Interval,
-        idle: dict[Event, int],
-        resting: int,
-        conservative: bool,
+        throughout: Throughout,
         parameter: Callable[[float], float],
+        report: Report,
     ) -> None:
-        self.remarks: list[str] = []
-        self.spent = False
-        self.open = False
         self._spectra = spectra
         self._ends = ends
-        self._idle = idle
-        self._resting = resting
-        self._conservative = conservative
-        self._critical = Critical(spectra, idle, conservative)
+        self._throughout = throughout
+        self._critical = Critical(spectra, throughout)
         self._parameter = parameter
+        self._report = report
         self._counts: dict[float, int | None] = {}
         self._settled: set[Interval] = set()  # gaps about which a remark was made
         probes = [spectra.values[0], spectra.values[len(spectra.values) // 2], spectra.values[-1]]
         spectra.disturbed(np.array(probes))  # together
         self._clearly = max(_CLEARLY, _ROOM * max(float(spectra.margin_errors(u).max()) for u in probes))
 
-    def balance(self, roots: list[Root]) -> list[Point]:
-        """Points that explain the counts, in order."""
+    def balance(self, roots: list[Root]) -> list[Crossing]:
+        """Crossings that explain the counts, in order."""
         self._spectra.at(np.array(self._ends))
         roots = [root for root in roots if self._is_critical(root) or self._lost(root)]
         for _ in range(_ROUNDS):
-            roots, points, again = self._walk(sorted(_without_shadows(roots), key=lambda root: root.place))
+            roots, found, again = self._walk(sorted(_without_shadows(roots), key=lambda root: root.place))
             if not again:
                 break
         else:
-            self.open = True
-            self.remarks.append("the counts of multipliers outside did not settle")
-        return points
+            self._report.leave("the counts of multipliers outside did not settle")
+        return found
 
     def count(self, place: float) -> int | None:
         """Number of multipliers outside the circle; None where one of them is too near to say."""
@@ -106,7 +122,7 @@ class Accounts:
             return
         found = margins(self._spectra.at(new))
         clear = np.abs(found).min(axis=1, initial=np.inf) > self._clearly
-        if self._resting or self._conservative:
+        if self._throughout.resting or self._throughout.conservative:
             clear[:] = False
         self._counts.update(zip(new[clear].tolist(), (found[clear] > 0.0).sum(axis=1).tolist(), strict=True))
         self._spectra.disturbed(new[~clear])
@@ -115,42 +131,40 @@ class Accounts:
         found = self._spectra.margins(place)
         errors = self._spectra.margin_errors(place)
         outside = int((found > errors).sum())
-        if self._conservative:
+        if self._throughout.conservative:
             sizes = np.abs(found) / errors
             for event in Event:
                 # Those that meet may have left the circle or not.
-                distances, uncertain = self._spectra.distances(place, event)
-                idle = self._idle[event]
+                distances, uncertain = self._spectra.factor_sizes(place, event)
+                idle = self._throughout.idle[event]
                 if (distances[idle:] <= _GREY * uncertain[idle:]).any():
                     return None
             return None if ((sizes > 1.0) & (sizes <= _GREY)).any() else outside
-        return outside if int((np.abs(found) <= errors).sum()) <= self._resting else None
+        return outside if int((np.abs(found) <= errors).sum()) <= self._throughout.resting else None
 
-    def _walk(self, roots: list[Root]) -> tuple[list[Root], list[Point], bool]:
-        """Compare counts along all gaps between decided places; the roots after that, the points, and whether to do
-        it again."""
+    def _walk(self, roots: list[Root]) -> tuple[list[Root], list[Crossing], bool]:
+        """Compare counts along all gaps between decided places; the roots after that, what crosses at them, and whether
+        to do it again."""
         decided = self._decided(roots)
         if not decided:
             self._remark("the multipliers are nowhere clear of the circle", self._ends)
-            return roots, [self._point(root, 0, None, None) for root in roots], False
+            return roots, self._unchanged(roots), False
         kept = self._beyond(roots, decided)
-        points = [self._at_end(root, decided) for root in kept]
-        again = False
-        index = 0
+        crossings = [crossing for root in kept for crossing in self._at_end(root, decided)]
+        places, again = [root.place for root in roots], False
         for (x, before), (y, after) in itertools.pairwise(decided):
-            inside = []
-            while index < len(roots) and roots[index].place < y:
-                if roots[index].place > x:
-                    inside.append(roots[index])
-                index += 1
+            inside = roots[bisect.bisect_right(places, x) : bisect.bisect_left(places, y)]
             found = self._in_gap(inside, x, y, before, after)
             if isinstance(found, _Anew):
                 kept += found.roots
                 again = True
             else:
                 kept += inside
-                points += found
-        return kept, sorted(points, key=lambda point: point.place), again
+                crossings += found
+        return kept, sorted(crossings, key=lambda crossing: crossing.value), again
+
+    def _unchanged(self, roots: list[Root]) -> list[Crossing]:
+        return [crossing for root in roots for crossing in self._critical.at(root)]
 
     def _beyond(self, roots: list[Root], decided: list[tuple[float, int]]) -> list[Root]:
         """Roots beyond the first and the last decided place, the ends of the interval among them."""
@@ -167,16 +181,15 @@ class Accounts:
                     self._lost(end)
         return kept
 
-    def _in_gap(self, inside: list[Root], x: float, y: float, before: int, after: int) -> list[Point] | _Anew:
-        """Points of the roots in a gap, if they explain the change of the count; else the roots to go on with."""
+    def _in_gap(self, inside: list[Root], x: float, y: float, before: int, after: int) -> list[Crossing] | _Anew:
+        """What crosses in a gap, if it explains the change of the count; else the roots to go on with."""
         change = after - before
-        unexplained = [self._point(root, 0, None, None) for root in inside]
         if (not inside and change == 0) or (x, y) in self._settled:
-            return unexplained
+            return self._unchanged(inside)
         explained = len(inside) == 1 and self._explains(inside[0], change)
         if self._spectra.left <= 0 and not explained:
-            self.spent = True
-            return unexplained
+            self._report.spent = True
+            return self._unchanged(inside)
         if not inside:
             return _Anew(self._followed(x, y, before, after))
         if len(inside) > 1:
@@ -187,10 +200,10 @@ class Accounts:
             if self._tightened(inside[0], x, y):
                 return _Anew(inside)
             # Or it is a collision whose ends are too near each other.
-            if not (self._conservative and change == 0):
-                critical = sum(group.multiplicity for group in self._critical.groups(inside[0]))
+            if not (self._throughout.conservative and change == 0):
+                critical = sum(crossing.multiplicity for crossing in self._critical.at(inside[0]))
                 self._remark(f"{change:+d} multipliers outside where {critical} are on the circle", (x, y))
-        return [self._point(inside[0], change, x, y)]
+        return self._changed(inside[0], change, x, y)
 
     def _decided(self, roots: list[Root]) -> list[tuple[float, int]]:
         """Places with a count, those within the brackets of roots left out."""
@@ -203,14 +216,11 @@ class Accounts:
         return [(v, count) for v in values if v not in within and (count := self.count(v)) is not None]
 
     def _remark(self, remark: str, gap: Interval) -> None:
-        self.open = True
         self._settled.add(gap)
-        self.remarks.append(f"{remark}, {between(*map(self._parameter, gap))}")
-
-    # ---- whether a root explains a change ---------------------------------------------------------------------------
+        self._report.leave(f"{remark}, {between(*map(self._parameter, gap))}")
 
     def _is_critical(self, root: Root) -> bool:
-        return self._spectra.exists(root.place) and bool(self._critical.groups(root))
+        return self._spectra.exists(root.place) and bool(self._critical.at(root))
 
     def _lost(self, root: Root) -> bool:
         """Say so where a root is none only because the multipliers there are not known; False."""
@@ -222,73 +232,65 @@ class Accounts:
 
     def _explains(self, root: Root, change: int) -> bool:
         """Whether a change of the count is what the critical multipliers at a root may do."""
-        groups = self._critical.groups(root)
-        number = sum(group.multiplicity for group in groups)
-        if self._conservative and all(group.collision for group in groups):
+        crossings = self._critical.at(root)
+        number = sum(crossing.multiplicity for crossing in crossings)
+        if self._throughout.conservative and all(crossing.collision for crossing in crossings):
             return 2 * abs(change) <= number and (root.touch or change != 0)
         if root.touch:
             return change == 0
-        alone = len(groups) == 1 and number == (2 if groups[0].event is Event.PAIR else 1)
+        alone = len(crossings) == 1 and number == (2 if crossings[0].event is Event.PAIR else 1)
         return abs(change) == number if alone else abs(change) <= number and (change - number) % 2 == 0
 
-    def _point(self, root: Root, change: int, x: float | None, y: float | None) -> Point:
-        groups = self._critical.groups(root)
-        if len(groups) > 1 and x is not None and y is not None:
-            changes = [self._critical.outside_near(g, y) - self._critical.outside_near(g, x) for g in groups]
-        else:
-            changes = [change] * len(groups)
-        return Point(
-            root.place,
-            root.left,
-            root.right,
-            tuple(
-                Group(g.event, g.multiplicity, c, g.multiplier, g.collision)
-                for g, c in zip(groups, changes, strict=True)
-            ),
-        )
+    def _changed(self, root: Root, change: int, x: float, y: float) -> list[Crossing]:
+        """What crosses at a root between two places at which the counts are known."""
+        crossings = self._critical.at(root)
+        if len(crossings) == 1:
+            return [replace(crossings[0], change=change)]
+        near = self._critical.outside_near
+        return [replace(each, change=near(each, y) - near(each, x)) for each in crossings]
 
-    def _at_end(self, root: Root, decided: list[tuple[float, int]]) -> Point:
-        """A root beyond the last decided place: as if the multipliers went on as they come."""
+    def _at_end(self, root: Root, decided: list[tuple[float, int]]) -> list[Crossing]:
+        """What crosses at a root beyond the last decided place: as if the multipliers went on as they come."""
         first = root.place < decided[0][0]
         count = decided[0 if first else -1][1]
-        number = sum(group.multiplicity for group in self._critical.groups(root))
+        crossings = self._critical.at(root)
+        number = sum(crossing.multiplicity for crossing in crossings)
         surely = int((self._spectra.margins(root.place) > self._critical.tolerances(root)).sum())
         outside = count - surely
-        change = (2 * outside - number) * (1 if first else -1)
-        return self._point(root, change if 0 <= outside <= number else 0, None, None)
-
-    # ---- refinement ------------------------------------------------------------------------------------------------
+        change = (2 * outside - number) * (1 if first else -1) if 0 <= outside <= number else 0
+        return [replace(crossing, change=change) for crossing in crossings]
 
     def _followed(self, x: float, y: float, before: int, after: int) -> list[Root]:
         """Roots of the multipliers of those ranks that are inside the circle at one end of a gap and outside at the
         other."""
+        changed = f"{after - before:+d} multipliers outside"
         if self._spectra.holes(x, y):
-            self._remark(f"{after - before:+d} multipliers outside, and no matrices in between", (x, y))
+            self._remark(f"{changed}, and no matrices in between", (x, y))
             return []
-        if self._conservative:
+        if self._throughout.conservative:
             return self._bisected(x, y, before, after)
         roots: list[Root] = []
+        said = False
         for rank in range(min(before, after), max(before, after)):
             if self._spectra.left <= 0:
-                self.spent = True
+                self._report.spent = True
                 break
 
             def margin(place: float, rank: int = rank) -> float:
                 # Those that rest on the circle are of any rank in between, and add nothing.
-                found = float(self._spectra.margins(place)[rank : rank + self._resting + 1].sum())
+                found = float(self._spectra.margins(place)[rank : rank + self._throughout.resting + 1].sum())
                 return found if np.isfinite(found) else 0.0
 
             if margin(x) * margin(y) >= 0.0:
                 break  # errors were not what they were said to be
-            most = min(200, max(self._spectra.left, 1))
-            place = float(brentq(margin, x, y, xtol=5e-324, rtol=4 * _EPSILON, maxiter=most, disp=False))
+            root = rooted(self._spectra, margin, x, y, None)
+            place = root.place
             if not self._spectra.exists(place):
-                self.spent |= self._spectra.left <= 0
-                if not self.spent:
-                    self._remark(f"{after - before:+d} multipliers outside, and no matrices in between", (x, y))
+                self._report.spent |= self._spectra.left <= 0
+                if not self._report.spent:
+                    self._remark(f"{changed}, and no matrices in between", (x, y))
+                    said = True
                 break
-            reach = 4.0 * _EPSILON * abs(place)
-            root = Root(place, max(place - reach, x), min(place + reach, y), None, False)
             if self._jumps(place, rank):
                 values = self._spectra.values
                 here = int(np.searchsorted(values, place))
@@ -296,11 +298,13 @@ class Accounts:
                 left = max((v for v in near if v <= place and (margin(v) > 0) == (margin(x) > 0)), default=x)
                 right = min((v for v in near if v >= place and (margin(v) > 0) == (margin(y) > 0)), default=y)
                 self._remark(f"a multiplier jumps across the circle at {self._parameter(place):.9g}", (left, right))
+                said = True
                 continue
-            if all(abs(place - other.place) > 4.0 * reach for other in roots) and self._is_critical(root):
+            apart = 16.0 * _EPSILON * abs(place)
+            if all(abs(place - other.place) > apart for other in roots) and self._is_critical(root):
                 roots.append(root)
-        if not roots and not self.spent and not self._settled & set(self._gaps(x, y)):
-            self._remark(f"{after - before:+d} multipliers outside, and none found on the circle", (x, y))
+        if not (roots or said or self._report.spent):
+            self._remark(f"{changed}, and none found on the circle", (x, y))
         return roots
 
     def _bisected(self, x: float, y: float, before: int, after: int) -> list[Root]:
@@ -311,15 +315,11 @@ class Accounts:
                 break
             x, y = (middle, y) if count == before else (x, middle)
         for event in (Event.MINUS, Event.PLUS, Event.PAIR):
-            root = Root(0.5 * x + 0.5 * y, x, y, event, False)
+            root = Root(0.5 * x + 0.5 * y, x, y, event)
             if (x, y) != gap and self._is_critical(root) and self._explains(root, after - before):
                 return [root]
         self._remark("multipliers leave the circle, or come back, and none were found to meet", (x, y))
         return []
-
-    def _gaps(self, x: float, y: float) -> list[Interval]:
-        inside = [v for v in self._spectra.values if x <= v <= y and self.count(v) is not None]
-        return list(itertools.pairwise(inside))
 
     def _jumps(self, place: float, rank: int) -> bool:
         """Whether the multiplier of a rank is not continuous at a place: its change does not fall with the width."""

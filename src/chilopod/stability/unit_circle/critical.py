@@ -1,13 +1,15 @@
-"""Which multipliers are critical at a root."""
+"""Multipliers that are critical at a root."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
-from chilopod.stability.unit_circle.spectra import Event, Spectra
+from chilopod.stability.unit_circle.spectra import TARGETS, Event, Spectra
 
 Array = NDArray[np.float64]
 
@@ -16,6 +18,7 @@ UNKNOWN = 1.0
 
 LOST = "multipliers near the circle are known no better than their distance from it"
 
+_EPSILON = float(np.finfo(float).eps)
 _ULPS = 64.0
 _TELLING = 0.01  # error of a margin, which goes from -1 to 1, that tells where the multiplier is
 
@@ -24,36 +27,82 @@ _TELLING = 0.01  # error of a margin, which goes from -1 to 1, that tells where 
 class Root:
     """A place where a multiplier may be critical.
 
-    ``event`` is that of the function that vanishes there, None where a multiplier was followed by its rank; ``touch``
-    is whether the function does not change sign.
+    Attributes
+    ----------
+    place, left, right
+        The place, and the interval in which it is enclosed.
+    event
+        The event whose function vanishes there; None where a multiplier was followed by its rank.
+    touch
+        Whether the function does not change sign.
     """
 
     place: float
     left: float
     right: float
     event: Event | None
-    touch: bool
+    touch: bool = False
+
+
+def rooted(spectra: Spectra, function: Callable[[float], float], low: float, high: float, event: Event | None) -> Root:
+    """The root of a function of the eigenvalues between two places where it has opposite signs."""
+    most = min(200, max(spectra.left, 1))
+    place = float(brentq(function, low, high, xtol=5e-324, rtol=4 * _EPSILON, maxiter=most, disp=False))
+    reach = 4.0 * _EPSILON * abs(place)
+    return Root(place, max(place - reach, low), min(place + reach, high), event)
 
 
 @dataclass(frozen=True)
-class Group:
-    """Multipliers that are critical at the same place of the circle."""
+class Crossing:
+    """Multipliers on the unit circle at a value of the parameter.
 
+    Attributes
+    ----------
+    value
+        Value of the parameter.
+    bracket
+        Interval in which the root finder has enclosed it; errors of the matrices come on top.
+    event
+        Where on the circle.
+    multiplicity
+        Number of multipliers on the circle there, both of a pair counted.
+    change
+        Rise of the number of multipliers outside: positive out of the circle, negative into it, 0 for a touch, or for
+        as many out as in. At an end of the interval: as if they went on as they come.
+    multiplier
+        One of the critical multipliers, of a pair the one with positive imaginary part.
+    collision
+        Whether multipliers meet on the circle there and leave it, or come back: a conservative family.
+    """
+
+    value: float
+    bracket: tuple[float, float]
     event: Event
     multiplicity: int
     change: int
     multiplier: complex
-    collision: bool
+    collision: bool = False
 
 
 @dataclass(frozen=True)
-class Point:
-    """A root with the multipliers that are critical there."""
+class Throughout:
+    """What vanishes for all values of the parameter.
 
-    place: float
-    left: float
-    right: float
-    groups: tuple[Group, ...]
+    Attributes
+    ----------
+    idle
+        For each event, the number of factors of its function that do.
+    conservative
+        Whether multipliers come in pairs with product 1, and may stay on the circle.
+    """
+
+    idle: dict[Event, int]
+    conservative: bool
+
+    @property
+    def resting(self) -> int:
+        """Number of multipliers that are +1 or -1 throughout."""
+        return self.idle[Event.PLUS] + self.idle[Event.MINUS]
 
 
 class Critical:
@@ -63,16 +112,13 @@ class Critical:
     ----------
     spectra
         Eigenvalues of the family.
-    idle
-        For each event, how many factors of its function vanish throughout.
-    conservative
-        Whether multipliers may stay on the circle.
+    throughout
+        What is critical everywhere.
     """
 
-    def __init__(self, spectra: Spectra, idle: dict[Event, int], conservative: bool) -> None:
+    def __init__(self, spectra: Spectra, throughout: Throughout) -> None:
         self._spectra = spectra
-        self._idle = idle
-        self._conservative = conservative
+        self._throughout = throughout
 
     def tolerances(self, root: Root) -> Array:
         """How far from zero the margins at a root may be if the multiplier is on the circle there."""
@@ -99,38 +145,37 @@ class Critical:
     def _telling(self, place: float) -> bool:
         return float(self._spectra.margin_errors(place).max()) <= _TELLING
 
-    def groups(self, root: Root) -> list[Group]:
-        """Multipliers that are critical at a root, without those that are so throughout; changes are not known yet."""
+    def at(self, root: Root) -> list[Crossing]:
+        """What is critical at a root, by where on the circle, without what is so throughout; changes are not known
+        yet."""
         nu = self._spectra.at(np.array([root.place]))[0]
-        margins, tolerances = self._spectra.margins(root.place), self.tolerances(root)
-        critical = nu[np.abs(margins) <= tolerances]
+        tolerances = self.tolerances(root)
+        critical = np.abs(self._spectra.margins(root.place)) <= tolerances
         if root.event is None:
             # No function vanishes here: what may be anywhere is not on the circle for that.
-            critical = nu[(np.abs(margins) <= tolerances) & (tolerances <= UNKNOWN)]
-        groups = []
-        rest = critical
-        for event, target in ((Event.MINUS, -1.0), (Event.PLUS, 1.0)):
-            errors = self._spectra.distances(root.place, event)[1]
-            distances = np.abs(rest - target)
-            near = (
-                (distances <= errors[: max(rest.size, 1)].max() + tolerances.max()) if rest.size else np.empty(0, bool)
-            )
-            # A real multiplier on the circle is nowhere else.
-            near = near | ((rest.imag == 0.0) & (rest.real * target > 0.0))
-            # However large errors are, what is critical is so at the nearer of the two.
-            near = near & (rest.real * target > 0.0)
-            number = int(near.sum()) - self._idle[event]
-            if number > 0 and (not self._conservative or root.event in (event, None)):
+            critical &= tolerances <= UNKNOWN
+        rest, found = nu[critical], []
+        conservative, bracket = self._throughout.conservative, (root.left, root.right)
+        for event, target in TARGETS.items():
+            if not rest.size:
+                break
+            reach = self._spectra.factor_sizes(root.place, event)[1][: rest.size].max() + tolerances.max()
+            # A real multiplier on the circle is nowhere else. However large errors are, what is critical is so at the
+            # nearer of the two.
+            near = ((np.abs(rest - target) <= reach) | (rest.imag == 0.0)) & (rest.real * target > 0.0)
+            number = int(near.sum()) - self._throughout.idle[event]
+            if number > 0 and (not conservative or root.event in (event, None)):
                 best = complex(rest[near][np.abs(rest[near] - target).argmin()])
-                groups.append(Group(event, number, 0, best, self._conservative and number % 2 == 0))
+                meeting = conservative and number % 2 == 0
+                found.append(Crossing(root.place, bracket, event, number, 0, best, meeting))
             rest = rest[~near]
         upper = rest[rest.imag > 0.0]
-        if self._conservative:
+        if conservative:
             upper = self._meeting(upper) if root.event is Event.PAIR and not root.touch else upper[:0]
         if upper.size:
             best = complex(upper[np.abs(np.abs(upper) - 1.0).argmin()])
-            groups.append(Group(Event.PAIR, 2 * upper.size, 0, best, self._conservative))
-        return groups
+            found.append(Crossing(root.place, bracket, Event.PAIR, 2 * upper.size, 0, best, conservative))
+        return found
 
     @staticmethod
     def _meeting(upper: NDArray[np.complex128]) -> NDArray[np.complex128]:
@@ -141,12 +186,11 @@ class Critical:
         nearest = int(np.abs(upper[first] - upper[second]).argmin())
         return upper[[first[nearest], second[nearest]]]
 
-    def outside_near(self, group: Group, place: float) -> int:
-        """How many of the multipliers nearest to those of a group are outside the circle at a place beside it."""
-        nu = self._spectra.at(np.array([place]))[0]
-        if group.event is Event.PAIR:
+    def outside_near(self, crossing: Crossing, place: float) -> int:
+        """How many of the multipliers nearest to those of a crossing are outside the circle at a place beside it."""
+        nu, number = self._spectra.at(np.array([place]))[0], crossing.multiplicity
+        times = 2 if crossing.event is Event.PAIR else 1
+        if times == 2:
             nu = nu[nu.imag > 0.0]
-            nearest = np.argsort(np.abs(nu - group.multiplier))[: group.multiplicity // 2]
-            return 2 * int((np.abs(nu[nearest]) > 1.0).sum())
-        nearest = np.argsort(np.abs(nu - group.multiplier))[: group.multiplicity]
-        return int((np.abs(nu[nearest]) > 1.0).sum())
+        nearest = np.argsort(np.abs(nu - crossing.multiplier))[: number // times]
+        return times * int((np.abs(nu[nearest]) > 1.0).sum())

@@ -9,24 +9,23 @@ crosses is followed by its rank, which is continuous whatever the multiplicities
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from chilopod.errors import ParameterError
 from chilopod.labels import Labelled
-from chilopod.stability.unit_circle.counts import Accounts
-from chilopod.stability.unit_circle.critical import LOST, Root
-from chilopod.stability.unit_circle.spectra import Event, Matrices, Spectra, margins
+from chilopod.stability.unit_circle.counts import Accounts, Report
+from chilopod.stability.unit_circle.critical import LOST, Crossing, Root, Throughout, rooted
+from chilopod.stability.unit_circle.spectra import TARGETS, Event, Matrices, Spectra, factors, margins
 from chilopod.stability.unit_circle.zeros import Interval, Zeros, between, find_zeros, first_places
 
 Array = NDArray[np.float64]
 
 BUDGET = 5000
-"""Matrices that a search may ask for, if not told otherwise."""
+"""Matrices that a search may ask for, by default."""
 
 _DECADES = 4.0
 _SEARCH = 0.7  # of the budget for the zeros of the functions; the rest for counting
@@ -39,9 +38,6 @@ _MANY = 800  # pairs of multipliers; beyond that the bialternate product has too
 _PROBES = 65
 _FINEST_PROBE = 1e-6  # of the interval
 _CLOSE = 0.25  # of the nearer end: so far towards the circle a multiplier must be heading
-_EPSILON = float(np.finfo(float).eps)
-
-_Place = Callable[[float], float]
 
 
 class SearchStatus(Labelled):
@@ -52,37 +48,9 @@ class SearchStatus(Labelled):
     INCOMPLETE = "incomplete", "not everything is accounted for; the remarks say what and where"
     BUDGET = "budget", "the budget was spent; what was found until then is listed"
 
-
-@dataclass(frozen=True)
-class Crossing:
-    """Multipliers on the unit circle at a value of the parameter.
-
-    Attributes
-    ----------
-    value
-        Of the parameter.
-    bracket
-        Interval in which the root finder has enclosed it; errors of the matrices come on top.
-    event
-        Where on the circle.
-    multiplicity
-        How many multipliers are on the circle there, both of a pair counted.
-    change
-        By how much the number of multipliers outside rises there: positive out of the circle, negative into it, 0 for
-        a touch, or for as many out as in. At an end of the interval: as if they went on as they come.
-    multiplier
-        One of the critical multipliers, of a pair the one with positive imaginary part.
-    collision
-        Whether multipliers meet on the circle there and leave it, or come back: a conservative family.
-    """
-
-    value: float
-    bracket: Interval
-    event: Event
-    multiplicity: int
-    change: int
-    multiplier: complex
-    collision: bool = False
+    def worst(self, *others: SearchStatus) -> SearchStatus:
+        """The worst of some statuses; members stand from the best to the worst."""
+        return max(self, *others, key=list(SearchStatus).index)
 
 
 @dataclass(frozen=True)
@@ -98,7 +66,7 @@ class Crossings:
     remarks
         What else is to be said, a sentence each.
     evaluations
-        At how many values matrices were asked for.
+        Number of values at which matrices were asked for.
     """
 
     crossings: tuple[Crossing, ...]
@@ -121,13 +89,11 @@ def find_crossings(
     Parameters
     ----------
     matrices
-        ``matrices(values)``, values of shape (k,), gives the matrices, shape (k, m, m), and bounds on the error of
-        their entries: relative, shape (k,), or each, shape (k, m, m). It raises AnalysisError, or gives NaN, where
-        there is no matrix, and may be asked for the same value twice.
+        The family.
     low, high
         The interval.
     budget
-        At how many values matrices may be asked for.
+        Number of values at which matrices may be asked for.
     affordable
         How many more matrices can be had, where that is for their cost to say: the search ends when it says none.
     shown
@@ -144,7 +110,7 @@ def find_crossings(
     if budget < least:
         raise ParameterError("is too small to begin", field="budget", value=budget, allowed=f"{least} or more")
     # Over decades a parameter acts by its logarithm.
-    inward, outward = (np.log, np.exp) if low > 0.0 and high / _DECADES > low else (_same, _same)
+    inward, outward = (np.log, np.exp) if low > 0.0 and high / _DECADES > low else (np.asarray, np.asarray)
     a, b = float(inward(low)), float(inward(high))
 
     def parameter(places: Any) -> Any:
@@ -153,70 +119,67 @@ def find_crossings(
         return np.where(places <= a, low, np.where(places >= b, high, inner))
 
     spectra = Spectra(lambda places: matrices(parameter(places)), budget, affordable)
-    return _Finder(spectra, a, b, lambda place: float(parameter(place)), shown).found()
-
-
-def _same(values: Any) -> Any:
-    return values
+    finder = _Finder(spectra, a, b, lambda place: shown(float(parameter(place))))
+    status = finder.search()
+    crossings = []
+    for each in finder.crossings:
+        value, left, right = parameter(np.array([each.value, *each.bracket])).tolist()
+        crossings.append(replace(each, value=value, bracket=(left, right)))
+    return Crossings(tuple(crossings), status, tuple(dict.fromkeys(finder.report.remarks)), spectra.evaluations)
 
 
 class _Finder:
     """The search, in a coordinate in which the parameter acts evenly."""
 
-    def __init__(self, spectra: Spectra, a: float, b: float, parameter: _Place, shown: _Place) -> None:
+    def __init__(self, spectra: Spectra, a: float, b: float, shown: Callable[[float], float]) -> None:
         self.spectra = spectra
         self.a, self.b = a, b
-        self.parameter = parameter
-        self.shown: _Place = lambda place: shown(parameter(place))
-        self.remarks: list[str] = []
-        self.spent = False
-        self.conservative = False
-        self.open = False  # whether something is not accounted for
+        self.shown = shown
+        self.report = Report()
+        self.crossings: list[Crossing] = []
 
-    def found(self) -> Crossings:
+    def search(self) -> SearchStatus:
+        """Find the crossings; how that ended."""
+        report, spectra = self.report, self.spectra
         first = first_places(self.a, self.b)
-        self.spectra.at(first)
-        if not self.spectra.values:
-            if self.spectra.left <= 0:
-                return Crossings((), SearchStatus.BUDGET, (), self.spectra.evaluations)
-            return Crossings((), SearchStatus.INCOMPLETE, ("there is no matrix anywhere",), self.spectra.evaluations)
-        idle = {event: self._idle(first, event) for event in Event}
-        resting = idle[Event.PLUS] + idle[Event.MINUS]
-        trivial = sum(idle[event] * (idle[event] - 1) // 2 for event in (Event.PLUS, Event.MINUS))
-        conservative = self.conservative = idle[Event.PAIR] > trivial
-        self._remark_on(idle, conservative)
-        events = [e for e in Event if idle[e] < self._factors(e) <= _MANY]
+        spectra.at(first)
+        if not spectra.values:
+            if spectra.left <= 0:
+                return SearchStatus.BUDGET
+            report.leave("there is no matrix anywhere")
+            return SearchStatus.INCOMPLETE
+        throughout = self._throughout(first)
+        events = [event for event in Event if throughout.idle[event] < self._factors(event) <= _MANY]
         if self._factors(Event.PAIR) > _MANY:
             self._probe()
-        found = self._searched(events, idle)
-        roots = [root for event in events for root in self._roots(event, idle[event], found[event])]
-        accounts = Accounts(self.spectra, (self.a, self.b), idle, resting, conservative, self.shown)
-        points = accounts.balance(roots)
-        self.remarks += accounts.remarks
-        crossings = tuple(
-            Crossing(
-                self.parameter(point.place),
-                (self.parameter(point.left), self.parameter(point.right)),
-                group.event,
-                group.multiplicity,
-                group.change,
-                group.multiplier,
-                conservative and group.collision,
-            )
-            for point in points
-            for group in point.groups
-        )
-        if self.spent or accounts.spent:
-            status = SearchStatus.BUDGET
-        elif self.open or accounts.open:
-            status = SearchStatus.INCOMPLETE
-        else:
-            status = SearchStatus.CONSERVATIVE if conservative else SearchStatus.COMPLETE
-        return Crossings(crossings, status, tuple(dict.fromkeys(self.remarks)), self.spectra.evaluations)
+        found = self._searched(events, throughout)
+        roots = [root for event in events for root in self._roots(event, throughout, found[event])]
+        accounts = Accounts(spectra, (self.a, self.b), throughout, self.shown, report)
+        self.crossings = accounts.balance(roots)
+        if report.spent:
+            return SearchStatus.BUDGET
+        if report.open:
+            return SearchStatus.INCOMPLETE
+        return SearchStatus.CONSERVATIVE if throughout.conservative else SearchStatus.COMPLETE
 
     def _factors(self, event: Event) -> int:
         m = self.spectra.size
         return m if event is not Event.PAIR else m * (m - 1) // 2
+
+    def _throughout(self, places: Array) -> Throughout:
+        """What is critical at all places, with remarks."""
+        idle = {event: self._idle(places, event) for event in Event}
+        trivial = sum(idle[event] * (idle[event] - 1) // 2 for event in TARGETS)
+        for event in (Event.PLUS, Event.MINUS):
+            if idle[event]:
+                many = "a multiplier is" if idle[event] == 1 else f"{idle[event]} multipliers are"
+                self.report.remarks.append(f"{many} {event.label} throughout and left aside")
+        conservative = idle[Event.PAIR] > trivial
+        if conservative:
+            self.report.remarks.append(
+                "multipliers come in pairs with product 1 throughout: the family is conservative"
+            )
+        return Throughout(idle, conservative)
 
     def _idle(self, places: Array, event: Event) -> int:
         """How many factors of the function of an event vanish for all values of the parameter."""
@@ -226,25 +189,26 @@ class _Finder:
         numbers = []
         for place in places.tolist():
             # Of a matrix with a large eigenvalue the small ones are uncertain, and their products with it.
-            largest = max(1.0, float(np.abs(self.spectra.at(np.array([place]))).max()))
+            nu = self.spectra.at(np.array([place]))[0]
+            largest = max(1.0, float(np.abs(nu).max()))
             largest *= min(largest, _HUGE) if event is Event.PAIR else 1.0
-            if self.spectra.smallest(place, event) > _IDLE * largest:
+            if float(np.abs(factors(nu, event)).min()) > _IDLE * largest:
                 numbers.append(0)
             else:
-                sizes, errors = self.spectra.distances(place, event)
+                sizes, errors = self.spectra.factor_sizes(place, event)
                 if errors[0] <= _TELLING:
                     numbers.append(int(np.argmin(np.append(sizes <= errors, False))))
             if numbers.count(0) > _MOSTLY * places.size:
                 return 0
         if len(numbers) < _FEWEST_TELLING:
-            self._leave(LOST)
+            self.report.leave(LOST)
             return 0
         return int(sorted(numbers)[int(_MOSTLY * len(numbers))])
 
     def _probe(self) -> None:
         """Ask for matrices wherever a multiplier may cross the circle and come back: where it heads for the circle on
         both sides of a gap."""
-        self.remarks.append("so many multipliers: pairs are found by counting, not by a function that vanishes")
+        self.report.remarks.append("so many multipliers: pairs are found by counting, not by a function that vanishes")
         places = np.linspace(self.a, self.b, _PROBES)
         while places.size and self.spectra.left > places.size:
             self.spectra.at(places)
@@ -263,75 +227,61 @@ class _Finder:
             again &= gap > _FINEST_PROBE
             places = (0.5 * known[1:-2] + 0.5 * known[2:-1])[again]
 
-    def _remark_on(self, idle: dict[Event, int], conservative: bool) -> None:
-        for event in (Event.PLUS, Event.MINUS):
-            if idle[event]:
-                many = "a multiplier is" if idle[event] == 1 else f"{idle[event]} multipliers are"
-                self.remarks.append(f"{many} {event.label} throughout and left aside")
-        if conservative:
-            self.remarks.append("multipliers come in pairs with product 1 throughout: the family is conservative")
-
-    def _searched(self, events: list[Event], idle: dict[Event, int]) -> dict[Event, Zeros]:
+    def _searched(self, events: list[Event], throughout: Throughout) -> dict[Event, Zeros]:
         """Zeros of the functions of some events: each with an even share of the budget, then with what is left."""
         reserve = int((1.0 - _SEARCH) * self.spectra.left)
         found: dict[Event, Zeros] = {}
         for number, event in enumerate(events):
             share = (self.spectra.left - reserve) // (len(events) - number)
-            found[event] = self._zeros(event, idle[event], self.spectra.left - share)
+            found[event] = self._zeros(event, throughout, self.spectra.left - share)
         for event in events:
             if found[event].spent:
-                found[event] = self._zeros(event, idle[event], reserve)
+                found[event] = self._zeros(event, throughout, reserve)
         return found
 
-    def _zeros(self, event: Event, idle: int, spare: int) -> Zeros:
-        spectra = self.spectra
+    def _zeros(self, event: Event, throughout: Throughout, spare: int) -> Zeros:
+        spectra, idle = self.spectra, throughout.idle[event]
         return find_zeros(
             lambda places: spectra.function(places, event, idle),
             self.a,
             self.b,
             error=lambda places: spectra.function_error(places, event, idle),
             left=lambda: spectra.left - spare,
-            skip=spectra.without_pair if event is Event.PAIR and not self.conservative else None,
+            skip=spectra.without_pair if event is Event.PAIR and not throughout.conservative else None,
         )
 
-    def _roots(self, event: Event, idle: int, found: Zeros) -> list[Root]:
-        self.spent |= found.spent or self.spectra.left <= 0
+    def _roots(self, event: Event, throughout: Throughout, found: Zeros) -> list[Root]:
+        report, spectra = self.report, self.spectra
+        report.spent |= found.spent or spectra.left <= 0
         if not found.spent:
             for piece in found.unresolved:
-                self._leave(f"the multipliers do not depend smoothly on the parameter {self._between(piece)}")
-        if not self.spent:  # or they were not looked for
+                report.leave(f"the multipliers do not depend smoothly on the parameter {self._between(piece)}")
+        if not report.spent:  # or they were not looked for
             for piece in found.missing:
-                self._leave(f"there are no matrices {self._between(piece)}, or only in part")
+                report.leave(f"there are no matrices {self._between(piece)}, or only in part")
         roots = []
         for left, right in found.changes:
-            if self.spectra.left <= 0:
-                self.spent = True
+            if spectra.left <= 0:
+                report.spent = True
                 break
-            if event is Event.PAIR and not self.conservative and self.spectra.without_pair(left, right):
+            if event is Event.PAIR and not throughout.conservative and spectra.without_pair(left, right):
                 continue
-            if left == right and self.spectra.distances(left, event)[1][0] > _TELLING:
-                if self.spectra.clear(left):
-                    continue  # two real multipliers with product 1
-                self._leave(f"{LOST}, at {self.shown(left):.9g}")  # zero only by rounding
+            if left == right and spectra.factor_sizes(left, event)[1][0] > _TELLING:
+                if not spectra.clear(left):  # or two real multipliers have product 1
+                    report.leave(f"{LOST}, at {self.shown(left):.9g}")  # zero only by rounding
                 continue
-            place = left if left == right else self._root(event, idle, left, right)
-            reach = 4.0 * _EPSILON * abs(place)
-            roots.append(Root(place, max(place - reach, self.a), min(place + reach, self.b), event, False))
+            idle = throughout.idle[event]
+            roots.append(Root(left, left, left, event) if left == right else self._root(event, idle, left, right))
         return roots + [Root(0.5 * a + 0.5 * b, a, b, event, True) for a, b in found.touches]
 
-    def _root(self, event: Event, idle: int, left: float, right: float) -> float:
+    def _root(self, event: Event, idle: int, left: float, right: float) -> Root:
         reference = float(self.spectra.function(np.array([left, right]), event, idle)[1].max())
 
         def value(place: float) -> float:
             signs, logs = self.spectra.function(np.array([place]), event, idle)
             return float(signs[0] * np.exp(logs[0] - reference)) if np.isfinite(signs[0]) else 0.0
 
-        most = min(200, max(self.spectra.left, 1))
-        return float(brentq(value, left, right, xtol=5e-324, rtol=4 * _EPSILON, maxiter=most, disp=False))
+        return rooted(self.spectra, value, left, right, event)
 
     def _between(self, piece: Interval) -> str:
         return between(*map(self.shown, piece))
-
-    def _leave(self, remark: str) -> None:
-        self.open = True
-        self.remarks.append(remark)

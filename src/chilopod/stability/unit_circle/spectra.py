@@ -13,13 +13,15 @@ from scipy.linalg import matrix_balance
 
 from chilopod.errors import AnalysisError
 from chilopod.labels import Labelled
+from chilopod.stability.spectrum.errors import DRAWS, SAFETY, disturbed
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 Matrices = Callable[[Array], tuple[Array, Array]]
+"""``matrices(values)``, values of shape (k,), gives real matrices, shape (k, m, m), and bounds on the errors of their
+entries: relative, shape (k,), or each, shape (k, m, m). It raises AnalysisError, or gives NaN, where there is no
+matrix, and may be asked for the same value twice."""
 
-_COPIES = 2
-_SAFETY = 16.0
 _ROUNDING = 2.0 * np.finfo(float).eps
 _SMALLEST = -1e300  # logarithm of zero
 _LARGEST = 1e150  # modulus beyond which multipliers are all the same
@@ -37,42 +39,53 @@ class Event(Labelled):
     PAIR = "pair", "a complex pair passes the unit circle"
 
 
+TARGETS = {Event.MINUS: -1.0, Event.PLUS: 1.0}
+
+
+def distances(nu: ComplexArray, event: Event) -> Array:
+    """Distances of multipliers from where they are critical at an event: from -1, from +1, or from the circle."""
+    return np.asarray(np.abs(np.abs(nu) - 1.0) if event is Event.PAIR else np.abs(nu - TARGETS[event]))
+
+
 class Spectra:
     """Eigenvalues of a family of matrices M, each computed once.
 
-    Errors are found by changing M at random by what it may be wrong by (Kenney & Laub, SIAM J. Sci. Comput. 15, 1994):
-    that is right for simple and for defective eigenvalues alike. Of a relative error, an entry may be wrong by that
-    times the geometric mean of the largest entries of its row and its column, the states being in units that balance M:
-    that does not depend on the units the states came in, and a small multiplier beside a huge one is not lost where the
-    matrix keeps them apart.
+    Errors are found by changing M at random by what it may be wrong by (:mod:`chilopod.stability.spectrum.errors`). An
+    entry with a relative error is off by that times the geometric mean of the largest entries of its row and its
+    column, the states being in units that balance M: that does not depend on the units the states came in, and a small
+    multiplier beside a huge one is not lost where the matrix keeps them apart.
 
     Parameters
     ----------
     matrices
-        ``matrices(values)`` gives M, shape (k, m, m), and bounds on its error: relative, shape (k,), or of every entry,
-        shape (k, m, m). It raises AnalysisError, or gives NaN, where there is none. Asked twice for the same value
-        where errors matter.
+        The family; values at which errors matter are asked for twice.
     budget
-        At how many values M may be asked for.
+        Number of values at which M may be asked for.
     affordable
         How many more matrices can be had, where that is for their cost to say.
+
+    Attributes
+    ----------
+    values
+        The values at which there is a matrix, in order.
+    size
+        Number of eigenvalues; 0 as long as no matrix is known.
     """
 
     def __init__(self, matrices: Matrices, budget: int, affordable: Callable[[], int] | None = None) -> None:
+        self.values: list[float] = []
+        self.size = 0
         self._matrices = matrices
         self._budget = budget
         self._affordable = affordable
-        self._known: dict[float, ComplexArray] = {}
+        self._known: dict[float, ComplexArray | None] = {}
         self._stretch: dict[float, float] = {}
         self._disturbed: dict[float, ComplexArray] = {}
-        self._values: list[float] = []
         self._units: Array | None = None
-        self._size: int | None = None
-        self._entrywise = False
 
     @property
     def evaluations(self) -> int:
-        """At how many values M was asked for."""
+        """Number of values at which M was asked for."""
         return len(self._known)
 
     @property
@@ -81,59 +94,36 @@ class Spectra:
         left = self._budget - len(self._known)
         return left if self._affordable is None else min(left, self._affordable())
 
-    @property
-    def size(self) -> int:
-        """Number of eigenvalues; 0 as long as no matrix is known."""
-        return self._size or 0
-
-    @property
-    def values(self) -> list[float]:
-        """The values at which there is a matrix, in order."""
-        return self._values
-
     def at(self, values: Array) -> ComplexArray:
         """Eigenvalues by falling modulus, shape (k, m); NaN where there is no matrix."""
         wanted = values.tolist()
         missing = sorted({value for value in wanted if value not in self._known})
         if missing:
-            self._compute(np.array(missing))
-        found = np.full((values.size, self.size), np.nan + 0j)
-        for row, value in zip(found, wanted, strict=True):
-            if self._known[value].size:
-                row[:] = self._known[value]
-        return found
+            self._compute(missing)
+        none = np.full(self.size, np.nan + 0j)
+        each = [self._known[value] for value in wanted]
+        return np.array([none if nu is None else nu for nu in each]).reshape(len(wanted), self.size)
 
-    def _compute(self, values: Array) -> None:
-        matrices, _ = self._ask(values)
-        here = np.isfinite(matrices).all(axis=(1, 2))
-        for value in values[~here].tolist():
-            self._known[value] = np.empty(0, dtype=np.complex128)
-        if not here.any():
+    def _compute(self, values: list[float]) -> None:
+        self._known.update(dict.fromkeys(values))
+        found = self._ask(values)
+        if not found:
             return
-        balanced = self._balanced(matrices[here])
-        nu = _eigenvalues(balanced)
-        stretch = _stretches(balanced)
-        for value, row, log in zip(values[here].tolist(), nu, stretch.tolist(), strict=True):
-            self._known[value] = row
-            self._stretch[value] = log
-            bisect.insort(self._values, value)
+        balanced = self._balanced(np.array([matrix for _, matrix, _ in found]))
+        self.size = balanced.shape[-1]
+        for (value, _, _), nu, stretch in zip(found, _eigenvalues(balanced), _stretches(balanced), strict=True):
+            self._known[value] = nu
+            self._stretch[value] = float(stretch)
+            bisect.insort(self.values, value)
 
-    def _ask(self, values: Array) -> tuple[Array, Array]:
-        """Matrices and errors; NaN at the values where there are none."""
+    def _ask(self, values: list[float]) -> list[tuple[float, Array, Array]]:
+        """The values at which there is a matrix, with the matrix and its error."""
         try:
-            matrices, errors = self._matrices(values)
+            matrices, errors = self._matrices(np.array(values))
         except AnalysisError:
-            if values.size == 1:
-                m = self.size or 1
-                return np.full((1, m, m), np.nan), np.full((1, m, m) if self._entrywise else 1, np.nan)
-            halves = [self._ask(part) for part in np.array_split(values, 2)]
-            return _joined([half[0] for half in halves]), _joined([half[1] for half in halves])
-        matrices = np.asarray(matrices, dtype=np.float64)
-        errors = np.asarray(errors, dtype=np.float64)
-        if np.isfinite(matrices).all(axis=(1, 2)).any():
-            self._size = matrices.shape[-1]
-            self._entrywise = errors.ndim == 3
-        return matrices, errors if errors.ndim == 3 else np.broadcast_to(errors, values.shape)
+            middle = (len(values) + 1) // 2
+            return self._ask(values[:middle]) + self._ask(values[middle:]) if len(values) > 1 else []
+        return [each for each in zip(values, matrices, errors, strict=True) if np.isfinite(each[1]).all()]
 
     def _balanced(self, matrices: Array) -> Array:
         """Matrices with the states in units in which rows and columns are of the same size; the same for all."""
@@ -148,11 +138,11 @@ class Spectra:
     def exists(self, value: float) -> bool:
         """Whether there is a matrix at a value; asked for if that is not known."""
         self.at(np.array([value]))
-        return self._known[value].size > 0
+        return self._known[value] is not None
 
     def holes(self, low: float, high: float) -> bool:
         """Whether there was no matrix somewhere between two values."""
-        return any(low < value < high and not nu.size for value, nu in self._known.items())
+        return any(low < value < high and nu is None for value, nu in self._known.items())
 
     def without_pair(self, low: float, high: float) -> bool:
         """Whether all complex multipliers are clear of the circle between two values, as far as those in between that
@@ -160,7 +150,7 @@ class Spectra:
 
         The bialternate product also vanishes where two real multipliers have product 1.
         """
-        values = self._values[bisect.bisect_left(self._values, low) : bisect.bisect_right(self._values, high)]
+        values = self.values[bisect.bisect_left(self.values, low) : bisect.bisect_right(self.values, high)]
         if len(values) < 2:
             return False
         nu = self.at(np.array(values))
@@ -172,30 +162,28 @@ class Spectra:
         least, most = found.min(axis=0), found.max(axis=0)
         return bool(((2.0 * least - most > 0.0) | (2.0 * most - least < 0.0)).all())
 
-    def smallest(self, value: float, event: Event) -> float:
-        """Size of the smallest factor of the function of an event."""
-        return float(np.abs(factors(self.at(np.array([value])), event)).min())
-
     def disturbed(self, values: Array) -> ComplexArray:
-        """Eigenvalues of matrices whose entries are changed by what they may be wrong by, shape (k, copies, m)."""
+        """Eigenvalues of matrices whose entries are changed by what they may be wrong by, shape (k, draws, m); NaN
+        where there is no matrix."""
         missing = sorted({value for value in values.tolist() if value not in self._disturbed})
         if missing:
             self.at(np.array(missing))
-            matrices, errors = self._ask(np.array(missing))
-            m = matrices.shape[-1]
-            balanced = self._balanced(matrices)
-            rows, columns = np.abs(balanced).max(axis=2), np.abs(balanced).max(axis=1)
-            amounts = np.nan_to_num(np.abs(errors), nan=0.0, posinf=1.0)
-            relative = np.full(len(missing), _ROUNDING) + (0.0 if self._entrywise else amounts)
-            wrong = relative[:, None, None] * np.sqrt(rows)[:, :, None] * np.sqrt(columns)[:, None, :]
-            if self._entrywise:
-                wrong = wrong + self._balanced(amounts)
-            signs = np.random.default_rng(m).choice(np.array([-1.0, 1.0]), size=(_COPIES, m, m))
-            changed = balanced[:, None] + wrong[:, None] * signs
-            for value, rows in zip(missing, changed, strict=True):
-                finite = np.isfinite(rows).all()
-                self._disturbed[value] = _eigenvalues(rows) if finite else np.full((_COPIES, self.size), np.nan + 0j)
+            for value, matrix, error in self._ask(missing):
+                copies = disturbed(*self._with_error(matrix, error))
+                if np.isfinite(copies).all():
+                    self._disturbed[value] = _eigenvalues(copies)
+            for value in missing:
+                self._disturbed.setdefault(value, np.full((DRAWS, self.size), np.nan + 0j))
         return np.array([self._disturbed[value] for value in values.tolist()])
+
+    def _with_error(self, matrix: Array, error: Array) -> tuple[Array, Array]:
+        """A matrix in units that balance it, and the errors of its entries."""
+        balanced = self._balanced(matrix)
+        rows, columns = np.abs(balanced).max(axis=1), np.abs(balanced).max(axis=0)
+        error = np.nan_to_num(np.abs(error), nan=0.0, posinf=1.0)
+        spread = np.sqrt(rows)[:, None] * np.sqrt(columns)
+        relative = error.ndim == 0
+        return balanced, (_ROUNDING + error) * spread if relative else _ROUNDING * spread + self._balanced(error)
 
     def margins(self, value: float) -> Array:
         """By how much each multiplier is outside the circle (see :func:`margins`), falling, shape (m,)."""
@@ -204,17 +192,17 @@ class Spectra:
     def margin_errors(self, value: float) -> Array:
         """Bounds on the errors of :meth:`margins`."""
         moved = margins(self.disturbed(np.array([value]))[0]) - self.margins(value)
-        return np.asarray(_SAFETY * np.abs(moved).max(axis=0) + _ROUNDING)
+        return np.asarray(SAFETY * np.abs(moved).max(axis=0) + _ROUNDING)
 
     def clear(self, value: float) -> bool:
         """Whether all multipliers are off the circle by more than their errors."""
         return bool((np.abs(self.margins(value)) > self.margin_errors(value)).all())
 
-    def distances(self, value: float, event: Event) -> tuple[Array, Array]:
+    def factor_sizes(self, value: float, event: Event) -> tuple[Array, Array]:
         """Sizes of the factors of the function of an event, rising, and what they may be wrong by."""
         sizes = np.sort(np.abs(factors(self.at(np.array([value])), event)), axis=-1)
         moved = np.sort(np.abs(factors(self.disturbed(np.array([value])), event)), axis=-1)[0]
-        return sizes[0], np.asarray(_SAFETY * np.abs(moved - sizes).max(axis=0) + _ROUNDING)
+        return sizes[0], np.asarray(SAFETY * np.abs(moved - sizes).max(axis=0) + _ROUNDING)
 
     def function(self, values: Array, event: Event, idle: int) -> tuple[Array, Array]:
         """The function that changes sign at an event, as signs and logarithms, shapes (k,).
@@ -248,15 +236,7 @@ class Spectra:
             with np.errstate(divide="ignore"):
                 moved = np.log(np.abs(signs * np.exp(logs - top) - other_signs * np.exp(other_logs - top)))
             largest = np.fmax(largest, moved + top)
-        return np.asarray(largest - self._bounds(values, event) + np.log(_SAFETY))
-
-
-def _joined(parts: list[Array]) -> Array:
-    """Arrays of matrices, or of numbers, one behind the other; NaN of any shape among them."""
-    shape = max((part.shape[1:] for part in parts), key=len)
-    shape = max(part.shape[1:] for part in parts if part.ndim == len(shape) + 1)
-    filled = [part if part.shape[1:] == shape else np.full((len(part), *shape), np.nan) for part in parts]
-    return np.concatenate(filled)
+        return np.asarray(largest - self._bounds(values, event) + np.log(SAFETY))
 
 
 def margins(nu: ComplexArray) -> Array:

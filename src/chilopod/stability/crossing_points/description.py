@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.stability.capabilities import SystemLike, is_autonomous
-from chilopod.stability.course import TARGETS, critical_multipliers
-from chilopod.stability.floquet import Spectrum, phased, spectrum
+from chilopod.stability.crossing_points.place import critical_multipliers
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import NormalForm
 from chilopod.stability.orbits import Orbit
@@ -22,10 +21,11 @@ from chilopod.stability.points import (
     kind_at_plus_one,
     with_coefficients,
 )
+from chilopod.stability.spectrum.eigenvalues import Spectrum, phased, spectrum
 from chilopod.stability.symmetry.equivariants import SymmetricCrossing, symmetric_crossing
 from chilopod.stability.symmetry.isotypic import Block
-from chilopod.stability.unit_circle.crossings import Crossing
-from chilopod.stability.unit_circle.spectra import Event
+from chilopod.stability.unit_circle.critical import Crossing
+from chilopod.stability.unit_circle.spectra import TARGETS, Event
 
 ComplexArray = NDArray[np.complex128]
 
@@ -73,9 +73,10 @@ def described(
     spec = spectrum(orbit.image)
     critical = critical_multipliers(spec, crossing)
     nu = complex(spec.values[critical[0]])
-    mode, left = phased(spec.right[:, critical[0]], spec.left[:, critical[0]])
-    size = _mean_size(system, orbit, mode)
-    mode, left = mode / size, left * size
+    mode, left = spec.right[:, critical[0]], spec.left[:, critical[0]]
+    peak = mode[np.abs(mode).argmax()]
+    scale = np.abs(peak) / peak / _mean_size(system, orbit, mode)
+    mode, left = mode * scale, left / scale.conjugate()
     frequency, k = 0.0, orbit.image.returns
     if crossing.event is Event.PAIR:
         angle = float(np.angle(np.exp(1j * k * np.angle(nu))))
@@ -171,7 +172,5 @@ def _modes(
         return spec.right[:, critical]
     values, vectors = np.linalg.eig(block.reduced(orbit.image.jacobian))
     eigenvector = vectors[:, np.abs(values - spec.values[critical[0]]).argmin()]
-    modes = np.stack([block.mode(eigenvector, branch.direction) for branch in symmetry.branches], axis=1)
-    peaks = modes[np.abs(modes).argmax(axis=0), range(modes.shape[1])]
-    unit: ComplexArray = modes * (np.abs(peaks) / peaks) / np.linalg.norm(modes, axis=0)
-    return unit
+    modes = phased(np.stack([block.mode(eigenvector, branch.direction) for branch in symmetry.branches], axis=1))
+    return np.asarray(modes / np.linalg.norm(modes, axis=0))

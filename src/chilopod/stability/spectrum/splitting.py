@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
+from chilopod.stability.spectrum.errors import disturbed
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -44,7 +45,7 @@ def split_product(factors: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]
     logarithms
         ln|eigenvalue| + i angle, by falling modulus, shape (n,).
     vectors
-        Unit eigenvectors as columns, the largest entry real and positive, shape (n, n).
+        Unit eigenvectors as columns, shape (n, n).
 
     Raises
     ------
@@ -82,9 +83,7 @@ def split_product(factors: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]
         vectors.append(columns)
     log_all, vec_all = np.concatenate(logarithms), np.hstack(vectors)
     order = np.argsort(-log_all.real, kind="stable")
-    vec_all = vec_all[:, order]
-    peaks = vec_all[np.abs(vec_all).argmax(axis=0), range(n)]
-    return log_all[order], vec_all * (np.abs(peaks) / peaks) / np.linalg.norm(vec_all, axis=0)
+    return log_all[order], vec_all[:, order]
 
 
 def split_leading(factors: Sequence[Array], count: int) -> tuple[ComplexArray, ComplexArray]:
@@ -97,6 +96,21 @@ def split_leading(factors: Sequence[Array], count: int) -> tuple[ComplexArray, C
     restricted = [after.T @ f @ before for f, before, after in zip(factors, bases, following, strict=True)]
     logarithms, vectors = split_product(restricted)
     return logarithms, bases[0] @ vectors
+
+
+def split_with_error(
+    factors: Sequence[Array], errors: Sequence[Array], count: int | None = None
+) -> tuple[ComplexArray, ComplexArray, Array]:
+    """The logarithms and eigenvectors of all or the ``count`` leading directions, and how far the logarithms move when
+    the factors change by their errors."""
+
+    def split(factors: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]:
+        return split_product(factors) if count is None else split_leading(factors, count)
+
+    logarithms, vectors = split(factors)
+    # A draw costs as much as the result: two have to do.
+    others = np.array([split(each)[0] for each in disturbed(np.array(factors), np.array(errors), draws=2)])
+    return logarithms, vectors, np.abs(logarithms[:, None] - others[:, None, :]).min(axis=2).max(axis=0)
 
 
 def _inverses(factors: Sequence[Array]) -> list[Array] | None:

@@ -16,21 +16,22 @@ from chilopod.flows.balance import numerical_balance
 from chilopod.stability.branches.fold import Fold
 from chilopod.stability.budget import UserCode
 from chilopod.stability.capabilities import Family
-from chilopod.stability.course import Course, place_error
-from chilopod.stability.described import Formed, described
-from chilopod.stability.extent import Extent, extent
+from chilopod.stability.crossing_points.description import Formed, described
+from chilopod.stability.crossing_points.place import Course, place_error
+from chilopod.stability.crossing_points.singular import past_singular
 from chilopod.stability.normal_forms.normal_form import normal_form as normal_form_of
 from chilopod.stability.orbit_blocks import crossings_in, orbit_blocks
 from chilopod.stability.orbits import Orbit, bounded, from_known
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import ReturnMap, returned_states
-from chilopod.stability.samples import Samples
 from chilopod.stability.scales import sizes
+from chilopod.stability.search.extent import Extent, extent
+from chilopod.stability.search.samples import Samples
 from chilopod.stability.shown import Result, axes_for, columns, dataset, rows, said
 from chilopod.stability.shown import bounded as bounded_text
-from chilopod.stability.singular import past_singular
 from chilopod.stability.symmetry.isotypic import Block
-from chilopod.stability.unit_circle.crossings import Crossing, Crossings, SearchStatus, find_crossings
+from chilopod.stability.unit_circle.critical import Crossing
+from chilopod.stability.unit_circle.crossings import Crossings, SearchStatus, find_crossings
 from chilopod.stability.unit_circle.spectra import Event, Matrices
 
 if TYPE_CHECKING:

@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.course import SAFETY, Course
-from chilopod.stability.floquet import spectrum
+from chilopod.stability.crossing_points.place import SAFETY, Course, Sample
 from chilopod.stability.orbits import Orbit
 from chilopod.stability.returns import ReturnMap
-from chilopod.stability.samples import Sample
-from chilopod.stability.unit_circle.crossings import Crossing
+from chilopod.stability.spectrum.eigenvalues import spectrum
+from chilopod.stability.unit_circle.critical import Crossing
 from chilopod.stability.unit_circle.spectra import Event
 
 Array = NDArray[np.float64]
@@ -73,7 +72,7 @@ def past_singular(course: Course, crossing: Crossing, bounded: Bounded) -> Regul
     place = crossing.value + reach * found.place
     orbit = bounded(place, found.orbit, found.orbit_error, found.beside.image)
     spec = spectrum(orbit.image)
-    uncertain = float(spec.error[np.abs(spec.values - 1.0).argmin()])
+    uncertain = float(spec.error[spec.nearest(1.0)])
     return Regular(place, bound + SAFETY * uncertain * reach / found.slope, found.orbit, orbit)
 
 

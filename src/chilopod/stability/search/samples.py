@@ -5,16 +5,14 @@ from __future__ import annotations
 import bisect
 import contextlib
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError, in_words
-from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.budget import Budget, SpentError, UserCode, UserError
 from chilopod.stability.capabilities import Family, SystemLike, is_autonomous
-from chilopod.stability.floquet import return_multipliers
+from chilopod.stability.crossing_points.place import Sample
 from chilopod.stability.orbits import Orbit, find_orbit, from_known, known_state
 from chilopod.stability.returns import ReturnMap, return_map, return_maps, section_at
 from chilopod.stability.scales import sizes
@@ -41,27 +39,6 @@ _BENT = 0.3  # of the distance of two orbits: how far from the straight line the
 _TOUCHING = 0.25  # of a multiplier's distance from +1: straight lines that meet nearer to it may touch it
 _MERGED = 1e-5  # of the interval: a gap in which they still do
 _JUMP = 0.3  # of the orbit between prediction and correction, relative to its size
-
-
-@dataclass(frozen=True)
-class Sample(ReadOnlyArrays):
-    """The return map on the orbit at a value of the parameter."""
-
-    value: float
-    orbit: Array
-    image: ReturnMap
-
-    @property
-    def off_plus_one(self) -> float:
-        """Distance of the return map's multipliers from +1, that along the motion left aside."""
-        return float(np.abs(return_multipliers(self.image) - 1.0).min(initial=np.inf))
-
-    @property
-    def beside_plus_one(self) -> float:
-        """Signed distance of the nearest real multiplier from +1; NaN if a pair is nearer."""
-        off = return_multipliers(self.image) - 1.0
-        nearest = complex(off[np.abs(off).argmin()]) if off.size else np.nan
-        return nearest.real if nearest.imag == 0.0 else np.nan
 
 
 def _touches(first: Sample, left: Sample, right: Sample, last: Sample) -> bool:

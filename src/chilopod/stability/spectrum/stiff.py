@@ -8,22 +8,15 @@ Russell and Van Vleck, *SIAM Journal on Numerical Analysis* 34, 402, 1997).
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Sequence
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.flows.balance import numerical_balance
 from chilopod.flows.implicit.flow import Stretched
-from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.capabilities import FlowsFrames, SystemLike, is_autonomous
-from chilopod.stability.orbits import Orbit
-from chilopod.stability.returns import flow_with_error
-from chilopod.stability.scales import sizes
-from chilopod.stability.splitting import intersection, split_leading
+from chilopod.stability.returns import ReturnMap
+from chilopod.stability.spectrum.cut import Cut, equal_cut, section_basis, turn_in_units
+from chilopod.stability.spectrum.splitting import intersection, split_with_error
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -39,76 +32,11 @@ _SAME = 1e-8  # of the logarithms in a part: two computations agree
 _NOISE = 1e-12  # of the largest of them, likewise
 _HALVINGS = 200  # in a pass, of parts where they do not
 _SHORTENINGS = 100
-_LEFT, _APART = (
-    1e-12,
-    1e-4,
-)  # of directions that decay, over a short time: what is above round-off, and tells them apart
+_LEFT, _APART = 1e-12, 1e-4  # stretch over a short time that is above round-off, and that tells directions apart
 
 
-@dataclass(frozen=True)
-class Cut(ReadOnlyArrays):
-    """A return in equal parts.
-
-    Attributes
-    ----------
-    times, states
-        Of the borders, shapes (parts + 1,) and (parts + 1, n).
-    sections
-        Orthonormal bases in the borders: of the plane across the motion where the system does not depend on time.
-    factors
-        Derivatives of the flow over the parts in these bases; the last one with the symmetry in time.
-    errors
-        Bounds on the errors of their entries.
-    basis
-        The first section in the units of the states.
-    """
-
-    times: Array
-    states: Array
-    sections: Sequence[Array]
-    factors: Sequence[Array]
-    errors: Sequence[Array]
-    basis: Array
-
-
-def disturbed(factors: Sequence[Array], errors: Sequence[Array]) -> list[Array]:
-    """Factors that are off by their errors, with signs by chance."""
-    random = np.random.default_rng(0)
-    return [f + e * random.choice([-1.0, 1.0], f.shape) for f, e in zip(factors, errors, strict=True)]
-
-
-def _cut(system: FlowsFrames, orbit: Orbit, units: Array) -> Cut:
-    times = np.linspace(0.0, orbit.image.period / orbit.image.returns, _PARTS + 1)
-    states, factors, errors = [orbit.state], [], []
-    for t0, t1 in itertools.pairwise(times.tolist()):
-        state, factor, error = flow_with_error(system, states[-1].copy(), t0, t1)
-        states.append(state)
-        factors.append(factor * units / units[:, None])
-        errors.append(np.broadcast_to(error, factor.shape) * units / units[:, None])
-    turn = _turn(system, units)
-    factors[-1], errors[-1] = turn @ factors[-1], np.abs(turn) @ errors[-1]
-    sections = [_section(system, state, units) for state in states[:-1]]
-    sections.append(sections[0])
-    borders = list(itertools.pairwise(sections))
-    factors = [after.T @ f @ before for f, (before, after) in zip(factors, borders, strict=True)]
-    errors = [np.abs(after.T) @ e @ np.abs(before) for e, (before, after) in zip(errors, borders, strict=True)]
-    return Cut(times, np.array(states), sections, factors, errors, units[:, None] * sections[0])
-
-
-def _turn(system: SystemLike, units: Array) -> Array:
-    return np.eye(units.size) if system.symmetry is None else system.symmetry * units / units[:, None]
-
-
-def _section(system: SystemLike, state: Array, units: Array) -> Array:
-    """Orthonormal basis of the plane across the motion, shape (n, n-1), or of the whole space."""
-    if not is_autonomous(system):
-        return np.eye(units.size)
-    basis: Array = np.linalg.svd((np.asarray(system.velocity(state)) / units)[None])[2][1:].T
-    return basis
-
-
-def split_stiff(system: FlowsFrames, orbit: Orbit) -> tuple[ComplexArray, ComplexArray, Array, Array]:
-    """Logarithms of the eigenvalues of the return map, its eigenvectors in a basis, this basis, and how far the
+def split_stiff(system: FlowsFrames, x: Array, image: ReturnMap) -> tuple[ComplexArray, ComplexArray, Array]:
+    """Logarithms of the eigenvalues of the return map at a state on the orbit, its eigenvectors, and how far the
     logarithms move with the errors.
 
     Directions that the derivative of the flow resolves are split by it; the others, which have to be real and of
@@ -120,14 +48,8 @@ def split_stiff(system: FlowsFrames, orbit: Orbit) -> tuple[ComplexArray, Comple
     AnalysisError
         If they are not.
     """
-    image = orbit.image
-    # The derivative on a section may be nothing but round-off; an orbit that moves has sizes of its own.
-    if is_autonomous(system):
-        units = sizes(system, orbit.state, image.period / image.returns)
-    else:
-        units = numerical_balance(image.jacobian)
-    cut = _cut(system, orbit, units)
-    frame, logarithms, signs, unsure = _carried(system, cut, units)
+    cut = equal_cut(system, x, image, _PARTS)
+    frame, logarithms, signs, unsure = _carried(system, cut)
     total, n = logarithms.sum(axis=0), logarithms.shape[1]
     deep = np.flatnonzero((logarithms < _DEEPEST).any(axis=0))
     slow = int(deep[0]) if deep.size else n
@@ -138,20 +60,18 @@ def split_stiff(system: FlowsFrames, orbit: Orbit) -> tuple[ComplexArray, Comple
     modes: list[ComplexArray] = []
     moved = unsure.copy()
     if slow:
-        leading, vectors = split_leading(cut.factors, slow)
-        others = split_leading(disturbed(cut.factors, cut.errors), slow)[0]
-        moved[:slow] = np.abs(leading[:, None] - others).min(axis=1)
+        leading, vectors, moved[:slow] = split_with_error(cut.factors, cut.errors, slow)
         values, modes = [leading], [vectors]
     for k in range(slow, n):
         values.append(np.array([total[k] + (0.0 if signs[k] > 0 else 1j * np.pi)]))
-        modes.append(intersection(frame[:, : k + 1], _fastest(system, cut, units, k), 1).astype(np.complex128))
-    return np.concatenate(values), np.hstack(modes), cut.basis, moved
+        modes.append(intersection(frame[:, : k + 1], _fastest(system, cut, k), 1).astype(np.complex128))
+    return np.concatenate(values), np.asarray(cut.basis @ np.hstack(modes), dtype=np.complex128), moved
 
 
-def _carried(system: FlowsFrames, cut: Cut, units: Array) -> tuple[Array, Array, Array, Array]:
+def _carried(system: FlowsFrames, cut: Cut) -> tuple[Array, Array, Array, Array]:
     """The frame at time 0 on the section, the logarithms of its stretch in every part, the signs it returns with (0 if
     they were lost), and how unsure the sums of the logarithms are."""
-    n = units.size
+    units, n = cut.units, cut.units.size
     along = 1 if is_autonomous(system) else 0
     frame = np.linalg.qr(np.random.default_rng(0).standard_normal((n, n)))[0]
     before = np.full(n - along, np.inf)
@@ -166,7 +86,7 @@ def _carried(system: FlowsFrames, cut: Cut, units: Array) -> tuple[Array, Array,
             frame, turned = part.frame, np.minimum(turned, part.turned)
             logarithms[k] = part.stretch
             others += part.other
-        frame, upper = _orthonormal(_turn(system, units) @ frame)
+        frame, upper = _orthonormal(turn_in_units(system, units) @ frame)
         logarithms[-1] += np.log(np.diag(upper))
         others += np.log(np.diag(upper))
         total = logarithms[:, along:].sum(axis=0)
@@ -225,7 +145,7 @@ def _orthonormal(matrix: Array) -> tuple[Array, Array]:
     return q * signs, r * signs[:, None]
 
 
-def _fastest(system: SystemLike, cut: Cut, units: Array, k: int) -> Array:
+def _fastest(system: SystemLike, cut: Cut, k: int) -> Array:
     """Orthonormal basis of the directions at time 0 that decay faster than the first k, on the section.
 
     Those which the flow contracts most, over a time so short that they are above round-off still.
@@ -235,8 +155,9 @@ def _fastest(system: SystemLike, cut: Cut, units: Array, k: int) -> Array:
     duration = float(cut.times[-1])
     for _ in range(_SHORTENINGS):
         state, derivative = system.flow(cut.states[0].copy(), 0.0, duration)
-        derivative = derivative * units / units[:, None]
-        stretch, right = np.linalg.svd(_section(system, state, units).T @ derivative @ cut.sections[0])[1:]
+        derivative = derivative * cut.units / cut.units[:, None]
+        after = section_basis(system, state, cut.units)
+        stretch, right = np.linalg.svd(after.T @ derivative @ cut.sections[0])[1:]
         if stretch[k] >= _LEFT * max(1.0, stretch[0]):
             if stretch[k] <= _APART * stretch[k - 1]:
                 return np.asarray(right[k:].T)

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.stability.floquet import Spectrum, spectrum
+from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.returns import ReturnMap
-from chilopod.stability.samples import Sample
-from chilopod.stability.unit_circle.crossings import Crossing
-from chilopod.stability.unit_circle.spectra import Event
+from chilopod.stability.spectrum import errors
+from chilopod.stability.spectrum.eigenvalues import Spectrum, return_multipliers, spectrum
+from chilopod.stability.unit_circle.critical import Crossing
+from chilopod.stability.unit_circle.spectra import TARGETS, Event, distances
 
 Array = NDArray[np.float64]
 
@@ -21,10 +22,28 @@ SAFETY = 1.5
 """Factor on the error of a multiplier, for that of its rate of change."""
 
 _TOUCH_STEP = 1e-3
-_DRAWS = 8
 _EPSILON = float(np.finfo(float).eps)
 
-TARGETS = {Event.MINUS: -1.0, Event.PLUS: 1.0}
+
+@dataclass(frozen=True)
+class Sample(ReadOnlyArrays):
+    """The return map on the orbit at a value of the parameter."""
+
+    value: float
+    orbit: Array
+    image: ReturnMap
+
+    @property
+    def off_plus_one(self) -> float:
+        """Distance of the return map's multipliers from +1, that along the motion left aside."""
+        return float(np.abs(return_multipliers(self.image) - 1.0).min(initial=np.inf))
+
+    @property
+    def beside_plus_one(self) -> float:
+        """Signed distance of the nearest real multiplier from +1; NaN if a pair is nearer."""
+        off = return_multipliers(self.image) - 1.0
+        nearest = complex(off[np.abs(off).argmin()]) if off.size else np.nan
+        return nearest.real if nearest.imag == 0.0 else np.nan
 
 
 @dataclass(frozen=True)
@@ -59,7 +78,7 @@ class Course:
 def critical_multipliers(spec: Spectrum, crossing: Crossing) -> NDArray[np.intp]:
     """Indices of the multipliers that are critical at a crossing, the nearest first."""
     if crossing.event is not Event.PAIR:
-        return np.argsort(np.abs(spec.values - TARGETS[crossing.event]), kind="stable")[: crossing.multiplicity]
+        return np.argsort(distances(spec.values, crossing.event), kind="stable")[: crossing.multiplicity]
     # Of both of a pair, the one asked for first.
     nu = crossing.multiplier
     distance = np.minimum(np.abs(spec.values - nu), np.abs(spec.values - nu.conjugate()))
@@ -84,9 +103,7 @@ def place_error(course: Course, crossing: Crossing, image: ReturnMap) -> float:
             return width + _collision_error(course, crossing, image)
         spec = spectrum(image)
         critical = critical_multipliers(spec, crossing)
-        nu = spec.values[critical]
-        off = np.abs(nu - TARGETS[crossing.event]) if crossing.event is not Event.PAIR else np.abs(np.abs(nu) - 1.0)
-        uncertain = float((spec.error[critical] + off).max())
+        uncertain = float((spec.error[critical] + distances(spec.values[critical], crossing.event)).max())
         slope = _slope(course, crossing, image)
         along = SAFETY * uncertain / slope if slope > 0.0 else np.inf
         if crossing.change == 0 and crossing.multiplicity <= 2:
@@ -127,21 +144,18 @@ def _collision_error(course: Course, crossing: Crossing, image: ReturnMap) -> fl
     difference of nu + 1/nu of two pairs, by how uncertain and how steep it is."""
     matrix = image.jacobian
     error = np.broadcast_to(image.error, matrix.shape) + 4.0 * _EPSILON * np.abs(matrix)
-    random = np.random.default_rng(0)
     here = _collision(matrix, crossing)
-    disturbed = [
-        _collision(matrix + error * random.choice([-1.0, 1.0], matrix.shape), crossing) - here for _ in range(_DRAWS)
-    ]
+    moved = max(abs(_collision(other, crossing) - here) for other in errors.disturbed(matrix, error))
     before, after, apart = course.jacobians(crossing.value)
     slope = abs(_collision(after, crossing) - _collision(before, crossing)) / apart
-    uncertain = 3.0 * float(np.abs(disturbed).max()) + abs(here)
+    uncertain = errors.SAFETY * moved + abs(here)
     return SAFETY * uncertain / slope if slope > 0.0 else np.inf
 
 
 def _collision(matrix: Array, crossing: Crossing) -> float:
     values = np.linalg.eigvals(matrix).astype(np.complex128)
     if crossing.event is not Event.PAIR:
-        near = np.argsort(np.abs(values - TARGETS[crossing.event]))[:2]
+        near = np.argsort(distances(values, crossing.event))[:2]
         return float(np.prod(values[near] - TARGETS[crossing.event]).real)
     sums = values + 1.0 / values
     critical = crossing.multiplier + 1.0 / crossing.multiplier

@@ -1,0 +1,1 @@
+"""Points where multipliers cross the unit circle: place, error bound and description."""

@@ -1,0 +1,159 @@
+"""A return cut into parts, between sections across the motion where a system does not depend on time."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.errors import AnalysisError
+from chilopod.flows.balance import numerical_balance
+from chilopod.stability.capabilities import SystemLike, is_autonomous
+from chilopod.stability.returns import ReturnMap, flow_with_error
+from chilopod.stability.scales import sizes
+from chilopod.stability.spectrum.eigenvalues import normal_basis
+
+Array = NDArray[np.float64]
+
+_WORST_CONDITION = 1e6
+_FEWEST, _MOST = 8, 32768  # parts of moderate condition
+_COMPOSED = 1e-6  # error of the product of the parts, relative to the whole, above which the flow has no parts
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A return in parts.
+
+    Attributes
+    ----------
+    times, states
+        Times and states at the borders, shapes (parts + 1,) and (parts + 1, n).
+    units
+        Sizes of the states, shape (n,).
+    sections
+        Orthonormal bases at the borders, in units: of the plane across the motion where the system does not depend on
+        time, else of the whole space.
+    factors
+        Derivatives of the flow over the parts in these bases; the last one with the symmetry in time.
+    errors
+        Bounds on the errors of their entries.
+    """
+
+    times: Array
+    states: Array
+    units: Array
+    sections: Sequence[Array]
+    factors: Sequence[Array]
+    errors: Sequence[Array]
+
+    @property
+    def basis(self) -> Array:
+        """The first section in the units of the system."""
+        return self.units[:, None] * self.sections[0]
+
+
+@dataclass(frozen=True)
+class _Part:
+    """The derivative of the flow over a part of the return, with the bound on its error, in units; and its end."""
+
+    start: float
+    end: float
+    state: Array
+    factor: Array
+    error: Array
+
+
+def equal_cut(system: SystemLike, x: Array, image: ReturnMap, count: int) -> Cut:
+    """A return from a state on the orbit in equal parts."""
+    units = _units(system, x, image)
+    return _on_sections(system, x, _equal_parts(system, x, image, count, units), units)
+
+
+def moderate_cut(system: SystemLike, x: Array, image: ReturnMap) -> Cut:
+    """A return from a state on the orbit in parts of moderate condition.
+
+    The parts that contract too strongly are halved, and only these: of a relaxation oscillation a few short ones. The
+    return of a map, which has no parts, is taken as a whole.
+
+    Raises
+    ------
+    AnalysisError
+        If no parts are of moderate condition.
+    """
+    units = _units(system, x, image)
+    parts = _equal_parts(system, x, image, _FEWEST, units)
+    if not is_autonomous(system):
+        ratios = units / units[:, None]
+        whole = image.jacobian * ratios
+        product = np.linalg.multi_dot([turn_in_units(system, units), *(part.factor for part in reversed(parts))])
+        if np.abs(product - whole).max() > _COMPOSED * np.abs(whole).max():
+            error = np.nan_to_num(np.broadcast_to(image.error, whole.shape) * ratios)
+            times = np.array([0.0, image.period / image.returns])
+            return Cut(times, np.array([x, image.state]), units, [np.eye(x.size)] * 2, [whole], [error])
+    return _on_sections(system, x, _of_moderate_condition(system, x, parts, units), units)
+
+
+def turn_in_units(system: SystemLike, units: Array) -> Array:
+    """The symmetry in time in units, shape (n, n); the unit matrix where there is none."""
+    return np.eye(units.size) if system.symmetry is None else system.symmetry * units / units[:, None]
+
+
+def section_basis(system: SystemLike, state: Array, units: Array) -> Array:
+    """Orthonormal basis of the plane across the motion, in units, shape (n, n-1), or of the whole space."""
+    if not is_autonomous(system):
+        return np.eye(units.size)
+    return normal_basis(np.asarray(system.velocity(state)) / units)
+
+
+def _units(system: SystemLike, x: Array, image: ReturnMap) -> Array:
+    # The derivative on a section may be nothing but round-off; an orbit that moves has sizes of its own.
+    if is_autonomous(system):
+        return sizes(system, x, image.period / image.returns)
+    return numerical_balance(image.jacobian)
+
+
+def _equal_parts(system: SystemLike, x: Array, image: ReturnMap, count: int, units: Array) -> list[_Part]:
+    parts: list[_Part] = []
+    for start, end in itertools.pairwise(np.linspace(0.0, image.period / image.returns, count + 1).tolist()):
+        parts.append(_part(system, parts[-1].state if parts else x, start, end, units))
+    return parts
+
+
+def _part(system: SystemLike, x: Array, start: float, end: float, units: Array) -> _Part:
+    state, derivative, error = flow_with_error(system, x.copy(), start, end)
+    factor = derivative * units / units[:, None]
+    return _Part(start, end, state, factor, np.broadcast_to(error, factor.shape) * units / units[:, None])
+
+
+def _of_moderate_condition(system: SystemLike, x: Array, parts: list[_Part], units: Array) -> list[_Part]:
+    """Parts of a return, those that contract too strongly cut in halves until they do not."""
+    done: list[_Part] = []
+    left, asked = parts[::-1], len(parts)
+    while left:
+        part = left.pop()
+        if float(np.linalg.cond(part.factor)) < _WORST_CONDITION:
+            done.append(part)
+            continue
+        middle = 0.5 * (part.start + part.end)
+        asked += 2
+        if asked > _MOST or not part.start < middle < part.end:
+            raise AnalysisError("the flow contracts too strongly to be resolved", field="flow")
+        first = _part(system, done[-1].state if done else x, part.start, middle, units)
+        left += [_part(system, first.state, middle, part.end, units), first]
+    return done
+
+
+def _on_sections(system: SystemLike, x: Array, parts: list[_Part], units: Array) -> Cut:
+    states = [x, *(part.state for part in parts)]
+    sections = [section_basis(system, state, units) for state in states[:-1]]
+    sections.append(sections[0])
+    turns = [np.eye(x.size)] * (len(parts) - 1) + [turn_in_units(system, units)]
+    factors, errors = [], []
+    for part, turn, (before, after) in zip(parts, turns, itertools.pairwise(sections), strict=True):
+        factors.append(after.T @ turn @ part.factor @ before)
+        errors.append(np.abs(after.T) @ np.abs(turn) @ part.error @ np.abs(before))
+    times = np.array([0.0, *(part.end for part in parts)])
+    return Cut(times, np.array(states), units, sections, factors, errors)

@@ -1,0 +1,116 @@
+"""Eigenvalues of a return map, with eigenvectors and bounds on their errors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.flows.balance import numerical_balance
+from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.returns import ReturnMap
+from chilopod.stability.spectrum.errors import FIRST_ORDER, eigenvalue_errors, falling_order
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+_EPSILON = float(np.finfo(float).eps)
+_SCALAR = 4.0  # factor on an error that is one number for all entries, which err independently
+
+
+@dataclass(frozen=True)
+class Spectrum(ReadOnlyArrays):
+    """Eigenvalues of a return map with left and right eigenvectors.
+
+    Attributes
+    ----------
+    values
+        Eigenvalues by falling modulus, shape (n,).
+    right, left
+        Unit right eigenvectors as columns, and left ones with left[:, i]^H right[:, i] = 1.
+    error
+        Bound on the error of each value, shape (n,): condition number times the error of the matrix, to first order.
+    """
+
+    values: ComplexArray
+    right: ComplexArray
+    left: ComplexArray
+    error: Array
+
+    def nearest(self, target: complex) -> int:
+        """Index of the eigenvalue nearest to a number."""
+        return int(np.abs(self.values - target).argmin())
+
+
+def spectrum(image: ReturnMap) -> Spectrum:
+    """Eigenvalues of a return map with their condition; without the zero that stands for the motion itself."""
+    into, out_of = _across(image)
+    jacobian = out_of @ image.jacobian @ into
+    # In units in which all entries are alike the errors of the eigenvalue solver are small against every one of them.
+    units = numerical_balance(jacobian)
+    scaled = jacobian * units / units[:, None]
+    values, right = np.linalg.eig(scaled)
+    order = falling_order(values)
+    values, right = values[order].astype(np.complex128), right[:, order].astype(np.complex128)
+    try:
+        left = np.linalg.inv(right).conj().T
+    except np.linalg.LinAlgError:  # a defective matrix: no bound to be had from conditions
+        left = np.full_like(right, np.nan)
+    # The backward error of the eigenvalue solver, whose eigenvectors have length 1.
+    error = 4.0 * _EPSILON * float(np.linalg.norm(scaled)) * np.linalg.norm(left, axis=0)
+    right, left = into @ (units[:, None] * right), out_of.T @ (left / units[:, None])
+    norms = np.linalg.norm(right, axis=0)
+    right, left = right / norms, left * norms
+    # d nu = left^H E right, of which a bound of every entry of E tells the most.
+    if isinstance(image.error, np.ndarray):
+        error += (np.abs(left) * (image.error @ np.abs(right))).sum(axis=0)
+    else:
+        error += _SCALAR * image.error * np.linalg.norm(left, axis=0)
+    error = np.where(np.isfinite(error), error, np.inf)
+    if (error > FIRST_ORDER * np.abs(values[0])).any():
+        off = np.abs(out_of) @ np.broadcast_to(image.error, image.jacobian.shape) @ np.abs(into)
+        error = np.minimum(error, eigenvalue_errors(values, jacobian, off))
+    return Spectrum(values, right, left, error)
+
+
+def return_multipliers(image: ReturnMap) -> ComplexArray:
+    """Eigenvalues of a return map by falling modulus, without the zero that stands for the motion itself."""
+    into, out_of = _across(image)
+    values = np.linalg.eigvals(out_of @ image.jacobian @ into).astype(np.complex128)
+    return values[np.lexsort((-values.imag, -np.abs(values)))]
+
+
+def _across(image: ReturnMap) -> tuple[Array, Array]:
+    """Coordinates on the section of a return map: (n, n-1) from them, and (n-1, n) to them along the motion; two unit
+    matrices where there is no section."""
+    n = image.state.size
+    if image.velocity is None or image.normal is None:
+        return np.eye(n), np.eye(n)
+    # Units in which the motion is across the section, so that its basis can be orthonormal.
+    units = numerical_balance(image.jacobian)
+    basis = normal_basis(image.normal * units)
+    along = np.eye(n) - np.outer(image.velocity, image.normal) / float(image.normal @ image.velocity)
+    return units[:, None] * basis, (basis.T / units) @ along
+
+
+def normal_basis(direction: Array) -> Array:
+    """Orthonormal basis of the plane across a direction, shape (n, n-1)."""
+    return np.asarray(np.linalg.svd(direction[None])[2][1:].T)
+
+
+def phased(vectors: ComplexArray) -> ComplexArray:
+    """Columns, or one vector, turned so that the largest entry is real and positive."""
+    peaks = np.take_along_axis(vectors, np.abs(vectors).argmax(axis=0, keepdims=True), axis=0)
+    return np.asarray(vectors * (np.abs(peaks) / peaks))
+
+
+def counts_outside(values: ComplexArray) -> tuple[int, int, int]:
+    """Number of multipliers beyond -1, beyond +1, and of complex pairs outside the unit circle."""
+    real = np.abs(values.imag) < 1e-9 * np.maximum(1e-3, np.abs(values))
+    outside = np.abs(values) > 1.0
+    return (
+        int((real & (values.real < -1.0)).sum()),
+        int((real & (values.real > 1.0)).sum()),
+        int((~real & outside & (values.imag > 0)).sum()),
+    )

@@ -1,0 +1,66 @@
+"""Errors of eigenvalues and of what is made of them.
+
+Where first-order bounds do not hold, a matrix is changed at random by what its entries may be wrong by, and a result is
+taken to be off by ``SAFETY`` times the largest move that is seen. This is right for simple and for defective
+eigenvalues alike, whose errors no condition number tells. A draw moves a result along its gradient in a random
+direction, which in one case of five is less than a quarter of the root mean square over all directions (Kenney and
+Laub, *SIAM J. Sci. Comput.* 15, 36, 1994); all of ``DRAWS`` are so small in one case of 400 000.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+SAFETY = 4.0
+"""Factor on the largest move seen under random changes."""
+
+DRAWS = 8
+"""Number of random changes."""
+
+FIRST_ORDER = 1e-6
+"""Error, relative to the largest eigenvalue, up to which first-order bounds hold."""
+
+VERDICTS = {True: "stable", False: "unstable", None: "undecided"}
+"""Words for what :func:`stable_within` finds."""
+
+_EPSILON = float(np.finfo(float).eps)
+
+
+def stable_within(values: ComplexArray, bound: float, bounds: Array | float | None = None) -> bool | None:
+    """Stability by multipliers, shape (n,), with a bound on the error of all that are not small, or bounds one by one:
+    True if all lie inside the unit circle by more than it, False if one lies outside by more than its own, None if the
+    errors leave it undecided."""
+    modulus = np.abs(values)
+    if (modulus < 1.0 - bound).all():
+        return True
+    return False if (modulus > 1.0 + (bound if bounds is None else bounds)).any() else None
+
+
+def falling_order(values: ComplexArray) -> NDArray[np.intp]:
+    """Order of eigenvalues by falling modulus; moduli that differ by round-off are equal, and the two of a pair stand
+    together, positive frequency first."""
+    modulus = np.abs(values)
+    relative = np.round(modulus / max(float(modulus.max()), 1e-300), 12)
+    return np.lexsort((-values.imag, -np.round(np.abs(values.imag), 12), -relative))
+
+
+def disturbed(matrix: Array, error: Array, draws: int = DRAWS) -> Array:
+    """Copies of a matrix, or of a stack of matrices, every entry changed by its error with a random sign, shape (draws,
+    ...)."""
+    signs = np.random.default_rng(0).choice(np.array([-1.0, 1.0]), (draws, *matrix.shape))
+    return np.asarray(matrix + error * signs)
+
+
+def eigenvalue_errors(values: ComplexArray, matrix: Array, error: Array) -> Array:
+    """Bounds on the errors of the eigenvalues of a matrix whose entries have errors, shape (n,)."""
+    error = error + 4.0 * _EPSILON * np.abs(matrix)
+    if not np.isfinite(error).all():
+        return np.full(values.size, np.inf)
+    others = np.linalg.eigvals(disturbed(matrix, error))
+    away = np.abs(values[:, None] - others[:, None, :])  # draws, values, others
+    nearest_other, nearest_value = away.min(axis=2), away.min(axis=1)
+    return np.asarray(SAFETY * np.maximum(nearest_other.max(axis=0), nearest_value.max()))
