@@ -41,7 +41,8 @@ from chilopod.stability.orbits import Orbit, find_orbit
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
 from chilopod.stability.returns import ReturnMap, Section
 from chilopod.stability.rhs import from_rhs
-from chilopod.stability.search.locate import Located, locate
+from chilopod.stability.search.locate import locate
+from chilopod.stability.search.located import Located
 from chilopod.stability.shown import Result
 from chilopod.stability.symmetry.equivariants import AxialBranch, SymmetricCrossing, SymmetricKind
 from chilopod.stability.system import PeriodicSystem

@@ -225,7 +225,8 @@ def linear_part(system: Autonomous, x: Array) -> tuple[Array, Array, Array]:
 def matrix_error(system: Autonomous, x: Array, matrix: Array, error: Array) -> Array:
     """How far the derivative may be off, shape (n, n), in a state that is off by its error and by rounding. Where terms
     of f cancel, an entry may be nothing but the rounding of entries as large as the others, in units that balance."""
-    others = [linear_part(system, other)[1:] for other in disturbed(x, error + 4.0 * _EPSILON * np.abs(x))]
+    states = disturbed(x, error + 4.0 * _EPSILON * np.abs(x), draws=4)
+    others = [linear_part(system, other)[1:] for other in states]
     moved = np.max([np.abs(other - matrix) + wrong for other, wrong in others], axis=0)
     units = numerical_balance(matrix)
     ratios = units / units[:, None]
@@ -273,15 +274,15 @@ def hopf_form(system: Autonomous, x: Array, error: Array, frequency: float) -> H
     random = np.random.default_rng(1)
     form = _hopf_form(system, x, matrix, frequency)
     scatter = [
-        _hopf_form(system, other, matrix + off * random.choice([-1.0, 1.0], off.shape), frequency).cubic
+        _hopf_form(system, other, matrix + off * random.choice([-1.0, 1.0], off.shape), frequency, draws=0).cubic
         for other in disturbed(x, error + 4.0 * _EPSILON * np.abs(x))
     ]
     moved = float(np.abs(np.array(scatter).real - form.cubic.real).max())
     return replace(form, error=form.error + SAFETY * moved)
 
 
-def _hopf_form(system: Autonomous, x: Array, matrix: Array, frequency: float) -> HopfForm:
-    """The normal form with a given derivative; of errors, those of rounding and of differences."""
+def _hopf_form(system: Autonomous, x: Array, matrix: Array, frequency: float, draws: int = 2) -> HopfForm:
+    """The normal form with a given derivative; of errors, those of rounding and, by some draws, of differences."""
     units = numerical_balance(matrix)
     values, lefts, rights = scipy.linalg.eig(matrix * units / units[:, None], left=True)
     index = int(np.abs(values - 1j * frequency).argmin())
@@ -311,8 +312,8 @@ def _hopf_form(system: Autonomous, x: Array, matrix: Array, frequency: float) ->
 
     second, mean, cubic, off = bent(quadratic[:, 2])
     error = float(np.abs(left) @ off)
-    if wrong.any():
-        others = [bent(each)[2] for each in disturbed(quadratic[:, 2], wrong[:, 2])]
+    if draws and wrong.any():
+        others = [bent(each)[2] for each in disturbed(quadratic[:, 2], wrong[:, 2], draws)]
         error += SAFETY * float(np.abs(np.array(others) - cubic).max())
     return HopfForm(
         complex(values[index]), mode, left, second / reach**2, mean / reach**2, cubic / reach**3, error / reach**3

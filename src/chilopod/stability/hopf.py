@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.balance import numerical_balance
+from chilopod.stability.branches.fold import Fold
 from chilopod.stability.budget import UserCode
 from chilopod.stability.capabilities import Autonomous, Family, SystemLike, expands_velocity, given_scale
 from chilopod.stability.crossing_points.place import Course, place_error
@@ -31,12 +32,13 @@ from chilopod.stability.equilibria import (
     linear_part,
 )
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
-from chilopod.stability.search.extent import Extent, extent
-from chilopod.stability.search.locate import BUDGET, GRAVITY, Located, checked_interval
+from chilopod.stability.search.locate import checked_interval
+from chilopod.stability.search.located import Found, Located, located
 from chilopod.stability.search.samples import Samples
+from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.system import PeriodicSystem
 from chilopod.stability.unit_circle.critical import Crossing
-from chilopod.stability.unit_circle.crossings import SearchStatus, find_crossings
+from chilopod.stability.unit_circle.crossings import BUDGET, Crossings, find_crossings
 from chilopod.stability.unit_circle.spectra import Event
 
 Array = NDArray[np.float64]
@@ -101,51 +103,29 @@ def locate_hopf(
         start = find_equilibrium(system, equilibrium)
     duration, scale = _duration(start, system.guess_period), _scale(system, start)
     samples = Samples(lambda v: _resting(family(v), duration, scale), start.state, low, high, budget, seconds)
-    here = extent(samples)
-    remarks = [here.ending] if here.ending else []
-    status = SearchStatus.BUDGET if samples.spent else SearchStatus.INCOMPLETE if here.ending else SearchStatus.COMPLETE
-    points: list[BifurcationPoint] = []
-    if here.start < here.end:
-        points, ended, more = _searched(family, samples, here, duration, budget)
-        status, remarks = max(status, ended, key=GRAVITY.index), remarks + more
-    remarks += [
-        f"the equilibrium ends in a fold at {fold.value:.12g} (± {fold.error_bound:.1e}): it meets another one there"
-        for fold in here.folds
-    ]
-    if samples.remarks:
-        status = max(status, SearchStatus.INCOMPLETE, key=GRAVITY.index)
-    said = [_of_equilibria(remark) for remark in [*remarks, *samples.remarks]]
-    return Located(tuple(points), status, tuple(dict.fromkeys(said)), samples.count)
-
-
-def _searched(
-    family: Family, samples: Samples, here: Extent, duration: float, budget: int
-) -> tuple[list[BifurcationPoint], SearchStatus, list[str]]:
-    """The Hopf points of an equilibrium, how the search for them ended, and what else is to be said."""
 
     def matrices(values: Array) -> tuple[Array, Array]:
         found = samples.at(values)
         errors = [_error(autonomous(family(each.value)), each.orbit, samples.size, duration) for each in found]
         return np.stack([each.image.jacobian for each in found]), np.array(errors)
 
-    found = find_crossings(matrices, here.start, here.end, budget=budget, affordable=samples.affordable)
-    points, status, remarks = [], found.status, list(found.remarks)
-    for crossing in found.crossings:
+    def crossings(start: float, end: float) -> list[tuple[Block | None, Crossings]]:
+        return [(None, find_crossings(matrices, start, end, budget=budget, affordable=samples.affordable))]
+
+    def described(crossing: Crossing, _: Block | None) -> list[Found]:
         if crossing.event is Event.PLUS:
-            if not here.explains(crossing.value):
-                remarks.append(f"an eigenvalue is zero at {crossing.value:.9g}: another equilibrium meets this one")
-        elif crossing.collision:
-            remarks.append(f"two pairs meet on the imaginary axis and leave it at {crossing.value:.9g}")
-        else:
-            samples.allow(_POINTS)
-            try:
-                point = _of_map(samples, crossing, matrices, duration)
-            except AnalysisError as error:
-                status = max(status, SearchStatus.INCOMPLETE, key=GRAVITY.index)
-                remarks.append(f"what crosses at {crossing.value:.9g} could not be described: {error}")
-            else:
-                points.append(_described(family, (samples.low, samples.high), point, duration, remarks))
-    return points, status, remarks
+            return [f"an eigenvalue is zero at {crossing.value:.9g}: another equilibrium meets this one"]
+        if crossing.collision:
+            return [f"two pairs meet on the imaginary axis and leave it at {crossing.value:.9g}"]
+        return _described(family, (low, high), _of_map(samples, crossing, matrices, duration), duration)
+
+    found = located(samples, crossings, described, _fold_remark, _POINTS)
+    return replace(found, remarks=tuple(dict.fromkeys(_of_equilibria(remark) for remark in found.remarks)))
+
+
+def _fold_remark(fold: Fold) -> str:
+    where = f"{fold.value:.12g} (± {fold.error_bound:.1e})"
+    return f"the equilibrium ends in a fold at {where}: it meets another one there"
 
 
 def _of_map(
@@ -174,18 +154,16 @@ def _of_map(
     )
 
 
-def _described(
-    family: Family, between: tuple[float, float], point: BifurcationPoint, duration: float, remarks: list[str]
-) -> BifurcationPoint:
-    """A Hopf point with all that f itself tells, or a remark on why there is no more than the map tells."""
+def _described(family: Family, between: tuple[float, float], point: BifurcationPoint, duration: float) -> list[Found]:
+    """A Hopf point with all that f itself tells, or with a remark on why there is no more than the map tells."""
     reason = f"{point.multiplicity // 2} pairs are critical at once"
     if point.multiplicity <= 2:
         try:
-            return _hopf_point(family, between, point, duration)
+            return [_hopf_point(family, between, point, duration)]
         except AnalysisError as error:
             reason = error.problem
-    remarks.append(f"no coefficient at {point.value:.9g}: {reason}")
-    return replace(point, multiplier=1j * point.frequency)
+    remark = f"no coefficient at {point.value:.9g}: {reason}"
+    return [remark, replace(point, multiplier=1j * point.frequency)]
 
 
 def _error(system: Autonomous, x: Array, size: Array, duration: float) -> float:

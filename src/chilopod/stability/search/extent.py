@@ -134,7 +134,7 @@ def _comes_as_a_root(samples: Samples, sample: Sample, fold: Fold, rising: bool)
 def _at_rest(samples: Samples, last: Sample) -> bool:
     """Whether hardly anything of the motion is left where an orbit ends: beyond there is none, and what looks like a
     fold is the same orbit again, half a period later."""
-    if samples.timed:
+    if samples.family.timed:
         return False
     first = _moved(samples, samples.family(samples.low), samples.first.image)
     return _moved(samples, samples.family(last.value), last.image) < _AT_REST * first

@@ -1,12 +1,9 @@
-"""Where a periodic orbit loses or gains stability as one parameter changes, what happens there, and how sure that
-is."""
+"""Search for the points where a periodic orbit loses or gains stability as one parameter changes."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, overload
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.balance import numerical_balance
 from chilopod.stability.branches.fold import Fold
-from chilopod.stability.budget import UserCode
 from chilopod.stability.capabilities import Family
 from chilopod.stability.crossing_points.description import Formed, described
 from chilopod.stability.crossing_points.place import Course, place_error
@@ -25,98 +21,20 @@ from chilopod.stability.orbits import Orbit, bounded, from_known
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import ReturnMap, returned_states
 from chilopod.stability.scales import sizes
-from chilopod.stability.search.extent import Extent, extent
+from chilopod.stability.search.located import Found, Located, located
 from chilopod.stability.search.samples import Samples
-from chilopod.stability.shown import Result, axes_for, columns, dataset, rows, said
 from chilopod.stability.shown import bounded as bounded_text
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.critical import Crossing
-from chilopod.stability.unit_circle.crossings import Crossings, SearchStatus, find_crossings
+from chilopod.stability.unit_circle.crossings import BUDGET, Crossings, find_crossings
 from chilopod.stability.unit_circle.spectra import Event, Matrices
-
-if TYPE_CHECKING:
-    import xarray as xr
-    from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
 
-BUDGET = 5000
-"""Orbits that a search may compute, if not told otherwise."""
-
-_TOUCH = "at {value} a multiplier only touches the unit circle and goes back: nothing changes"
-_GRACE = 0.7  # s, to describe what was found when the time is over
 _DESCRIBING = 400  # return maps to solve for the orbits beside a point
-
-GRAVITY = (SearchStatus.COMPLETE, SearchStatus.CONSERVATIVE, SearchStatus.INCOMPLETE, SearchStatus.BUDGET)
-"""Ways in which a search ends, from the best to the worst."""
-
 _FOLLOWED = 10.0  # factor on the error of the first orbit for that of those which are followed from it
 _LEAST_ERROR = 1e-15
 _BESIDE = 1e-6  # of the interval: how far beside a crossing rates of change are taken
-
-
-@dataclass(frozen=True)
-class Located(Result, Sequence[BifurcationPoint]):
-    """The bifurcations that :func:`locate` found: a sequence of points by rising parameter, and how the search ended.
-
-    Attributes
-    ----------
-    points
-        By rising parameter.
-    status
-        How the search ended: ``status.sentence`` says it in words.
-    remarks
-        What else is to be said, a sentence each.
-    evaluations
-        Orbits that were computed.
-    """
-
-    points: tuple[BifurcationPoint, ...]
-    status: SearchStatus
-    remarks: tuple[str, ...]
-    evaluations: int
-
-    @property
-    def complete(self) -> bool:
-        """Whether the numbers of unstable multipliers at the ends and between all points add up."""
-        return self.status in (SearchStatus.COMPLETE, SearchStatus.CONSERVATIVE)
-
-    @overload
-    def __getitem__(self, index: int) -> BifurcationPoint: ...
-    @overload
-    def __getitem__(self, index: slice) -> tuple[BifurcationPoint, ...]: ...
-    def __getitem__(self, index: int | slice) -> BifurcationPoint | tuple[BifurcationPoint, ...]:
-        return self.points[index]
-
-    def __len__(self) -> int:
-        return len(self.points)
-
-    def __iter__(self) -> Iterator[BifurcationPoint]:
-        return iter(self.points)
-
-    def _lines(self) -> list[str]:
-        many = f"{len(self)} bifurcation{'' if len(self) == 1 else 's'}"
-        table = rows(point.row for point in self.points)
-        return [f"Located: {many}, {self.status.label}: {self.status.sentence}", *table, *said(self.remarks)]
-
-    def plot(self, axes: Axes | None = None) -> Axes:
-        """Draw which kind of bifurcation is where, over the parameter, on axes of matplotlib or on new ones."""
-        axes = axes_for(axes)
-        for point in self.points:
-            axes.plot([point.value], [point.kind.label], "o", color="C0")
-            text = f"{point.value:.6g}\n{point.row[2]}".strip()
-            at = point.value, point.kind.label
-            axes.annotate(text, at, (0, 6), ha="center", textcoords="offset points")
-        axes.margins(x=0.2, y=0.5)
-        axes.set(xlabel="parameter")
-        return axes
-
-    def to_dataset(self) -> xr.Dataset:
-        """The points as a dataset over ``point``. The multiplier is the critical one of the return map."""
-        names = ("value", "error_bound", "kind", "criticality", "coefficient", "coefficient_error")
-        more = ("multiplier", "multiplicity", "frequency", "period", "orbit", "mode")
-        said, status = "; ".join(self.remarks), self.status.label
-        return dataset("point", columns(self.points, *names, *more), status=status, remarks=said)
 
 
 def locate(
@@ -166,44 +84,13 @@ def locate(
     """
     low, high = checked_interval(between)
     samples = Samples(family, orbit, low, high, budget, seconds)
-    with samples.budget:
-        here = extent(samples)
-    remarks = [here.ending] if here.ending else []
-    status = SearchStatus.BUDGET if samples.spent else SearchStatus.INCOMPLETE if here.ending else SearchStatus.COMPLETE
-    points: list[BifurcationPoint] = []
-    if here.start < here.end:
-        with samples.budget:
-            searched, more = _searched(samples, here, budget)
-        remarks += more
-        samples.budget.prolong(_GRACE)  # for what has been found
-        with samples.budget:
-            for block, found in searched:
-                status = max(status, found.status, key=GRAVITY.index)
-                remarks += found.remarks
-                for crossing in found.crossings:
-                    if crossing.event is Event.PLUS and here.explains(crossing.value):
-                        continue
-                    samples.allow(_DESCRIBING)
-                    try:
-                        with UserCode("family", crossing.value):
-                            touch = _touches(samples, crossing)
-                            point = _described(samples, crossing, block, normal_form and not touch, touch)
-                        if not point.error_bound < samples.width:
-                            raise AnalysisError(
-                                f"its error bound of {point.error_bound:.1e} tells nothing", field="value"
-                            )
-                        if touch:
-                            remarks.append(_TOUCH.format(value=bounded_text(point.value, point.error_bound)))
-                        else:
-                            points.append(point)
-                    except AnalysisError as error:
-                        status = max(status, SearchStatus.INCOMPLETE, key=GRAVITY.index)
-                        remarks.append(f"what crosses at {crossing.value:.9g} could not be described: {error}")
-    points += [_fold(samples, fold, normal_form) for fold in here.folds]
-    if samples.remarks:
-        status = max(status, SearchStatus.INCOMPLETE, key=GRAVITY.index)
-    ordered = tuple(sorted(points, key=lambda point: point.value))
-    return Located(ordered, status, tuple(dict.fromkeys([*remarks, *samples.remarks])), samples.count)
+    return located(
+        samples,
+        lambda start, end: _crossings(samples, start, end, budget),
+        lambda crossing, block: [_described(samples, crossing, block, normal_form)],
+        lambda fold: _fold(samples, fold, normal_form),
+        _DESCRIBING,
+    )
 
 
 def checked_interval(between: tuple[float, float]) -> tuple[float, float]:
@@ -217,8 +104,8 @@ def checked_interval(between: tuple[float, float]) -> tuple[float, float]:
     return low, high
 
 
-def _searched(samples: Samples, here: Extent, budget: int) -> tuple[list[tuple[Block | None, Crossings]], list[str]]:
-    """The crossings in every block of the return map, and what is to be said of the blocks."""
+def _crossings(samples: Samples, start: float, end: float, budget: int) -> list[tuple[Block | None, Crossings]]:
+    """The crossings in every block of the return map."""
     blocks, remarks = orbit_blocks(samples.family(samples.low), samples.first)
     # Of the first orbit hardly a trace may be left after a return; of those that are followed from it there is more.
     uncertain = _FOLLOWED * _relative(samples.of_flow(), at_least=1.0)
@@ -235,9 +122,10 @@ def _searched(samples: Samples, here: Extent, budget: int) -> tuple[list[tuple[B
         return np.stack([each.image.jacobian for each in found]), errors
 
     def search(matrices: Matrices) -> Crossings:
-        return find_crossings(matrices, here.start, here.end, budget=budget, affordable=samples.affordable)
+        found = find_crossings(matrices, start, end, budget=budget, affordable=samples.affordable)
+        return replace(found, remarks=(*remarks, *found.remarks))
 
-    return [(block, crossings_in(block, whole, search)) for block in blocks], list(remarks)
+    return [(block, crossings_in(block, whole, search)) for block in blocks]
 
 
 def _touches(samples: Samples, crossing: Crossing) -> bool:
@@ -246,10 +134,9 @@ def _touches(samples: Samples, crossing: Crossing) -> bool:
     return simple and crossing.change == 0 and not crossing.collision and samples.low < crossing.value < samples.high
 
 
-def _described(
-    samples: Samples, crossing: Crossing, block: Block | None, with_normal_form: bool, touch: bool
-) -> BifurcationPoint:
+def _described(samples: Samples, crossing: Crossing, block: Block | None, with_normal_form: bool) -> Found:
     """What happens at a crossing of an orbit that is known, or followed."""
+    touch = _touches(samples, crossing)
 
     def bounded_at(value: float, state: Array, error: Array, image: ReturnMap) -> Orbit:
         return bounded(samples.family(value), state, image, error=error)
@@ -265,7 +152,7 @@ def _described(
         value, bound, orbit = regular.place, regular.error_bound, regular.orbit
     # Where an orbit is lost the point may be the fold that it ends in.
     lost = samples.end < samples.high and value + bound >= samples.end
-    return described(
+    point = described(
         samples.family(value),
         (value, bound),
         orbit,
@@ -273,8 +160,14 @@ def _described(
         block,
         _formed(samples, value, orbit),
         kind=Kind.BRANCH_POINT if (touch or (lost and trivial)) and crossing.event is Event.PLUS else None,
-        with_normal_form=with_normal_form,
+        with_normal_form=with_normal_form and not touch,
     )
+    if not point.error_bound < samples.width:
+        raise AnalysisError(f"its error bound of {point.error_bound:.1e} tells nothing", field="value")
+    if touch:
+        value_text = bounded_text(point.value, point.error_bound)
+        return f"at {value_text} a multiplier only touches the unit circle and goes back: nothing changes"
+    return point
 
 
 def _fold(samples: Samples, fold: Fold, with_normal_form: bool) -> BifurcationPoint:

@@ -3,31 +3,34 @@
 from __future__ import annotations
 
 import bisect
-import contextlib
-from collections.abc import Iterator
+from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.errors import AnalysisError, ParameterError, in_words
-from chilopod.stability.budget import Budget, SpentError, UserCode, UserError
-from chilopod.stability.capabilities import Family, SystemLike, is_autonomous
+from chilopod.errors import AnalysisError
+from chilopod.stability.budget import Budget, SpentError, UserCode
+from chilopod.stability.capabilities import Family
 from chilopod.stability.crossing_points.place import Sample
 from chilopod.stability.orbits import Orbit, find_orbit, from_known, known_state
 from chilopod.stability.returns import ReturnMap, return_map, return_maps, section_at
 from chilopod.stability.scales import sizes
+from chilopod.stability.search.family import AskedFamily
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 FIRST_STEPS = 8
 """Steps in which an orbit is followed through the interval, if it takes no shorter ones."""
+
+NEAR_FOLD = 0.02
+"""Distance of a multiplier from +1 within which a fold may be so near that the search does not tell it."""
+
 _SHORTEST = 2.0**-10  # step of an orbit that is followed, relative to the first
 _RETURNS = 2  # return maps for every orbit of the budget, to follow the orbit and again to search
 _DEAREST = 8.0  # return maps for an orbit
 _ATTEMPTS = 24  # steps to a value from the sample beside it: ten halvings, and on from there
-_KEPT = 64  # systems: around a point the same one is asked for again and again
-NEAR_FOLD = 0.02
-"""Distance of a multiplier from +1 within which a fold may be so near that the search does not tell it."""
 _SURE = 1e-4  # singular value of H - 1, in units, above which the orbit is as good as the flow
 _BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
 _FORESEEN, _SMALL = 0.3, 0.01  # of a change of the orbit, and of the sizes: what a prediction may miss
@@ -41,20 +44,6 @@ _MERGED = 1e-5  # of the interval: a gap in which they still do
 _JUMP = 0.3  # of the orbit between prediction and correction, relative to its size
 
 
-def _touches(first: Sample, left: Sample, right: Sample, last: Sample) -> bool:
-    """Whether a multiplier on one side of +1 heads for it from both sides of the gap between two of four samples."""
-    places = np.array([each.value for each in (first, left, right, last)])
-    off = np.array([each.beside_plus_one for each in (first, left, right, last)])
-    if not np.isfinite(off).all() or (np.sign(off) != np.sign(off[1])).any():
-        return False
-    off = np.abs(off)
-    into, out = np.diff(off)[[0, 2]] / np.diff(places)[[0, 2]]
-    if not into < 0.0 < out:
-        return False
-    meeting = (off[2] - off[1] + into * places[1] - out * places[2]) / (into - out)
-    return bool(off[1] + into * (meeting - places[1]) < _TOUCHING * off[1:3].min())
-
-
 class Samples:
     """Samples of a family, each computed once.
 
@@ -63,7 +52,7 @@ class Samples:
     family
         ``family(value)`` is the system.
     guess
-        Of the orbit at the lower end, or None if the systems know theirs.
+        Guess of the orbit at the lower end, or None if the systems know theirs.
     low, high
         The interval.
     budget
@@ -74,16 +63,14 @@ class Samples:
 
     Attributes
     ----------
-    low, high, width
-        Of the interval.
+    width
+        Length of the interval.
     first
         The orbit at the lower end, with its error bounds.
     known
         Whether the systems know their orbits.
-    timed
-        Whether the systems depend on time.
     size
-        Of the states on the first orbit, shape (n,).
+        Sizes of the states on the first orbit, shape (n,).
     path
         The samples by which an orbit that is not known was followed from ``low``, as far as it goes.
     end
@@ -92,55 +79,36 @@ class Samples:
         Whether the path ends because the budget was spent.
     merges
         Whether the path ends where the orbit meets another one, which goes on alone.
+    count
+        Number of orbits computed.
     """
 
     def __init__(
         self, family: Family, guess: ArrayLike | None, low: float, high: float, budget: int, seconds: float
     ) -> None:
-        self._family = family
+        self.family = AskedFamily(family)
         self.low, self.high, self.width = low, high, high - low
         self.known = guess is None
-        self._systems: dict[float, SystemLike] = {}
+        self.spent = self.merges = False
+        self.count = self._counted = 0
         self._by_value: dict[float, Sample] = {}
         self._values: list[float] = []
         self._missing: dict[float, AnalysisError] = {}
         self._bends: dict[float, float] = {}
         self._orbits = budget
         self._allowed = _RETURNS * budget
-        self._refused: dict[str, tuple[str, set[float]]] = {}
-        self._dimension, self.timed = 0, True
-        self.count = self._counted = 0
         self.budget = Budget(self._allowed, seconds)
         with self.budget, UserCode("family", low):
             self.first = find_orbit(self.family(low), guess, budget=self.budget)
             self.size = sizes(self.family(low), self.first.state, self.first.period / self.first.image.returns)
         self.budget.left = self._allowed
-        if not (self.known and self.timed):
+        self._exact = self.known and self.family.timed
+        if not self._exact:
             self._keep(_sample(low, self.first))
-        self.spent = False
-        self.merges = False
         with self.budget:
-            self.path = [] if guess is None else self._to_merging(self._followed(low, high))
+            self.path = [] if guess is None else self._to_merging(self._followed())
         self.end = self.path[-1].value if self.path else high
         self.allow(self._allowed)
-
-    def family(self, value: float) -> SystemLike:
-        """The system at a value of the parameter, once it is seen to be of the same kind as the others."""
-        if value in self._systems:
-            return self._systems[value]
-        with self._asking(value):
-            system = self._family(value)
-        timed = not is_autonomous(system)
-        if self._dimension == 0:
-            self._dimension, self.timed = system.dimension, timed
-        if system.dimension != self._dimension or timed is not self.timed:
-            what = "dimension" if system.dimension != self._dimension else "kind of period"
-            self._refuse(value, what, f"the family changes its {what}")
-            raise AnalysisError(f"changes its {what} at {value:g}", field="family", allowed="systems of one kind")
-        if len(self._systems) >= _KEPT:
-            self._systems.pop(next(iter(self._systems)))
-        self._systems[value] = system
-        return system
 
     def at(self, values: Array) -> list[Sample]:
         """Samples at some values within the interval; together where the systems allow it.
@@ -152,19 +120,13 @@ class Samples:
         """
         wanted = [float(value) for value in values]
         missing = sorted({value for value in wanted if value not in self._by_value})
-        if len(missing) > 1 and self.known and self.timed:
-            try:
-                self._keep_known(missing)
-                missing = []
-            except SpentError:
-                raise
-            except AnalysisError:
-                pass  # which one it was shows when each is asked for alone
+        if len(missing) > 1 and self._exact:
+            _found(lambda: self._keep_known(missing))  # where one fails, each is asked for alone
         for value in missing:
             if value in self._by_value or value in self._missing:
                 continue
             try:
-                if self.known and self.timed:
+                if self._exact:
                     self._keep_known([value])
                 else:
                     self._keep(self._of_itself(value) if self.known else self._between(value))
@@ -177,78 +139,32 @@ class Samples:
                 raise self._missing[value]
         return [self._by_value[value] for value in wanted]
 
-    def _keep_known(self, values: list[float]) -> None:
-        """Samples of systems that depend on time and know their orbits."""
-        systems = [self.family(value) for value in values]
-        for _ in systems:
-            self.budget.take()
-        with self._asking(values[0]) if len(values) == 1 else UserCode("family", values[0]):
-            states = [known_state(system) for system in systems]
-            images = return_maps(systems, states)
-        for value, system, state, image in zip(values, systems, states, images, strict=True):
-            orbit = from_known(system, state, image=image, budget=self.budget)
-            self._keep(Sample(value, orbit.state, orbit.image))
-
     def allow(self, returns: int) -> None:
         """From now on, at most so many return maps."""
         self._allowed, self._counted = returns, self.count
         self.budget.left = returns
 
     def affordable(self) -> int:
-        """How many more orbits there may be, at the price of those since :meth:`allow`."""
+        """Number of orbits that there may still be, at the price of those since :meth:`allow`."""
         if self.budget.late:
             return 0
         price = (self._allowed - self.budget.left) / max(self.count - self._counted, 1)
         # Those that were not found say nothing of the next ones.
         return int(self.budget.left / min(max(price, 1.0), _DEAREST))
 
-    @property
-    def remarks(self) -> list[str]:
-        """Where there was no system, and why, a sentence each."""
-        return [
-            said + (f", and at {len(values) - 1} more values" if len(values) > 1 else "")
-            for said, values in self._refused.values()
-        ]
-
-    def _refuse(self, value: float, kind: str, why: str) -> None:
-        self._refused.setdefault(kind, (f"{why} at {value:.9g}", set()))[1].add(value)
-
-    @contextlib.contextmanager
-    def _asking(self, value: float) -> Iterator[None]:
-        """Around calls of the user's functions: exceptions of theirs mean that there is no system."""
-        try:
-            with UserCode("family", value):
-                yield
-        except (UserError, ParameterError) as error:
-            if not self._dimension:
-                raise
-            cause = error.__cause__ if isinstance(error, UserError) else error
-            assert cause is not None
-            self._refuse(value, type(cause).__name__, f"the family raised {in_words(cause)}")
-            raise UserError(error.problem, field=error.field, value=error.value, allowed=error.allowed) from cause
-
     def error(self, sample: Sample, of_flow: float) -> float:
-        """Relative error of the derivative at a sample of an orbit that is followed: that of the flow, and what comes
-        of the orbit's own, which is the flow's times what H - 1 makes of it.
-
-        Parameters
-        ----------
-        sample
-            From :meth:`at`.
-        of_flow
-            Relative error of the flow and of its derivative.
-        """
+        """Relative error of the derivative at a sample of an orbit that is followed: that of the flow and of its
+        derivative, ``of_flow``, and what comes of the orbit's own, which is the flow's times what H - 1 makes of it."""
         scaled = sample.image.jacobian * self.size / self.size[:, None]
         _, values, rows = np.linalg.svd(scaled - np.eye(self.size.size))
         if values[-1] > _SURE:
             return of_flow
         if sample.value not in self._bends:
-            beside = sample.orbit + _BESIDE * self.size * rows[-1]
-            section = section_at(
-                self.family(sample.value), sample.orbit, self.size, sample.image.period / sample.image.returns
-            )
-            change = return_map(self.family(sample.value), beside, False, section).jacobian - sample.image.jacobian
-            self._bends[sample.value] = float(np.linalg.norm(change * self.size / self.size[:, None])) / _BESIDE
+            system, duration = self.family(sample.value), sample.image.period / sample.image.returns
+            section = section_at(system, sample.orbit, self.size, duration)
+            beside = return_map(system, sample.orbit + _BESIDE * self.size * rows[-1], False, section)
+            change = (beside.jacobian - sample.image.jacobian) * self.size / self.size[:, None]
+            self._bends[sample.value] = float(np.linalg.norm(change)) / _BESIDE
         # Where H - 1 vanishes along a direction, what is left there is of third order at most in all but odd cases.
         off = min(of_flow / max(float(values[-1]), of_flow), of_flow ** (1.0 / 3.0))
         return min(1.0, of_flow + self._bends[sample.value] * off)
@@ -259,44 +175,51 @@ class Samples:
             return self.first.image  # the orbit is as good as the flow
         return return_map(self.family(self.low), self.first.state, True, self.first.section)
 
+    def jumped(self, orbit: Array, guess: Array) -> bool:
+        """Whether an orbit is so far from what was foreseen that it must be another one."""
+        return bool((np.abs(orbit - guess) > _JUMP * np.maximum(self.size, np.abs(guess))).any())
+
     def _keep(self, sample: Sample) -> None:
         self.count += 1
         self._by_value[sample.value] = sample
         bisect.insort(self._values, sample.value)
 
+    def _keep_known(self, values: list[float]) -> None:
+        """Samples of systems that depend on time and know their orbits."""
+        systems = [self.family(value) for value in values]
+        for _ in systems:
+            self.budget.take()
+        with self.family.asking(values[0]) if len(values) == 1 else UserCode("family", values[0]):
+            states = [known_state(system) for system in systems]
+            images = return_maps(systems, states)
+        for value, system, state, image in zip(values, systems, states, images, strict=True):
+            self._keep(_sample(value, from_known(system, state, image=image, budget=self.budget)))
+
     def _of_itself(self, value: float) -> Sample:
         """A sample of a system that tells a state on its orbit, or near it, or from the orbit beside."""
         system = self.family(value)
-        try:
-            with self._asking(value):
-                return _sample(value, find_orbit(system, known_state(system), settle=False, budget=self.budget))
-        except SpentError:
-            raise
-        except AnalysisError:
-            index = bisect.bisect(self._values, value)
-            beside = self._by_value[min(self._values[max(index - 1, 0) : index + 1], key=lambda v: abs(v - value))]
-        try:
-            return self._sampled(value, beside.orbit, beside)
-        except SpentError:
-            raise
-        except AnalysisError:
-            with self._asking(value):
-                return _sample(value, find_orbit(system, known_state(system), budget=self.budget))
+
+        def own(settle: bool) -> Sample:
+            with self.family.asking(value):
+                return _sample(value, find_orbit(system, known_state(system), settle=settle, budget=self.budget))
+
+        index = bisect.bisect(self._values, value)
+        nearest = min(self._values[max(index - 1, 0) : index + 1], key=lambda v: abs(v - value))
+        beside = self._by_value[nearest]
+        found = _found(lambda: own(False)) or _found(lambda: self._sampled(value, beside.orbit, beside))
+        return found or own(True)
 
     def _sampled(self, value: float, near: Array, beside: Sample) -> Sample:
+        """A sample near a state, of about the period of a sample beside."""
         system = self.family(value)
-        with self._asking(value):
-            # The orbit beside tells how long an orbit takes, where it is the orbit's to say.
+        with self.family.asking(value):
             section = section_at(system, near, self.size, beside.image.period / beside.image.returns)
-            return _sample(
-                value,
-                find_orbit(system, near, with_error=self.known, section=section, settle=False, budget=self.budget),
-            )
+            orbit = find_orbit(system, near, self.known, section, settle=False, budget=self.budget)
+            return _sample(value, orbit)
 
     def _between(self, value: float) -> Sample:
         """A sample between two that are there, from their orbits."""
-        right = min(max(bisect.bisect(self._values, value), 1), len(self._values) - 1)
-        around = self._around(right)
+        around = self._around(min(max(bisect.bisect(self._values, value), 1), len(self._values) - 1))
         try:
             return self._sampled(value, self._foreseen(around, value), around[0])
         except SpentError:
@@ -304,11 +227,10 @@ class Samples:
         except AnalysisError:
             reached = self._follow(around[:1], value, _ATTEMPTS)
             for sample in reached:
-                if sample.value != value:
-                    self._keep(sample)
-            if not reached or reached[-1].value != value:
-                raise
-            return reached[-1]
+                if sample.value == value:
+                    return sample
+                self._keep(sample)
+            raise
 
     def _around(self, right: int) -> list[Sample]:
         """Two samples that follow each other, the second of which is number ``right``, and one beyond either."""
@@ -322,7 +244,7 @@ class Samples:
     def _foreseen(self, samples: list[Sample], value: float) -> Array:
         """The orbit at a value by the polynomial through samples; by the straight line through the first two where
         that is very different, or the states are anywhere on their orbits."""
-        if not self.timed:
+        if not self.family.timed:
             samples = samples[:2]
         if len(samples) == 1:
             return samples[0].orbit
@@ -335,10 +257,10 @@ class Samples:
         allowed = _BENT * float((np.abs(orbits[1] - orbits[0]) / self.size).max())
         return curve if (np.abs(curve - line) <= allowed * self.size).all() else line
 
-    def _followed(self, low: float, high: float) -> list[Sample]:
-        """Follow the orbit from the lower end."""
-        path = [self._by_value[low]]
-        for value in np.linspace(low, high, FIRST_STEPS + 1)[1:].tolist():
+    def _followed(self) -> list[Sample]:
+        """Samples by which the orbit is followed from the lower end."""
+        path = [self._by_value[self.low]]
+        for value in np.linspace(self.low, self.high, FIRST_STEPS + 1)[1:].tolist():
             reached = self._follow(path, value)
             for sample in reached:
                 self._keep(sample)
@@ -369,39 +291,32 @@ class Samples:
                     behind.append(found)
         return path
 
-    def _follow(self, behind: list[Sample], value: float, attempts: float = np.inf) -> list[Sample]:
+    def _follow(self, behind: list[Sample], value: float, attempts: int | None = None) -> list[Sample]:
         """Samples from the last one behind to ``value``, by smaller steps where Newton's method does not carry that
-        far.
-
-        They end early where the orbit does, the budget, or the attempts.
-        """
-        behind = behind[-_BEHIND:]
-        reached: list[Sample] = []
-        smallest = _SHORTEST * abs(value - behind[-1].value)
-        target = value
-        while attempts > 0 and (np.isfinite(attempts) or self.count + len(reached) < self._orbits):
-            attempts -= 1
-            last = behind[-1]
-            guess = self._foreseen(behind[::-1], target)
+        far. They end early where the orbit does, the budget, or the attempts."""
+        path, target = list(behind), value
+        smallest = _SHORTEST * abs(value - path[-1].value)
+        while path[-1].value != value:
+            if attempts == 0 or (attempts is None and self.count + len(path) - len(behind) >= self._orbits):
+                break
+            attempts = None if attempts is None else attempts - 1
+            last, guess = path[-1], self._foreseen(path[: -_BEHIND - 1 : -1], target)
             try:
                 found = self._sampled(target, guess, last)
             except SpentError:
-                return reached
+                break
             except AnalysisError:
                 found = None
             # A large jump means that Newton's method has found another orbit.
             if found is None or self.jumped(found.orbit, guess) or not self._connected(last, guess, found):
                 target = 0.5 * (last.value + target)
                 if abs(target - last.value) < smallest:
-                    return reached
+                    break
                 continue
-            reached.append(found)
-            if target == value:
-                return reached
-            behind = [*behind, found][-_BEHIND:]
+            path.append(found)
             longer = target + 2.0 * (target - last.value)
             target = longer if abs(value - longer) > smallest and longer < value else value
-        return reached
+        return path[len(behind) :]
 
     def _connected(self, last: Sample, guess: Array, found: Sample) -> bool:
         """Whether an orbit that was not foreseen is on the branch of the last one: then there is one about halfway
@@ -418,10 +333,30 @@ class Samples:
             return False
         return bool((np.abs(middle.orbit - last.orbit - 0.5 * change) <= _HALFWAY * size).all())
 
-    def jumped(self, orbit: Array, guess: Array) -> bool:
-        """Whether an orbit is so far from what was foreseen that it must be another one."""
-        return bool((np.abs(orbit - guess) > _JUMP * np.maximum(self.size, np.abs(guess))).any())
-
 
 def _sample(value: float, orbit: Orbit) -> Sample:
     return Sample(value, orbit.state, orbit.image)
+
+
+def _found(compute: Callable[[], T]) -> T | None:
+    """What a function gives; None where there is nothing."""
+    try:
+        return compute()
+    except SpentError:
+        raise
+    except AnalysisError:
+        return None
+
+
+def _touches(first: Sample, left: Sample, right: Sample, last: Sample) -> bool:
+    """Whether a multiplier on one side of +1 heads for it from both sides of the gap between two of four samples."""
+    places = np.array([each.value for each in (first, left, right, last)])
+    off = np.array([each.beside_plus_one for each in (first, left, right, last)])
+    if not np.isfinite(off).all() or (np.sign(off) != np.sign(off[1])).any():
+        return False
+    off = np.abs(off)
+    into, out = np.diff(off)[[0, 2]] / np.diff(places)[[0, 2]]
+    if not into < 0.0 < out:
+        return False
+    meeting = (off[2] - off[1] + into * places[1] - out * places[2]) / (into - out)
+    return bool(off[1] + into * (meeting - places[1]) < _TOUCHING * off[1:3].min())

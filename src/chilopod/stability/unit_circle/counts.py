@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chilopod.stability.unit_circle.critical import LOST, UNKNOWN, Critical, Crossing, Root, Throughout, rooted
+from chilopod.stability.unit_circle.critical import LOST, UNKNOWN, Critical, Crossing, Root, rooted
 from chilopod.stability.unit_circle.spectra import Event, Spectra, margins
 from chilopod.stability.unit_circle.zeros import Interval, between
 
@@ -68,8 +68,6 @@ class Accounts:
         Eigenvalues; all values at which they are known are used.
     ends
         The interval.
-    throughout
-        What is critical everywhere.
     parameter
         The parameter at a place, for remarks.
     report
@@ -80,14 +78,12 @@ class Accounts:
         self,
         spectra: Spectra,
         ends: Interval,
-        throughout: Throughout,
         parameter: Callable[[float], float],
         report: Report,
     ) -> None:
         self._spectra = spectra
         self._ends = ends
-        self._throughout = throughout
-        self._critical = Critical(spectra, throughout)
+        self._critical = Critical(spectra)
         self._parameter = parameter
         self._report = report
         self._counts: dict[float, int | None] = {}
@@ -122,7 +118,7 @@ class Accounts:
             return
         found = margins(self._spectra.at(new))
         clear = np.abs(found).min(axis=1, initial=np.inf) > self._clearly
-        if self._throughout.resting or self._throughout.conservative:
+        if self._spectra.resting or self._spectra.conservative:
             clear[:] = False
         self._counts.update(zip(new[clear].tolist(), (found[clear] > 0.0).sum(axis=1).tolist(), strict=True))
         self._spectra.disturbed(new[~clear])
@@ -131,16 +127,16 @@ class Accounts:
         found = self._spectra.margins(place)
         errors = self._spectra.margin_errors(place)
         outside = int((found > errors).sum())
-        if self._throughout.conservative:
+        if self._spectra.conservative:
             sizes = np.abs(found) / errors
             for event in Event:
                 # Those that meet may have left the circle or not.
                 distances, uncertain = self._spectra.factor_sizes(place, event)
-                idle = self._throughout.idle[event]
+                idle = self._spectra.idle[event]
                 if (distances[idle:] <= _GREY * uncertain[idle:]).any():
                     return None
             return None if ((sizes > 1.0) & (sizes <= _GREY)).any() else outside
-        return outside if int((np.abs(found) <= errors).sum()) <= self._throughout.resting else None
+        return outside if int((np.abs(found) <= errors).sum()) <= self._spectra.resting else None
 
     def _walk(self, roots: list[Root]) -> tuple[list[Root], list[Crossing], bool]:
         """Compare counts along all gaps between decided places; the roots after that, what crosses at them, and whether
@@ -200,7 +196,7 @@ class Accounts:
             if self._tightened(inside[0], x, y):
                 return _Anew(inside)
             # Or it is a collision whose ends are too near each other.
-            if not (self._throughout.conservative and change == 0):
+            if not (self._spectra.conservative and change == 0):
                 critical = sum(crossing.multiplicity for crossing in self._critical.at(inside[0]))
                 self._remark(f"{change:+d} multipliers outside where {critical} are on the circle", (x, y))
         return self._changed(inside[0], change, x, y)
@@ -234,7 +230,7 @@ class Accounts:
         """Whether a change of the count is what the critical multipliers at a root may do."""
         crossings = self._critical.at(root)
         number = sum(crossing.multiplicity for crossing in crossings)
-        if self._throughout.conservative and all(crossing.collision for crossing in crossings):
+        if self._spectra.conservative and all(crossing.collision for crossing in crossings):
             return 2 * abs(change) <= number and (root.touch or change != 0)
         if root.touch:
             return change == 0
@@ -267,7 +263,7 @@ class Accounts:
         if self._spectra.holes(x, y):
             self._remark(f"{changed}, and no matrices in between", (x, y))
             return []
-        if self._throughout.conservative:
+        if self._spectra.conservative:
             return self._bisected(x, y, before, after)
         roots: list[Root] = []
         said = False
@@ -278,7 +274,7 @@ class Accounts:
 
             def margin(place: float, rank: int = rank) -> float:
                 # Those that rest on the circle are of any rank in between, and add nothing.
-                found = float(self._spectra.margins(place)[rank : rank + self._throughout.resting + 1].sum())
+                found = float(self._spectra.margins(place)[rank : rank + self._spectra.resting + 1].sum())
                 return found if np.isfinite(found) else 0.0
 
             if margin(x) * margin(y) >= 0.0:

@@ -84,41 +84,11 @@ class Crossing:
     collision: bool = False
 
 
-@dataclass(frozen=True)
-class Throughout:
-    """What vanishes for all values of the parameter.
-
-    Attributes
-    ----------
-    idle
-        For each event, the number of factors of its function that do.
-    conservative
-        Whether multipliers come in pairs with product 1, and may stay on the circle.
-    """
-
-    idle: dict[Event, int]
-    conservative: bool
-
-    @property
-    def resting(self) -> int:
-        """Number of multipliers that are +1 or -1 throughout."""
-        return self.idle[Event.PLUS] + self.idle[Event.MINUS]
-
-
 class Critical:
-    """What is critical at the roots of a family.
+    """What is critical at the roots of a family with some spectra."""
 
-    Parameters
-    ----------
-    spectra
-        Eigenvalues of the family.
-    throughout
-        What is critical everywhere.
-    """
-
-    def __init__(self, spectra: Spectra, throughout: Throughout) -> None:
+    def __init__(self, spectra: Spectra) -> None:
         self._spectra = spectra
-        self._throughout = throughout
 
     def tolerances(self, root: Root) -> Array:
         """How far from zero the margins at a root may be if the multiplier is on the circle there."""
@@ -155,7 +125,7 @@ class Critical:
             # No function vanishes here: what may be anywhere is not on the circle for that.
             critical &= tolerances <= UNKNOWN
         rest, found = nu[critical], []
-        conservative, bracket = self._throughout.conservative, (root.left, root.right)
+        conservative, bracket = self._spectra.conservative, (root.left, root.right)
         for event, target in TARGETS.items():
             if not rest.size:
                 break
@@ -163,7 +133,7 @@ class Critical:
             # A real multiplier on the circle is nowhere else. However large errors are, what is critical is so at the
             # nearer of the two.
             near = ((np.abs(rest - target) <= reach) | (rest.imag == 0.0)) & (rest.real * target > 0.0)
-            number = int(near.sum()) - self._throughout.idle[event]
+            number = int(near.sum()) - self._spectra.idle[event]
             if number > 0 and (not conservative or root.event in (event, None)):
                 best = complex(rest[near][np.abs(rest[near] - target).argmin()])
                 meeting = conservative and number % 2 == 0

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from chilopod.errors import ParameterError
 from chilopod.labels import Labelled
 from chilopod.stability.unit_circle.counts import Accounts, Report
-from chilopod.stability.unit_circle.critical import LOST, Crossing, Root, Throughout, rooted
+from chilopod.stability.unit_circle.critical import LOST, Crossing, Root, rooted
 from chilopod.stability.unit_circle.spectra import TARGETS, Event, Matrices, Spectra, factors, margins
 from chilopod.stability.unit_circle.zeros import Interval, Zeros, between, find_zeros, first_places
 
@@ -148,38 +148,35 @@ class _Finder:
                 return SearchStatus.BUDGET
             report.leave("there is no matrix anywhere")
             return SearchStatus.INCOMPLETE
-        throughout = self._throughout(first)
-        events = [event for event in Event if throughout.idle[event] < self._factors(event) <= _MANY]
+        self._rest(first)
+        events = [event for event in Event if spectra.idle[event] < self._factors(event) <= _MANY]
         if self._factors(Event.PAIR) > _MANY:
             self._probe()
-        found = self._searched(events, throughout)
-        roots = [root for event in events for root in self._roots(event, throughout, found[event])]
-        accounts = Accounts(spectra, (self.a, self.b), throughout, self.shown, report)
+        found = self._searched(events)
+        roots = [root for event in events for root in self._roots(event, found[event])]
+        accounts = Accounts(spectra, (self.a, self.b), self.shown, report)
         self.crossings = accounts.balance(roots)
         if report.spent:
             return SearchStatus.BUDGET
         if report.open:
             return SearchStatus.INCOMPLETE
-        return SearchStatus.CONSERVATIVE if throughout.conservative else SearchStatus.COMPLETE
+        return SearchStatus.CONSERVATIVE if spectra.conservative else SearchStatus.COMPLETE
 
     def _factors(self, event: Event) -> int:
         m = self.spectra.size
         return m if event is not Event.PAIR else m * (m - 1) // 2
 
-    def _throughout(self, places: Array) -> Throughout:
-        """What is critical at all places, with remarks."""
-        idle = {event: self._idle(places, event) for event in Event}
-        trivial = sum(idle[event] * (idle[event] - 1) // 2 for event in TARGETS)
+    def _rest(self, places: Array) -> None:
+        """See what is critical at all places, with remarks."""
+        idle = self.spectra.idle = {event: self._idle(places, event) for event in Event}
         for event in (Event.PLUS, Event.MINUS):
             if idle[event]:
                 many = "a multiplier is" if idle[event] == 1 else f"{idle[event]} multipliers are"
                 self.report.remarks.append(f"{many} {event.label} throughout and left aside")
-        conservative = idle[Event.PAIR] > trivial
-        if conservative:
-            self.report.remarks.append(
-                "multipliers come in pairs with product 1 throughout: the family is conservative"
-            )
-        return Throughout(idle, conservative)
+        if idle[Event.PAIR] > sum(idle[event] * (idle[event] - 1) // 2 for event in TARGETS):
+            self.spectra.conservative = True
+            pairs = "multipliers come in pairs with product 1 throughout: the family is conservative"
+            self.report.remarks.append(pairs)
 
     def _idle(self, places: Array, event: Event) -> int:
         """How many factors of the function of an event vanish for all values of the parameter."""
@@ -227,30 +224,30 @@ class _Finder:
             again &= gap > _FINEST_PROBE
             places = (0.5 * known[1:-2] + 0.5 * known[2:-1])[again]
 
-    def _searched(self, events: list[Event], throughout: Throughout) -> dict[Event, Zeros]:
+    def _searched(self, events: list[Event]) -> dict[Event, Zeros]:
         """Zeros of the functions of some events: each with an even share of the budget, then with what is left."""
         reserve = int((1.0 - _SEARCH) * self.spectra.left)
         found: dict[Event, Zeros] = {}
         for number, event in enumerate(events):
             share = (self.spectra.left - reserve) // (len(events) - number)
-            found[event] = self._zeros(event, throughout, self.spectra.left - share)
+            found[event] = self._zeros(event, self.spectra.left - share)
         for event in events:
             if found[event].spent:
-                found[event] = self._zeros(event, throughout, reserve)
+                found[event] = self._zeros(event, reserve)
         return found
 
-    def _zeros(self, event: Event, throughout: Throughout, spare: int) -> Zeros:
-        spectra, idle = self.spectra, throughout.idle[event]
+    def _zeros(self, event: Event, spare: int) -> Zeros:
+        spectra = self.spectra
         return find_zeros(
-            lambda places: spectra.function(places, event, idle),
+            lambda places: spectra.function(places, event),
             self.a,
             self.b,
-            error=lambda places: spectra.function_error(places, event, idle),
+            error=lambda places: spectra.function_error(places, event),
             left=lambda: spectra.left - spare,
-            skip=spectra.without_pair if event is Event.PAIR and not throughout.conservative else None,
+            skip=spectra.without_pair if event is Event.PAIR and not spectra.conservative else None,
         )
 
-    def _roots(self, event: Event, throughout: Throughout, found: Zeros) -> list[Root]:
+    def _roots(self, event: Event, found: Zeros) -> list[Root]:
         report, spectra = self.report, self.spectra
         report.spent |= found.spent or spectra.left <= 0
         if not found.spent:
@@ -264,21 +261,20 @@ class _Finder:
             if spectra.left <= 0:
                 report.spent = True
                 break
-            if event is Event.PAIR and not throughout.conservative and spectra.without_pair(left, right):
+            if event is Event.PAIR and not spectra.conservative and spectra.without_pair(left, right):
                 continue
             if left == right and spectra.factor_sizes(left, event)[1][0] > _TELLING:
                 if not spectra.clear(left):  # or two real multipliers have product 1
                     report.leave(f"{LOST}, at {self.shown(left):.9g}")  # zero only by rounding
                 continue
-            idle = throughout.idle[event]
-            roots.append(Root(left, left, left, event) if left == right else self._root(event, idle, left, right))
+            roots.append(Root(left, left, left, event) if left == right else self._root(event, left, right))
         return roots + [Root(0.5 * a + 0.5 * b, a, b, event, True) for a, b in found.touches]
 
-    def _root(self, event: Event, idle: int, left: float, right: float) -> Root:
-        reference = float(self.spectra.function(np.array([left, right]), event, idle)[1].max())
+    def _root(self, event: Event, left: float, right: float) -> Root:
+        reference = float(self.spectra.function(np.array([left, right]), event)[1].max())
 
         def value(place: float) -> float:
-            signs, logs = self.spectra.function(np.array([place]), event, idle)
+            signs, logs = self.spectra.function(np.array([place]), event)
             return float(signs[0] * np.exp(logs[0] - reference)) if np.isfinite(signs[0]) else 0.0
 
         return rooted(self.spectra, value, left, right, event)

@@ -70,11 +70,17 @@ class Spectra:
         The values at which there is a matrix, in order.
     size
         Number of eigenvalues; 0 as long as no matrix is known.
+    idle
+        For each event, number of factors of its function that vanish throughout, as far as that is known.
+    conservative
+        Whether multipliers come in pairs with product 1 throughout, and may stay on the circle.
     """
 
     def __init__(self, matrices: Matrices, budget: int, affordable: Callable[[], int] | None = None) -> None:
         self.values: list[float] = []
         self.size = 0
+        self.idle = dict.fromkeys(Event, 0)
+        self.conservative = False
         self._matrices = matrices
         self._budget = budget
         self._affordable = affordable
@@ -82,6 +88,11 @@ class Spectra:
         self._stretch: dict[float, float] = {}
         self._disturbed: dict[float, ComplexArray] = {}
         self._units: Array | None = None
+
+    @property
+    def resting(self) -> int:
+        """Number of multipliers that are +1 or -1 throughout."""
+        return self.idle[Event.PLUS] + self.idle[Event.MINUS]
 
     @property
     def evaluations(self) -> int:
@@ -204,21 +215,20 @@ class Spectra:
         moved = np.sort(np.abs(factors(self.disturbed(np.array([value])), event)), axis=-1)[0]
         return sizes[0], np.asarray(SAFETY * np.abs(moved - sizes).max(axis=0) + _ROUNDING)
 
-    def function(self, values: Array, event: Event, idle: int) -> tuple[Array, Array]:
+    def function(self, values: Array, event: Event) -> tuple[Array, Array]:
         """The function that changes sign at an event, as signs and logarithms, shapes (k,).
 
         det(M + 1), det(M - 1), or the bialternate product, the product of nu_i nu_j - 1 over all pairs (Kuznetsov,
         Elements of Applied Bifurcation Theory, section 10.2.2), over a power of det(1 + M^T M) that keeps them bounded
-        however much M stretches. Where ``idle`` of the factors vanish for all values, it is the product of the others:
-        the elementary symmetric polynomial of that many factors fewer. For the bialternate product of a symplectic
-        matrix that is, up to its sign, the discriminant of the polynomial in nu + 1/nu (Howard & MacKay, J. Math. Phys.
-        28, 1987).
+        however much M stretches. Where some factors vanish throughout, it is the elementary symmetric polynomial of the
+        others: of a symplectic matrix, up to its sign, the discriminant of the polynomial in nu + 1/nu (Howard &
+        MacKay, J. Math. Phys. 28, 1987).
         """
         nu = self.at(values)
         here = np.isfinite(nu).all(axis=1)
         signs, logs = np.full((2, values.size), np.nan)
         if here.any():
-            signs[here], logs[here] = symmetric(factors(nu[here], event), idle)
+            signs[here], logs[here] = symmetric(factors(nu[here], event), self.idle[event])
         return signs, logs - self._bounds(values, event)
 
     def _bounds(self, values: Array, event: Event) -> Array:
@@ -226,8 +236,9 @@ class Spectra:
         stretch = np.array([self._stretch.get(value, np.nan) for value in values.tolist()])
         return np.asarray(stretch * (1.0 if event is not Event.PAIR else self.size - 1.0))
 
-    def function_error(self, values: Array, event: Event, idle: int) -> Array:
+    def function_error(self, values: Array, event: Event) -> Array:
         """Logarithm of what :meth:`function` may be wrong by, shape (k,)."""
+        idle = self.idle[event]
         signs, logs = symmetric(factors(self.at(values), event), idle)
         largest = np.full(values.size, -np.inf)
         for copy in np.moveaxis(self.disturbed(values), 1, 0):
