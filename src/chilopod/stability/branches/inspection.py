@@ -17,7 +17,6 @@ import functools
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
@@ -32,17 +31,12 @@ from chilopod.stability.spectrum.eigenvalues import counts_outside, spectrum
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.critical import Crossing
 from chilopod.stability.unit_circle.crossings import Crossings, SearchStatus, find_crossings
-from chilopod.stability.unit_circle.spectra import TARGETS, Event, Matrices
+from chilopod.stability.unit_circle.interpolation import DEGREE, DENSE, PLACES, interpolated
+from chilopod.stability.unit_circle.spectra import TARGETS, Event, Matrices, factors
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-_DEGREE = 8
-_PLACES: Array = np.append(np.cos(np.pi * np.arange(_DEGREE, -1, -1) / _DEGREE), [-0.618, 0.137])
-_FIT = np.linalg.inv(chebyshev.chebvander(_PLACES[: _DEGREE + 1], _DEGREE))
-_AT_CHECKS = chebyshev.chebvander(_PLACES[_DEGREE + 1 :], _DEGREE) @ _FIT
-_FINE = np.linspace(-1.0, 1.0, 65)
-_AT_FINE = chebyshev.chebvander(_FINE, _DEGREE) @ _FIT
 _CLEAR = 4.0  # times what a polynomial is uncertain by
 _BESIDE = 2  # fine places on either side of a simple zero that need not be clear
 _OFF = 1e-5  # of a step: an orbit that the cubic misses by more is solved for
@@ -299,25 +293,21 @@ def _start_jacobian(within: Within) -> Array:
 
 def _tests(nu: ComplexArray) -> Array:
     """What changes its sign at each of the events, shape (places, 3), from multipliers, shape (places, n)."""
-    first, second = np.triu_indices(nu.shape[-1], 1)
     with np.errstate(all="ignore"):
-        pairs = (nu[:, first] * nu[:, second] - 1.0).prod(axis=1)
-        return np.stack([(nu + 1.0).prod(axis=1).real, (nu - 1.0).prod(axis=1).real, pairs.real], axis=1)
+        return np.stack([factors(nu, event).prod(axis=1).real for event in _EVENTS], axis=1)
 
 
 def _brackets_from_places(within: Within) -> list[Bracket] | None:
     """The one event that happens within a step between places that separate it from the others, none if none does; None
     where this is not clear."""
     low, size = within.low, within.step.size
-    places = low + 0.5 * (1.0 + _PLACES) * (size - low)
-    places[_DEGREE] = size
+    places = low + 0.5 * (1.0 + PLACES) * (size - low)
+    places[DEGREE] = size
     nu = np.linalg.eigvals(np.array([_jacobian_at(within, place) for place in places.tolist()])).astype(np.complex128)
     tests = _tests(nu)
     if not np.isfinite(tests).all():
         return None
-    nodes, checks = tests[: _DEGREE + 1], tests[_DEGREE + 1 :]
-    uncertain = np.maximum(np.abs(_AT_CHECKS @ nodes - checks).max(axis=0), np.abs((_FIT @ nodes)[-2:]).max(axis=0))
-    fine = _AT_FINE @ nodes
+    _, uncertain, fine = interpolated(tests)
     unclear = np.abs(fine) <= _CLEAR * uncertain
     outside = (np.abs(nu) > 1.0).sum(axis=1)
     changes = [np.flatnonzero(fine[1:, i] * fine[:-1, i] <= 0.0) for i in range(len(_EVENTS))]
@@ -325,13 +315,13 @@ def _brackets_from_places(within: Within) -> list[Bracket] | None:
     if not passed:
         return [] if not unclear.any() and (outside == outside[0]).all() else None
     (i,), change = passed[:1], changes[passed[0]]
-    if len(passed) > 1 or change.size > 1 or abs(int(outside[_DEGREE]) - int(outside[0])) != (2 if i == 2 else 1):
+    if len(passed) > 1 or change.size > 1 or abs(int(outside[DEGREE]) - int(outside[0])) != (2 if i == 2 else 1):
         return None
     left, right = int(change[0]) - _BESIDE, int(change[0]) + 1 + _BESIDE
     unclear[max(left, 0) : right + 1, i] = False
-    if unclear.any() or left < 0 or right >= _FINE.size:
+    if unclear.any() or left < 0 or right >= DENSE.size:
         return None
-    a, b = (low + 0.5 * (1.0 + _FINE[j]) * (size - low) for j in (left, right))
+    a, b = (low + 0.5 * (1.0 + DENSE[j]) * (size - low) for j in (left, right))
     return [(_EVENTS[i], float(a), float(b))]
 
 

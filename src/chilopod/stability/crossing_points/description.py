@@ -1,4 +1,4 @@
-"""What happens where multipliers are on the unit circle: kind, modes, normal form and what symmetries make of it."""
+"""Description of a point where multipliers are on the unit circle: kind, modes, normal form and symmetry."""
 
 from __future__ import annotations
 
@@ -57,15 +57,13 @@ def described(
     place
         Value of the parameter and bound of its error, to which round-off is added.
     orbit
-        There, with error bounds.
-    crossing
-        Which multipliers of the whole return map are critical.
-    block
-        In which block of the return map, if spatial symmetries split it.
+        The orbit there, with error bounds.
+    crossing, block
+        The critical multipliers of the whole return map, and their block where spatial symmetries split it.
     formed
-        Computes normal forms; it is asked where one multiplier is critical, or one pair.
+        Computes normal forms, where one multiplier is critical, or one pair.
     kind
-        What happens, where that is known.
+        Kind of the point, where that is known.
     with_normal_form
         Whether coefficients and a verdict are wanted.
     """
@@ -116,10 +114,8 @@ def described(
 
 
 def _mean_size(system: SystemLike, orbit: Orbit, mode: ComplexArray) -> float:
-    """Root of the mean square of a mode over a return, across the motion: it is the same from every state of the orbit.
-
-    1 where the period is known, and with it what is time 0.
-    """
+    """Root of the mean square of a mode over a return, across the motion, which is the same from every state of the
+    orbit; 1 where the period is known, and with it what is time 0."""
     if not is_autonomous(system):
         return 1.0
     before, parts, duration = 0.0, _FEWEST_PARTS, orbit.period / orbit.image.returns
@@ -139,7 +135,7 @@ def _mean_size(system: SystemLike, orbit: Orbit, mode: ComplexArray) -> float:
 def _critical_orbit(
     orbit: Orbit, event: Event, nu: complex, mode: ComplexArray, left: ComplexArray
 ) -> tuple[CriticalOrbit, float]:
-    """What a normal form is computed from, and the relative error of the return map."""
+    """Arguments of a normal form: the critical orbit and the relative error of the return map."""
     image = orbit.image
     exact = nu / abs(nu) if event is Event.PAIR else complex(TARGETS[event])
     if event is not Event.PAIR:

@@ -1,4 +1,4 @@
-"""Orbits along a coordinate in which they are smooth, and how sure the places are at which multipliers cross."""
+"""Error bounds of the places at which multipliers cross, along a coordinate in which orbits are smooth."""
 
 from __future__ import annotations
 
@@ -54,12 +54,10 @@ class Course:
     ----------
     at
         ``at(places)``: samples with the coordinate as their ``value``; ``orbit`` may hold more than the state.
-    low, high
-        Where they begin and end.
-    width
-        Of what is looked at: from ``low`` to ``high``, or further.
+    low, high, width
+        Ends of the course, and width of what is looked at, which may be more.
     beside
-        How far beside a place rates of change are taken.
+        Distance from a place at which rates of change are taken.
     """
 
     at: Callable[[Array], Sequence[Sample]]
@@ -86,17 +84,8 @@ def critical_multipliers(spec: Spectrum, crossing: Crossing) -> NDArray[np.intp]
 
 
 def place_error(course: Course, crossing: Crossing, image: ReturnMap) -> float:
-    """Bound on the error of the place of a crossing: of the critical multipliers over their rate of change.
-
-    Parameters
-    ----------
-    course
-        On which the crossing is.
-    crossing
-        With its place as ``value``.
-    image
-        The return map there, with error bounds.
-    """
+    """Bound on the error of the place of a crossing on a course, from the return map there with its error bounds: that
+    of the critical multipliers over their rate of change."""
     width = 0.5 * (crossing.bracket[1] - crossing.bracket[0])
     try:
         if crossing.collision:

@@ -35,7 +35,7 @@ near."""
 
 @dataclass(frozen=True)
 class Regular(ReadOnlyArrays):
-    """What was interpolated past a singular orbit: its place with an error bound, what samples have as their ``orbit``
+    """A singular orbit that was interpolated: its place with an error bound, what samples have as their ``orbit``
     there, and the orbit itself."""
 
     place: float
@@ -88,21 +88,10 @@ def _nodes(course: Course, place: float) -> Iterator[tuple[Array, float]]:
 
 
 class _Interpolation:
-    """Polynomials through the critical multiplier and the orbit at all nodes, and at all but the outermost.
-
-    Attributes
-    ----------
-    place, between
-        Of the multiplier +1, and how far apart both polynomials have it; in units of the reach from where it was seen.
-    slope
-        Of the multiplier, per reach.
-    orbit, orbit_error
-        What samples have there, and how far apart both polynomials have that.
-    beside
-        A sample next to it.
-    """
+    """Polynomials through the critical multiplier and the orbit at all nodes, and at all but the outermost."""
 
     def __init__(self, beside: Sequence[Sample], nodes: Array, fine: Polynomial, roots: list[float]) -> None:
+        # Place of the multiplier +1 and slope of the multiplier, in units of the reach from where it was seen.
         self.place, self.between = roots[0], abs(roots[0] - roots[1])
         self.slope = abs(float(fine.deriv()(self.place)))
         columns = np.array([each.orbit for each in beside]).T
@@ -133,9 +122,9 @@ def _interpolated(course: Course, place: float, nodes: Array, reach: float) -> _
                 return None
             values[i] = real[np.abs(real - expected).argmin()]
             expected = values[i] + (values[i] - 1.0) * abs(nodes[side[0]] / nodes[i])
-    fine, coarse = (_fit(nodes[part], values[part] - 1.0) for part in _parts(nodes))
-    roots = [root for root in (_root_near_zero(fine, nodes), _root_near_zero(coarse, nodes)) if root is not None]
-    return _Interpolation(beside, nodes, fine, roots) if len(roots) == 2 else None
+    fits = [_fit(nodes[part], values[part] - 1.0) for part in _parts(nodes)]
+    roots = [root for fit in fits if (root := _root_near_zero(fit, nodes)) is not None]
+    return _Interpolation(beside, nodes, fits[0], roots) if len(roots) == 2 else None
 
 
 def _parts(nodes: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:

@@ -65,16 +65,9 @@ class KrylovSubspace(ReadOnlyArrays):
 
 
 def krylov_subspaces(apply: Callable[[Array], Array], start: Array) -> Iterator[KrylovSubspace]:
-    """Growing subspaces, each by an eighth or more, so that what is made of all of them costs no more than a few times
-    what is made of the last one, which is invariant.
-
-    Parameters
-    ----------
-    apply
-        The matrix times directions, shape (n, any) both.
-    start
-        The block to start from, shape (n, columns).
-    """
+    """Subspaces of a matrix, given by what it makes of directions, shape (n, any), from a block to start from, shape
+    (n, columns). Each is larger by an eighth or more, so that what is made of all of them costs no more than a few
+    times what is made of the last one, which is invariant."""
     n = len(start)
     block = _orthonormal(start, _ROUND_OFF * float(np.linalg.norm(start)), n)[0]
     first = block.shape[1]

@@ -25,24 +25,12 @@ _BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once
 
 @dataclass(frozen=True)
 class LeadingMultipliers(ReadOnlyArrays):
-    """The largest eigenvalues of the derivative of a return map.
-
-    Attributes
-    ----------
-    values
-        By falling modulus, shape (count,), or one more where that would part a pair.
-    error
-        Bound on the error of each.
-    following
-        About the modulus of the next one.
-    directions
-        How many directions the flow has carried.
-    """
+    """The largest eigenvalues of the derivative of a return map by falling modulus, shape (count,), or one more where
+    that would part a pair; a bound on the error of each; and about the modulus of the following one."""
 
     values: ComplexArray
     error: Array
     following: float
-    directions: int
 
 
 @dataclass(frozen=True)
@@ -56,21 +44,13 @@ class _Ritz:
 
 
 def leading_multipliers(image: TangentMap, size: Array, count: int) -> LeadingMultipliers:
-    """The multipliers of largest modulus of a return map, all others included only in that they are smaller.
+    """The ``count`` multipliers of largest modulus of the return map in a state on the orbit, the states being of some
+    sizes, shape (n,).
 
     A value theta with the vector y, |y| = 1, is off by w^T (H' y - theta y) / w^T y, exactly, with w the left
     eigenvector of the multiplier. H' y is computed anew, with its error; of w, the components in the random directions
     from which the subspace grew are known, and w is almost never much longer than they tell (Kenney and Laub, *SIAM J.
     Sci. Comput.* 15, 36, 1994).
-
-    Parameters
-    ----------
-    image
-        The return map in a state on the orbit.
-    size
-        Sizes of the states, shape (n,).
-    count
-        How many multipliers.
     """
     n, units = size.size, size[:, None]
     width = min(n, max(_FEWEST, -(-(count + _SPARE) // _LANES) * _LANES))
@@ -92,7 +72,7 @@ def leading_multipliers(image: TangentMap, size: Array, count: int) -> LeadingMu
         wrong = np.full(subspace.matrix.shape, float(residual.max()))
         error = np.minimum(error, eigenvalue_errors(ritz.values, subspace.matrix, wrong)[:chosen])
     following = float(np.abs(ritz.values[chosen])) if chosen < ritz.values.size else 0.0
-    return LeadingMultipliers(values, error, following, subspace.basis.shape[1])
+    return LeadingMultipliers(values, error, following)
 
 
 def _ritz(subspace: KrylovSubspace) -> _Ritz:
@@ -112,7 +92,7 @@ def _ritz(subspace: KrylovSubspace) -> _Ritz:
 
 
 def whole_pairs(values: ComplexArray, count: int) -> int:
-    """So many multipliers, or one more where the last one would be without its conjugate."""
+    """A number of multipliers, or one more where the last one would be without its conjugate."""
     count = min(count, values.size)
     if count < values.size and values[count - 1].imag > 0.0 and values[count].imag < 0.0:
         count += 1
@@ -120,7 +100,7 @@ def whole_pairs(values: ComplexArray, count: int) -> int:
 
 
 def _settled(ritz: _Ritz, chosen: int, largest: float) -> bool:
-    """Whether those that are taken are known to round-off, and no other one may yet become larger."""
+    """Whether the chosen ones are known to round-off, and no other one may yet become larger."""
     if ritz.values.size <= chosen:
         return False
     least = float(np.abs(ritz.values[chosen - 1]))
@@ -132,8 +112,8 @@ def _settled(ritz: _Ritz, chosen: int, largest: float) -> bool:
 def _bend(
     image: TangentMap, size: Array, subspace: KrylovSubspace, state_error: Array, directions: Array, images: Array
 ) -> Array:
-    """How much the derivative changes, along each of some vectors given by real and imaginary parts, within the error
-    of the orbit: along the direction in which the orbit is least sure."""
+    """Change of the derivative within the error of the orbit, along the direction in which the orbit is least sure, on
+    each of some vectors given by real and imaginary parts."""
     _, values, right = np.linalg.svd(subspace.matrix - np.eye(len(subspace.matrix)))
     values = values[values > _SINGULAR * values[0]]
     weakest = subspace.basis @ right[values.size - 1]

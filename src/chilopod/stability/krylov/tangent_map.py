@@ -27,14 +27,10 @@ class TangentMap(ReadOnlyArrays):
 
     Attributes
     ----------
-    system
-        The system.
-    point
-        The state at time 0, shape (n,).
-    state
-        H(point), shape (n,).
+    point, state
+        The state at time 0 and H(point), shape (n,).
     duration, returns
-        Of a return, and how many of them make the full period.
+        Duration of a return, and number of returns in the full period.
     velocity, normal
         dx/dt at ``state`` and the normal of the section, shape (n,), where the system does not depend on time; else
         None.
@@ -95,14 +91,8 @@ class TangentMap(ReadOnlyArrays):
 
 
 def tangent_map(system: FlowsTangents, x: Array, section: Section | None = None) -> TangentMap:
-    """The return map at a state.
-
-    Parameters
-    ----------
-    system, x
-        The system and a state at time 0, shape (n,).
-    section
-        Where a return ends; needed if the system does not depend on time.
+    """The return map at a state at time 0, shape (n,); with the section where a return ends if the system does not
+    depend on time.
 
     Raises
     ------
@@ -110,10 +100,7 @@ def tangent_map(system: FlowsTangents, x: Array, section: Section | None = None)
         If the flow gives anything that is not finite, or does not come back to the section.
     """
     velocity, normal = None, None
-    duration = return_duration(system)
-    if is_autonomous(system):
-        assert section is not None
-        duration = return_time(system, x, section)
+    duration = return_time(system, x, section) if is_autonomous(system) and section else return_duration(system)
     state = carried(system, x[None], 0.0, duration)[0]
     if not np.isfinite(state).all():
         raise AnalysisError("the flow is not finite over one return", field="flow")

@@ -1,4 +1,4 @@
-"""How far an orbit goes within an interval of the parameter, and what it begins and ends in."""
+"""Extent of an orbit within an interval of the parameter, and what it begins and ends in."""
 
 from __future__ import annotations
 
@@ -17,9 +17,7 @@ _BEFORE = 1e-6  # of the interval: so far from a fold other crossings are looked
 _TRIES = 2  # starts of curves round a fold
 _CLEAR_OF_FOLD = 1e-3  # distance of a multiplier from +1 from which a curve that starts there passes the fold
 _COMES, _FARTHER = 1e-5, 100.0  # of the interval before a fold, and times that: where the multiplier is looked at
-_MERGING = (
-    1e-4  # of the interval, before the orbit meets another one: from there on multipliers are within their errors
-)
+_MERGING = 1e-4  # of the interval, before the orbit meets another one: multipliers are within their errors there
 _BETWEEN_POWERS = 0.75  # of one half and one
 _AT_REST = 0.03  # of the motion of the first orbit
 _PARTS = 5  # of a return, to see how far the motion goes
@@ -27,14 +25,14 @@ _PARTS = 5  # of a return, to see how far the motion goes
 
 @dataclass(frozen=True)
 class Extent:
-    """How far an orbit goes.
+    """Part of the interval in which an orbit exists.
 
     Attributes
     ----------
     start, end
-        Between which orbits can be told apart: the ends of the interval, or just beside the folds that are there.
+        Values between which orbits can be told apart: the ends of the interval, or just beside the folds there.
     folds
-        Those it begins and ends in, if it does.
+        Folds in which the orbit begins and ends, if it does.
     ending
         A sentence where it ends otherwise before the end of the interval; else empty.
     shrinks
@@ -57,7 +55,7 @@ class Extent:
 
 
 def extent(samples: Samples) -> Extent:
-    """How far the orbit goes that some samples are on."""
+    """Extent of the orbit that some samples are on."""
     path, high = samples.path, samples.high
     if samples.known:
         return Extent(samples.low, high)

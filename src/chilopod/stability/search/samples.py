@@ -49,12 +49,10 @@ class Samples:
 
     Parameters
     ----------
-    family
-        ``family(value)`` is the system.
+    family, low, high
+        ``family(value)`` is the system; the interval.
     guess
         Guess of the orbit at the lower end, or None if the systems know theirs.
-    low, high
-        The interval.
     budget
         Orbits that may be computed until the upper end is reached, by twice as many return maps, and as many return
         maps once more for those in between.

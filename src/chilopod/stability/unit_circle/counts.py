@@ -4,6 +4,7 @@ not."""
 from __future__ import annotations
 
 import bisect
+import functools
 import itertools
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,7 +13,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from chilopod.stability.unit_circle.critical import LOST, UNKNOWN, Critical, Crossing, Root, rooted
+from chilopod.stability.unit_circle.critical import (
+    LOST,
+    UNKNOWN,
+    Crossing,
+    Root,
+    critical_at,
+    outside_near,
+    rooted,
+    tolerances,
+)
 from chilopod.stability.unit_circle.spectra import Event, Spectra, margins
 from chilopod.stability.unit_circle.zeros import Interval, between
 
@@ -30,17 +40,7 @@ _EPSILON = float(np.finfo(float).eps)
 
 
 class Report:
-    """What a search says of itself.
-
-    Attributes
-    ----------
-    remarks
-        What else is to be said, a sentence each.
-    spent
-        Whether the budget ended the search.
-    open
-        Whether something is not accounted for.
-    """
+    """Remarks of a search, a sentence each, whether its budget was spent, and whether something is left open."""
 
     def __init__(self) -> None:
         self.remarks: list[str] = []
@@ -54,25 +54,14 @@ class Report:
 
 
 class _Anew(NamedTuple):
-    """Roots to go on with, where the counts are to be compared once more."""
+    """Roots with which the counts are to be compared once more."""
 
     roots: list[Root]
 
 
 class Accounts:
-    """The numbers of multipliers outside the circle along a family, and the roots that explain their changes.
-
-    Parameters
-    ----------
-    spectra
-        Eigenvalues; all values at which they are known are used.
-    ends
-        The interval.
-    parameter
-        The parameter at a place, for remarks.
-    report
-        What is said of the search.
-    """
+    """The numbers of multipliers outside the circle, at all values at which spectra are known in an interval, and the
+    roots that explain their changes; remarks go to a report, in terms of the parameter at a place."""
 
     def __init__(
         self,
@@ -83,7 +72,6 @@ class Accounts:
     ) -> None:
         self._spectra = spectra
         self._ends = ends
-        self._critical = Critical(spectra)
         self._parameter = parameter
         self._report = report
         self._counts: dict[float, int | None] = {}
@@ -160,7 +148,7 @@ class Accounts:
         return kept, sorted(crossings, key=lambda crossing: crossing.value), again
 
     def _unchanged(self, roots: list[Root]) -> list[Crossing]:
-        return [crossing for root in roots for crossing in self._critical.at(root)]
+        return [crossing for root in roots for crossing in critical_at(self._spectra, root)]
 
     def _beyond(self, roots: list[Root], decided: list[tuple[float, int]]) -> list[Root]:
         """Roots beyond the first and the last decided place, the ends of the interval among them."""
@@ -197,7 +185,7 @@ class Accounts:
                 return _Anew(inside)
             # Or it is a collision whose ends are too near each other.
             if not (self._spectra.conservative and change == 0):
-                critical = sum(crossing.multiplicity for crossing in self._critical.at(inside[0]))
+                critical = sum(crossing.multiplicity for crossing in critical_at(self._spectra, inside[0]))
                 self._remark(f"{change:+d} multipliers outside where {critical} are on the circle", (x, y))
         return self._changed(inside[0], change, x, y)
 
@@ -216,11 +204,11 @@ class Accounts:
         self._report.leave(f"{remark}, {between(*map(self._parameter, gap))}")
 
     def _is_critical(self, root: Root) -> bool:
-        return self._spectra.exists(root.place) and bool(self._critical.at(root))
+        return self._spectra.exists(root.place) and bool(critical_at(self._spectra, root))
 
     def _lost(self, root: Root) -> bool:
         """Say so where a root is none only because the multipliers there are not known; False."""
-        if self._spectra.exists(root.place) and float(self._critical.tolerances(root).max()) > UNKNOWN:
+        if self._spectra.exists(root.place) and float(tolerances(self._spectra, root).max()) > UNKNOWN:
             gap = root.left, root.right
             if gap not in self._settled and not (root.touch and root.event is not None):
                 self._remark(LOST, gap)
@@ -228,7 +216,7 @@ class Accounts:
 
     def _explains(self, root: Root, change: int) -> bool:
         """Whether a change of the count is what the critical multipliers at a root may do."""
-        crossings = self._critical.at(root)
+        crossings = critical_at(self._spectra, root)
         number = sum(crossing.multiplicity for crossing in crossings)
         if self._spectra.conservative and all(crossing.collision for crossing in crossings):
             return 2 * abs(change) <= number and (root.touch or change != 0)
@@ -239,19 +227,19 @@ class Accounts:
 
     def _changed(self, root: Root, change: int, x: float, y: float) -> list[Crossing]:
         """What crosses at a root between two places at which the counts are known."""
-        crossings = self._critical.at(root)
+        crossings = critical_at(self._spectra, root)
         if len(crossings) == 1:
             return [replace(crossings[0], change=change)]
-        near = self._critical.outside_near
+        near = functools.partial(outside_near, self._spectra)
         return [replace(each, change=near(each, y) - near(each, x)) for each in crossings]
 
     def _at_end(self, root: Root, decided: list[tuple[float, int]]) -> list[Crossing]:
         """What crosses at a root beyond the last decided place: as if the multipliers went on as they come."""
         first = root.place < decided[0][0]
         count = decided[0 if first else -1][1]
-        crossings = self._critical.at(root)
+        crossings = critical_at(self._spectra, root)
         number = sum(crossing.multiplicity for crossing in crossings)
-        surely = int((self._spectra.margins(root.place) > self._critical.tolerances(root)).sum())
+        surely = int((self._spectra.margins(root.place) > tolerances(self._spectra, root)).sum())
         outside = count - surely
         change = (2 * outside - number) * (1 if first else -1) if 0 <= outside <= number else 0
         return [replace(crossing, change=change) for crossing in crossings]

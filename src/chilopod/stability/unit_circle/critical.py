@@ -84,83 +84,75 @@ class Crossing:
     collision: bool = False
 
 
-class Critical:
-    """What is critical at the roots of a family with some spectra."""
+def tolerances(spectra: Spectra, root: Root) -> Array:
+    """How far from zero the margins at a root may be if the multiplier is on the circle there."""
+    ulps = _ULPS * max(float(np.spacing(abs(root.place))), 0.5 * (root.right - root.left) / _ULPS)
+    values = spectra.values
+    here = int(np.searchsorted(values, root.place))
+    left = next((v for v in reversed(values[:here]) if root.place - v >= ulps), root.place)
+    right = next((v for v in values[here:] if v - root.place >= ulps), root.place)
+    errors = spectra.margin_errors(root.place)
+    if left != right:
+        changes = np.abs(spectra.margins(right) - spectra.margins(left))
+        reach = max(4.0 * float(np.spacing(abs(root.place))), root.right - root.left)
+        errors = errors + changes * min(reach / (right - left), 1.0)
+    if errors.max() <= _TELLING:
+        return np.asarray(errors)
+    # Where the orbit itself is uncertain, multipliers are between those of the nearest places where it is not.
+    before = next((v for v in reversed(values[:here]) if spectra.margin_errors(v).max() <= _TELLING), None)
+    after = next((v for v in values[here:] if spectra.margin_errors(v).max() <= _TELLING), None)
+    if before is None or after is None:
+        return np.asarray(errors)
+    apart = np.maximum(spectra.margin_errors(before), spectra.margin_errors(after))
+    return np.minimum(errors, apart + np.abs(spectra.margins(after) - spectra.margins(before)))
 
-    def __init__(self, spectra: Spectra) -> None:
-        self._spectra = spectra
 
-    def tolerances(self, root: Root) -> Array:
-        """How far from zero the margins at a root may be if the multiplier is on the circle there."""
-        ulps = _ULPS * max(float(np.spacing(abs(root.place))), 0.5 * (root.right - root.left) / _ULPS)
-        values = self._spectra.values
-        here = int(np.searchsorted(values, root.place))
-        left = next((v for v in reversed(values[:here]) if root.place - v >= ulps), root.place)
-        right = next((v for v in values[here:] if v - root.place >= ulps), root.place)
-        errors = self._spectra.margin_errors(root.place)
-        if left != right:
-            changes = np.abs(self._spectra.margins(right) - self._spectra.margins(left))
-            reach = max(4.0 * float(np.spacing(abs(root.place))), root.right - root.left)
-            errors = errors + changes * min(reach / (right - left), 1.0)
-        if errors.max() <= _TELLING:
-            return np.asarray(errors)
-        # Where the orbit itself is uncertain, multipliers are between those of the nearest places where it is not.
-        sides = [next(filter(self._telling, near), None) for near in (values[:here][::-1], values[here:])]
-        if None in sides:
-            return np.asarray(errors)
-        first, last = (self._spectra.margins(side) for side in sides if side is not None)
-        apart = np.maximum(*(self._spectra.margin_errors(side) for side in sides if side is not None))
-        return np.minimum(errors, apart + np.abs(last - first))
+def critical_at(spectra: Spectra, root: Root) -> list[Crossing]:
+    """Crossings at a root, by where on the circle, without what rests there; changes are not known yet."""
+    nu = spectra.at(np.array([root.place]))[0]
+    allowed = tolerances(spectra, root)
+    critical = np.abs(spectra.margins(root.place)) <= allowed
+    if root.event is None:
+        # No function vanishes here: what may be anywhere is not on the circle for that.
+        critical &= allowed <= UNKNOWN
+    rest, found = nu[critical], []
+    conservative, bracket = spectra.conservative, (root.left, root.right)
+    for event, target in TARGETS.items():
+        if not rest.size:
+            break
+        reach = spectra.factor_sizes(root.place, event)[1][: rest.size].max() + allowed.max()
+        # A real multiplier on the circle is nowhere else. However large errors are, what is critical is so at the
+        # nearer of the two.
+        near = ((np.abs(rest - target) <= reach) | (rest.imag == 0.0)) & (rest.real * target > 0.0)
+        number = int(near.sum()) - spectra.idle[event]
+        if number > 0 and (not conservative or root.event in (event, None)):
+            best = complex(rest[near][np.abs(rest[near] - target).argmin()])
+            meeting = conservative and number % 2 == 0
+            found.append(Crossing(root.place, bracket, event, number, 0, best, meeting))
+        rest = rest[~near]
+    upper = rest[rest.imag > 0.0]
+    if conservative:
+        upper = _meeting(upper) if root.event is Event.PAIR and not root.touch else upper[:0]
+    if upper.size:
+        best = complex(upper[np.abs(np.abs(upper) - 1.0).argmin()])
+        found.append(Crossing(root.place, bracket, Event.PAIR, 2 * upper.size, 0, best, conservative))
+    return found
 
-    def _telling(self, place: float) -> bool:
-        return float(self._spectra.margin_errors(place).max()) <= _TELLING
 
-    def at(self, root: Root) -> list[Crossing]:
-        """What is critical at a root, by where on the circle, without what is so throughout; changes are not known
-        yet."""
-        nu = self._spectra.at(np.array([root.place]))[0]
-        tolerances = self.tolerances(root)
-        critical = np.abs(self._spectra.margins(root.place)) <= tolerances
-        if root.event is None:
-            # No function vanishes here: what may be anywhere is not on the circle for that.
-            critical &= tolerances <= UNKNOWN
-        rest, found = nu[critical], []
-        conservative, bracket = self._spectra.conservative, (root.left, root.right)
-        for event, target in TARGETS.items():
-            if not rest.size:
-                break
-            reach = self._spectra.factor_sizes(root.place, event)[1][: rest.size].max() + tolerances.max()
-            # A real multiplier on the circle is nowhere else. However large errors are, what is critical is so at the
-            # nearer of the two.
-            near = ((np.abs(rest - target) <= reach) | (rest.imag == 0.0)) & (rest.real * target > 0.0)
-            number = int(near.sum()) - self._spectra.idle[event]
-            if number > 0 and (not conservative or root.event in (event, None)):
-                best = complex(rest[near][np.abs(rest[near] - target).argmin()])
-                meeting = conservative and number % 2 == 0
-                found.append(Crossing(root.place, bracket, event, number, 0, best, meeting))
-            rest = rest[~near]
-        upper = rest[rest.imag > 0.0]
-        if conservative:
-            upper = self._meeting(upper) if root.event is Event.PAIR and not root.touch else upper[:0]
-        if upper.size:
-            best = complex(upper[np.abs(np.abs(upper) - 1.0).argmin()])
-            found.append(Crossing(root.place, bracket, Event.PAIR, 2 * upper.size, 0, best, conservative))
-        return found
+def _meeting(upper: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """The two nearest to each other."""
+    if upper.size < 2:
+        return upper[:0]
+    first, second = np.triu_indices(upper.size, 1)
+    nearest = int(np.abs(upper[first] - upper[second]).argmin())
+    return upper[[first[nearest], second[nearest]]]
 
-    @staticmethod
-    def _meeting(upper: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """The two nearest to each other."""
-        if upper.size < 2:
-            return upper[:0]
-        first, second = np.triu_indices(upper.size, 1)
-        nearest = int(np.abs(upper[first] - upper[second]).argmin())
-        return upper[[first[nearest], second[nearest]]]
 
-    def outside_near(self, crossing: Crossing, place: float) -> int:
-        """How many of the multipliers nearest to those of a crossing are outside the circle at a place beside it."""
-        nu, number = self._spectra.at(np.array([place]))[0], crossing.multiplicity
-        times = 2 if crossing.event is Event.PAIR else 1
-        if times == 2:
-            nu = nu[nu.imag > 0.0]
-        nearest = np.argsort(np.abs(nu - crossing.multiplier))[: number // times]
-        return times * int((np.abs(nu[nearest]) > 1.0).sum())
+def outside_near(spectra: Spectra, crossing: Crossing, place: float) -> int:
+    """How many of the multipliers nearest to those of a crossing are outside the circle at a place beside it."""
+    nu, number = spectra.at(np.array([place]))[0], crossing.multiplicity
+    times = 2 if crossing.event is Event.PAIR else 1
+    if times == 2:
+        nu = nu[nu.imag > 0.0]
+    nearest = np.argsort(np.abs(nu - crossing.multiplier))[: number // times]
+    return times * int((np.abs(nu[nearest]) > 1.0).sum())

@@ -55,19 +55,8 @@ class SearchStatus(Labelled):
 
 @dataclass(frozen=True)
 class Crossings:
-    """What :func:`find_crossings` found.
-
-    Attributes
-    ----------
-    crossings
-        By rising value.
-    status
-        How the search ended.
-    remarks
-        What else is to be said, a sentence each.
-    evaluations
-        Number of values at which matrices were asked for.
-    """
+    """Crossings by rising value, how the search for them ended, remarks of a sentence each, and the number of values at
+    which matrices were asked for."""
 
     crossings: tuple[Crossing, ...]
     status: SearchStatus
@@ -88,10 +77,8 @@ def find_crossings(
 
     Parameters
     ----------
-    matrices
-        The family.
-    low, high
-        The interval.
+    matrices, low, high
+        The family and the interval.
     budget
         Number of values at which matrices may be asked for.
     affordable

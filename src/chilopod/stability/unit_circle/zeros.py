@@ -18,21 +18,14 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
+from chilopod.stability.unit_circle.interpolation import DEGREE, DENSE, PLACES, interpolated
+
 Array = NDArray[np.float64]
 Interval = tuple[float, float]
 SignedLog = Callable[[Array], tuple[Array, Array]]
 """A function given as ``numpy.linalg.slogdet`` gives a determinant: signs, shape (k,), and logarithms of sizes, shape
 (k,), so that no size is too small or too large; NaN where the function cannot be evaluated."""
 
-BUDGET = 20_000
-"""Values of the function that a search may ask for, if not told otherwise."""
-
-_DEGREE = 8
-_NODES = np.cos(np.pi * np.arange(_DEGREE, -1, -1) / _DEGREE)
-_TRANSFORM: Array = np.linalg.inv(chebyshev.chebvander(_NODES, _DEGREE)).astype(np.float64)
-_CHECKS = np.array([-0.618, 0.137])  # the function is held against the polynomial here too
-_POINTS = np.concatenate([_NODES, _CHECKS])
-_DENSE = np.linspace(-1.0, 1.0, 65)
 _RESOLVED = 1e-4  # of the largest value on the piece
 _CLEAR = 4.0  # times what it may be wrong by: so far from zero a piece has none
 _NEAR = 0.02  # a pair of zeros this close to each other, or to the real axis, relative to the piece, is looked at again
@@ -48,13 +41,12 @@ _REAL = 1e-10  # imaginary part of a zero that is real
 
 @dataclass(frozen=True)
 class Zeros:
-    """What a search found; all intervals in order.
+    """Zeros that a search found, all intervals in order.
 
     Attributes
     ----------
     changes
-        Intervals at whose ends the function has opposite signs, one zero each; a zero met at an end of the interval
-        is a pair (a, a).
+        Intervals at whose ends the function has opposite signs, one zero each; (a, a) for a zero at an end.
     touches
         Intervals with a zero of even order, or without any sign that is certain, between equal signs.
     unresolved
@@ -79,8 +71,8 @@ def between(low: float, high: float) -> str:
 
 
 def first_places(low: float, high: float) -> Array:
-    """Where a search begins: the values of the function it asks for first, whatever the function is."""
-    return _places(low, high, _POINTS)
+    """Places at which a search asks for any function first."""
+    return _places(low, high, PLACES)
 
 
 def find_zeros(
@@ -96,26 +88,23 @@ def find_zeros(
 
     Parameters
     ----------
-    function
-        Takes values, shape (k,); it need not be scaled.
-    low, high
-        The interval.
+    function, low, high
+        The function, which need not be scaled, and the interval.
     error
-        Logarithm of the error of the function at some values, shape (k,): below it a value is zero within its error,
+        Logarithm of the error of the function at some values, shape (k,), by default none: below it a value is zero,
         and the search stops. Asked for where the search goes deep only.
     left
-        How many more values of the function may be asked for; when there are none the widest pieces have been looked
-        at, and the changes of sign met so far are reported. If not given, a budget of ``BUDGET``.
+        How many more values of the function may be asked for, by default 20 000 in all; when there are none the widest
+        pieces have been looked at, and the changes of sign met so far are reported.
     skip
-        Whether zeros between two values are of no interest, the function having been evaluated there; asked for narrow
-        pieces.
+        Whether zeros between two values are of no interest; asked for narrow pieces that were evaluated.
     """
     search = _Search(function, error, skip, low, high)
-    room_left = left if left is not None else lambda: BUDGET - search.asked
+    room_left = left if left is not None else lambda: 20_000 - search.asked
     pieces = [(low, high)]
     spent = False
     while pieces:
-        room = max(room_left(), 0) // (2 * _POINTS.size)
+        room = max(room_left(), 0) // (2 * PLACES.size)
         pieces.sort(key=lambda piece: 0.5 * piece[0] - 0.5 * piece[1])  # the widest first
         if room < len(pieces):
             spent = True
@@ -154,7 +143,7 @@ class _Search:
 
     def look(self, pieces: list[Interval]) -> list[Interval]:
         """Look at some pieces at once; those that are left to be looked at."""
-        places = np.array([_places(a, b, _POINTS) for a, b in pieces])
+        places = np.array([_places(a, b, PLACES) for a, b in pieces])
         signs, logs = (part.reshape(places.shape) for part in self._ask(places.ravel()))
         left: list[Interval] = []
         resolved: list[_Piece] = []
@@ -189,12 +178,10 @@ class _Search:
             self.flat.append((a, b))
             return []
         values = signs * np.exp(logs - reference)
-        coefficients = _TRANSFORM @ values[: _NODES.size]
-        off = np.abs(chebyshev.chebval(_CHECKS, coefficients) - values[_NODES.size :]).max()
-        uncertain = float(max(off, np.abs(coefficients[-2:]).max()))
+        coefficients, off, dense = interpolated(values)
+        uncertain = float(off)
         real, close, spread = _roots(coefficients)
-        dense = np.abs(chebyshev.chebval(_DENSE, coefficients))
-        unclear = _DENSE[dense <= _CLEAR * uncertain]
+        unclear = DENSE[np.abs(dense) <= _CLEAR * uncertain]
         if not unclear.size and not real.size and not close.size:
             return _Piece(a, b, 0, (False, False), np.empty(0))
         # Where the polynomial says nothing there must be one of its zeros at hand, or the end of the piece.
@@ -207,7 +194,7 @@ class _Search:
             return []
         noise = 0.0
         if self.error is not None and (close.size or vague or uncertain > _RESOLVED) and self._fine(a, b, _DEEP):
-            noise = _CLEAR * float(np.exp(min(self.error(_places(a, b, _POINTS)).max() - reference, 0.0)))
+            noise = _CLEAR * float(np.exp(min(self.error(_places(a, b, PLACES)).max() - reference, 0.0)))
         if noise >= 1.0:
             self.flat.append((a, b))
             return []
@@ -226,7 +213,7 @@ class _Search:
         self.roots += zip(_places(a, b, real).tolist(), (reach * (0.5 * b - 0.5 * a)).tolist(), strict=True)
         # A zero that may lie on either side of a border is left to whoever compares the signs on both sides.
         doubt = _CLEAR * max(uncertain, noise)
-        at_left, at_right = bool(abs(values[0]) <= doubt), bool(abs(values[_DEGREE]) <= doubt)
+        at_left, at_right = bool(abs(values[0]) <= doubt), bool(abs(values[DEGREE]) <= doubt)
         kept = real[~(at_left & (real + 1.0 <= reach)) & ~(at_right & (1.0 - real <= reach))]
         alone = (at_left or at_right) and not kept.size
         stations = np.concatenate([[-1.0] if at_left or alone else [], kept, [1.0] if at_right or alone else []])
