@@ -59,9 +59,9 @@ class Multipliers(Result, ReadOnlyArrays):
     orbit
         State on the orbit at time 0.
     period
-        Of the orbit.
+        Period of the orbit.
     remarks
-        What else is to be said, a sentence each: that these are only the leading ones.
+        Remarks, a sentence each: that these are only the leading ones.
     """
 
     values: ComplexArray
@@ -74,7 +74,7 @@ class Multipliers(Result, ReadOnlyArrays):
 
     @property
     def stable(self) -> bool | None:
-        """Whether all multipliers lie inside the unit circle: True or False by more than the error bounds, None where
+        """True if all multipliers lie inside the unit circle: True or False by more than the error bounds, None where
         these leave it undecided."""
         return stable_within(self.values, self.error_bound, self.error_bounds)
 
@@ -167,7 +167,7 @@ def multipliers(system: SystemLike, orbit: ArrayLike | None = None, leading: int
     orbit
         A first guess of a state on the orbit at time 0; not needed where the system knows its orbit.
     leading
-        How many of the largest multipliers are wanted, with their multiplicity, or one more where that would part a
+        Number of the largest multipliers that are wanted, with their multiplicity, or one more where that would part a
         pair; all by default. Of a system of 100 states or more that has ``flow_tangents`` (any right-hand side that can
         be traced) they are computed in a block Krylov subspace, without the derivative of the flow as a matrix.
 

@@ -65,7 +65,7 @@ def described(
     kind
         Kind of the point, where that is known.
     with_normal_form
-        Whether coefficients and a verdict are wanted.
+        True if coefficients and a verdict are wanted.
     """
     value, error_bound = place
     spec = spectrum(orbit.image)
@@ -162,7 +162,7 @@ def _kind(crossing: Crossing, returns: int, form: NormalForm | None, broken: Sym
 def _modes(
     spec: Spectrum, critical: NDArray[np.intp], orbit: Orbit, block: Block | None, symmetry: SymmetricCrossing | None
 ) -> ComplexArray:
-    """Of several critical multipliers: along the axial branches where a symmetry makes them several, else as they
+    """Modes of several critical multipliers: along the axial branches where a symmetry makes them several, else as they
     come."""
     if block is None or symmetry is None or not symmetry.branches or critical.size > 2 * block.dimension:
         return spec.right[:, critical]

@@ -117,7 +117,7 @@ def _slope(course: Course, crossing: Crossing, image: ReturnMap) -> float:
 
 
 def _touch_error(course: Course, crossing: Crossing, uncertain: float) -> float:
-    """Of a multiplier that touches the circle and turns back: its distance is a parabola."""
+    """Error of the place where a multiplier touches the circle and turns back: its distance is a parabola."""
     step = _TOUCH_STEP * course.width
     away = []
     for each in course.at(np.clip(crossing.value + step * np.array([-1.0, 0.0, 1.0]), course.low, course.high)):
@@ -129,8 +129,8 @@ def _touch_error(course: Course, crossing: Crossing, uncertain: float) -> float:
 
 
 def _collision_error(course: Course, crossing: Crossing, image: ReturnMap) -> float:
-    """Where two multipliers meet they move as a square root, but their product does not: det(H' - nu), or the squared
-    difference of nu + 1/nu of two pairs, by how uncertain and how steep it is."""
+    """Error of the place where two multipliers meet. They move as a square root, but their product does not: det(H' -
+    nu), or the squared difference of nu + 1/nu of two pairs, by how uncertain and how steep it is."""
     matrix = image.jacobian
     error = np.broadcast_to(image.error, matrix.shape) + 4.0 * _EPSILON * np.abs(matrix)
     here = _collision(matrix, crossing)

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 _ROUND_OFF = 1e-14
-"""Of the largest image: what is left of one outside the subspace that is that small is round-off."""
+"""Part of an image outside the subspace, relative to the largest image, that is round-off."""
 
 _GROWTH = 1.125
 _SINGULAR = 1e-13  # singular values of A - 1 that count as zero, A or the unit matrix being one

@@ -100,7 +100,7 @@ def whole_pairs(values: ComplexArray, count: int) -> int:
 
 
 def _settled(ritz: _Ritz, chosen: int, largest: float) -> bool:
-    """Whether the chosen ones are known to round-off, and no other one may yet become larger."""
+    """True if the chosen ones are known to round-off, and no other one may yet become larger."""
     if ritz.values.size <= chosen:
         return False
     least = float(np.abs(ritz.values[chosen - 1]))

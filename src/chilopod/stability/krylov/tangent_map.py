@@ -113,7 +113,7 @@ def tangent_map(system: FlowsTangents, x: Array, section: Section | None = None)
 
 
 def tangent_sizes(system: FlowsTangents, x: Array, duration: float) -> Array:
-    """What is large for every state, shape (n,), as :func:`chilopod.stability.scales.sizes` says, without the matrix.
+    """Sizes of the states, shape (n,), as :func:`chilopod.stability.scales.sizes` says, without the matrix.
 
     A state is as large as it becomes during a return, or as what the others, disturbed by their own sizes at random,
     make of it within a part of the return. Where the orbit is zero throughout that alone gives the ratios: the

@@ -36,7 +36,7 @@ class Extent:
     ending
         A sentence where it ends otherwise before the end of the interval; else empty.
     shrinks
-        Whether it ends in an equilibrium.
+        True if it ends in an equilibrium.
     beside
         Distance of a fold from ``start`` and ``end``.
     """
@@ -49,7 +49,7 @@ class Extent:
     beside: float = 0.0
 
     def explains(self, value: float) -> bool:
-        """Whether a value is so near what the orbit begins or ends in that a multiplier +1 is what comes of that."""
+        """True if a value is so near what the orbit begins or ends in that a multiplier +1 is what comes of that."""
         ends = [fold.value for fold in self.folds] + [self.end] * self.shrinks
         return any(abs(value - end) <= 2.0 * self.beside for end in ends)
 
@@ -106,7 +106,7 @@ def _fold_beside(samples: Samples, sample: Sample, others: list[Sample], rising:
 
 
 def _next_to(samples: Samples, sample: Sample, fold: Fold, rising: bool) -> bool:
-    """Whether a fold is just past a sample at either end, on the same orbit; others may be anywhere."""
+    """True if a fold is just past a sample at either end, on the same orbit; others may be anywhere."""
     further = fold.value - sample.value if rising else sample.value - fold.value
     return (
         bool(np.isfinite(fold.error_bound))
@@ -117,7 +117,7 @@ def _next_to(samples: Samples, sample: Sample, fold: Fold, rising: bool) -> bool
 
 
 def _comes_as_a_root(samples: Samples, sample: Sample, fold: Fold, rising: bool) -> bool:
-    """Whether the multiplier comes to +1 as the root of the distance, as it does in a fold; where another branch only
+    """True if the multiplier comes to +1 as the root of the distance, as it does in a fold; where another branch only
     passes it comes evenly."""
     near = max(_COMES * samples.width, abs(fold.value - sample.value))
     away = np.array([near, min(_FARTHER * near, 0.5 * samples.width)])
@@ -130,7 +130,7 @@ def _comes_as_a_root(samples: Samples, sample: Sample, fold: Fold, rising: bool)
 
 
 def _at_rest(samples: Samples, last: Sample) -> bool:
-    """Whether hardly anything of the motion is left where an orbit ends: beyond there is none, and what looks like a
+    """True if hardly anything of the motion is left where an orbit ends: beyond there is none, and what looks like a
     fold is the same orbit again, half a period later."""
     if samples.family.timed:
         return False
@@ -139,7 +139,7 @@ def _at_rest(samples: Samples, last: Sample) -> bool:
 
 
 def _moved(samples: Samples, system: SystemLike, image: ReturnMap) -> float:
-    """How far the motion goes within a return, relative to the sizes of the states."""
+    """Extent of the motion within a return, relative to the sizes of the states."""
     path = [image.state]
     for _ in range(_PARTS - 1):
         path.append(system.flow(path[-1], 0.0, image.period / image.returns / _PARTS)[0])

@@ -20,7 +20,7 @@ class AskedFamily:
     dimension
         Number of states; 0 as long as no system is known.
     timed
-        Whether the systems depend on time.
+        True if the systems depend on time.
     """
 
     def __init__(self, family: Family) -> None:

@@ -60,7 +60,7 @@ def locate(
         A guess of a state on the orbit at time 0 for ``low``, shape (n,); the orbit is then followed through the
         interval. Not needed where the systems know their orbit.
     normal_form
-        Whether to compute coefficients and verdicts as well.
+        True to compute coefficients and verdicts as well.
     budget
         Orbits that may be computed to follow the first one through the interval, and once more for the search; either
         ends as well when twice as many return maps were evaluated, by Newton's method too and for orbits that are not
@@ -129,13 +129,13 @@ def _crossings(samples: Samples, start: float, end: float, budget: int) -> list[
 
 
 def _touches(samples: Samples, crossing: Crossing) -> bool:
-    """Whether one multiplier, or one pair, comes to the circle within the interval and goes back."""
+    """True if one multiplier, or one pair, comes to the circle within the interval and goes back."""
     simple = crossing.multiplicity <= (2 if crossing.event is Event.PAIR else 1)
     return simple and crossing.change == 0 and not crossing.collision and samples.low < crossing.value < samples.high
 
 
 def _described(samples: Samples, crossing: Crossing, block: Block | None, with_normal_form: bool) -> Found:
-    """What happens at a crossing of an orbit that is known, or followed."""
+    """Description of a crossing of an orbit that is known, or followed."""
     touch = _touches(samples, crossing)
 
     def bounded_at(value: float, state: Array, error: Array, image: ReturnMap) -> Orbit:

@@ -35,11 +35,11 @@ class Located(Result, Sequence[BifurcationPoint]):
     Attributes
     ----------
     points
-        By rising parameter.
+        Points by rising parameter.
     status
-        How the search ended: ``status.sentence`` says it in words.
+        End of the search: ``status.sentence`` says it in words.
     remarks
-        What else is to be said, a sentence each.
+        Remarks, a sentence each.
     evaluations
         Number of orbits computed.
     """
@@ -51,7 +51,7 @@ class Located(Result, Sequence[BifurcationPoint]):
 
     @property
     def complete(self) -> bool:
-        """Whether the numbers of unstable multipliers at the ends and between all points add up."""
+        """True if the numbers of unstable multipliers at the ends and between all points add up."""
         return self.status in (SearchStatus.COMPLETE, SearchStatus.CONSERVATIVE)
 
     @overload
@@ -108,9 +108,9 @@ def located(
     crossings
         ``crossings(start, end)`` searches every block of the return map.
     described
-        What there is to say of a crossing.
+        ``described(crossing, block)`` gives the point, remarks, or both.
     fold
-        What there is to say of a fold that the orbit begins or ends in.
+        ``fold(fold)`` gives the point, or a remark, for a fold that the orbit begins or ends in.
     returns
         Number of return maps that describing a crossing may take.
     """

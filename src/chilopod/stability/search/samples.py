@@ -66,17 +66,17 @@ class Samples:
     first
         The orbit at the lower end, with its error bounds.
     known
-        Whether the systems know their orbits.
+        True if the systems know their orbits.
     size
         Sizes of the states on the first orbit, shape (n,).
     path
         The samples by which an orbit that is not known was followed from ``low``, as far as it goes.
     end
-        Where the orbit ends, at most ``high``.
+        Value at which the orbit ends, at most ``high``.
     spent
-        Whether the path ends because the budget was spent.
+        True if the path ends because the budget was spent.
     merges
-        Whether the path ends where the orbit meets another one, which goes on alone.
+        True if the path ends where the orbit meets another one, which goes on alone.
     count
         Number of orbits computed.
     """
@@ -174,7 +174,7 @@ class Samples:
         return return_map(self.family(self.low), self.first.state, True, self.first.section)
 
     def jumped(self, orbit: Array, guess: Array) -> bool:
-        """Whether an orbit is so far from what was foreseen that it must be another one."""
+        """True if an orbit is so far from what was foreseen that it must be another one."""
         return bool((np.abs(orbit - guess) > _JUMP * np.maximum(self.size, np.abs(guess))).any())
 
     def _keep(self, sample: Sample) -> None:
@@ -317,7 +317,7 @@ class Samples:
         return path[len(behind) :]
 
     def _connected(self, last: Sample, guess: Array, found: Sample) -> bool:
-        """Whether an orbit that was not foreseen is on the branch of the last one: then there is one about halfway
+        """True if an orbit that was not foreseen is on the branch of the last one: then there is one about halfway
         between them, in a fold at the square root of a half; to another orbit it is a jump at any place."""
         change = found.orbit - last.orbit
         size = self.size * float((np.abs(change) / self.size).max())
@@ -337,7 +337,7 @@ def _sample(value: float, orbit: Orbit) -> Sample:
 
 
 def _found(compute: Callable[[], T]) -> T | None:
-    """What a function gives; None where there is nothing."""
+    """Result of a function; None where there is nothing."""
     try:
         return compute()
     except SpentError:
@@ -347,7 +347,7 @@ def _found(compute: Callable[[], T]) -> T | None:
 
 
 def _touches(first: Sample, left: Sample, right: Sample, last: Sample) -> bool:
-    """Whether a multiplier on one side of +1 heads for it from both sides of the gap between two of four samples."""
+    """True if a multiplier on one side of +1 heads for it from both sides of the gap between two of four samples."""
     places = np.array([each.value for each in (first, left, right, last)])
     off = np.array([each.beside_plus_one for each in (first, left, right, last)])
     if not np.isfinite(off).all() or (np.sign(off) != np.sign(off[1])).any():

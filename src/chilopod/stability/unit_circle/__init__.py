@@ -1,1 +1,1 @@
-"""Where eigenvalues of a family of matrices meet the unit circle: zeros, counts and their errors."""
+"""Eigenvalues of a family of matrices on the unit circle: zeros, counts and their errors."""

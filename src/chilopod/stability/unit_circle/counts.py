@@ -1,5 +1,4 @@
-"""Whether the number of multipliers outside the unit circle changes by what crosses it, and what crosses where it does
-not."""
+"""Balance of the number of multipliers outside the unit circle against the crossings, and the crossings it lacks."""
 
 from __future__ import annotations
 
@@ -166,7 +165,7 @@ class Accounts:
         return kept
 
     def _in_gap(self, inside: list[Root], x: float, y: float, before: int, after: int) -> list[Crossing] | _Anew:
-        """What crosses in a gap, if it explains the change of the count; else the roots to go on with."""
+        """Crossings in a gap, if they explain the change of the count; else the roots to go on with."""
         change = after - before
         if (not inside and change == 0) or (x, y) in self._settled:
             return self._unchanged(inside)
@@ -215,7 +214,7 @@ class Accounts:
         return False
 
     def _explains(self, root: Root, change: int) -> bool:
-        """Whether a change of the count is what the critical multipliers at a root may do."""
+        """True if a change of the count is what the critical multipliers at a root may do."""
         crossings = critical_at(self._spectra, root)
         number = sum(crossing.multiplicity for crossing in crossings)
         if self._spectra.conservative and all(crossing.collision for crossing in crossings):
@@ -226,7 +225,7 @@ class Accounts:
         return abs(change) == number if alone else abs(change) <= number and (change - number) % 2 == 0
 
     def _changed(self, root: Root, change: int, x: float, y: float) -> list[Crossing]:
-        """What crosses at a root between two places at which the counts are known."""
+        """Crossings at a root between two places at which the counts are known."""
         crossings = critical_at(self._spectra, root)
         if len(crossings) == 1:
             return [replace(crossings[0], change=change)]
@@ -234,7 +233,7 @@ class Accounts:
         return [replace(each, change=near(each, y) - near(each, x)) for each in crossings]
 
     def _at_end(self, root: Root, decided: list[tuple[float, int]]) -> list[Crossing]:
-        """What crosses at a root beyond the last decided place: as if the multipliers went on as they come."""
+        """Crossings at a root beyond the last decided place, as if the multipliers went on as they come."""
         first = root.place < decided[0][0]
         count = decided[0 if first else -1][1]
         crossings = critical_at(self._spectra, root)
@@ -306,7 +305,7 @@ class Accounts:
         return []
 
     def _jumps(self, place: float, rank: int) -> bool:
-        """Whether the multiplier of a rank is not continuous at a place: its change does not fall with the width."""
+        """True if the multiplier of a rank is not continuous at a place: its change does not fall with the width."""
         values = self._spectra.values
         here = int(np.searchsorted(values, place))
         left = values[here - 1] if here > 0 else place
@@ -337,7 +336,7 @@ class Accounts:
         return roots
 
     def _tightened(self, root: Root, x: float, y: float) -> bool:
-        """Whether places nearer to a root could be decided."""
+        """True if places nearer to a root could be decided."""
         found = False
         for side, end in ((-1.0, x), (1.0, y)):
             reach = max(8.0 * float(np.spacing(abs(root.place))), root.right - root.left)

@@ -34,7 +34,7 @@ class Root:
     event
         The event whose function vanishes there; None where a multiplier was followed by its rank.
     touch
-        Whether the function does not change sign.
+        True if the function does not change sign.
     """
 
     place: float
@@ -63,7 +63,7 @@ class Crossing:
     bracket
         Interval in which the root finder has enclosed it; errors of the matrices come on top.
     event
-        Where on the circle.
+        Place on the circle.
     multiplicity
         Number of multipliers on the circle there, both of a pair counted.
     change
@@ -72,7 +72,7 @@ class Crossing:
     multiplier
         One of the critical multipliers, of a pair the one with positive imaginary part.
     collision
-        Whether multipliers meet on the circle there and leave it, or come back: a conservative family.
+        True if multipliers meet on the circle there and leave it, or come back: a conservative family.
     """
 
     value: float
@@ -85,7 +85,7 @@ class Crossing:
 
 
 def tolerances(spectra: Spectra, root: Root) -> Array:
-    """How far from zero the margins at a root may be if the multiplier is on the circle there."""
+    """Largest margins at a root of multipliers that may be on the circle there, shape (m,)."""
     ulps = _ULPS * max(float(np.spacing(abs(root.place))), 0.5 * (root.right - root.left) / _ULPS)
     values = spectra.values
     here = int(np.searchsorted(values, root.place))
@@ -149,7 +149,7 @@ def _meeting(upper: NDArray[np.complex128]) -> NDArray[np.complex128]:
 
 
 def outside_near(spectra: Spectra, crossing: Crossing, place: float) -> int:
-    """How many of the multipliers nearest to those of a crossing are outside the circle at a place beside it."""
+    """Number outside the circle, at a place beside a crossing, of the multipliers nearest to the critical ones."""
     nu, number = spectra.at(np.array([place]))[0], crossing.multiplicity
     times = 2 if crossing.event is Event.PAIR else 1
     if times == 2:

@@ -1,4 +1,4 @@
-"""Where eigenvalues of a family of matrices cross the unit circle, and whether these are all.
+"""Search for all crossings of the unit circle by eigenvalues of a family of matrices.
 
 Two ways meet here. Zeros of functions that are analytic in the parameter (:mod:`.spectra`) show
 events however close together they lie, but not two equal ones at once. The number of eigenvalues outside the circle,
@@ -41,7 +41,7 @@ _CLOSE = 0.25  # of the nearer end: so far towards the circle a multiplier must 
 
 
 class SearchStatus(Labelled):
-    """How a search ended; each member's ``sentence`` says it in words."""
+    """End of a search; each member's ``sentence`` says it in words."""
 
     COMPLETE = "complete", "the counts at both ends and between all points add up"
     CONSERVATIVE = "conservative", "multipliers lie on the circle throughout; where they meet and leave it is listed"
@@ -82,7 +82,7 @@ def find_crossings(
     budget
         Number of values at which matrices may be asked for.
     affordable
-        How many more matrices can be had, where that is for their cost to say: the search ends when it says none.
+        Number of matrices that can still be had, where that is for their cost to say; the search ends at none.
     shown
         ``shown(value)`` is what remarks say of a value.
 
@@ -166,7 +166,7 @@ class _Finder:
             self.report.remarks.append(pairs)
 
     def _idle(self, places: Array, event: Event) -> int:
-        """How many factors of the function of an event vanish for all values of the parameter."""
+        """Number of factors of the function of an event that vanish for all values of the parameter."""
         places = places[np.isfinite(self.spectra.at(places)).all(axis=1)]
         if self._factors(event) == 0:
             return 0

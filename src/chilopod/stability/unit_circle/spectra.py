@@ -32,7 +32,7 @@ _FILL = 1e-30  # of the largest entry, in place of zeros, so that a triangular m
 
 
 class Event(Labelled):
-    """Where multipliers of a return map meet the unit circle."""
+    """A place at which multipliers of a return map meet the unit circle."""
 
     MINUS = "-1", "a real multiplier passes -1"
     PLUS = "+1", "a real multiplier passes +1"
@@ -62,7 +62,7 @@ class Spectra:
     budget
         Number of values at which M may be asked for.
     affordable
-        How many more matrices can be had, where that is for their cost to say.
+        Number of matrices that can still be had, where that is for their cost to say.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class Spectra:
     idle
         For each event, number of factors of its function that vanish throughout, as far as that is known.
     conservative
-        Whether multipliers come in pairs with product 1 throughout, and may stay on the circle.
+        True if multipliers come in pairs with product 1 throughout, and may stay on the circle.
     """
 
     def __init__(self, matrices: Matrices, budget: int, affordable: Callable[[], int] | None = None) -> None:
@@ -101,7 +101,7 @@ class Spectra:
 
     @property
     def left(self) -> int:
-        """How many more values may be asked for."""
+        """Number of values that may still be asked for."""
         left = self._budget - len(self._known)
         return left if self._affordable is None else min(left, self._affordable())
 
@@ -147,16 +147,16 @@ class Spectra:
         return np.asarray(matrices * (self._units / self._units[:, None]))
 
     def exists(self, value: float) -> bool:
-        """Whether there is a matrix at a value; asked for if that is not known."""
+        """True if there is a matrix at a value; asked for if that is not known."""
         self.at(np.array([value]))
         return self._known[value] is not None
 
     def holes(self, low: float, high: float) -> bool:
-        """Whether there was no matrix somewhere between two values."""
+        """True if there was no matrix somewhere between two values."""
         return any(low < value < high and nu is None for value, nu in self._known.items())
 
     def without_pair(self, low: float, high: float) -> bool:
-        """Whether all complex multipliers are clear of the circle between two values, as far as those in between that
+        """True if all complex multipliers are clear of the circle between two values, as far as those in between that
         are known say.
 
         The bialternate product also vanishes where two real multipliers have product 1.
@@ -197,7 +197,7 @@ class Spectra:
         return balanced, (_ROUNDING + error) * spread if relative else _ROUNDING * spread + self._balanced(error)
 
     def margins(self, value: float) -> Array:
-        """By how much each multiplier is outside the circle (see :func:`margins`), falling, shape (m,)."""
+        """Margin of each multiplier (see :func:`margins`), falling, shape (m,)."""
         return margins(self.at(np.array([value])))[0]
 
     def margin_errors(self, value: float) -> Array:
@@ -206,7 +206,7 @@ class Spectra:
         return np.asarray(SAFETY * np.abs(moved).max(axis=0) + _ROUNDING)
 
     def clear(self, value: float) -> bool:
-        """Whether all multipliers are off the circle by more than their errors."""
+        """True if all multipliers are off the circle by more than their errors."""
         return bool((np.abs(self.margins(value)) > self.margin_errors(value)).all())
 
     def factor_sizes(self, value: float, event: Event) -> tuple[Array, Array]:
@@ -257,7 +257,7 @@ def margins(nu: ComplexArray) -> Array:
 
 
 def factors(nu: ComplexArray, event: Event) -> ComplexArray:
-    """What vanishes at an event: nu + 1, nu - 1, or nu_i nu_j - 1 over all pairs, along the last axis."""
+    """Factors that vanish at an event: nu + 1, nu - 1, or nu_i nu_j - 1 over all pairs, along the last axis."""
     if event is Event.MINUS:
         return nu + 1.0
     if event is Event.PLUS:

@@ -54,7 +54,7 @@ class Zeros:
     missing
         Pieces on which the function cannot be evaluated, or only in part.
     spent
-        Whether the budget ended the search.
+        True if the budget ended the search.
     """
 
     changes: tuple[Interval, ...]
@@ -94,10 +94,10 @@ def find_zeros(
         Logarithm of the error of the function at some values, shape (k,), by default none: below it a value is zero,
         and the search stops. Asked for where the search goes deep only.
     left
-        How many more values of the function may be asked for, by default 20 000 in all; when there are none the widest
+        Number of values of the function that may still be asked for, by default 20 000 in all; at none the widest
         pieces have been looked at, and the changes of sign met so far are reported.
     skip
-        Whether zeros between two values are of no interest; asked for narrow pieces that were evaluated.
+        True if zeros between two values are of no interest; asked for narrow pieces that were evaluated.
     """
     search = _Search(function, error, skip, low, high)
     room_left = left if left is not None else lambda: 20_000 - search.asked
@@ -162,7 +162,7 @@ class _Search:
         return signs, logs
 
     def _fine(self, a: float, b: float, part: float) -> bool:
-        """Whether a piece is too narrow to be cut."""
+        """True if a piece is too narrow to be cut."""
         least = max(part * (0.5 * self.high - 0.5 * self.low), 0.5 * _ULPS * float(np.spacing(max(abs(a), abs(b)))))
         return 0.5 * b - 0.5 * a <= least
 
