@@ -51,6 +51,7 @@ _STRAYS = 0.1  # of a step: so far beyond the interval a curve is sought that en
 _SOONER, _LATER = 0.2, 0.5  # of a return: the time of the next one is foreseen to differ by so much at most
 _SHARPEST_TURN = 0.5  # cosine between two tangents: beyond it the step may have landed on another curve
 _SHRUNK = 10.0  # cube roots of the precision, of the largest motion so far
+_PARTS = 32  # of a return, in which the extent of an orbit is taken
 _NOT_SMALL = 0.5  # modulus of a multiplier
 _ROUNDING = 16.0 * float(np.finfo(float).eps)  # of eigenvalues
 
@@ -333,11 +334,14 @@ class Curve(FamilyReturns):
             self._motion = max(self._motion, motion)
             # Past an equilibrium come the same orbits again, half a period later. Before it, a part f of the largest
             # motion is a parameter f^2 away from the Hopf point, which the precision leaves uncertain by its f-th part.
-            if (
-                motion < _SHRUNK * np.cbrt(self.precision) * self._motion
-                or not float(anchor.section.normal @ velocity) > 0.0
-            ):
-                raise AnalysisError("the orbit shrinks into an equilibrium: a Hopf point", field="orbit")
+            passed = not float(anchor.section.normal @ velocity) > 0.0
+            if passed or motion < _SHRUNK * np.cbrt(self.precision) * self._motion:
+                raise AnalysisError(
+                    "the orbit shrinks into an equilibrium: a Hopf point"
+                    if self._extent(x, value, image) <= motion
+                    else "the orbit nearly rests in its section, and the next step has no direction",
+                    field="orbit",
+                )
             along = self._projection(velocity, section)
             tangent, matrix = np.array(tangent), np.array(matrix)
             tangent[:-1] = along @ tangent[:-1]
@@ -348,6 +352,16 @@ class Curve(FamilyReturns):
             matrix[-1] = tangent
         point = BranchPoint(value, x, values, tangent, units=self.units(x.size), period=image.period, error_bound=bound)
         return Anchor(point, matrix, before, section)
+
+    def _extent(self, x: Array, value: float, image: ReturnMap) -> float:
+        """Largest distance of an orbit from a state on it, in units; a small cycle is smaller than its velocity in any
+        state times its period."""
+        system, states = self.system(value), [x]
+        self.budget.take()
+        with UserCode("flow", value):
+            for _ in range(_PARTS):
+                states.append(system.flow(np.array(states[-1]), 0.0, image.period / image.returns / _PARTS)[0])
+        return float(np.linalg.norm((np.array(states) - x) / self.units(x.size)[:-1], axis=1).max())
 
     def multipliers(self, image: ReturnMap, wrong: float = 0.0) -> tuple[ComplexArray, float]:
         """Multipliers of the full period, by falling modulus, and a bound on the errors of those that are not small.
