@@ -30,8 +30,8 @@ def panel(data: xr.Dataset) -> Panel:
         name="branch",
         title=f"Curved walks over {shown}",
         draw=lambda narrow: _draw(data, narrow),
-        alt=f"Mean joint angles, radii of axis and path, and cost of transport over {shown}; where a part is not stable, "
-        "the legend names its line.",
+        alt=f"Mean joint angles, radii of axis and path, and cost of transport over {shown}; the legend names lines "
+        "of parts that are not stable.",
         text=(),
         data=data,
     )
