@@ -88,12 +88,14 @@ class Critical:
             errors = errors + changes * min(reach / (right - left), 1.0)
         if errors.max() <= _TELLING:
             return np.asarray(errors)
-        # Where the orbit itself is uncertain, multipliers are between those of the nearest places where it is not.
+        # Where the orbit itself is uncertain, multipliers are between those of the nearest places where it is not, or
+        # between the one such place and an end of the interval.
         sides = [next(filter(self._telling, near), None) for near in (values[:here][::-1], values[here:])]
-        if None in sides:
+        telling = [side for side in sides if side is not None]
+        if not telling:
             return np.asarray(errors)
-        first, last = (self._spectra.margins(side) for side in sides if side is not None)
-        apart = np.maximum(*(self._spectra.margin_errors(side) for side in sides if side is not None))
+        first, last = (self._spectra.margins(root.place if side is None else side) for side in sides)
+        apart = np.max([self._spectra.margin_errors(side) for side in telling], axis=0)
         return np.minimum(errors, apart + np.abs(last - first))
 
     def _telling(self, place: float) -> bool:
