@@ -252,10 +252,10 @@ def counts_outside(values: ComplexArray) -> tuple[int, int, int]:
 def _multipliers(orbit: Orbit) -> Multipliers:
     image = orbit.image
     spec = spectrum(image)
-    return _of_period(spec.values, spec.error, image.returns, orbit.state, image.period)
+    return full_period(spec.values, spec.error, image.returns, orbit.state, image.period)
 
 
-def _of_period(nu: ComplexArray, error: Array, k: int, state: Array, period: float) -> Multipliers:
+def full_period(nu: ComplexArray, error: Array, k: int, state: Array, period: float) -> Multipliers:
     """The multipliers mu = nu^k of the full period from those of the return map, with their errors."""
     modulus = np.abs(nu)
     resolved = modulus > RESOLVED
@@ -293,7 +293,7 @@ def multipliers(system: SystemLike, orbit: ArrayLike | None = None, leading: int
     if flows_tangents(system) and system.dimension >= LARGE:
         image, size = find_large_orbit(system, orbit)
         found = leading_multipliers(image, size, count)
-        result = _of_period(found.values, found.error, image.returns, image.point, image.returns * image.duration)
+        result = full_period(found.values, found.error, image.returns, image.point, image.returns * image.duration)
         of_period = found.following**image.returns
     else:
         result, of_period = _leading_of(_multipliers(find_orbit(system, orbit)), count)

@@ -27,7 +27,7 @@ from chilopod.stability.capabilities import (
     returns_per_period,
 )
 from chilopod.stability.convergence import CURVE
-from chilopod.stability.floquet import return_multipliers
+from chilopod.stability.floquet import full_period, return_multipliers, spectrum
 from chilopod.stability.returns import (
     ReturnMap,
     Section,
@@ -53,7 +53,6 @@ _SHARPEST_TURN = 0.5  # cosine between two tangents: beyond it the step may have
 _SHRUNK = 10.0  # cube roots of the precision, of the largest motion so far
 _PARTS = 32  # of a return, in which the extent of an orbit is taken
 _NOT_SMALL = 0.5  # modulus of a multiplier
-_ROUNDING = 16.0 * float(np.finfo(float).eps)  # of eigenvalues
 
 
 class Curve(FamilyReturns):
@@ -373,25 +372,13 @@ class Curve(FamilyReturns):
         wrong
             How much its derivative is off beside its own error, in units; infinite if no bound is wanted.
         """
-        nu = return_multipliers(image)
-        values = nu**image.returns if image.returns > 1 else nu
-        if not np.isfinite(wrong) or not nu.any():
-            return values, np.inf if nu.any() else 0.0
-        n = image.state.size
-        scaled, error = self._scaled(image.jacobian, n), float(np.linalg.norm(self._scaled(image.error, n)))
-        if not np.isfinite(error):
-            return values, np.inf
-        size = float(np.linalg.norm(scaled))
-        eigenvalues, right = np.linalg.eig(scaled)
-        with np.errstate(all="ignore"):
-            try:
-                left = np.linalg.inv(right)
-            except np.linalg.LinAlgError:
-                return values, float(np.sqrt(error + wrong))
-        moduli = np.abs(eigenvalues)
-        condition = float(np.linalg.norm(left, axis=1)[moduli >= min(_NOT_SMALL, float(moduli.max()))].max())
-        bound = (error + wrong + _ROUNDING * size) * condition
-        return values, image.returns * bound * max(1.0, float(np.abs(nu[0]))) ** (image.returns - 1)
+        if not (np.isfinite(wrong) and np.isfinite(image.error).all()):
+            return return_multipliers(image) ** image.returns, np.inf
+        sizes = self.units(image.state.size)[:-1]
+        spec = spectrum(replace(image, error=image.error + wrong * sizes[:, None] / sizes))
+        found = full_period(spec.values, spec.error, image.returns, image.state, image.period)
+        moduli = np.abs(spec.values)
+        return found.values, float(found.error_bounds[moduli >= min(_NOT_SMALL, float(moduli.max()))].max())
 
     def _scaled(self, matrix: Array | float, n: int) -> Array:
         """A derivative of the return map, or the bound of its error, in units, shape (n, n)."""
