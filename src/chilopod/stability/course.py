@@ -38,7 +38,7 @@ class Course:
     low, high
         Where they begin and end.
     width
-        Of what is looked at: from ``low`` to ``high``, or further.
+        Width of what is looked at: from ``low`` to ``high``, or further.
     beside
         How far beside a place rates of change are taken.
     """

@@ -67,7 +67,7 @@ def described(
     kind
         What happens, where that is known.
     with_normal_form
-        Whether coefficients and a verdict are wanted.
+        True if coefficients and a verdict are wanted.
     """
     value, error_bound = place
     spec = spectrum(orbit.image)

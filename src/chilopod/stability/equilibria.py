@@ -65,7 +65,7 @@ class Equilibrium(ReadOnlyArrays):
     jacobian
         Derivative of the right-hand side there, shape (n, n).
     eigenvalues
-        Of the derivative, by falling real part, shape (n,), in 1/s.
+        Eigenvalues of the derivative, by falling real part, shape (n,), in 1/s.
     error_bounds
         On the error of each eigenvalue, shape (n,).
     """

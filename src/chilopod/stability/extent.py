@@ -37,7 +37,7 @@ class Extent:
     ending
         A sentence where it ends otherwise before the end of the interval; else empty.
     shrinks
-        Whether it ends in an equilibrium.
+        True if it ends in an equilibrium.
     beside
         Distance of a fold from ``start`` and ``end``.
     """

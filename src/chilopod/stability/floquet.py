@@ -26,7 +26,7 @@ from chilopod.stability.returns import ReturnMap, flow_with_error, return_maps
 from chilopod.stability.scales import sizes
 from chilopod.stability.shown import Result, Shown, axes_for, dataset, number, rows, said
 from chilopod.stability.splitting import split_product
-from chilopod.stability.stiff import disturbed, split_stiff
+from chilopod.stability.stiff import split_stiff
 from chilopod.stability.system import PeriodicSystem
 
 if TYPE_CHECKING:
@@ -343,11 +343,11 @@ def exponents(system: SystemLike, orbit: ArrayLike | None = None) -> Exponents:
     image = found.image
     if is_stiff(system, found.state, image.period / image.returns):
         log_nu, modes, units, moved = split_stiff(system, found)
+        moved = DRAWN * moved
     else:
         factors, errors, units = _factors(system, found)
-        log_nu, modes = split_product(factors)
-        moved = np.abs(log_nu[:, None] - split_product(disturbed(factors, errors))[0]).min(axis=1)
-    bound = image.returns * (DRAWN * moved + 4.0 * np.finfo(float).eps * np.abs(log_nu)) / image.period
+        log_nu, modes, moved = split_product(factors, errors)
+    bound = image.returns * (moved + 4.0 * np.finfo(float).eps * np.abs(log_nu)) / image.period
     # Principal logarithm of nu^k: the imaginary part back into (-pi, pi].
     angle = np.angle(np.exp(1j * image.returns * log_nu.imag))
     angle[np.abs(angle) < _SAME_ANGLE] = 0.0

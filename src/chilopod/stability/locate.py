@@ -141,7 +141,7 @@ def locate(
         A guess of a state on the orbit at time 0 for ``low``, shape (n,); the orbit is then followed through the
         interval. Not needed where the systems know their orbit.
     normal_form
-        Whether to compute coefficients and verdicts as well.
+        True to compute coefficients and verdicts as well.
     budget
         Orbits that may be computed to follow the first one through the interval, and once more for the search; either
         ends as well when twice as many return maps were evaluated, by Newton's method too and for orbits that are not

@@ -92,7 +92,7 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
     kind
         What it is.
     value
-        Of the parameter.
+        Value of the parameter.
     error_bound
         Bound on the error of ``value``: that of the critical multiplier over its rate of change, and the root finder's.
     orbit
@@ -115,7 +115,7 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
     rotation, rotation_error
         Where the mode turns (Neimark-Sacker), the phase per period that an amplitude adds, rad per amplitude^2.
     period
-        Of the orbit.
+        Period of the orbit.
     multiplicity
         How many multipliers are critical, both of a pair counted.
     modes
@@ -124,7 +124,7 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
     symmetry
         What the spatial symmetries make of it, where the orbit has some.
     rate
-        Of a Hopf point: how fast its eigenvalue moves, in 1/s per unit of the parameter.
+        Rate of a Hopf point: how fast its eigenvalue moves, in 1/s per unit of the parameter.
     normal_form
         All that is known of the normal form, with a status that says why where it has no numbers; None where it was
         not asked for, and at folds.

@@ -80,7 +80,7 @@ class ReturnMap(ReadOnlyArrays):
     velocity
         dx/dt at H(x), shape (n,), where the system does not depend on time; else None.
     normal
-        Of the section, likewise.
+        Normal of the section, likewise.
     """
 
     state: Array
@@ -131,7 +131,7 @@ def section_at(
         Sizes of the states, shape (n,): across means at right angles in these units. By default
         :func:`chilopod.stability.scales.sizes`.
     duration
-        Of a return; the system's own guess by default.
+        Duration of a return; the system's own guess by default.
 
     Raises
     ------
@@ -204,7 +204,7 @@ def return_map(system: SystemLike, x: ArrayLike, with_error: bool = True, sectio
     system, x
         The system and a state at time 0, shape (n,).
     with_error
-        Whether to bound the error as well, which may cost a second computation; without, ``error`` is NaN.
+        True to bound the error as well, which may cost a second computation; without, ``error`` is NaN.
     section
         Where a return ends, if the system does not depend on time; by default across the motion in ``x``.
 

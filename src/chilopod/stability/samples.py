@@ -91,7 +91,7 @@ class Samples:
     family
         ``family(value)`` is the system.
     guess
-        Of the orbit at the lower end, or None if the systems know theirs.
+        Guess of the orbit at the lower end, or None if the systems know theirs.
     low, high
         The interval.
     budget
@@ -103,23 +103,23 @@ class Samples:
     Attributes
     ----------
     low, high, width
-        Of the interval.
+        Low, high and width of the interval.
     first
         The orbit at the lower end, with its error bounds.
     known
-        Whether the systems know their orbits.
+        True if the systems know their orbits.
     timed
-        Whether the systems depend on time.
+        True if the systems depend on time.
     size
-        Of the states on the first orbit, shape (n,).
+        Size of the states on the first orbit, shape (n,).
     path
         The samples by which an orbit that is not known was followed from ``low``, as far as it goes.
     end
         Where the orbit ends, at most ``high``.
     spent
-        Whether the path ends because the budget was spent.
+        True if the path ends because the budget was spent.
     merges
-        Whether the path ends where the orbit meets another one, which goes on alone.
+        True if the path ends where the orbit meets another one, which goes on alone.
     """
 
     def __init__(

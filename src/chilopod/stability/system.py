@@ -61,7 +61,7 @@ class PeriodicSystem(ReadOnlyArrays):
     flow_with_error, flow_states, flow_tangents, flow_frame, is_stiff, velocity_series
         See :mod:`chilopod.stability.capabilities`.
     concurrent
-        Whether flows may run in several threads at once, which :func:`chilopod.stability.sweep` then does.
+        True if flows may run in several threads at once, which :func:`chilopod.stability.sweep` then does.
     """
 
     dimension: int

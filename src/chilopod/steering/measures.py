@@ -35,7 +35,7 @@ def of_course(record: xr.Dataset, robot: Robot, brief: bool = False) -> xr.Datas
     robot
         It.
     brief
-        Whether to leave out what is over time and over events.
+        True to leave out what is over time and over events.
     """
     begin, end = (record[f"goal_{name}"].values[0] for name in ("begin", "end"))
     over = float(np.nanmax(end))

@@ -115,7 +115,7 @@ class TaylorFlow(ReadOnlyArrays):
     period
         T of an explicit dependence on time; infinite if there is none.
     directions
-        Of the events: 1, -1 or 0.
+        Directions of the events: 1, -1 or 0.
     tolerance
         Truncation error of a step relative to the size of each state and entry of the derivative; never more exact
         than round-off.

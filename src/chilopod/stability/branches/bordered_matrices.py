@@ -28,7 +28,7 @@ def symmetric_space(system: SystemLike, state: Array, sizes: Array, mode: Array 
     system, state
         The system and a state on the orbit, shape (n,).
     sizes
-        Of the states, shape (n,).
+        Sizes of the states, shape (n,).
     mode
         In units, shape (n,): the symmetries are those that it has as well, which are those of what branches off along
         it.

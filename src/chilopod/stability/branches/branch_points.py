@@ -23,12 +23,12 @@ class BranchPoint(ReadOnlyArrays):
     Attributes
     ----------
     value
-        Of the parameter.
+        Value of the parameter.
     orbit
         State at time 0, shape (n,).
     multipliers
-        Of the full period, by falling modulus, shape (n,), or (n-1,) without the trivial one where the system does not
-        depend on time.
+        Multipliers of the full period, by falling modulus, shape (n,), or (n-1,) without the trivial one where the
+        system does not depend on time.
     tangent
         Unit tangent of the curve, shape (n+1,): state, then parameter, in ``units``.
     special
@@ -76,7 +76,7 @@ class Anchor(ReadOnlyArrays):
     section
         Where returns end during the step, of a system without a period of its own.
     leaving
-        Whether the point is one where branches meet: the matrix is then one taken ahead.
+        True if the point is one where branches meet: the matrix is then one taken ahead.
     """
 
     last: BranchPoint
@@ -99,7 +99,8 @@ class Step(ReadOnlyArrays):
     moved
         From start to end, in units, shape (n+1,).
     tangent, matrix
-        Of the curve at the end, on the section of the start; the matrix has the tangent as its last row.
+        Tangent and matrix of the curve at the end, on the section of the start; the matrix has the tangent as its last
+        row.
     image
         The return map at the end, on the section of the start.
     corrections

@@ -103,7 +103,7 @@ def inspect(curve: Curve, step: Step, closely: bool) -> Found:
     curve, step
         The step and its curve.
     closely
-        Whether to look between its ends even where these give no reason to.
+        True to look between its ends even where these give no reason to.
 
     Raises
     ------

@@ -51,7 +51,7 @@ def special_point(
     Parameters
     ----------
     curve
-        Of the step.
+        Curve of the step.
     at
         Parts of the step, by where they end.
     place
@@ -59,7 +59,7 @@ def special_point(
     between
         Places within which the step may be cut.
     blocks
-        Of the return map along the step.
+        Blocks of the return map along the step.
     """
     crossing, block = place.crossing, place.block
     low, high = between

@@ -62,14 +62,14 @@ class Codimension2(ReadOnlyArrays):
     kind
         What it is.
     values
-        Of both parameters, shape (2,).
+        Values of both parameters, shape (2,).
     error_bound
         Bounds on their errors, shape (2,): that of the test function over its rate of change along the curve, and that
         of the curve.
     orbit
         State on the orbit at time 0, shape (n,).
     multipliers
-        Of the return map, by falling modulus.
+        Multipliers of the return map, by falling modulus.
     next_coefficient, next_coefficient_error
         Where the coefficient of the curve's normal form vanishes: the first one after it, of the same map and in the
         same amplitude, and a bound on its error. That is c of a -> a + c a^3 at a cusp and a degenerate transcritical

@@ -29,7 +29,7 @@ class Point2(ReadOnlyArrays):
     Attributes
     ----------
     values
-        Of both parameters, shape (2,).
+        Values of both parameters, shape (2,).
     error_bound
         How far both may be off, shape (2,), at right angles to the curve (in units of the box).
     orbit
@@ -43,9 +43,9 @@ class Point2(ReadOnlyArrays):
     frequency
         Angular frequency (1/s) of the critical mode over the full period, as of a :class:`BifurcationPoint`.
     coefficient, coefficient_error
-        Of the normal form, of the map that a :class:`BifurcationPoint` has it of (of two periods at a period doubling):
-        the quadratic one of a fold or a transcritical point, the cubic one of all others; None where there is none or
-        it was not asked for.
+        Coefficient and coefficient error of the normal form, of the map that a :class:`BifurcationPoint` has it of (of
+        two periods at a period doubling): the quadratic one of a fold or a transcritical point, the cubic one of all
+        others; None where there is none or it was not asked for.
     """
 
     values: Array

@@ -92,7 +92,8 @@ class Critical(ReadOnlyArrays):
     mode, left
         Unit right eigenvector and left one with left^H mode = 1, shape (n,).
     overlap
-        Of the two where both have unit length in units of the frame: 0 where the multiplier is double. NaN for a pair.
+        Overlap of the two where both have unit length in units of the frame: 0 where the multiplier is double. NaN for
+        a pair.
     """
 
     spectrum: Spectrum
@@ -137,11 +138,11 @@ class Detector:
     Parameters
     ----------
     equations
-        Of the curve.
+        Equations of the curve.
     kind
         What happens along it.
     coefficients
-        Whether normal forms are computed.
+        True if normal forms are computed.
     """
 
     def __init__(self, equations: Equations, kind: Kind, coefficients: bool) -> None:

@@ -48,7 +48,7 @@ def closed_orbit(
     system, x
         The system and the guess, shape (n,).
     section
-        Of a system that does not depend on time; by default, across the motion in the guess.
+        Section of a system that does not depend on time; by default, across the motion in the guess.
     farthest
         How much the guess may miss itself, relative to the sizes of the states.
     budget

@@ -35,7 +35,7 @@ class TangentMap(ReadOnlyArrays):
     state
         H(point), shape (n,).
     duration, returns
-        Of a return, and how many of them make the full period.
+        Duration and returns of a return, and how many of them make the full period.
     velocity, normal
         dx/dt at ``state`` and the normal of the section, shape (n,), where the system does not depend on time; else
         None.

@@ -224,7 +224,7 @@ def effect_of_bend(
     resonant
         As in :func:`solve_homological`, of every monomial.
     order
-        Of the coefficient.
+        Order of the coefficient.
     """
     n = at.state.size
     if n == (1 if at.real else 2):

@@ -46,7 +46,7 @@ class CriticalOrbit(ReadOnlyArrays):
     state
         The fixed point, shape (n,).
     jacobian
-        Of the return map there, shape (n, n).
+        Jacobian of the return map there, shape (n, n).
     multiplier
         nu: exactly +1, exactly -1, or the one of a complex pair whose mode is ``right``.
     right, left
@@ -84,7 +84,7 @@ class Sampled:
     shrink
         Factor of the radius at which the series of the projection would fall to the noise that was to be expected.
     falling
-        Whether they still fall at their end; noise would not.
+        True if they still fall at their end; noise would not.
     size
         Largest distance from x, on the curve or of its image, of every state: shape (n,).
     radius

@@ -41,7 +41,7 @@ class NormalForm:
     Attributes
     ----------
     status
-        Whether the numbers mean anything. Where it is neither FOUND nor LINEAR they are NaN, their errors infinite;
+        True if the numbers mean anything. Where it is neither FOUND nor LINEAR they are NaN, their errors infinite;
         except at the resonances 1:3 and 1:4, where they are those of Kuznetsov's normal form but decide nothing alone.
     quadratic, cubic
         Coefficients. A negative ``cubic`` bounds the growth: supercritical.

@@ -79,7 +79,7 @@ class AxialBranch(ReadOnlyArrays):
         Numbers of the elements with rho(P) w = w, at -1 also with rho(P) w = -w, shape (k,): what the new orbits keep,
         at -1 together with a shift by one return.
     reversed
-        Whether an element, or at -1 the shift by one return, takes w to -w: both halves of the branch are then the same
+        True if an element, or at -1 the shift by one return, takes w to -w: both halves of the branch are then the same
         orbits, seen differently.
     """
 
@@ -102,7 +102,7 @@ class SymmetricCrossing:
     branches
         The axial ones, those that keep most elements first; none are looked for at a pair.
     complete
-        Whether these are all of them: the search ends after a budget.
+        True if these are all of them: the search ends after a budget.
     """
 
     kind: SymmetricKind

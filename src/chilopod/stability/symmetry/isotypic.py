@@ -133,7 +133,7 @@ class Block(ReadOnlyArrays):
         Parameters
         ----------
         eigenvector
-            Of the reduced matrix, shape (m,).
+            Eigenvector of the reduced matrix, shape (m,).
         direction
             For the real type any vector, for the complex type one with J w = i w, shape (d,).
         """

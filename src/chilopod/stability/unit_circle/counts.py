@@ -49,7 +49,7 @@ class Accounts:
     resting
         How many multipliers are +1 or -1 throughout.
     conservative
-        Whether multipliers may stay on the circle.
+        True if multipliers may stay on the circle.
     parameter
         The parameter at a place, for remarks.
     """

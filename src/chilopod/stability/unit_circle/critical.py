@@ -66,7 +66,7 @@ class Critical:
     idle
         For each event, how many factors of its function vanish throughout.
     conservative
-        Whether multipliers may stay on the circle.
+        True if multipliers may stay on the circle.
     """
 
     def __init__(self, spectra: Spectra, idle: dict[Event, int], conservative: bool) -> None:

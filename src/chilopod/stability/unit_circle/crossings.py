@@ -60,7 +60,7 @@ class Crossing:
     Attributes
     ----------
     value
-        Of the parameter.
+        Value of the parameter.
     bracket
         Interval in which the root finder has enclosed it; errors of the matrices come on top.
     event
@@ -73,7 +73,7 @@ class Crossing:
     multiplier
         One of the critical multipliers, of a pair the one with positive imaginary part.
     collision
-        Whether multipliers meet on the circle there and leave it, or come back: a conservative family.
+        True if multipliers meet on the circle there and leave it, or come back: a conservative family.
     """
 
     value: float

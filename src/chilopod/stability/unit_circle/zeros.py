@@ -62,7 +62,7 @@ class Zeros:
     missing
         Pieces on which the function cannot be evaluated, or only in part.
     spent
-        Whether the budget ended the search.
+        True if the budget ended the search.
     """
 
     changes: tuple[Interval, ...]
@@ -107,7 +107,7 @@ def find_zeros(
         How many more values of the function may be asked for; when there are none the widest pieces have been looked
         at, and the changes of sign met so far are reported. If not given, a budget of ``BUDGET``.
     skip
-        Whether zeros between two values are of no interest, the function having been evaluated there; asked for narrow
+        True if zeros between two values are of no interest, the function having been evaluated there; asked for narrow
         pieces.
     """
     search = _Search(function, error, skip, low, high)
