@@ -224,7 +224,11 @@ def _compared(
             found.gap(f"{point.special.label} at {point.value!r} has no bound")
             rest = [each for each in rest if not near or each is not near[0]]
             continue
-        if not near or abs(near[0].place - place) > 0.05:
+        bound = point.bifurcation.error_bound
+        # Where an orbit is met at another instant its place is another, but not its value.
+        near.sort(key=lambda each: abs(each.value - point.value) > bound + 3.0 * each.error or each.test != test)
+        agrees = bool(near) and abs(near[0].value - point.value) <= bound + 3.0 * near[0].error and near[0].test == test
+        if not near or (abs(near[0].place - place) > 0.05 and not agrees):
             if _touches(found, segment, point, place, test):
                 continue
             found.fault("not there", f"{point.special.label} at {point.value!r} ± {point.bifurcation.error_bound:.1e}")
@@ -234,7 +238,7 @@ def _compared(
         multiple = point.bifurcation.multiplicity > (2 if test == 2 else 1)
         if multiple:  # which cross at one place
             rest = [each for each in rest if abs(each.place - mine.place) > 1e-3]
-        off, bound = abs(mine.value - point.value), point.bifurcation.error_bound
+        off = abs(mine.value - point.value)
         if mine.test != test and not branch.symmetric and not multiple:
             found.fault("kind", f"{point.special.label} at {point.value!r} is test {mine.test}")
         elif mine.fold != (point.special.label == "fold") and test == 0 and not multiple:
