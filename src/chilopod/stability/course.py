@@ -36,11 +36,11 @@ class Course:
     at
         ``at(places)``: samples with the coordinate as their ``value``; ``orbit`` may hold more than the state.
     low, high
-        Where they begin and end.
+        Values at which they begin and end.
     width
         Width of what is looked at: from ``low`` to ``high``, or further.
     beside
-        How far beside a place rates of change are taken.
+        Distance from a place at which rates of change are taken.
     """
 
     at: Callable[[Array], Sequence[Sample]]

@@ -59,13 +59,13 @@ def described(
     orbit
         There, with error bounds.
     crossing
-        Which multipliers of the whole return map are critical.
+        Crossing: which multipliers of the whole return map are critical, and where.
     block
         In which block of the return map, if spatial symmetries split it.
     formed
         Computes normal forms; it is asked where one multiplier is critical, or one pair.
     kind
-        What happens, where that is known.
+        Kind of the bifurcation, where it is known.
     with_normal_form
         True if coefficients and a verdict are wanted.
     """

@@ -61,7 +61,7 @@ class Equilibrium(ReadOnlyArrays):
     state
         The state, shape (n,).
     error
-        How far it may be off, shape (n,); infinite where the derivative is singular.
+        Bound on the error of the state, shape (n,); infinite where the derivative is singular.
     jacobian
         Derivative of the right-hand side there, shape (n, n).
     eigenvalues

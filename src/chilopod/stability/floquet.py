@@ -68,9 +68,9 @@ class Multipliers(Result, ReadOnlyArrays):
     orbit
         State on the orbit at time 0.
     period
-        Of the orbit.
+        Period of the orbit.
     remarks
-        What else is to be said, a sentence each: that these are only the leading ones.
+        Sentences on what else is to be said: that these are only the leading ones.
     """
 
     values: ComplexArray
@@ -278,7 +278,7 @@ def multipliers(system: SystemLike, orbit: ArrayLike | None = None, leading: int
     orbit
         A first guess of a state on the orbit at time 0; not needed where the system knows its orbit.
     leading
-        How many of the largest multipliers are wanted, with their multiplicity, or one more where that would part a
+        Number of the largest multipliers that are wanted, with their multiplicity, or one more where that would part a
         pair; all by default. Of a system of 100 states or more that has ``flow_tangents`` (any right-hand side that can
         be traced) they are computed in a block Krylov subspace, without the derivative of the flow as a matrix.
 

@@ -63,9 +63,9 @@ class Located(Result, Sequence[BifurcationPoint]):
     points
         By rising parameter.
     status
-        How the search ended: ``status.sentence`` says it in words.
+        Status of the search: ``status.sentence`` says it in words.
     remarks
-        What else is to be said, a sentence each.
+        Sentences on what else is to be said.
     evaluations
         Orbits that were computed.
     """

@@ -74,7 +74,7 @@ class Orbit(Shown, ReadOnlyArrays):
     image
         The return map there.
     error
-        How far ``state`` may be off, shape (n,); zero where it is known exactly, NaN if it was not asked for.
+        Bound on the error of ``state``, shape (n,); zero where it is known exactly, NaN if it was not asked for.
     """
 
     state: Array
@@ -403,7 +403,7 @@ def bounded(system: SystemLike, x: Array, image: ReturnMap, error: Array | None 
     image
         The return map there, or near.
     error
-        How far off the state may be, shape (n,), if that is known.
+        Bound on the error of the state, shape (n,), if it is known.
     """
     size = sizes(system, x, image.period / image.returns)
     shared, given = _shared(system, x, size), x

@@ -74,7 +74,7 @@ class ReturnMap(ReadOnlyArrays):
         Bound on the error of every entry of ``jacobian``, shape (n, n), or one number for all; NaN if it was not asked
         for.
     returns
-        How many times H makes the full period.
+        Number of returns in the full period.
     period
         The full period.
     velocity
@@ -206,7 +206,7 @@ def return_map(system: SystemLike, x: ArrayLike, with_error: bool = True, sectio
     with_error
         True to bound the error as well, which may cost a second computation; without, ``error`` is NaN.
     section
-        Where a return ends, if the system does not depend on time; by default across the motion in ``x``.
+        Section on which a return ends, if the system does not depend on time; by default across the motion in ``x``.
 
     Raises
     ------

@@ -115,7 +115,7 @@ class Samples:
     path
         The samples by which an orbit that is not known was followed from ``low``, as far as it goes.
     end
-        Where the orbit ends, at most ``high``.
+        Value at which the orbit ends, at most ``high``.
     spent
         True if the path ends because the budget was spent.
     merges

@@ -99,7 +99,7 @@ class _Interpolation:
     slope
         Rate of change of the determinant, per reach.
     orbit, orbit_error
-        What samples have there, and how far apart both polynomials have that.
+        Orbit of the samples there, and how far apart both polynomials have it.
     beside
         A sample next to it.
     """

@@ -53,7 +53,7 @@ def split_product(
     vectors
         Unit eigenvectors as columns, the largest entry real and positive, shape (n, n).
     bounds
-        How far the logarithms may move by the errors, to first order between groups, shape (n,).
+        Bounds on how far the logarithms move by the errors, to first order between groups, shape (n,).
 
     Raises
     ------

@@ -53,7 +53,7 @@ class Cut(ReadOnlyArrays):
     Attributes
     ----------
     times, states
-        Of the borders, shapes (parts + 1,) and (parts + 1, n).
+        Times and states at the borders, shapes (parts + 1,) and (parts + 1, n).
     sections
         Orthonormal bases in the borders: of the plane across the motion where the system does not depend on time.
     factors

@@ -52,7 +52,7 @@ class PeriodicSystem(ReadOnlyArrays):
     orbit
         A state at time 0 on the periodic orbit, if it is known. It is improved where it does not return exactly.
     scale
-        What a large change of every state is, shape (n,), where the orbit should not tell it.
+        Sizes of a large change of every state, shape (n,), where the orbit should not tell it.
     velocity
         ``velocity(x)`` -> dx/dt, shape (n,), of a system that does not depend on time.
     guess_period

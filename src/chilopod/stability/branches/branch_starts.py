@@ -52,7 +52,7 @@ class Start(ReadOnlyArrays):
     old
         The tangent of the branch that is left, shape (n+1,), in the states' and the parameter's own units, if known.
     periods
-        How many periods its orbits take.
+        Number of periods that its orbits take.
     period
         The full period of the orbit that is left, where the system does not depend on time.
     bifurcation
@@ -146,7 +146,7 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
     point
         The located point, or a special point on a branch; or a Hopf point from :func:`chilopod.stability.locate_hopf`.
     periods
-        How many periods the orbits of the branch take that is left.
+        Number of periods that the orbits of the branch take that is left.
 
     Returns
     -------

@@ -63,7 +63,7 @@ class Curve(FamilyReturns):
     family, scale, sizes, returns
         See :class:`FamilyReturns`.
     precision
-        How closely orbits are solved for, of the sizes of the states.
+        Precision to which orbits are solved for, relative to the sizes of the states.
     """
 
     def __init__(
@@ -370,7 +370,7 @@ class Curve(FamilyReturns):
         image
             Return map on the orbit.
         wrong
-            How much its derivative is off beside its own error, in units; infinite if no bound is wanted.
+            Error of its derivative beside its own, in units; infinite if no bound is wanted.
         """
         if not (np.isfinite(wrong) and np.isfinite(image.error).all()):
             return return_multipliers(image) ** image.returns, np.inf

@@ -49,7 +49,7 @@ class FamilyReturns:
     between
         Values of the parameter that the family is asked for at most.
     periods
-        How many periods an orbit takes.
+        Number of periods that an orbit takes.
     symmetric
         True to stay among the orbits that have the systems' symmetry in time.
     budget

@@ -55,7 +55,7 @@ def special_point(
     at
         Parts of the step, by where they end.
     place
-        What happens where.
+        Place within the step, with what happens there.
     between
         Places within which the step may be cut.
     blocks

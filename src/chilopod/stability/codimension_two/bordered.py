@@ -70,7 +70,7 @@ class Frame(ReadOnlyArrays):
     mixture
         Makes the k equations of the entries of G, shape (k, k * k).
     section
-        Where a return ends, of a system that does not depend on time.
+        Section on which a return ends, for a system that does not depend on time.
     """
 
     size: Array
@@ -117,7 +117,7 @@ class Evaluated(ReadOnlyArrays):
     Attributes
     ----------
     place, image
-        Where, and the return map there.
+        Place, and the return map there.
     jacobian
         Jacobian of the return map in units of the frame, shape (n, n).
     residual

@@ -60,7 +60,7 @@ class Codimension2(ReadOnlyArrays):
     Attributes
     ----------
     kind
-        What it is.
+        Kind of the point.
     values
         Values of both parameters, shape (2,).
     error_bound
@@ -71,7 +71,7 @@ class Codimension2(ReadOnlyArrays):
     multipliers
         Multipliers of the return map, by falling modulus.
     next_coefficient, next_coefficient_error
-        Where the coefficient of the curve's normal form vanishes: the first one after it, of the same map and in the
+        Next coefficient where that of the curve's normal form vanishes: the first one after it, of the same map and in the
         same amplitude, and a bound on its error. That is c of a -> a + c a^3 at a cusp and a degenerate transcritical
         point; e of a -> a + e a^5 at a degenerate pitchfork and, over two periods, at a generalised period doubling;
         the second Lyapunov coefficient e of |a| -> |a| + e |a|^5 over one period at a Chenciner point. None elsewhere.
@@ -99,7 +99,7 @@ class Start2(ReadOnlyArrays):
     outward
         Direction in which the curve leaves, shape (n + 2,): of the state, and of both parameters.
     periods
-        How many periods its orbits take. They need not have the systems' symmetry in time.
+        Number of periods that its orbits take. They need not have the systems' symmetry in time.
     """
 
     point: BifurcationPoint

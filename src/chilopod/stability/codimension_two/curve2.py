@@ -31,7 +31,7 @@ class Point2(ReadOnlyArrays):
     values
         Values of both parameters, shape (2,).
     error_bound
-        How far both may be off, shape (2,), at right angles to the curve (in units of the box).
+        Bounds on the errors of both, shape (2,), at right angles to the curve (in units of the box).
     orbit
         State on the critical orbit at time 0, shape (n,).
     mode
@@ -66,17 +66,17 @@ class Curve2(Result):
     Attributes
     ----------
     kind
-        What happens along it.
+        Kind of the bifurcation along it.
     points
         In order.
     special
         Points of codimension two, in order.
     endings
-        Why it ends, at its first point and at its last.
+        Reasons for which it ends, at its first point and at its last.
     reasons
-        What was the matter where it was lost, else empty: one for each end.
+        Details where it was lost, else empty: one for each end.
     periods
-        How many periods its orbits take.
+        Number of periods that its orbits take.
     """
 
     kind: Kind

@@ -86,7 +86,7 @@ class Critical(ReadOnlyArrays):
     spectrum
         All multipliers of the return map.
     others
-        Which of them are not the critical ones, shape (others,).
+        Numbers of those that are not critical, shape (others,).
     multiplier
         The critical one: +1, -1, or on the unit circle with positive imaginary part.
     mode, left
@@ -140,7 +140,7 @@ class Detector:
     equations
         Equations of the curve.
     kind
-        What happens along it.
+        Kind of the bifurcation along it.
     coefficients
         True if normal forms are computed.
     """

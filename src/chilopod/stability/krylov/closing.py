@@ -50,7 +50,7 @@ def closed_orbit(
     section
         Section of a system that does not depend on time; by default, across the motion in the guess.
     farthest
-        How much the guess may miss itself, relative to the sizes of the states.
+        Largest distance by which the guess may miss itself, relative to the sizes of the states.
     budget
         Return maps that may be evaluated, of which each round takes one.
 

@@ -36,7 +36,7 @@ class LeadingMultipliers(ReadOnlyArrays):
     following
         About the modulus of the next one.
     directions
-        How many directions the flow has carried.
+        Number of directions that the flow has carried.
     """
 
     values: ComplexArray
@@ -70,7 +70,7 @@ def leading_multipliers(image: TangentMap, size: Array, count: int) -> LeadingMu
     size
         Sizes of the states, shape (n,).
     count
-        How many multipliers.
+        Number of multipliers.
     """
     n, units = size.size, size[:, None]
     width = min(n, max(_FEWEST, -(-(count + _SPARE) // _LANES) * _LANES))

@@ -103,7 +103,7 @@ def tangent_map(system: FlowsTangents, x: Array, section: Section | None = None)
     system, x
         The system and a state at time 0, shape (n,).
     section
-        Where a return ends; needed if the system does not depend on time.
+        Section on which a return ends; needed if the system does not depend on time.
 
     Raises
     ------

@@ -52,7 +52,7 @@ class CriticalOrbit(ReadOnlyArrays):
     right, left
         Critical eigenvectors, shape (n,), ``right`` of unit length in the user's units, left^H right = 1.
     returns
-        How many returns make a full period.
+        Number of returns in a full period.
     """
 
     state: Array

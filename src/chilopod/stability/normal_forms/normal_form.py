@@ -99,7 +99,7 @@ def normal_form(
         Sizes of the states, shape (n,), in their units: where the search for an amplitude starts. Without it, it
         starts from the size of the orbit, if that has one.
     orbit_error
-        How far off ``at.state`` may be along the mode (in the amplitude's unit); 0 where it is exact. Without it, what
+        Error of ``at.state`` along the mode (in the amplitude's unit); 0 where it is exact. Without it, what
         its residual and the noise allow: beside a singular H - 1 that is much.
 
     Returns

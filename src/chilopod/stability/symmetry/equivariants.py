@@ -95,7 +95,7 @@ class SymmetricCrossing:
     Attributes
     ----------
     kind
-        What it is.
+        Kind of the crossing.
     quadratic
         Number of linearly independent quadratic maps that commute with the representation (with its negatives too at
         -1; with phase shifts too at a pair): terms of the normal form.
@@ -119,7 +119,7 @@ def symmetric_crossing(block: Block, critical: Event, returns: int = 1) -> Symme
     block
         The block; :func:`chilopod.stability.symmetry.isotypic.isotypic` makes them.
     critical
-        Where it crosses.
+        Event: the place of the circle where it crosses.
     returns
         Number of returns in a period. Where it is even, -1 breaks the symmetry in time: the new orbits have the same
         period, not twice of it.

@@ -62,7 +62,8 @@ class Block(ReadOnlyArrays):
         Basis of what commutes with rho: the identity, and with the complex type a matrix J with J^2 = -1; shape
         (1, d, d) or (2, d, d).
     kernel
-        Which elements act as the identity, shape (order,): new orbits keep these symmetries whatever else they break.
+        Elements that act as the identity, truth values of shape (order,): new orbits keep these symmetries whatever
+        else they break.
     """
 
     type: Type

@@ -47,7 +47,7 @@ class Accounts:
     idle
         For each event, how many factors of its function vanish throughout.
     resting
-        How many multipliers are +1 or -1 throughout.
+        Number of multipliers that are +1 or -1 throughout.
     conservative
         True if multipliers may stay on the circle.
     parameter

@@ -64,9 +64,9 @@ class Crossing:
     bracket
         Interval in which the root finder has enclosed it; errors of the matrices come on top.
     event
-        Where on the circle.
+        Place on the circle.
     multiplicity
-        How many multipliers are on the circle there, both of a pair counted.
+        Number of multipliers on the circle there, both of a pair counted.
     change
         By how much the number of multipliers outside rises there: positive out of the circle, negative into it, 0 for
         a touch, or for as many out as in. At an end of the interval: as if they went on as they come.
@@ -94,9 +94,9 @@ class Crossings:
     crossings
         By rising value.
     status
-        How the search ended.
+        Status of the search.
     remarks
-        What else is to be said, a sentence each.
+        Sentences on what else is to be said.
     evaluations
         At how many values matrices were asked for.
     """
@@ -129,7 +129,8 @@ def find_crossings(
     budget
         At how many values matrices may be asked for.
     affordable
-        How many more matrices can be had, where that is for their cost to say: the search ends when it says none.
+        Number of matrices that can still be had, where that is for their cost to say: the search ends when it says
+        none.
     shown
         ``shown(value)`` is what remarks say of a value.
 

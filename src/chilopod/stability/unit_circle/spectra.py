@@ -55,7 +55,7 @@ class Spectra:
     budget
         At how many values M may be asked for.
     affordable
-        How many more matrices can be had, where that is for their cost to say.
+        Number of matrices that can still be had, where that is for their cost to say.
     """
 
     def __init__(self, matrices: Matrices, budget: int, affordable: Callable[[], int] | None = None) -> None:

@@ -104,8 +104,8 @@ def find_zeros(
         Logarithm of the error of the function at some values, shape (k,): below it a value is zero within its error,
         and the search stops. Asked for where the search goes deep only.
     left
-        How many more values of the function may be asked for; when there are none the widest pieces have been looked
-        at, and the changes of sign met so far are reported. If not given, a budget of ``BUDGET``.
+        Number of values of the function that may still be asked for; when there are none the widest pieces have been
+        looked at, and the changes of sign met so far are reported. If not given, a budget of ``BUDGET``.
     skip
         True if zeros between two values are of no interest, the function having been evaluated there; asked for narrow
         pieces.
