@@ -71,10 +71,11 @@ class Codimension2(ReadOnlyArrays):
     multipliers
         Multipliers of the return map, by falling modulus.
     next_coefficient, next_coefficient_error
-        Next coefficient where that of the curve's normal form vanishes: the first one after it, of the same map and in the
-        same amplitude, and a bound on its error. That is c of a -> a + c a^3 at a cusp and a degenerate transcritical
-        point; e of a -> a + e a^5 at a degenerate pitchfork and, over two periods, at a generalised period doubling;
-        the second Lyapunov coefficient e of |a| -> |a| + e |a|^5 over one period at a Chenciner point. None elsewhere.
+        Next coefficient where that of the curve's normal form vanishes: the first one after it, of the same map and in
+        the same amplitude, and a bound on its error. That is c of a -> a + c a^3 at a cusp and a degenerate
+        transcritical point; e of a -> a + e a^5 at a degenerate pitchfork and, over two periods, at a generalised
+        period doubling; the second Lyapunov coefficient e of |a| -> |a| + e |a|^5 over one period at a Chenciner point.
+        None elsewhere.
     """
 
     kind: CodimensionTwo
