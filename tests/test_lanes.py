@@ -110,8 +110,9 @@ def test_threads_that_cannot_be_had_are_one_line(command, name, value):
         assert found["mend"] == f"unset NUMBA_THREADING_LAYER{name}"
     else:
         assert done.returncode == 2
-        assert done.stderr.startswith(f"error: {line}")
-        assert done.stderr.count("\n") == 1
+        # A loaded machine takes so long that it says first what it does.
+        (error,) = [each for each in done.stderr.splitlines() if not each.startswith("walk: ")]
+        assert error.startswith(f"error: {line}")
 
 
 def test_threads_that_wait_sleep_unless_the_user_says_otherwise():

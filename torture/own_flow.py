@@ -246,24 +246,41 @@ def _side(g: int, y: Array, n: int, p: float, s: Any, slopes: Array, floor: Arra
 
 
 @njit(cache=True)
-def _within(g: int, y: Array, new: Array, h: float, n: int, p: float, s: Any, k: Array, mode: Any) -> bool:
-    """Whether the cubic of a guard over a step changes its side within, although both ends agree."""
-    a, b = _beyond(g, y, n, p, s), _beyond(g, new, n, p, s)
-    da = db = 0.0
+def _dip(
+    t: float, y: Array, h: float, g: int, n: int, p: float, s: Any, mode: Any, k: Array, new: Array, ms: Any
+) -> float:
+    """Part of a step after which a guard is on its other side, although both ends agree; 0 if there is none.
+
+    The guard is looked at where its cubic over the step comes nearest to the surface, and where the slopes found there
+    say that it does: a grazing orbit is beyond the surface for a tiny part of a step.
+    """
+    a, da, b, db = _beyond(g, y, n, p, s), 0.0, _beyond(g, new, n, p, s), 0.0
     for i in range(n):
         da += h * s[7][g, i] * k[0, i]
         db += h * s[7][g, i] * k[12, i]
-    for part in range(1, 8):
-        u = part / 8.0
-        value = (
-            a * (1.0 + 2.0 * u) * (1.0 - u) ** 2
-            + da * u * (1.0 - u) ** 2
-            + b * u * u * (3.0 - 2.0 * u)
-            - db * u * u * (1.0 - u)
-        )
-        if value * mode[g] < 0.0:
-            return True
-    return False
+    if da * mode[g] >= 0.0 or db * mode[g] <= 0.0:
+        return 0.0
+    low, high, u = 0.0, 1.0, 0.5
+    for _ in range(60):  # the slope of the cubic rises from one end to the other
+        u = 0.5 * (low + high)
+        slope = 6.0 * (b - a) * u * (1.0 - u) + da * (1.0 - u) * (1.0 - 3.0 * u) + db * u * (3.0 * u - 2.0)
+        low, high = (u, high) if slope * mode[g] < 0.0 else (low, u)
+    low, high, found = 0.0, 1.0, 0.0
+    for _ in range(4):
+        _step(t, y, u * h, n, p, s, mode, k, new, ms)
+        if _beyond(g, new, n, p, s) * mode[g] < 0.0:
+            found = u
+            break
+        slope = 0.0
+        for i in range(n):
+            slope += h * s[7][g, i] * k[12, i]
+        if slope * mode[g] < 0.0:
+            low, da = u, slope
+        else:
+            high, db = u, slope
+        u = low + (high - low) * da / (da - db)
+    _step(t, y, h, n, p, s, mode, k, new, ms)
+    return found
 
 
 @njit(cache=True)
@@ -350,7 +367,7 @@ def flow(y: Array, end: float, n: int, p: float, s: Any, floor: Array, tolerance
             if h < 1e-14 * end:
                 return -count - 1, crossings
             continue
-        hit, inner = -1, False
+        hit, inner = -1, 0.0
         earliest = h
         for g in range(surfaces):
             side = 1 if _beyond(g, new, n, p, s) > 0.0 else -1
@@ -362,10 +379,10 @@ def flow(y: Array, end: float, n: int, p: float, s: Any, floor: Array, tolerance
                 if place <= earliest:
                     hit, earliest = g, place
                 _step(t, y, h, n, p, s, mode, k, new, ms)
-            elif _within(g, y, new, h, n, p, s, k, mode) and h > 1e-9 * end:
-                inner = True
-        if inner:
-            h *= 0.3
+            elif h > 1e-9 * end:
+                inner = max(inner, _dip(t, y, h, g, n, p, s, mode, k, new, ms))
+        if inner > 0.0:
+            h *= inner
             continue
         if hit >= 0:
             _step(t, y, earliest, n, p, s, mode, k, new, ms)

@@ -67,7 +67,7 @@ def integrator(rhs: Callable[..., None], on_disk: bool = True) -> Callable[..., 
     rhs
         Compiled function ``rhs(t, x, args, out)`` that writes ``dx/dt`` into ``out``; smooth between ``t0`` and ``t1``.
     on_disk
-        Whether to keep the compiled code on disk. Not for a function made at run time: its code would never be found
+        True to keep the compiled code on disk. Not for a function made at run time: its code would never be found
         again, and leave a file behind at every run.
 
     Returns

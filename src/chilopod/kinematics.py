@@ -20,7 +20,7 @@ def module_headings(heading: ArrayLike, joint_angles: ArrayLike) -> Array:
     Parameters
     ----------
     heading
-        Of module 1, rad, shape (...).
+        Heading of module 1, rad, shape (...).
     joint_angles
         Heading of a module less that of the one in front of it, rad, shape (..., N-1).
 
@@ -41,7 +41,7 @@ def module_centres(position: ArrayLike, headings: Array, length: float) -> Array
     headings
         rad, shape (..., N).
     length
-        Of a module, m.
+        Length of a module, m.
 
     Returns
     -------
@@ -57,11 +57,11 @@ def module_velocities(velocity: ArrayLike, headings: Array, rates: Array, length
     Parameters
     ----------
     velocity
-        Of the centre of module 1, m/s, shape (..., 2).
+        Velocity of the centre of module 1, m/s, shape (..., 2).
     headings, rates
         rad and rad/s, shape (..., N).
     length
-        Of a module, m, one for all or shape (..., 1).
+        Length of a module, m, one for all or shape (..., 1).
 
     Returns
     -------
@@ -77,11 +77,12 @@ def foot_places(forward_offset: ArrayLike, half_width: ArrayLike, stroke: ArrayL
     Parameters
     ----------
     forward_offset, half_width
-        Of a foot at mid-stroke, ahead of the centre and to the side of the axis, m, one for all or shape (..., 1, 1).
+        Forward offset and half width of a foot at mid-stroke, ahead of the centre and to the side of the axis, m, one
+        for all or shape (..., 1, 1).
     stroke
         How far a foot is ahead of mid-stroke along its stroke, m, shape (..., N, 2).
     yaw
-        Of the strokes, about the feet at mid-stroke, left positive, rad, shape (..., N, 2).
+        Yaw of the strokes, about the feet at mid-stroke, left positive, rad, shape (..., N, 2).
 
     Returns
     -------

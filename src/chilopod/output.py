@@ -28,7 +28,7 @@ def check_files(paths: Iterable[Path], *, replace: bool = False) -> None:
     paths
         The files.
     replace
-        Whether those that are there already may be replaced.
+        True if those that are there already may be replaced.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def check_room(path: Path, needed: float) -> None:
     Parameters
     ----------
     path
-        Of the file or the folder.
+        Path of the file or the folder.
     needed
         Bytes, at least.
 
@@ -104,13 +104,13 @@ def write_atomic(
     path
         Where to.
     content
-        Of the file.
+        Content of the file.
     replace
-        Whether a file that is already there may be replaced; what is no regular file never is.
+        True if a file that is already there may be replaced; what is no regular file never is.
     durable
-        Whether it is to outlast a power failure; :func:`sync_folder` makes its name do so.
+        True if it is to outlast a power failure; :func:`sync_folder` makes its name do so.
     folders
-        Whether its folder is made where there is none.
+        True if its folder is made where there is none.
     temporary
         How its name begins until it is whole; such a file stays where a process is killed.
 
@@ -152,7 +152,7 @@ def write_all(files: Iterable[tuple[Path, Content]], *, replace: bool = True) ->
     files
         Where to, and what. They are written one after the other, as the iterable gives them.
     replace
-        Whether files that are already there may be replaced.
+        True if files that are already there may be replaced.
 
     Returns
     -------

@@ -73,9 +73,9 @@ class Recording:
     rate
         Samples per second.
     forces
-        Whether to add the force on every foot.
+        True to add the force on every foot.
     poses
-        Whether to add the positions of all joints, from which the robot can be drawn, where an engine has them.
+        True to add the positions of all joints, from which the robot can be drawn, where an engine has them.
     """
 
     rate: float = RATE
@@ -181,7 +181,7 @@ class Samples:
     Parameters
     ----------
     shape
-        Of a row.
+        Shape of a row.
     expected
         Rows that are likely to come; more may.
     """
@@ -243,13 +243,13 @@ def walk_record(
     time
         s, shape (T,).
     position, velocity
-        Of the centre of module 1, m and m/s, shape (T, robots, 2).
+        Position and velocity of the centre of module 1, m and m/s, shape (T, robots, 2).
     heading, heading_rate
-        Of module 1, rad and rad/s, shape (T, robots).
+        Heading and heading rate of module 1, rad and rad/s, shape (T, robots).
     joint_angle, joint_rate
-        Of the yaw joints, rad and rad/s, shape (T, robots, N-1).
+        Joint angle and joint rate of the yaw joints, rad and rad/s, shape (T, robots, N-1).
     leg_yaw
-        Of the legs of module 1, rad, shape (T, robots, 2).
+        Leg yaw of the legs of module 1, rad, shape (T, robots, 2).
     """
     import xarray as xr  # takes a third of a second to load, and not all who know of records make any
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import brentq
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability import (
@@ -509,3 +510,30 @@ def test_a_cycle_is_followed_in_steps_of_the_size_it_grows_to():
     (doubling,) = cycles.special_points
     assert doubling.special is Kind.PERIOD_DOUBLING
     assert doubling.value == pytest.approx(0.63030200616, abs=1e-10)
+
+
+def test_the_oregonator_over_a_wide_interval():
+    """Its equilibrium passes another one at a distance of 0.08 near f = 1, in a twentieth of the interval."""
+    eps, delta, q = 0.04, 4e-4, 8e-4
+
+    def rhs(t, x, f):
+        first = (q * x[1] - x[0] * x[1] + x[0] * (1 - x[0])) / eps
+        return [first, (-q * x[1] - x[0] * x[1] + f * x[2]) / delta, x[0] - x[2]]
+
+    def growth(f):
+        x = 0.5 * (1 - f - q + np.sqrt((1 - f - q) ** 2 + 4 * q * (1 + f)))
+        y = f * x / (q + x)
+        matrix = [
+            [(1 - 2 * x - y) / eps, (q - x) / eps, 0.0],
+            [-y / delta, -(q + x) / delta, f / delta],
+            [1.0, 0.0, -1.0],
+        ]
+        return np.sort(np.linalg.eigvals(matrix).real)[-1]
+
+    found = locate_hopf(lambda f: from_rhs(rhs, 3, None, args=(f,), guess_period=5.0), (0.3, 2.8), [0.7, 0.3, 0.7])
+    assert found.complete
+    expected = [brentq(growth, *each, xtol=1e-12) for each in ((0.45, 0.6), (2.1, 2.4))]
+    assert [point.value for point in found] == pytest.approx(expected, abs=1e-9)
+    assert all(
+        abs(point.value - value) <= point.error_bound + 1e-11 for point, value in zip(found, expected, strict=True)
+    )

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.stability import Kind, PeriodicSystem, find_orbit, from_rhs, locate
+from chilopod.stability import Kind, PeriodicSystem, find_orbit, from_map, from_rhs, locate
 
 PERIOD = 1.3
 
@@ -224,3 +224,15 @@ def test_an_orbit_that_meets_another_one_and_ends_is_not_all():
     found = locate(lorenz, (305.0, 325.0), orbit=[-13.484487, 37.180551, 286.471177])
     assert not found.complete
     assert any("meets another one near 312.973" in remark for remark in found.remarks)
+
+
+@pytest.mark.parametrize("gap", [0.1, 0.01, 0.001])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_two_orbits_that_pass_each_other_at_a_distance(gap, side):
+    """The fixed points p/2 +- sqrt(p^2 + gap^2)/2 exchange what they look like, and neither bifurcates."""
+
+    def passing(p):
+        return from_map(lambda x: ([x[0] + 0.5 * (p * x[0] - x[0] ** 2 + gap**2 / 4)], [[1.0 + 0.5 * p - x[0]]]), 1)
+
+    found = locate(passing, (-1.0, 1.3), orbit=[0.5 * (-1.0 + side * np.hypot(1.0, gap))])
+    assert (len(found), found.status.name) == (0, "COMPLETE")

@@ -29,7 +29,7 @@ KILLS = range(int(os.environ.get("CHILOPOD_KILLS", "1")))
 ROBOT = load_robot("aoi2022-planar")
 BASE = Trial(ROBOT, 15.0, target=Target(0.7, 1.3), controller=LegYawController(), rate=20.0)
 TRIALS = [replace(BASE, seed=seed) for seed in range(96)]
-PATIENCE = 30.0  # s, on a busy machine
+PATIENCE = 60.0  # s, on a busy machine
 CONTROLLERS = '''
     """Controllers of somebody's own."""
 

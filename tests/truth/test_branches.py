@@ -422,3 +422,27 @@ def test_a_branch_begins_at_a_fold():
         for point in branch.points:
             assert np.hypot(point.orbit[0], point.value) == pytest.approx(0.5, abs=1e-7)
     assert down.points[-1].orbit[0] * up.points[-1].orbit[0] < 0.0
+
+
+@pytest.mark.parametrize("between", [(1.0, 1.3), (0.64, 3.055)])
+def test_a_pitchfork_right_beside_a_collision(between):
+    """Almost without damping a pair meets on the real axis 8e-7 before one of the two passes +1, where neither is
+    smooth. The pitchfork breaks a symmetry in time that the system does not declare."""
+    c, f, w, phase = 0.3094316621687306, 7.543749370451843, 1.235929467663377, 1.4680845484394605
+
+    def rhs(t, x, p):
+        return [x[1], -0.001 * x[1] - c * x[0] ** 3 + f * p * np.cos(w * t + phase)]
+
+    start = [0.2415764, -2.9058916]
+    branch = follow(
+        lambda p: from_rhs(rhs, 2, 2.0 * pi / w, args=(p,)),
+        begin(lambda p: from_rhs(rhs, 2, 2.0 * pi / w, args=(p,)), 1.0, start),
+        between,
+        longest=0.19,
+    )
+    (point,) = branch.special_points
+    assert point.special is Kind.PITCHFORK
+    # By torture/own_orbits.py, which shares no code with chilopod: 1.011467363853523 +- 9.7e-10.
+    assert point.value == pytest.approx(1.011467363853523, abs=9.7e-10)
+    assert point.bifurcation.error_bound < 1e-9
+    assert branch.ending is Ending.LEFT_INTERVAL

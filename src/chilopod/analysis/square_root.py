@@ -71,7 +71,7 @@ def square_root_fit(inverse: ArrayLike, angle: ArrayLike, resampled: int = RESAM
     resampled
         How many times trials are drawn anew for the bootstrap; 0 for no bootstrap.
     seed
-        Of the drawing.
+        Seed of the drawing.
 
     Raises
     ------

@@ -227,7 +227,7 @@ def bifurcations(
     between
         The interval in SI units, rising.
     normal_form
-        Whether to compute the coefficients and verdicts.
+        True to compute the coefficients and verdicts.
     remark
         Called with a sentence for what leaves open whether these are all points.
     seconds

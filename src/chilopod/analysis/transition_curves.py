@@ -143,7 +143,7 @@ def transition_curve(
     between
         Both intervals in SI units: the first is searched for a point to start from, and the curve is followed in both.
     kind
-        Of the bifurcation.
+        Kind of the bifurcation.
     second
         Value of the second parameter (SI) at which the first is searched.
     points

@@ -42,9 +42,9 @@ class Finding:
     mend
         The line that mends it; empty if nothing is missing.
     essential
-        Whether nothing works without it.
+        True if nothing works without it.
     looked
-        Whether it could be looked at.
+        True if it could be looked at.
     """
 
     name: str

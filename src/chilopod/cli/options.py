@@ -167,7 +167,7 @@ def new_app(help_text: str, *, completion: bool = False) -> typer.Typer:
     help_text
         What it is for.
     completion
-        Whether it has the options that make a shell complete its commands; only the outermost can.
+        True if it has the options that make a shell complete its commands; only the outermost can.
     """
     # Help without rich: importing it costs a third of what --help may take. Tracebacks are the business of `main`.
     return _App(

@@ -46,7 +46,7 @@ class Actuators:
     robots
         One a walk.
     keep
-        Whether to keep what was commanded, for :meth:`add_to`.
+        True to keep what was commanded, for :meth:`add_to`.
 
     Attributes
     ----------
@@ -55,9 +55,9 @@ class Actuators:
     profile
         Stiffness over time since the last command: the rows named above, shape (7, robots, N-1).
     lag
-        Of the springs' actuators, s, shape (robots, N-1).
+        Lag of the springs' actuators, s, shape (robots, N-1).
     driven
-        Whether a robot's springs or torques were ever commanded, shape (robots,).
+        True if a robot's springs or torques were ever commanded, shape (robots,).
     """
 
     def __init__(self, robots: Sequence[Robot], keep: bool = True) -> None:

@@ -221,7 +221,7 @@ def rows_anew(
     which, seeds
         As given.
     robots, time, record
-        Of the walk.
+        Robots, time and record of the walk.
     arguments
         As of :func:`rows_of`.
 

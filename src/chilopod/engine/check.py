@@ -28,7 +28,7 @@ def check_engine(engine: Engine, robot: Robot, seed: int = 0) -> tuple[str, ...]
     robot
         One that it knows. Its springs are made adjustable for some of the walks.
     seed
-        Of the odd instants at which the walks are interrupted.
+        Seed of the odd instants at which the walks are interrupted.
 
     Returns
     -------

@@ -66,9 +66,9 @@ class Observation:
         Direction of the target relative to the heading of module 1, left positive, rad in [-pi, pi); NaN where it is
         not seen. Shape (robots,).
     distance
-        Of the target from the centre of module 1, m; NaN where it is not seen. Shape (robots,).
+        Distance of the target from the centre of module 1, m; NaN where it is not seen. Shape (robots,).
     joint_angles
-        Of the yaw joints, rad, shape (robots, N-1); NaN for a robot that no longer walks.
+        Joint angles of the yaw joints, rad, shape (robots, N-1); NaN for a robot that no longer walks.
     leg_yaw
         Angles last commanded for the left and right leg of module 1, rad, shape (robots, 2).
     stiffness
@@ -94,8 +94,8 @@ class Command:
     leg_yaw
         Angles for the left and right leg of module 1, left positive, rad, at most a right angle, shape (robots, 2).
     stiffness
-        Of the springs of the yaw joints, N*m/rad, positive, shape (robots, N-1). A spring that is not adjustable must
-        be given the stiffness it has.
+        Stiffness of the springs of the yaw joints, N*m/rad, positive, shape (robots, N-1). A spring that is not
+        adjustable must be given the stiffness it has.
     joint_torque
         That drives the yaw joints beside their springs, positive where it turns the rear module to the left, N*m,
         shape (robots, N-1). Held until another torque is commanded.
@@ -216,7 +216,7 @@ class Walk(Protocol):
         friction
             Likewise; None: as it is.
         seeds
-            Of the noise of their sensors, counted from now, one each; None: it goes on.
+            Seeds of the noise of their sensors, counted from now, one each; None: it goes on.
 
         Raises
         ------
@@ -279,11 +279,11 @@ class Traits:
     sentence
         What it is.
     exact
-        Whether its walks are those of the planar theory (:mod:`chilopod.analysis`), so that branches hold for them.
+        True if its walks are those of the planar theory (:mod:`chilopod.analysis`), so that branches hold for them.
     noisy
-        Whether its sensors have noise of their own, drawn from ``seeds``.
+        True if its sensors have noise of their own, drawn from ``seeds``.
     poses
-        Whether it can record the positions of all joints, to be drawn.
+        True if it can record the positions of all joints, to be drawn.
     a_core
         Robots that one core should walk at a time: a few seconds' work.
     a_round
@@ -291,7 +291,7 @@ class Traits:
     haste
         How many times as long as at the speed of the straight walk without slip a task should be given.
     version
-        Of whatever else than chilopod decides what its records hold; empty for nothing.
+        Version of whatever else than chilopod decides what its records hold; empty for nothing.
     """
 
     name: str
@@ -337,9 +337,9 @@ class Engine(Protocol):
         joint_angles
             rad, shape (N-1,) or (robots, N-1).
         heading
-            Of module 1, rad, a number or shape (robots,).
+            Heading of module 1, rad, a number or shape (robots,).
         position
-            Of its centre, m, shape (2,) or (robots, 2).
+            Position of its centre, m, shape (2,) or (robots, 2).
 
         Returns
         -------
@@ -372,7 +372,7 @@ class Engine(Protocol):
         target
             Its place on the floor, m, shape (2,) or (walks, 2), for the robots to see.
         seeds
-            Of the noise of the sensors, one a walk; without them there is none.
+            Seeds of the noise of the sensors, one a walk; without them there is none.
         record
             What is written down; by default the motion, :data:`chilopod.record.RATE` times a second. None: nothing.
         expected

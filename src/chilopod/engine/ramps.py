@@ -20,7 +20,7 @@ class Ramps:
     start
         Values before any command, any shape.
     keep
-        Whether to keep what was told, for :meth:`over`.
+        True to keep what was told, for :meth:`over`.
     """
 
     def __init__(self, start: Array, keep: bool = False) -> None:

@@ -28,7 +28,7 @@ def pack(traits: Traits, robots: Sequence[Robot], settings: Mapping[str, Any], a
     Parameters
     ----------
     traits
-        Of its engine.
+        Traits of its engine.
     robots
         One a walk.
     settings

@@ -23,7 +23,7 @@ class Targets:
     start
         Places at the start, m, shape (robots, 2), or None.
     keep
-        Whether to keep where they were, for :meth:`recorded`.
+        True to keep where they were, for :meth:`recorded`.
 
     Attributes
     ----------

@@ -58,7 +58,7 @@ class CalledFlow:
     times
         One inside every interval between edges.
     reason
-        Why the function cannot be traced.
+        Reason for which the function cannot be traced.
     tolerance
         Local error per step.
     """

@@ -59,7 +59,7 @@ def check_events(events: tuple[Event, ...], args: tuple[Any, ...], times: Array,
     Parameters
     ----------
     events, args
-        Of the system, with n states.
+        Events and arguments of the system, with n states.
     times
         Within the period, shape (times,).
     orbit

@@ -27,6 +27,7 @@ from chilopod.flows.taylor.flow import TaylorFlow, TooManySteps
 from chilopod.flows.tracing.evaluation import evaluate, evaluate_jacobian, evaluate_series
 from chilopod.flows.tracing.trace import Trace, trace
 from chilopod.flows.tracing.traced import Untraceable
+from chilopod.frozen import read_only
 
 Array = NDArray[np.float64]
 
@@ -117,12 +118,15 @@ class RightHandSide:
             self.rhs, self.dimension, self.args, self.tolerance
         )
         self.events = checked_events(self.events)
-        self.edges = _edges(self.switch_times, self.duration)
+        if isinstance(self.switch_times, tuple) and not self.switch_times:
+            self.edges, self.times = _unswitched(self.duration)
+        else:
+            self.edges = _edges(self.switch_times, self.duration)
+            self.times = np.asarray(self.edges[:-1] + 0.4142 * np.diff(self.edges))
         if self.autonomous and self.edges.size > 2:
             raise ParameterError("need a period", field="switch_times", value=self.switch_times, allowed="none")
         self.start = None if self.orbit is None else finite_array(self.orbit, (self.dimension,), "orbit")
         self.base = np.zeros(self.dimension) if self.start is None else self.start
-        self.times = np.asarray(self.edges[:-1] + 0.4142 * np.diff(self.edges))
         check_events(self.events, self.args, self.times, self.start, self.dimension)
 
     def flows(self) -> Flows:
@@ -196,23 +200,30 @@ class RightHandSide:
                 concurrent=True,
             )
         else:
-            flows = _taylor_flows(slopes, self._taylor(traced), params)
-            if self.method == "automatic" and can_be_implicit(tape):
+            taylor = self._taylor(traced)
+            flows = _taylor_flows(slopes, taylor, params)
+            if taylor.patience:
                 flows = _either(flows, implicit)
         if self.autonomous:
             flows = flows._replace(velocity_series=lambda curves: evaluate_series(tape, curves, params))
         return flows
 
     def _taylor(self, traced: Trace) -> TaylorFlow:
-        other = self.method == "automatic" and can_be_implicit(traced.tape)
-        return TaylorFlow(
-            traced.tape,
-            edges=tuple(self.edges.tolist()) if self.edges.size > 2 else (),
-            period=float(self.edges[-1]),
-            tolerance=_FLOOR * self.tolerance,
-            directions=tuple(float(event.direction) for event in self.events),
-            patience=_PATIENCE if other else 0,
-        )
+        """The flow by Taylor series, one for all values of the parameters."""
+        edges = tuple(self.edges.tolist()) if self.edges.size > 2 else ()
+        key = edges, self.duration, self.tolerance, self.method, tuple(event.direction for event in self.events)
+        found = traced.derived.get(key)
+        if found is None:
+            other = self.method == "automatic" and can_be_implicit(traced.tape)
+            found = traced.derived[key] = TaylorFlow(
+                traced.tape,
+                edges=edges,
+                period=self.duration,
+                tolerance=_FLOOR * self.tolerance,
+                directions=tuple(float(event.direction) for event in self.events),
+                patience=_PATIENCE if other else 0,
+            )
+        return found
 
     def _check_jacobian(self, jacobian: Callable[..., ArrayLike], traced: Trace) -> None:
         """A traced function needs no jacobian, but who hands over one that is wrong wants to know."""
@@ -291,9 +302,12 @@ def _either(flows: Flows, implicit: Callable[[], ImplicitFlow]) -> Flows:
     )
 
 
+@functools.lru_cache
+def _unswitched(period: float) -> tuple[Array, Array]:
+    return read_only(np.array([0.0, period])), read_only(np.array([0.4142 * period]))
+
+
 def _edges(switch_times: Sequence[float], period: float) -> Array:
-    if isinstance(switch_times, tuple) and not switch_times:
-        return np.array([0.0, period])
     try:
         switches = np.unique(np.array(switch_times, dtype=np.float64))
         valid = np.ndim(switch_times) == 1 and bool(((switches >= 0) & (switches < period)).all())

@@ -40,9 +40,9 @@ class Actions:
     robot
         With an actuator for each of the springs.
     joints
-        Of these springs, counted from 0.
+        Joints of these springs, counted from 0.
     softest, stiffest
-        Of these springs, N*m/rad.
+        Softest and stiffest of these springs, N*m/rad.
     legs
         Whose limit and swing it is.
     """

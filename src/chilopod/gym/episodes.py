@@ -77,9 +77,9 @@ class Step:
     reward
         See :class:`Rewards`; 0 for a robot whose episode has just begun.
     terminated
-        Whether the robot has arrived at its last target, or does not walk any more.
+        True if the robot has arrived at its last target, or does not walk any more.
     truncated
-        Whether its time for the last target is over.
+        True if its time for the last target is over.
     info
         ``time`` of the episode (s), ``distance`` of the target (m), ``pose`` of module 1 (m, m, rad), ``verdict`` on
         the target of which the robot is done with this step, or "", and ``arrived``: how many targets so far.
@@ -122,11 +122,11 @@ class Episodes:
     count
         How many.
     engine
-        Of :data:`chilopod.engine.ENGINES`, or one's own as ``package.module:object``.
+        One of :data:`chilopod.engine.ENGINES`, or one's own as ``package.module:object``.
     springs
         Which ones actions set, see :class:`chilopod.gym.Actions`.
     targets
-        Of an episode, one after the other, see :func:`chilopod.steering.random_course`.
+        Targets of an episode, one after the other, see :func:`chilopod.steering.random_course`.
     patience
         For each target, s; by default the engine's, see :func:`chilopod.tasks.course.patience_of`.
     disturbance
@@ -134,14 +134,14 @@ class Episodes:
     rewards
         What steps are worth.
     remember
-        Whether to keep :attr:`moments`.
+        True to keep :attr:`moments`.
 
     Attributes
     ----------
     actions, sight
         What actions and observations mean.
     moments
-        Of the steps so far, as many as the longest episode has.
+        Moments of the steps so far, as many as the longest episode has.
 
     Raises
     ------
@@ -227,7 +227,8 @@ class Episodes:
         generators
             One a robot, of the seeds of its episodes from now on.
         seeds
-            Of its first one: that is the course and the disturbance that trials draw from this seed; None: drawn too.
+            Seeds of its first one: that is the course and the disturbance that trials draw from this seed; None: drawn
+            too.
         """
         self._generators = list(generators)
         return self._begin(seeds)

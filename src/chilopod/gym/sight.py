@@ -27,7 +27,7 @@ class Sight:
     Attributes
     ----------
     actions
-        Of the same robot.
+        Actions of the same robot.
     range
         How far its scanner sees, m.
     """

@@ -49,7 +49,7 @@ class Controls:
     Parameters
     ----------
     server
-        Of the page.
+        Server of the page.
     session
         Whose box takes the wishes; nothing else of it is changed.
     title

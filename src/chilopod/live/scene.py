@@ -47,11 +47,11 @@ class View:
     Parameters
     ----------
     server
-        Of the page.
+        Server of the page.
     placed
         The robot's parts at the start.
     length
-        Of the robot, m.
+        Length of the robot, m.
     """
 
     def __init__(self, server: viser.ViserServer, placed: Mapping[str, Placed], length: float) -> None:
@@ -150,9 +150,9 @@ def floor_place(origin: Array, start: tuple[float, ...], direction: tuple[float,
     Parameters
     ----------
     origin
-        Of the floor, as seen, m, (3,).
+        Origin of the floor, as seen, m, (3,).
     start, direction
-        Of the ray.
+        Start and direction of the ray.
     """
     if not direction[2] < 0.0:
         return None

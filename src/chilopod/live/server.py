@@ -58,7 +58,7 @@ class Live:
     port
         Port to listen at; 0 for any that is free.
     token
-        Whether a browser needs a token on this machine too, where others use it.
+        True if a browser needs a token on this machine too, where others use it.
     kept
         Called with the name of a recording and its two files, netCDF and HTML, besides the download in the browser.
         What it raises of :mod:`chilopod.errors` is shown at the page.

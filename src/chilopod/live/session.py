@@ -65,9 +65,9 @@ class Session:
     robot
         The robot; all of its springs may be changed here.
     engine
-        Of :data:`chilopod.engine.ENGINES`, or one's own as ``package.module:object``.
+        One of :data:`chilopod.engine.ENGINES`, or one's own as ``package.module:object``.
     seed
-        Of start and nudges.
+        Seed of start and nudges.
     strategy
         Name of one of :data:`STRATEGIES_HERE`.
 

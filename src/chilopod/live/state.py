@@ -48,11 +48,11 @@ class Seen:
     pose
         x, y (m) and heading (rad) of module 1.
     joint_angles, stiffness
-        Of the yaw joints, now: rad and N*m/rad, (N-1,).
+        Joint angles and stiffness of the yaw joints, now: rad and N*m/rad, (N-1,).
     leg_yaw
-        Of the legs of module 1, rad, (2,).
+        Leg yaw of the legs of module 1, rad, (2,).
     mean_angles
-        Of the joints over the last gait cycle, rad, (N-1,).
+        Mean angles of the joints over the last gait cycle, rad, (N-1,).
     turning
         By how much the sum of their sizes grows, rad/s.
     pulled
@@ -99,7 +99,7 @@ class Settings:
     strategy, speed, paused, seed
         As asked for.
     recording
-        Whether the walk is being written down, or about to be.
+        True if the walk is being written down, or about to be.
     """
 
     robot: Robot

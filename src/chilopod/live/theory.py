@@ -39,7 +39,7 @@ class Theory:
     Attributes
     ----------
     robot
-        Of which it is known; None: of none.
+        Robot of which it is known; None: of none.
     pitchfork
         First spring below which the straight walk gives way, N*m/rad; None where it is not known.
     springs, radii, stable

@@ -63,7 +63,7 @@ def radius_ratio(base: xr.Dataset, variant: xr.Dataset, drawn: int = DRAWN, seed
         How many times trials are drawn anew at every spring for the standard errors, onsets fitted anew each time; 0
         for none.
     seed
-        Of the drawing.
+        Seed of the drawing.
     """
     inverse, bends = zip(*(_bends(each) for each in (base, variant)), strict=True)
     found = _ratios(inverse, bends)

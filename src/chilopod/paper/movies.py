@@ -32,11 +32,11 @@ class Movie:
     Attributes
     ----------
     name
-        Of its files.
+        Name of its files.
     heading
         Above all panels.
     titles
-        Of the panels.
+        Titles of the panels.
     record
         The walks.
     speed

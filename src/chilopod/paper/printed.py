@@ -91,11 +91,11 @@ class Variant:
     Attributes
     ----------
     overrides
-        Of the robot's description, as ``--set`` takes them.
+        Overrides of the robot's description, as ``--set`` takes them.
     model
         The planar model's critical k1, over that as built.
     onset, radius
-        Of the robot: where curved walks set in, and their radius over that as built.
+        Onset and radius of the robot: where curved walks set in, and their radius over that as built.
     """
 
     overrides: tuple[str, ...]
@@ -113,7 +113,7 @@ class Task:
     target
         Where it is.
     radius
-        Of the circle to it, in so many digits.
+        Radius of the circle to it, in so many digits.
     k_hat
         The spring whose walk has this radius.
     minima

@@ -65,7 +65,7 @@ def difference(one: ArrayLike, other: ArrayLike, *, paired: bool = False) -> Dif
     one, other
         A value of every trial, shapes (n,) and (m,); NaN does not count.
     paired
-        Whether trials of equal index belong together, as those of one seed do; then the scatter of their differences
+        True if trials of equal index belong together, as those of one seed do; then the scatter of their differences
         counts. Else the trials are independent.
     """
     x, y = np.asarray(one, dtype=np.float64), np.asarray(other, dtype=np.float64)

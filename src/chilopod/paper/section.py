@@ -24,9 +24,9 @@ class Context:
     Attributes
     ----------
     robot
-        Of the planar model; the paper's numbers are those of ``aoi2022-planar``.
+        Robot of the planar model; the paper's numbers are those of ``aoi2022-planar``.
     whole
-        Of the sections in three dimensions, with a twin.
+        Whole of the sections in three dimensions, with a twin.
     size
         How much of everything is computed.
     folder
@@ -59,11 +59,11 @@ class Section(Generic[T]):
     needs
         Other sections whose results it uses where they were computed; they come before it.
     beyond
-        Whether it goes beyond the paper's own experiments.
+        True if it goes beyond the paper's own experiments.
     on_request
-        Whether it is computed only if it is asked for by name.
+        True if it is computed only if it is asked for by name.
     full
-        Whether it is left out of a quick report unless it is asked for by name.
+        True if it is left out of a quick report unless it is asked for by name.
     """
 
     name: str
@@ -86,7 +86,7 @@ class Found:
     context
         What it was computed from.
     values, rows, seconds
-        Of the sections that were computed: result, lines of the tables, and how long it took.
+        Values, rows and seconds of the sections that were computed: result, lines of the tables, and how long it took.
     failures
         Why others could not be.
     """

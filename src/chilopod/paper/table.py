@@ -38,7 +38,7 @@ class Row:
     quantity, paper, computed
         In words and numbers with units; ``paper`` says so where it prints none.
     where
-        Of the paper.
+        Where of the paper.
     verdict
         One of :data:`AGREES`, or :data:`NOT_PRINTED`.
     remark
@@ -72,7 +72,7 @@ class Statement(Generic[S]):
     said
         What the paper says and what is asked of the twin, of a number if it is a :class:`Band`.
     kind
-        Whether the twin was fitted to it.
+        True if the twin was fitted to it.
     """
 
     quantity: str
@@ -87,13 +87,13 @@ class OfTwin:
     Attributes
     ----------
     statement
-        Of the paper's robot.
+        Statement of the paper's robot.
     words
         In words and numbers with units.
     answer
-        Whether that is what is asked.
+        True if that is what is asked.
     reading
-        Of what the paper leaves open, if the twin has several.
+        Reading of what the paper leaves open, if the twin has several.
     """
 
     statement: Statement[Said]
@@ -123,7 +123,7 @@ class RobotRow:
     kind
         One of :class:`Kind`.
     verdict
-        Of :data:`WITHIN`, or :data:`NOT_COMPUTED`.
+        One of :data:`WITHIN`, or :data:`NOT_COMPUTED`.
     asked
         What counts as within.
     """

@@ -118,7 +118,7 @@ class WalkMeans(ReadOnlyArrays):
     Attributes
     ----------
     mean_angle
-        Of every joint, rad, shape (walks, N-1).
+        Mean angle of every joint, rad, shape (walks, N-1).
     most_bent
         Largest angle of any joint within the period, rad, shape (walks,).
     leg_power

@@ -44,13 +44,13 @@ def sum_moments(
     Parameters
     ----------
     contact, stroke
-        Whether each foot stands, and where it is ahead of mid-stroke (m), shape (N, 2).
+        True if each foot stands, and where it is ahead of mid-stroke (m), shape (N, 2).
     friction
-        Of every foot, N*s/m, shape (N, 2).
+        Friction of every foot, N*s/m, shape (N, 2).
     forward_offset, half_width
         Foot at mid-stroke, ahead of the module's centre and to the side of its axis, m.
     yaw
-        Of the two legs of module 1 about their feet at mid-stroke, left positive, rad, shape (2,).
+        Yaw of the two legs of module 1 about their feet at mid-stroke, left positive, rad, shape (2,).
     out
         Shape (N, 8): N*s/m, N*s, N*s, N*m*s, N*s/m, N*s/m, N*s, N*s.
     """

@@ -133,11 +133,11 @@ def foot_powers(friction: Array, slip: Array, heading: Array, speed: float) -> t
     Parameters
     ----------
     friction
-        Of every foot, 0 in the air, N*s/m, shape (..., N, 2).
+        Friction of every foot, 0 in the air, N*s/m, shape (..., N, 2).
     slip
         Velocity of every foot on the floor, m/s, shape (..., N, 2, 2).
     heading
-        Of every module, on the same axes, rad, shape (..., N).
+        Heading of every module, on the same axes, rad, shape (..., N).
     speed
         At which standing feet move back, m/s.
 

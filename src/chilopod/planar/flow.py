@@ -40,7 +40,7 @@ def advance(
     starts, widths
         Where in its contact interval each piece starts and how long it lasts, s, shape (pieces,).
     scalars, stiffness, damping
-        Of the robots, shapes (robots, 4), (robots, N-1), (robots, N-1).
+        Scalars, stiffness and damping of the robots, shapes (robots, 4), (robots, N-1), (robots, N-1).
     moments
         Contact moments at the start of the contact interval of every piece, shape (robots, pieces, N, 8).
     owner
@@ -48,7 +48,7 @@ def advance(
     states
         Reduced states, shape (states, 2N+1), or with poses behind, (states, 2N+4); float64 or complex128.
     tolerance
-        Of the integrator, relative to max(1, |x|).
+        Tolerance of the integrator, relative to max(1, |x|).
     ok
         Set to False where a state could not be carried to the end, shape (states,).
 

@@ -74,13 +74,13 @@ def system_matrices(
     Parameters
     ----------
     length, mass, inertia
-        Of a module, m, kg, kg*m^2.
+        Length, mass and inertia of a module, m, kg, kg*m^2.
     speed
-        Of the straight walk, m/s.
+        Speed of the straight walk, m/s.
     moments
         Contact moments at the start of every interval, shape (intervals, N, 8), all legs straight.
     durations
-        Of the intervals, s, shape (intervals,).
+        Durations of the intervals, s, shape (intervals,).
 
     Returns
     -------

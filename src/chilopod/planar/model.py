@@ -52,10 +52,10 @@ class PlanarModel(ReadOnlyArrays):
     robot
         The description; SI inside.
     tolerance
-        Of the nonlinear flow, relative to max(1, |x|). The straight walk does not use it: there the derivative comes
-        from the linearised equations by Taylor series, to round-off.
+        Tolerance of the nonlinear flow, relative to max(1, |x|). The straight walk does not use it: there the
+        derivative comes from the linearised equations by Taylor series, to round-off.
     use_symmetry
-        Whether to offer the half-period symmetry of the gait, where it has one, to the analyses.
+        True to offer the half-period symmetry of the gait, where it has one, to the analyses.
     """
 
     robot: Robot

@@ -54,9 +54,9 @@ def simulate(
     rate
         Samples per second.
     tolerance
-        Of every step, relative to max(1, |state|).
+        Tolerance of every step, relative to max(1, |state|).
     forces
-        Whether to add the force on every foot.
+        True to add the force on every foot.
     progress
         Called with the part done (0 to 1) and a few words.
 

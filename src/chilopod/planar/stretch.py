@@ -79,11 +79,11 @@ class Robots(NamedTuple):
     damping
         N*m*s/rad, shape (robots, N-1).
     friction
-        Of every foot, N*s/m, shape (robots, N, 2).
+        Friction of every foot, N*s/m, shape (robots, N, 2).
     profile, lag, torque
         See :class:`chilopod.engine.Actuators`, shapes (7, robots, N-1), (robots, N-1), (robots, N-1).
     yaw
-        Of the legs of module 1, rad, shape (robots, 2).
+        Yaw of the legs of module 1, rad, shape (robots, 2).
     """
 
     scalars: Any
@@ -122,7 +122,7 @@ class _Places(NamedTuple):
     tried, rejected
         Steps in this part so far, and whether the one before was rejected.
     last
-        Whether the present step is to be the last of the part.
+        True if the present step is to be the last of the part.
     """
 
     robot: Any
@@ -369,7 +369,7 @@ def carry(
     pieces, robots
         See :class:`Pieces` and :class:`Robots`.
     tolerance
-        Of the integrator, relative to max(1, |x|).
+        Tolerance of the integrator, relative to max(1, |x|).
     states
         Reduced states with poses behind, shape (robots, 2N+4).
     step

@@ -108,7 +108,7 @@ def start(
     seeds
         Not used: what these robots see has no noise.
     tolerance
-        Of every step, relative to max(1, |state|).
+        Tolerance of every step, relative to max(1, |state|).
     """
     tolerance, expected = in_range("tolerance", tolerance, 1e-2), check_wishes(record, expected)
     given = as_robots(robots)

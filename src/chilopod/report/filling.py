@@ -171,7 +171,7 @@ def write_report(found: Found, folder: str | Path) -> Path:
     Returns
     -------
     Path
-        Of the page.
+        Path of the page.
 
     Raises
     ------

@@ -23,11 +23,11 @@ def check_report(folder: Path, sections: Collection[Section[Any]], size: Size, *
     Parameters
     ----------
     folder
-        Of the report.
+        Folder of the report.
     sections, size
         What it will have. A report that has no more is gone on with.
     replace
-        Whether to replace whatever is there.
+        True to replace whatever is there.
 
     Raises
     ------

@@ -43,7 +43,7 @@ def write_branch(data: xr.Dataset, folder: str | Path, *, replace: bool = True) 
     folder
         Created where there is none.
     replace
-        Whether files that are already there may be replaced.
+        True if files that are already there may be replaced.
 
     Returns
     -------

@@ -25,13 +25,13 @@ class Body(Description):
     modules
         How many, from 2 to 1000.
     length
-        Of the whole chain, m.
+        Length of the whole chain, m.
     mass
-        Of the whole chain, kg.
+        Mass of the whole chain, kg.
     yaw_inertia
-        Of one whole module with its legs about its centre, kg*m^2, in every engine. None means that of a uniform rod of
-        the module's mass and length; or, where the legs and the body's width of [twin] alone have more than the rod, as
-        in short modules, the least possible (:mod:`chilopod.robot.inertia`).
+        Yaw inertia of one whole module with its legs about its centre, kg*m^2, in every engine. None means that of a
+        uniform rod of the module's mass and length; or, where the legs and the body's width of [twin] alone have more
+        than the rod, as in short modules, the least possible (:mod:`chilopod.robot.inertia`).
     """
 
     modules: Annotated[int, MODULES]
@@ -52,7 +52,7 @@ class Springs(Description):
     damping
         (modules-1,) N*m*s/rad, zero or more.
     adjustable
-        Whether a spring has an actuator that changes its stiffness, (modules-1,); None: none of them.
+        True if a spring has an actuator that changes its stiffness, (modules-1,); None: none of them.
     softest, stiffest
         Between which its actuator keeps a spring, (modules-1,) N*m/rad; None: no limit.
     rate
@@ -110,19 +110,19 @@ class Twin(Description):
     Attributes
     ----------
     hip_height
-        Of the leg's pitch axis at the body above the centre of its foot in stance, m.
+        Hip height of the leg's pitch axis at the body above the centre of its foot in stance, m.
     upper_link, lower_link
         Lengths of the two links of a leg, from pitch axis to pitch axis and from there to the foot's centre, m.
     link_mass
-        Of each link, kg; taken from the mass of the whole robot.
+        Link mass of each link, kg; taken from the mass of the whole robot.
     foot_radius
-        Of the round foot, m.
+        Foot radius of the round foot, m.
     body_width, body_height
-        Of the box that a module's body is, m; its length is that of the module.
+        Body width and body height of the box that a module's body is, m; its length is that of the module.
     clearance
         Height of the tip path's half ellipse, m.
     servo_stiffness, servo_damping
-        Of every leg joint's position servo, N*m/rad and N*m*s/rad.
+        Servo stiffness and servo damping of every leg joint's position servo, N*m/rad and N*m*s/rad.
     joint_inertia
         Reflected inertia of every servo's motor, kg*m^2.
     sliding_friction
@@ -130,11 +130,11 @@ class Twin(Description):
     contact_time
         Time constant in which the floor pushes a foot out, s (MuJoCo: first number of solref).
     impedance_ratio
-        Of frictional to normal contact constraints; the higher, the less feet creep (MuJoCo: impratio).
+        Impedance ratio of frictional to normal contact constraints; the higher, the less feet creep (MuJoCo: impratio).
     control_interval
         Time between two servo targets, s.
     timestep
-        Of the simulation, s; a whole number of them makes a control interval.
+        Timestep of the simulation, s; a whole number of them makes a control interval.
     scanner_view, scanner_step
         Whole angle the scanner sees, centred ahead, and between two of its beams, rad.
     scanner_period
@@ -144,9 +144,9 @@ class Twin(Description):
     scanner_resolution, scanner_noise
         Step of its distances, and standard deviation of their error, m.
     scanner_offset
-        Of the scanner ahead of the centre of module 1, m.
+        Scanner offset of the scanner ahead of the centre of module 1, m.
     pole_radius
-        Of the pole that marks a target, m.
+        Pole radius of the pole that marks a target, m.
     """
 
     hip_height: Annotated[float, Quantity("m", "mm")]

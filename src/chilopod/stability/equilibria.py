@@ -60,11 +60,11 @@ class Equilibrium(ReadOnlyArrays):
     state
         The state, shape (n,).
     error
-        How far it may be off, shape (n,); infinite where the derivative is singular.
+        Bound on the error of the state, shape (n,); infinite where the derivative is singular.
     jacobian
         Derivative of the right-hand side there, shape (n, n).
     eigenvalues
-        Of the derivative, by falling real part, shape (n,), in 1/s.
+        Eigenvalues of the derivative, by falling real part, shape (n,), in 1/s.
     error_bounds
         On the error of each eigenvalue, shape (n,).
     """

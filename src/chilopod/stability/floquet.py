@@ -21,8 +21,8 @@ from chilopod.stability.returns import return_maps
 from chilopod.stability.shown import Result, Shown, axes_for, dataset, number, rows, said
 from chilopod.stability.spectrum.cut import moderate_cut
 from chilopod.stability.spectrum.eigenvalues import phased, spectrum
-from chilopod.stability.spectrum.errors import SAFETY, VERDICTS, stable_within
-from chilopod.stability.spectrum.splitting import split_with_error
+from chilopod.stability.spectrum.errors import VERDICTS, stable_within
+from chilopod.stability.spectrum.splitting import split_product
 from chilopod.stability.spectrum.stiff import split_stiff
 from chilopod.stability.system import PeriodicSystem
 
@@ -141,10 +141,10 @@ class Exponents(Shown, ReadOnlyArrays):
 def _multipliers(orbit: Orbit) -> Multipliers:
     image = orbit.image
     spec = spectrum(image)
-    return _of_period(spec.values, spec.error, image.returns, orbit.state, image.period)
+    return full_period(spec.values, spec.error, image.returns, orbit.state, image.period)
 
 
-def _of_period(nu: ComplexArray, error: Array, k: int, state: Array, period: float) -> Multipliers:
+def full_period(nu: ComplexArray, error: Array, k: int, state: Array, period: float) -> Multipliers:
     """The multipliers mu = nu^k of the full period from those of the return map, with their errors."""
     modulus = np.abs(nu)
     resolved = modulus > _RESOLVED
@@ -182,7 +182,7 @@ def multipliers(system: SystemLike, orbit: ArrayLike | None = None, leading: int
     if flows_tangents(system) and system.dimension >= LARGE:
         image, size = find_large_orbit(system, orbit)
         found = leading_multipliers(image, size, count)
-        result = _of_period(found.values, found.error, image.returns, image.point, image.returns * image.duration)
+        result = full_period(found.values, found.error, image.returns, image.point, image.returns * image.duration)
         of_period = found.following**image.returns
     else:
         result, of_period = _leading_of(_multipliers(find_orbit(system, orbit)), count)
@@ -234,9 +234,9 @@ def exponents(system: SystemLike, orbit: ArrayLike | None = None) -> Exponents:
         log_nu, modes, moved = split_stiff(system, found.state, image)
     else:
         cut = moderate_cut(system, found.state, image)
-        log_nu, modes, moved = split_with_error(cut.factors, cut.errors)
+        log_nu, modes, moved = split_product(cut.factors, cut.errors)
         modes = cut.basis @ modes
-    bound = image.returns * (SAFETY * moved + 4.0 * _EPSILON * np.abs(log_nu)) / image.period
+    bound = image.returns * (moved + 4.0 * _EPSILON * np.abs(log_nu)) / image.period
     # Principal logarithm of nu^k: the imaginary part back into (-pi, pi].
     angle = np.angle(np.exp(1j * image.returns * log_nu.imag))
     angle[np.abs(angle) < _SAME_ANGLE] = 0.0

@@ -74,7 +74,7 @@ class Orbit(Shown, ReadOnlyArrays):
     image
         The return map there.
     error
-        How far ``state`` may be off, shape (n,); zero where it is known exactly, NaN if it was not asked for.
+        Bound on the error of ``state``, shape (n,); zero where it is known exactly, NaN if it was not asked for.
     """
 
     state: Array
@@ -144,17 +144,17 @@ def find_orbit(
         even times over one period, shape (times, n), or times and states, shapes (times,) and (times, n), as a tuple or
         an ``xarray.DataArray`` over ``time``. It then takes the period that the guess has.
     with_error
-        Whether to bound errors.
+        True to bound errors.
     section
-        Of a system that does not depend on time: where its orbit is looked for. By default across the motion in the
-        guess; the orbit that is found has the section across its own motion.
+        Section of a system that does not depend on time: where its orbit is looked for. By default across the motion in
+        the guess; the orbit that is found has the section across its own motion.
     settle
-        Whether to let the motion settle where Newton's method fails: up to 330 returns, or 83 guessed periods.
+        True to let the motion settle where Newton's method fails: up to 330 returns, or 83 guessed periods.
     budget
         Return maps that may be evaluated, which are taken from it: up to 30 for every start of Newton's method, and 100
         for letting the motion settle.
     shortest
-        Whether to look for the shortest period, where no section tells how long a return takes.
+        True to look for the shortest period, where no section tells how long a return takes.
 
     Raises
     ------
@@ -403,7 +403,7 @@ def bounded(system: SystemLike, x: Array, image: ReturnMap, error: Array | None 
     image
         The return map there, or near.
     error
-        How far off the state may be, shape (n,), if that is known.
+        Bound on the error of the state, shape (n,), if it is known.
     """
     size = sizes(system, x, image.period / image.returns)
     shared, given = _shared(system, x, size), x

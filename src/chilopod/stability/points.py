@@ -90,9 +90,9 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
     Attributes
     ----------
     kind
-        What it is.
+        Kind of the point.
     value
-        Of the parameter.
+        Value of the parameter.
     error_bound
         Bound on the error of ``value``: that of the critical multiplier over its rate of change, and the root finder's.
     orbit
@@ -113,18 +113,18 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
         meaning (fold, transcritical, branch point) or where there is no normal form. At a Hopf point
         the first Lyapunov coefficient l1 (Kuznetsov, section 3.5), with |a| -> |a| + 2 pi l1 |a|^3 over one period.
     rotation, rotation_error
-        Where the mode turns (Neimark-Sacker), the phase per period that an amplitude adds, rad per amplitude^2.
+        Phase per period that an amplitude adds where the mode turns (Neimark-Sacker), rad per amplitude^2.
     period
-        Of the orbit.
+        Period of the orbit.
     multiplicity
-        How many multipliers are critical, both of a pair counted.
+        Number of critical multipliers, both of a pair counted.
     modes
         Unit critical eigenvectors where there are several, shape (n, modes): where a symmetry makes them several, those
         along which new orbits branch off; else of the critical space some basis.
     symmetry
-        What the spatial symmetries make of it, where the orbit has some.
+        Consequences of the spatial symmetries, where the orbit has some.
     rate
-        Of a Hopf point: how fast its eigenvalue moves, in 1/s per unit of the parameter.
+        Rate of a Hopf point: how fast its eigenvalue moves, in 1/s per unit of the parameter.
     normal_form
         All that is known of the normal form, with a status that says why where it has no numbers; None where it was
         not asked for, and at folds.

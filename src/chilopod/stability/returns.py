@@ -77,13 +77,13 @@ class ReturnMap(ReadOnlyArrays):
         Bound on the error of every entry of ``jacobian``, shape (n, n), or one number for all; NaN if it was not asked
         for.
     returns
-        How many times H makes the full period.
+        Number of returns in the full period.
     period
         The full period.
     velocity
         dx/dt at H(x), shape (n,), where the system does not depend on time; else None.
     normal
-        Of the section, likewise.
+        Normal of the section, likewise.
     """
 
     state: Array
@@ -134,7 +134,7 @@ def section_at(
         Sizes of the states, shape (n,): across means at right angles in these units. By default
         :func:`chilopod.stability.scales.sizes`.
     duration
-        Of a return; the system's own guess by default.
+        Duration of a return; the system's own guess by default.
 
     Raises
     ------
@@ -207,9 +207,9 @@ def return_map(system: SystemLike, x: ArrayLike, with_error: bool = True, sectio
     system, x
         The system and a state at time 0, shape (n,).
     with_error
-        Whether to bound the error as well, which may cost a second computation; without, ``error`` is NaN.
+        True to bound the error as well, which may cost a second computation; without, ``error`` is NaN.
     section
-        Where a return ends, if the system does not depend on time; by default across the motion in ``x``.
+        Section on which a return ends, if the system does not depend on time; by default across the motion in ``x``.
 
     Raises
     ------

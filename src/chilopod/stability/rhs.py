@@ -60,8 +60,8 @@ def from_rhs(
     args
         Parameters of the right-hand side.
     events
-        Where the state jumps, or the right-hand side switches, on reaching a surface. Needs functions that can be
-        traced.
+        Events at which the state jumps, or the right-hand side switches, on reaching a surface. Needs functions that
+        can be traced.
     switch_times
         Times in [0, T) at which ``rhs`` jumps or has a kink. Integration stops and restarts there. A function that is
         traced needs none; of others, within an interval the function is only ever asked at times strictly inside it,

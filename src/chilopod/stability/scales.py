@@ -28,7 +28,7 @@ def sizes(system: SystemLike, x: Array, duration: float) -> Array:
     system, x
         The system and a state at time 0, shape (n,).
     duration
-        Of a return.
+        Duration of a return.
 
     Raises
     ------

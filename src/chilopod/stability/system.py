@@ -52,7 +52,7 @@ class PeriodicSystem(ReadOnlyArrays):
     orbit
         A state at time 0 on the periodic orbit, if it is known. It is improved where it does not return exactly.
     scale
-        What a large change of every state is, shape (n,), where the orbit should not tell it.
+        Sizes of a large change of every state, shape (n,), where the orbit should not tell it.
     velocity
         ``velocity(x)`` -> dx/dt, shape (n,), of a system that does not depend on time.
     guess_period
@@ -61,7 +61,7 @@ class PeriodicSystem(ReadOnlyArrays):
     flow_with_error, flow_states, flow_tangents, flow_frame, is_stiff, velocity_series
         See :mod:`chilopod.stability.capabilities`.
     concurrent
-        Whether flows may run in several threads at once, which :func:`chilopod.stability.sweep` then does.
+        True if flows may run in several threads at once, which :func:`chilopod.stability.sweep` then does.
     """
 
     dimension: int

@@ -29,13 +29,13 @@ class ActuatedAxis:
     Attributes
     ----------
     stiffness
-        Of the springs that it works against, N*m/rad, (N-1,).
+        Stiffness of the springs that it works against, N*m/rad, (N-1,).
     module_length
         m.
     most_bent
         Wanted of one joint, rad.
     leg_yaw
-        Of the legs of module 1.
+        Leg yaw of the legs of module 1.
     """
 
     stiffness: tuple[float, ...]

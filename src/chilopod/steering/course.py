@@ -43,7 +43,7 @@ class Goal:
     x, y
         On the floor, where the robot starts at the origin along x; or ahead of module 1 and to its left, m.
     relative
-        Whether seen from module 1 when the goal before is done with.
+        True if seen from module 1 when the goal before is done with.
 
     Raises
     ------
@@ -114,7 +114,8 @@ class Goal:
         Parameters
         ----------
         poses
-            Of module 1 of each robot when the goal's turn comes: x and y (m) and heading (rad), shape (robots, 3).
+            Poses of module 1 of each robot when the goal's turn comes: x and y (m) and heading (rad), shape (robots,
+            3).
         """
         if not self.relative:
             return np.tile([self.x, self.y], (len(poses), 1))

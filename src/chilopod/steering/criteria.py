@@ -33,9 +33,9 @@ class Criteria(ReadOnlyArrays):
     time
         At which the first two are taken and up to which the third is, s.
     distance
-        Of the target, m (epsilon 1).
+        Distance of the target, m (epsilon 1).
     angle
-        Of the target to the heading, unsigned, rad (epsilon 2).
+        Angle of the target to the heading, unsigned, rad (epsilon 2).
     effort
         Integral of the squared leg yaw of both legs over time, rad^2 s (epsilon 3).
     arrival
@@ -89,8 +89,8 @@ def evaluate(record: xr.Dataset, time: float) -> Criteria:
     Parameters
     ----------
     record
-        Of turning tasks: ``distance`` and ``bearing`` over (time, robot), ``status`` and, if the legs were steered,
-        ``command`` over (event, robot, side).
+        Record of turning tasks: ``distance`` and ``bearing`` over (time, robot), ``status`` and, if the legs were
+        steered, ``command`` over (event, robot, side).
     time
         The evaluation time: in the paper the earliest at which any robot arrives, 23 s. A model that walks faster
         has an earlier one.

@@ -31,7 +31,7 @@ class LegYawController:
     limit
         Largest yaw, rad (5 deg in the paper).
     start, end
-        Of the ramp, as parts of the swing (0.4 and 0.8 in the paper).
+        Start and end of the ramp, as parts of the swing (0.4 and 0.8 in the paper).
     """
 
     step: float = math.radians(5.0)

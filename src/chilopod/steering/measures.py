@@ -11,6 +11,7 @@ from chilopod.robot import Robot
 Array = NDArray[np.float64]
 
 _OVER = ("robot", "goal")
+_READ = ("position", "leg_yaw", "joint_angle", "stiffness", "command_torque", "seen_joint_angles")
 
 
 def of_course(record: xr.Dataset, robot: Robot, brief: bool = False) -> xr.Dataset:
@@ -34,15 +35,15 @@ def of_course(record: xr.Dataset, robot: Robot, brief: bool = False) -> xr.Datas
     robot
         It.
     brief
-        Whether to leave out what is over time and over events.
+        True to leave out what is over time and over events.
     """
     begin, end = (record[f"goal_{name}"].values[0] for name in ("begin", "end"))
     over = float(np.nanmax(end))
     last = over + 1e-9
     # How long others walked on that were simulated with it is no part of it.
-    data = record.isel(time=record.time.values <= last).assign_attrs(duration=over)
-    if "event" in data.dims:
-        data = data.isel(event=data.event.values < last)
+    data = (record[[name for name in _READ if name in record]] if brief else record).isel(
+        time=record.time.values <= last, **({"event": record.event.values < last} if "event" in record.dims else {})
+    )
     sums = {
         "path": (_path(data, robot.gait.period), "m"),
         "effort": (_effort(data), "rad^2*s"),
@@ -54,7 +55,8 @@ def of_course(record: xr.Dataset, robot: Robot, brief: bool = False) -> xr.Datas
         between = np.interp(end, times, so_far) - np.interp(begin, times, so_far)
         found[f"goal_{name}"] = (_OVER, between[None], {"units": unit})
     # All at once: to add them one by one takes several times as long.
-    return (data.drop_dims(["time", "event"], errors="ignore") if brief else data).assign(found)
+    kept = record.drop_dims(["time", "event"], errors="ignore") if brief else data
+    return kept.assign(found).assign_attrs(duration=over)
 
 
 def _so_far(times: Array, steps: Array) -> tuple[Array, Array]:

@@ -26,7 +26,7 @@ class RadiusLaw(ReadOnlyArrays):
     Attributes
     ----------
     values
-        Of the parameter, rising, SI units, shape (points,); the last one is the pitchfork.
+        Values of the parameter, rising, SI units, shape (points,); the last one is the pitchfork.
     radii
         m, shape (points,), infinite at the pitchfork.
     unit

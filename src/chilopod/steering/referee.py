@@ -76,11 +76,11 @@ class CourseReferee:
     courses
         One a robot; how long they have for a target, and what they see, is the same in all.
     gait
-        Of the robots.
+        Gait of the robots.
     missed
-        Whether a target is missed by the scanner, by event, shape (robots, at least as many as events); None: never.
+        True if a target is missed by the scanner, by event, shape (robots, at least as many as events); None: never.
     keep
-        Whether to keep what controllers were shown, for :meth:`add_to`.
+        True to keep what controllers were shown, for :meth:`add_to`.
     """
 
     every = LOOK
@@ -256,7 +256,7 @@ def decisions(record: xr.Dataset, controller: Controller, gait: Gait) -> list[Co
     Parameters
     ----------
     record
-        Of a course.
+        Record of a course.
     controller, gait
         That steered, and of the robots.
     """

@@ -30,7 +30,7 @@ def shortest_path(place: Array, radius: float, arrival: float = ARRIVAL_RADIUS) 
     place
         Ahead and to the left, m, shape (..., 2).
     radius
-        Of the tightest circle, m; 0 for what turns on the spot.
+        Radius of the tightest circle, m; 0 for what turns on the spot.
     arrival
         How near counts as arrived, m; 0 for the place itself.
 

@@ -46,7 +46,7 @@ class SpringLaw(ReadOnlyArrays):
     Attributes
     ----------
     softest, stiffest
-        Of the first spring, N*m/rad.
+        Softest and stiffest of the first spring, N*m/rad.
     curvatures, springs
         The inverse radius law: 1/m, rising from 0 at the pitchfork, and N*m/rad.
     tightest
@@ -62,9 +62,9 @@ class SpringLaw(ReadOnlyArrays):
     straight
         A wanted bend of all joints together that is left to the legs, rad.
     most_bent
-        Of one joint, rad; at a right angle modules run into each other.
+        Most bent of one joint, rad; at a right angle modules run into each other.
     leg_yaw
-        Of the legs of module 1.
+        Leg yaw of the legs of module 1.
     """
 
     softest: float

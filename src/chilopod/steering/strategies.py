@@ -24,7 +24,7 @@ class Strategy:
     springs
         The parameter it chooses: the dotted path of one spring or of all; None leaves the springs alone.
     leg_yaw
-        Whether the legs of module 1 yaw towards the target.
+        True if the legs of module 1 yaw towards the target.
     """
 
     name: str

@@ -83,7 +83,7 @@ class Driven(Short):
     trials
         With all that makes each walk.
     records
-        Of every walk, up to where it ended, see :func:`chilopod.steering.of_course`.
+        Records of every walk, up to where it ended, see :func:`chilopod.steering.of_course`.
     """
 
     driver: Driver

@@ -53,7 +53,7 @@ class Turn(Short):
     stiffness
         The spring it walked with, N*m/rad; None where the strategy leaves the springs alone.
     record
-        Of all repeats.
+        Record of all repeats.
     criteria
         At the earliest arrival of any repeat, or at the end if none arrives.
     """
@@ -152,16 +152,16 @@ def turn(
     strategy
         How, one of :data:`chilopod.steering.STRATEGIES`.
     spring
-        Of the strategy, N*m/rad; or ``law``: the paper's k1-hat, from the radius law; or ``auto``: what comes nearest
-        to the target in undisturbed simulated trials, which takes into account that a walk needs time to bend. Without
-        leg yaw nothing bends undisturbed, and ``auto`` is ``law``.
+        Spring of the strategy, N*m/rad; or ``law``: the paper's k1-hat, from the radius law; or ``auto``: what comes
+        nearest to the target in undisturbed simulated trials, which takes into account that a walk needs time to bend.
+        Without leg yaw nothing bends undisturbed, and ``auto`` is ``law``.
     duration
         s; by default what the circle takes at the speed of the straight walk without slip, times the engine's haste,
         see :class:`chilopod.engine.Traits`; at least 5 s.
     seed, repeats, progress
         As for :func:`chilopod.tasks.walk`.
     engine
-        Of :data:`chilopod.engine.ENGINES`, or one's own as ``package.module:object``. The radius law of the planar
+        One of :data:`chilopod.engine.ENGINES`, or one's own as ``package.module:object``. The radius law of the planar
         model is that of its exact branch, any other's that of trials.
     controller
         In place of the strategy's: a frozen dataclass, see :class:`chilopod.trials.Trial`.

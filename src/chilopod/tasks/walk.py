@@ -35,7 +35,7 @@ class Ends(Short):
     summaries
         The end of every walk.
     straight
-        Whether none of them ever bent, see :func:`chilopod.trials.straight`.
+        True if none of them ever bent, see :func:`chilopod.trials.straight`.
     """
 
     trials: tuple[Trial, ...]
@@ -104,7 +104,7 @@ class Walks(Ends):
     trials, summaries, straight
         As for :class:`Ends`.
     record
-        Of all walks.
+        Record of all walks.
     """
 
     record: xr.Dataset

@@ -68,7 +68,7 @@ def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
     Parameters
     ----------
     trials
-        Of one of :func:`batches`.
+        Trials of one of :func:`batches`.
 
     Returns
     -------

@@ -34,7 +34,7 @@ class Claims:
     Parameters
     ----------
     folder
-        Of the trials.
+        Folder of the trials.
     sweep
         Called at the end if nobody else is there: what is in the folder now and is no whole file was left over by
         somebody who was killed.
@@ -75,7 +75,7 @@ class Claims:
         Parameters
         ----------
         name
-            Of its file.
+            Name of its file.
         """
         with suppress(OSError):
             return self._handle is None or _locked(self._handle, _ALONE, _byte_of(name))

@@ -44,7 +44,7 @@ class Cluster:
         The address of a scheduler, such as ``tcp://10.0.0.1:8786``; or how many worker processes to start on this
         machine.
     threads
-        Of each worker process that is started here; by default its share of the cores.
+        Threads of each worker process that is started here; by default its share of the cores.
 
     Raises
     ------

@@ -30,13 +30,13 @@ class Disturbance:
     Attributes
     ----------
     joint_angle
-        Of every yaw joint at the start, rad.
+        Joint angle of every yaw joint at the start, rad.
     heading
-        Of module 1 at the start, rad.
+        Heading of module 1 at the start, rad.
     friction
-        Of the logarithm of every foot's friction coefficient.
+        Friction of the logarithm of every foot's friction coefficient.
     bearing
-        Of every measured bearing, rad. The twin's scanner has noise of its own instead, if this is not zero.
+        Bearing of every measured bearing, rad. The twin's scanner has noise of its own instead, if this is not zero.
     missed
         Part of its looks at which the scanner misses the target, on a course.
     slick
@@ -82,9 +82,9 @@ class Drawn:
     bearing
         Errors of the measured bearings, rad, shape (looks,).
     missed
-        Whether the scanner misses the target, shape (looks,).
+        True if the scanner misses the target, shape (looks,).
     scan_seed
-        Of the noise of a scanner that has its own.
+        Scan seed of the noise of a scanner that has its own.
     """
 
     joint_angles: Array
@@ -107,7 +107,7 @@ def draw(
     seed
         0 or more.
     modules
-        Of the robot.
+        Modules of the robot.
     looks
         How often it looks at its target, at most.
     joint_angles

@@ -120,7 +120,7 @@ def read_header(path: Path, *, whole: bool = False) -> Header:
     path
         The file.
     whole
-        Whether all of it is held against its seal; otherwise its length alone is.
+        True if all of it is held against its seal; otherwise its length alone is.
 
     Raises
     ------

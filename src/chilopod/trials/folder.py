@@ -56,15 +56,15 @@ class Kept:
     Attributes
     ----------
     path
-        Of the file.
+        Path of the file.
     size
-        Of the file, bytes.
+        Size of the file, bytes.
     robot
         What the robot is called.
     told
         The trial's text, see :attr:`chilopod.trials.Trial.text`.
     found
-        Whether this version of chilopod and of the engine takes it for what it would walk; of an engine of one's own
+        True if this version of chilopod and of the engine takes it for what it would walk; of an engine of one's own
         its version is not looked at.
     """
 
@@ -107,7 +107,7 @@ def kept(paths: Sequence[Path], progress: Progress = silent) -> tuple[list[Kept]
     Parameters
     ----------
     paths
-        Of :func:`contents`.
+        Paths of :func:`contents`.
     progress
         Called with the part done (0 to 1) and a few words.
     """
@@ -125,11 +125,11 @@ def clean(folder: Path, *, old: bool = False, dry: bool = False) -> tuple[list[P
     Parameters
     ----------
     folder
-        Of trials.
+        Folder of trials.
     old
-        Whether to remove the records of other versions, too.
+        True to remove the records of other versions, too.
     dry
-        Whether to remove nothing.
+        True to remove nothing.
 
     Returns
     -------
@@ -177,11 +177,11 @@ class Group:
     robots
         How many robots, told apart by their numbers.
     seeds
-        Of those that are disturbed, in order.
+        Seeds of those that are disturbed, in order.
     count
-        Of the trials.
+        Count of the trials.
     size
-        Of all files, bytes.
+        Size of all files, bytes.
     """
 
     robot: str

@@ -34,7 +34,7 @@ class WalkSummary:
     axis_radius
         Radius by these, see :meth:`chilopod.robot.Robot.axis_radius`, m: infinite if the walk is straight.
     x, y
-        Of the centre of module 1 at the end, m.
+        X and y of the centre of module 1 at the end, m.
     """
 
     status: str

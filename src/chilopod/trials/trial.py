@@ -39,7 +39,7 @@ class Trial:
     duration
         s.
     seed
-        Of its disturbances.
+        Seed of its disturbances.
     joint_angles
         At the start, before disturbance, rad, (N-1,); empty for straight.
     target
@@ -52,11 +52,11 @@ class Trial:
     rate
         Samples per second.
     forces
-        Whether the record has the force on every foot.
+        True if the record has the force on every foot.
     engine
         One of :data:`chilopod.engine.ENGINES`, or one's own as ``package.module:object``.
     poses
-        Whether the record has the positions of all joints, to be drawn, which not every engine has.
+        True if the record has the positions of all joints, to be drawn, which not every engine has.
     brief
         Of a course: whether only what became of its targets is kept, not what happened over time.
 

@@ -33,9 +33,9 @@ def failures(
     before
         The same before the first step, (robots, nq) and (robots, nv).
     yaw_positions
-        Of the yaw joints in ``qpos``, (N-1,).
+        Yaw positions of the yaw joints in ``qpos``, (N-1,).
     warned
-        Whether MuJoCo warned of a robot, which it then stopped, repeating its last state, (robots,).
+        True if MuJoCo warned of a robot, which it then stopped, repeating its last state, (robots,).
 
     Returns
     -------

@@ -130,7 +130,7 @@ def context(width: int, height: int) -> Iterator[None]:
     Parameters
     ----------
     width, height
-        Of what is drawn, pixels.
+        Width and height of what is drawn, pixels.
 
     Raises
     ------

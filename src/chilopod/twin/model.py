@@ -55,7 +55,7 @@ class TwinModel:
     robot
         With a twin.
     forces
-        Whether to measure the force on every foot (sensors, in the order of :attr:`feet`).
+        True to measure the force on every foot (sensors, in the order of :attr:`feet`).
     edit
         Makes of MuJoCo's description of the robot one's own, see :class:`chilopod.twin.Edited`.
 
@@ -68,17 +68,18 @@ class TwinModel:
     yaw_joints
         Index of the yaw joints among the joints, front to rear, (N-1,).
     yaw_positions, yaw_rates
-        Of the yaw joints in ``qpos`` and ``qvel``, (N-1,).
+        Yaw positions and yaw rates of the yaw joints in ``qpos`` and ``qvel``, (N-1,).
     feet
         Geom of every foot, (N, 2).
     leg_positions
-        Of hip and knee in ``qpos``, (N, 2, 2).
+        Leg positions of hip and knee in ``qpos``, (N, 2, 2).
     leg_controls
-        Of their servos in ``ctrl``, (N, 2, 2).
+        Leg controls of their servos in ``ctrl``, (N, 2, 2).
     leg_yaw_positions, leg_yaw_controls
-        Of the leg yaw joints of module 1, (2,).
+        Leg yaw positions and leg yaw controls of the leg yaw joints of module 1, (2,).
     spring_controls
-        Of the actuators that change the springs, (N-1,): N*m/rad above the spring's own stiffness; empty if none does.
+        Spring controls of the actuators that change the springs, (N-1,): N*m/rad above the spring's own stiffness;
+        empty if none does.
 
     Raises
     ------

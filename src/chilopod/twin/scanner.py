@@ -37,7 +37,7 @@ class Scanner:
     batch
         The robots, where they start.
     seeds
-        Of its noise, one a robot, which the walk may replace; None for none.
+        Seeds of its noise, one a robot, which the walk may replace; None for none.
     """
 
     def __init__(self, twin: Twin, batch: Batch, seeds: NDArray[np.object_] | None) -> None:
@@ -56,7 +56,7 @@ class Scanner:
         before, now
             Control intervals gone by since the start.
         poses
-            Of module 1 at the end of every interval from ``before`` on: place and quaternion, shape
+            Poses of module 1 at the end of every interval from ``before`` on: place and quaternion, shape
             (len(ids), intervals, 7).
         ids
             Which robots.
@@ -117,7 +117,7 @@ def scan(twin: Twin, batch: Batch, poses: Array, ids: NDArray[np.intp], noise: A
     batch
         The robots and their targets.
     poses
-        Of module 1 of all robots at the time of the scan: place and quaternion, shape (robots, 7).
+        Poses of module 1 of all robots at the time of the scan: place and quaternion, shape (robots, 7).
     ids
         Which of them.
     noise

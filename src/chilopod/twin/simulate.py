@@ -46,11 +46,11 @@ def simulate(
         Place of the pole on the floor, m, shape (2,) or (walks, 2). The controller sees what the scanner made of its
         last scan.
     seeds
-        Of the scanner's noise, one a walk; without them it has none.
+        Seeds of the scanner's noise, one a walk; without them it has none.
     rate
         Samples per second; they are taken at the nearest step.
     poses
-        Whether to add the positions of all joints, from which the robot can be drawn.
+        True to add the positions of all joints, from which the robot can be drawn.
     threads
         At most; 0 for all cores. Results are the same to the bit at any number.
     tolerance

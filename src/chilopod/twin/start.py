@@ -97,7 +97,7 @@ def start(
         Place of a pole on the floor, m, shape (2,) or (walks, 2); what is seen of it is what the scanner made of its
         last scan.
     seeds
-        Of the scanner's noise, one a walk.
+        Seeds of the scanner's noise, one a walk.
     threads
         At most; 0 for all cores. Results are the same to the bit at any number.
     tolerance

@@ -33,11 +33,11 @@ class Quantity:
     at_least, at_most
         Range in SI units, both ends included. By default positive, and not beyond all reason.
     integer
-        Whether only whole numbers are allowed.
+        True if only whole numbers are allowed.
     each
-        Whether the field holds a tuple of such values.
+        True if the field holds a tuple of such values.
     optional
-        Whether the field may be None.
+        True if the field may be None.
     """
 
     si: str

@@ -46,6 +46,7 @@ RESOLUTION = 4096
 _MOST_WORK = 1e7
 _FEWEST_STEPS = 5000
 _MOST_EVENTS = 4096
+_MOST_CLOCKS = 8  # tables of 4096 rows, of as many values of the parameters
 _FEWEST_PER_THREAD = 16
 _LEAST_TOLERANCE = 1.2e-16
 _OTHER_ORDER = 4
@@ -114,7 +115,7 @@ class TaylorFlow(ReadOnlyArrays):
     period
         T of an explicit dependence on time; infinite if there is none.
     directions
-        Of the events: 1, -1 or 0.
+        Directions of the events: 1, -1 or 0.
     tolerance
         Truncation error of a step relative to the size of each state and entry of the derivative; never more exact
         than round-off.
@@ -129,9 +130,7 @@ class TaylorFlow(ReadOnlyArrays):
     directions: tuple[float, ...] = ()
     tolerance: float = _LEAST_TOLERANCE
     patience: int = 0
-    _clocks: list[tuple[bytes | None, Array]] = field(
-        init=False, repr=False, compare=False, default_factory=lambda: [(None, _NOTHING)]
-    )
+    _clocks: dict[bytes, Array] = field(init=False, repr=False, compare=False, default_factory=dict)
 
     @functools.cached_property
     def _directions(self) -> Array | None:
@@ -261,10 +260,13 @@ class TaylorFlow(ReadOnlyArrays):
     def _clock(self, params: Array) -> tuple[Array, float]:
         if self.tape.clocks.size == 0:
             return _NO_CLOCK
-        key, (known, table) = params.tobytes(), self._clocks[0]
-        if known != key:
+        key = params.tobytes()
+        table = self._clocks.get(key)
+        if table is None:
             table = _clock_table(self.tape, self.period, params)
-            self._clocks[0] = key, table
+            if len(self._clocks) >= _MOST_CLOCKS:
+                self._clocks.clear()
+            self._clocks[key] = table
         return table, self.period
 
     def _pieces(self, t0: float, t1: float) -> list[tuple[float, float]]:

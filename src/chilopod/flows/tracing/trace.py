@@ -37,16 +37,16 @@ class Trace:
         The operations, shared by all functions that differ in floats only.
     params
         Values of the parameters, shape (parameters,).
-    fresh
-        Whether the tape was made just now, so that checks of the function are due.
+    derived
+        Whatever follows from the tape alone, kept with it.
     """
 
     tape: Tape
     params: Array
-    fresh: bool
+    derived: dict[Any, Any]
 
 
-_Kept = dict[Any, tuple[tuple[int, ...], dict[tuple[float, ...], Tape]]]
+_Kept = dict[Any, tuple[tuple[int, ...], dict[tuple[float, ...], tuple[Tape, dict[Any, Any]]]]]
 _KEPT: weakref.WeakKeyDictionary[types.CodeType, _Kept] = weakref.WeakKeyDictionary()
 
 
@@ -93,11 +93,11 @@ def trace(
         key, floats, baked, tapes, kept = None, [], (), {}, {}
     values = np.array(floats)
     known = tapes.get(tuple(floats[i] for i in baked))
-    fresh = known is None
     if known is None:
         before = baked
-        known, baked = _traced(functions, dimension, args, floats, key is not None, baked)
-        _verify(known, _open(values, baked), rhs, args, times, base)
+        tape, baked = _traced(functions, dimension, args, floats, key is not None, baked)
+        _verify(tape, _open(values, baked), rhs, args, times, base)
+        known = tape, {}
         if key is not None:
             if len(kept) >= _MOST_KEPT:
                 kept.clear()
@@ -105,7 +105,7 @@ def trace(
                 tapes = {}
             tapes[tuple(floats[i] for i in baked)] = known
             kept[key] = (baked, tapes)
-    return Trace(known, _open(values, baked), fresh)
+    return Trace(known[0], _open(values, baked), known[1])
 
 
 def _open(values: Array, baked: tuple[int, ...]) -> Array:

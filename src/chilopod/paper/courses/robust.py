@@ -50,15 +50,15 @@ class Condition:
     name
         In a few words.
     changes
-        Of the robot, as ``--set`` takes them; the law does not know.
+        Changes of the robot, as ``--set`` takes them; the law does not know.
     disturbance
         Besides what the course's seed draws.
     engine
         Where it walks.
     own_law
-        Whether the law is made for what ``changes`` say, and drives the robot as it is.
+        True if the law is made for what ``changes`` say, and drives the robot as it is.
     only_variable
-        Whether it concerns the actuator of the spring alone.
+        True if it concerns the actuator of the spring alone.
     """
 
     name: str

@@ -70,7 +70,7 @@ def bootstrap_mean(values: ArrayLike, seed: int = 0) -> Interval:
         Shape (groups,) or (groups, members). Groups are independent and are drawn anew as a whole; members of one, as
         the targets of one course, need not be.
     seed
-        Of what is drawn.
+        Seed of what is drawn.
     """
     table = np.asarray(values, dtype=np.float64)
     table = table.reshape(len(table), -1)
@@ -86,7 +86,7 @@ def bootstrap_ratio(of: ArrayLike, to: ArrayLike, seed: int = 0) -> Interval:
         Of independent groups, which are drawn anew as a whole, shape (groups,); groups in which both are 0 count for
         nothing.
     seed
-        Of what is drawn.
+        Seed of what is drawn.
     """
     above, below = np.asarray(of, dtype=np.float64), np.asarray(to, dtype=np.float64)
     groups = np.flatnonzero((above != 0.0) | (below != 0.0))

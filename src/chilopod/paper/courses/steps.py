@@ -35,7 +35,7 @@ class EarlierLaw(SpringLaw):
     Attributes
     ----------
     searches
-        Whether a target that is not seen is looked for, else it leaves the spring as it is.
+        True if a target that is not seen is looked for, else it leaves the spring as it is.
     """
 
     searches: bool = True

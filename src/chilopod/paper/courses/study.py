@@ -39,7 +39,7 @@ class Plan:
     courses
         Seeds of the courses that strategies are compared on.
     others
-        Of those on which the best spring of a strategy is found.
+        Others of those on which the best spring of a strategy is found.
     springs
         That are tried, by strategy, N*mm/deg.
     """
@@ -98,7 +98,7 @@ def driven(
     cases
         In one engine, or in engines that have the same patience.
     seeds
-        Of the courses.
+        Seeds of the courses.
     size
         Courses of the whole robot have one near target if this is tiny.
     folder

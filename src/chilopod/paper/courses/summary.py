@@ -35,13 +35,13 @@ class Summary:
         By how much later than the variable spring, s, at targets that both reach, and of courses that both reach as a
         whole; the mean of the differences.
     work
-        Of the actuators of springs and joints, J a course.
+        Work of the actuators of springs and joints, J a course.
     spring_work, drive_work
         Its two parts, mean, J a course.
     more_work
         By how much more than the variable spring's it is, J a course.
     effort
-        Of the leg yaw, mean, rad^2 s a course.
+        Effort of the leg yaw, mean, rad^2 s a course.
     detour
         Path over the shortest with circles of the radius law, of all targets that are reached together.
     cost

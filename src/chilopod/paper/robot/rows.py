@@ -112,9 +112,9 @@ def variant_rows(base: xr.Dataset, data: xr.Dataset, name: str, reading: str = "
     base, data
         Trials of the robot as built and of the variant.
     name
-        Of the variant, as the paper's.
+        Name of the variant, as the paper's.
     reading
-        Of the variant, if there are several.
+        Reading of the variant, if there are several.
     """
     said = statements.VARIANTS[name]
     ratio = radius_ratio(base, data)

@@ -117,7 +117,7 @@ class Structure:
     name, sentence
         In a word, and what it means.
     overrides
-        Of the robot's description, as ``--set`` takes them.
+        Overrides of the robot's description, as ``--set`` takes them.
     edited
         Name of the engine in this module, if a robot file cannot say it.
     """

@@ -157,7 +157,7 @@ def growth(
     folder
         Where trials are kept.
     duration
-        Of the walks, s.
+        Duration of the walks, s.
 
     Returns
     -------

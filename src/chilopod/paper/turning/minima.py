@@ -25,7 +25,7 @@ def minima(criteria: xr.Dataset, instant: int = 0) -> xr.Dataset:
     Parameters
     ----------
     criteria
-        Of a :class:`TurningTask`.
+        Criteria of a :class:`TurningTask`.
     instant
         0: the earliest arrival, 1: the paper's 23 s.
 

@@ -109,18 +109,18 @@ def turning_task(
     repeats
         Trials with each, with the seeds 0, 1, ...
     strategy
-        Of :data:`chilopod.steering.STRATEGIES`.
+        One of :data:`chilopod.steering.STRATEGIES`.
     time
         When epsilon 1 to 3 are taken, s; by default the earliest arrival of any of these trials, as in the paper, and
         ``duration`` if none arrives.
     duration
-        Of every trial, s, at least the paper's.
+        Duration of every trial, s, at least the paper's.
     disturbance
         How much differs from trial to trial; by default what all studies have.
     shown
         Springs of ``paths``, N*mm/deg.
     engine
-        Of :data:`chilopod.engine.ENGINES`.
+        One of :data:`chilopod.engine.ENGINES`.
     folder
         Where records are kept, so that a study that was stopped goes on where it was.
     progress

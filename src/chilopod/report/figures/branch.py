@@ -30,8 +30,8 @@ def panel(data: xr.Dataset) -> Panel:
         name="branch",
         title=f"Curved walks over {shown}",
         draw=lambda narrow: _draw(data, narrow),
-        alt=f"Mean joint angles, radii of axis and path, and cost of transport over {shown}; unstable parts dashed, "
-        "those out of range dotted.",
+        alt=f"Mean joint angles, radii of axis and path, and cost of transport over {shown}; the legend names lines "
+        "of parts that are not stable.",
         text=(),
         data=data,
     )
@@ -74,8 +74,10 @@ def _draw(data: xr.Dataset, narrow: bool) -> Figure:
     bottom, top = axes["A"].get_ylim()
     axes["A"].set_ylim(top=top + 0.4 * (top - bottom))  # room for the legend
     axes["A"].legend(loc="upper right", ncols=max(2, data.sizes["joint"] // 3))
-    for verdict in sorted({verdict for *_, verdict in _stretches(verdicts)} - {"stable"} | {"unstable"}):
-        axes["B"].plot([], [], color=style.GREY, linestyle=_LINES[verdict], label=verdict)
+    shown = {verdict for *_, verdict in _stretches(verdicts)}
+    if shown != {"stable"}:
+        for verdict in sorted(shown):
+            axes["B"].plot([], [], color=style.GREY, linestyle=_LINES[verdict], label=verdict)
     axes["B"].legend(loc="upper left")
     return figure
 

@@ -53,15 +53,15 @@ class Film:
     Attributes
     ----------
     name
-        Of its files.
+        Name of its files.
     title
         What it shows.
     speed
         Seconds of the walk per second of the film.
     encoded
-        Whether there is an mp4 beside the replay.
+        True if there is an mp4 beside the replay.
     pictured
-        Whether there is a png with moments of it.
+        True if there is a png with moments of it.
     """
 
     name: str

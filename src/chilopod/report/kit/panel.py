@@ -16,7 +16,7 @@ class Panel:
     Attributes
     ----------
     name
-        Of its files.
+        Name of its files.
     title
         Its heading.
     draw

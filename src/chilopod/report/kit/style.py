@@ -69,7 +69,7 @@ class Layout:
     height
         Inches.
     heights, widths
-        Of rows and columns, relative; equal if empty.
+        Heights and widths of rows and columns, relative; equal if empty.
     """
 
     mosaic: str

@@ -64,7 +64,7 @@ def film_3d(
     titles, heading, fps, speed, size
         As for :func:`chilopod.report.scene.film.filmed`.
     follow
-        Whether every panel follows its robot; otherwise all show the same piece of floor, with all of all walks.
+        True if every panel follows its robot; otherwise all show the same piece of floor, with all of all walks.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def stills(
     record, titles, heading
         As for :func:`film_3d`; by default without titles and heading.
     times
-        Of the moments, s, shape (T,); the nearest samples are shown.
+        Times of the moments, s, shape (T,); the nearest samples are shown.
     size
         Width and height of a picture, pixels.
 

@@ -26,7 +26,7 @@ def chain(angles: ArrayLike, length: float) -> tuple[Array, Array, Array]:
     angles
         Heading of each module less that of the module in front of it, rad, shape (N-1,).
     length
-        Of a module.
+        Length of a module.
 
     Returns
     -------

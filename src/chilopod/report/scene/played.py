@@ -28,7 +28,7 @@ class Replay:
     Attributes
     ----------
     heading
-        Of the page.
+        Heading of the page.
     html
         The page.
     """
@@ -62,12 +62,12 @@ def replay(
     Parameters
     ----------
     record
-        Of any engine, see :mod:`chilopod.report.scene.frames`.
+        Record of any engine, see :mod:`chilopod.report.scene.frames`.
     titles
         What to call each robot: by its label in the record, or in the order of the record; None: by their numbers, the
         first six of them.
     heading
-        Of the page; None: the robot's name.
+        Heading of the page; None: the robot's name.
 
     Raises
     ------

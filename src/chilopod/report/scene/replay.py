@@ -28,7 +28,7 @@ def replay(record: xr.Dataset, *, titles: Mapping[Any, str] | Sequence[str], hea
     titles
         What to call each robot: by its label in the record, or in the order of the record.
     heading
-        Of the page.
+        Heading of the page.
 
     Returns
     -------

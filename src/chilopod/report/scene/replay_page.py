@@ -50,11 +50,11 @@ def page(
     Parameters
     ----------
     name
-        Of the template.
+        Name of the template.
     shown
         What is drawn.
     heading
-        Of the page.
+        Heading of the page.
     view
         What is seen, for those who cannot see it.
     data

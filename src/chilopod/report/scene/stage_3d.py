@@ -88,17 +88,17 @@ class Look:
     pose
         MuJoCo's ``qpos``; None shows the floor alone.
     stands
-        Whether each foot is on the floor, (N, 2).
+        True if each foot is on the floor, (N, 2).
     walks
-        Whether the robot still walks, or has arrived or was halted; if not, it is pale.
+        True if the robot still walks, or has arrived or was halted; if not, it is pale.
     path
-        Of the centre of module 1 up to then, m, (P, 2).
+        Path of the centre of module 1 up to then, m, (P, 2).
     target
         m, (2,), or None.
     radius
         Within which the target counts as reached, m.
     arrived
-        Whether it has been.
+        True if it has been.
     """
 
     pose: Array | None
@@ -122,7 +122,7 @@ class Studio:
     view
         Roughly from where they will be taken.
     fine
-        Whether things cast shadows, which takes several times as long; otherwise a patch of shade lies under a module.
+        True if things cast shadows, which takes several times as long; otherwise a patch of shade lies under a module.
     """
 
     def __init__(self, robot: Robot, size: tuple[int, int], view: View, fine: bool = False) -> None:

@@ -13,9 +13,8 @@ from chilopod.stability.symmetry.mirrored import symmetric_states
 
 Array = NDArray[np.float64]
 
-_SINGULAR = 1e-9
-"""Singular value, relative to the largest, that counts as zero: the derivative by the parameter is a difference, and
-errs by about as much."""
+_SINGULAR = 1e-9  # singular value, relative to the largest, that counts as zero in corrections
+_UNCERTAIN = 1e-6  # the same where a direction is wanted: the derivative by the parameter is a difference over that
 
 
 def symmetric_space(system: SystemLike, state: Array, sizes: Array, mode: Array | None = None) -> Array | None:
@@ -29,7 +28,7 @@ def symmetric_space(system: SystemLike, state: Array, sizes: Array, mode: Array 
     system, state
         The system and a state on the orbit, shape (n,).
     sizes
-        Of the states, shape (n,).
+        Sizes of the states, shape (n,).
     mode
         In units, shape (n,): the symmetries are those that it has as well, which are those of what branches off along
         it.
@@ -77,12 +76,12 @@ def inverted(matrix: Array) -> tuple[Array, bool]:
 def null_vector(bordered: Array) -> Array:
     """Unit vector that all but the last row of a matrix map to zero, on the side of the last row.
 
-    At a branch point the matrix is singular, but for rounding; of its solutions the shortest strays least.
+    At a branch point the matrix is singular, but for its errors; of its solutions the shortest strays least.
     """
     n = len(bordered) - 1
     if not np.isfinite(bordered).all():
         raise AnalysisError("the return map is not finite", field="flow")
-    tangent: Array = np.linalg.lstsq(bordered, np.append(np.zeros(n), 1.0), rcond=_SINGULAR)[0]
+    tangent: Array = np.linalg.lstsq(bordered, np.append(np.zeros(n), 1.0), rcond=_UNCERTAIN)[0]
     if not tangent.any():
         raise AnalysisError("the curve has no direction here", field="step")
     return tangent / np.linalg.norm(tangent)

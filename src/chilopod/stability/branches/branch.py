@@ -70,17 +70,17 @@ class Branch(Result):
     points
         Along the curve, special points among them.
     ending
-        Why it ends.
+        Reason for which it ends.
     step
         Along the curve, with which it goes on.
     periods
-        How many periods of the systems its orbits take.
+        Number of periods of the systems that its orbits take.
     symmetric
-        Whether it stays among the orbits with the systems' symmetry in time.
+        True if it stays among the orbits with the systems' symmetry in time.
     reason
-        What stood in the way, if the curve was lost.
+        Reason for the loss of the curve; empty if it was not lost.
     remarks
-        What could not be made out on the way, a sentence each.
+        Sentences on what could not be made out on the way.
     """
 
     points: tuple[BranchPoint, ...]
@@ -213,12 +213,12 @@ def follow(
     step, longest
         First and largest step along the curve, in units of the states' sizes and of the scale.
     closely
-        Whether to look at the multipliers at nine places within every step, a flow each; otherwise only where the ends
+        True to look at the multipliers at nine places within every step, a flow each; otherwise only where the ends
         of a step tell that something happens.
     precision
-        How closely orbits are solved for, of the sizes of the states: as good as the flow is at best.
+        Precision to which orbits are solved for, relative to the sizes of the states: as good as the flow is at best.
     symmetric
-        Whether to stay among the orbits that have the systems' symmetry in time. By default the full period is used
+        True to stay among the orbits that have the systems' symmetry in time. By default the full period is used
         even where there is such a symmetry, for the orbits of interest have lost it.
     budget, seconds
         Number of flows, and time in s, after which the branch ends.

@@ -23,16 +23,16 @@ class BranchPoint(ReadOnlyArrays):
     Attributes
     ----------
     value
-        Of the parameter.
+        Value of the parameter.
     orbit
         State at time 0, shape (n,).
     multipliers
-        Of the full period, by falling modulus, shape (n,), or (n-1,) without the trivial one where the system does not
-        depend on time.
+        Multipliers of the full period, by falling modulus, shape (n,), or (n-1,) without the trivial one where the
+        system does not depend on time.
     tangent
         Unit tangent of the curve, shape (n+1,): state, then parameter, in ``units``.
     special
-        What happens here, if anything; ordinary points have None.
+        Kind of the bifurcation here; None at ordinary points.
     units
         Sizes of the states and scale of the parameter that the tangent is in, shape (n+1,); None: the states' own.
     period
@@ -41,7 +41,7 @@ class BranchPoint(ReadOnlyArrays):
         Bound on the absolute error of the multipliers that are not small (below 0.5, and below the largest): by the
         error of the flow there, and by that of the orbit.
     bifurcation
-        What is known of the special point: bound, mode, multiplier, normal form.
+        Bifurcation point with bound, mode, multiplier and normal form; None at ordinary points.
     """
 
     value: float
@@ -74,9 +74,9 @@ class Anchor(ReadOnlyArrays):
     before
         The point before it with its matrix, if there is one.
     section
-        Where returns end during the step, of a system without a period of its own.
+        Section on which returns end during the step, for a system without a period of its own.
     leaving
-        Whether the point is one where branches meet: the matrix is then one taken ahead.
+        True if the point is one where branches meet: the matrix is then one taken ahead.
     """
 
     last: BranchPoint
@@ -93,17 +93,18 @@ class Step(ReadOnlyArrays):
     Attributes
     ----------
     start, end
-        Where it started; where the next one starts.
+        Anchors where it started and where the next one starts.
     size
         Its length along the first tangent.
     moved
         From start to end, in units, shape (n+1,).
     tangent, matrix
-        Of the curve at the end, on the section of the start; the matrix has the tangent as its last row.
+        Tangent and matrix of the curve at the end, on the section of the start; the matrix has the tangent as its last
+        row.
     image
         The return map at the end, on the section of the start.
     corrections
-        How many were needed.
+        Number of corrections that were needed.
     missed
         Distance from where it was predicted to end, in units.
     """

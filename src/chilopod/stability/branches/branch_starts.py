@@ -44,15 +44,15 @@ class Start(ReadOnlyArrays):
     value, orbit
         Parameter, and state on the orbit at time 0, shape (n,).
     rising
-        Whether the parameter rises at first, along the curve through the orbit.
+        True if the parameter rises at first, along the curve through the orbit.
     mode
         If not None: the direction of the state, shape (n,), in which the branch leaves; ``rising`` means nothing then.
     crossing
-        Whether the branch that leaves has a direction of its own in the parameter as well (transcritical).
+        True if the branch that leaves has a direction of its own in the parameter as well (transcritical).
     old
         The tangent of the branch that is left, shape (n+1,), in the states' and the parameter's own units, if known.
     periods
-        How many periods its orbits take.
+        Number of periods that its orbits take.
     period
         The full period of the orbit that is left, where the system does not depend on time.
     bifurcation
@@ -91,7 +91,7 @@ def begin(
     family
         ``family(value)`` is the system.
     value
-        Of the parameter.
+        Value of the parameter.
     orbit
         A state on the orbit or near it, shape (n,): the orbit is solved for. Not needed where the system knows it.
     rising
@@ -146,7 +146,7 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
     point
         The located point, or a special point on a branch; or a Hopf point from :func:`chilopod.stability.locate_hopf`.
     periods
-        How many periods the orbits of the branch take that is left.
+        Number of periods that the orbits of the branch take that is left.
 
     Returns
     -------

@@ -27,6 +27,7 @@ from chilopod.stability.capabilities import (
     returns_per_period,
 )
 from chilopod.stability.convergence import CURVE
+from chilopod.stability.floquet import full_period
 from chilopod.stability.returns import (
     ReturnMap,
     Section,
@@ -34,7 +35,7 @@ from chilopod.stability.returns import (
     section_at,
 )
 from chilopod.stability.shooting import FEW_ROUNDS, Free, node_count, nodes_along, shot
-from chilopod.stability.spectrum.eigenvalues import return_multipliers
+from chilopod.stability.spectrum.eigenvalues import return_multipliers, spectrum
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -51,8 +52,8 @@ _STRAYS = 0.1  # of a step: so far beyond the interval a curve is sought that en
 _SOONER, _LATER = 0.2, 0.5  # of a return: the time of the next one is foreseen to differ by so much at most
 _SHARPEST_TURN = 0.5  # cosine between two tangents: beyond it the step may have landed on another curve
 _SHRUNK = 10.0  # cube roots of the precision, of the largest motion so far
+_PARTS = 32  # of a return, in which the extent of an orbit is taken
 _NOT_SMALL = 0.5  # modulus of a multiplier
-_ROUNDING = 16.0 * float(np.finfo(float).eps)  # of eigenvalues
 
 
 class Curve(FamilyReturns):
@@ -63,7 +64,7 @@ class Curve(FamilyReturns):
     family, scale, sizes, returns
         See :class:`FamilyReturns`.
     precision
-        How closely orbits are solved for, of the sizes of the states.
+        Precision to which orbits are solved for, relative to the sizes of the states.
     """
 
     def __init__(
@@ -333,11 +334,14 @@ class Curve(FamilyReturns):
             self._motion = max(self._motion, motion)
             # Past an equilibrium come the same orbits again, half a period later. Before it, a part f of the largest
             # motion is a parameter f^2 away from the Hopf point, which the precision leaves uncertain by its f-th part.
-            if (
-                motion < _SHRUNK * np.cbrt(self.precision) * self._motion
-                or not float(anchor.section.normal @ velocity) > 0.0
-            ):
-                raise AnalysisError("the orbit shrinks into an equilibrium: a Hopf point", field="orbit")
+            passed = not float(anchor.section.normal @ velocity) > 0.0
+            if passed or motion < _SHRUNK * np.cbrt(self.precision) * self._motion:
+                raise AnalysisError(
+                    "the orbit shrinks into an equilibrium: a Hopf point"
+                    if self._extent(x, value, image) <= motion
+                    else "the orbit nearly rests in its section, and the next step has no direction",
+                    field="orbit",
+                )
             along = self._projection(velocity, section)
             tangent, matrix = np.array(tangent), np.array(matrix)
             tangent[:-1] = along @ tangent[:-1]
@@ -349,6 +353,16 @@ class Curve(FamilyReturns):
         point = BranchPoint(value, x, values, tangent, units=self.units(x.size), period=image.period, error_bound=bound)
         return Anchor(point, matrix, before, section)
 
+    def _extent(self, x: Array, value: float, image: ReturnMap) -> float:
+        """Largest distance of an orbit from a state on it, in units; a small cycle is smaller than its velocity in any
+        state times its period."""
+        system, states = self.system(value), [x]
+        self.budget.take()
+        with UserCode("flow", value):
+            for _ in range(_PARTS):
+                states.append(system.flow(np.array(states[-1]), 0.0, image.period / image.returns / _PARTS)[0])
+        return float(np.linalg.norm((np.array(states) - x) / self.units(x.size)[:-1], axis=1).max())
+
     def multipliers(self, image: ReturnMap, wrong: float = 0.0) -> tuple[ComplexArray, float]:
         """Multipliers of the full period, by falling modulus, and a bound on the errors of those that are not small.
 
@@ -357,27 +371,15 @@ class Curve(FamilyReturns):
         image
             Return map on the orbit.
         wrong
-            How much its derivative is off beside its own error, in units; infinite if no bound is wanted.
+            Error of its derivative beside its own, in units; infinite if no bound is wanted.
         """
-        nu = return_multipliers(image)
-        values = nu**image.returns if image.returns > 1 else nu
-        if not np.isfinite(wrong) or not nu.any():
-            return values, np.inf if nu.any() else 0.0
-        n = image.state.size
-        scaled, error = self._scaled(image.jacobian, n), float(np.linalg.norm(self._scaled(image.error, n)))
-        if not np.isfinite(error):
-            return values, np.inf
-        size = float(np.linalg.norm(scaled))
-        eigenvalues, right = np.linalg.eig(scaled)
-        with np.errstate(all="ignore"):
-            try:
-                left = np.linalg.inv(right)
-            except np.linalg.LinAlgError:
-                return values, float(np.sqrt(error + wrong))
-        moduli = np.abs(eigenvalues)
-        condition = float(np.linalg.norm(left, axis=1)[moduli >= min(_NOT_SMALL, float(moduli.max()))].max())
-        bound = (error + wrong + _ROUNDING * size) * condition
-        return values, image.returns * bound * max(1.0, float(np.abs(nu[0]))) ** (image.returns - 1)
+        if not (np.isfinite(wrong) and np.isfinite(image.error).all()):
+            return return_multipliers(image) ** image.returns, np.inf
+        sizes = self.units(image.state.size)[:-1]
+        spec = spectrum(replace(image, error=image.error + wrong * sizes[:, None] / sizes))
+        found = full_period(spec.values, spec.error, image.returns, image.state, image.period)
+        moduli = np.abs(spec.values)
+        return found.values, float(found.error_bounds[moduli >= min(_NOT_SMALL, float(moduli.max()))].max())
 
     def _scaled(self, matrix: Array | float, n: int) -> Array:
         """A derivative of the return map, or the bound of its error, in units, shape (n, n)."""

@@ -43,15 +43,15 @@ class FamilyReturns:
     family
         ``family(value)`` is the system.
     scale
-        Of the parameter along the curve.
+        Scale of the parameter along the curve.
     sizes
-        Of the states along the curve, shape (n,); None: their own units.
+        Sizes of the states along the curve, shape (n,); None: their own units.
     between
         Values of the parameter that the family is asked for at most.
     periods
-        How many periods an orbit takes.
+        Number of periods that an orbit takes.
     symmetric
-        Whether to stay among the orbits that have the systems' symmetry in time.
+        True to stay among the orbits that have the systems' symmetry in time.
     budget
         Flows and time that may be taken; None for any.
     """

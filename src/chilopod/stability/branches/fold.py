@@ -30,7 +30,7 @@ class Fold:
     Attributes
     ----------
     value
-        Of the parameter.
+        Value of the parameter.
     error_bound
         Bound on its error.
     image
@@ -52,9 +52,9 @@ def find_fold(family: Family, value: float, orbit: Array, scale: float, rising: 
     value, orbit
         Parameter and orbit to start from, near the fold but not in it: a curve that starts in a fold does not pass it.
     scale
-        Of the parameter: the fold is looked for as far away as that.
+        Scale of the parameter: the fold is looked for as far away as that.
     rising
-        Whether it is looked for at higher values, or at lower ones.
+        True if it is looked for at higher values, or at lower ones.
     """
     between = value - scale, value + scale
     try:

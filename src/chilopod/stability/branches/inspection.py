@@ -97,7 +97,7 @@ def inspect(curve: Curve, step: Step, closely: bool) -> Found:
     curve, step
         The step and its curve.
     closely
-        Whether to look between its ends even where these give no reason to.
+        True to look between its ends even where these give no reason to.
 
     Raises
     ------
@@ -118,13 +118,18 @@ def inspect(curve: Curve, step: Step, closely: bool) -> Found:
         raise AnalysisError("the step landed on another curve", field="step")
     between = within.low, step.size
     sure = flows_with_error(curve.system(step.end.last.value))
-    for place in list(places):
+    points: tuple[BranchPoint, ...] = ()
+    for place in places:
+        near, event = within.at(place.crossing.value).end.last.value, place.crossing.event
         if (sure or (leaving and place.crossing.event is Event.PLUS)) and not _confirmed(within, place):
-            places.remove(place)
-            near, event = within.at(place.crossing.value).end.last.value, place.crossing.event
             remarks += (f"near {near:.9g}: {event.sentence} by no more than its error, which is no event",)
-    points = [special_point(curve, within.at, place, between, within.blocks) for place in places]
-    return Found(tuple(point for point in points if point is not None), remarks)
+            continue
+        point = special_point(curve, within.at, place, between, within.blocks)
+        if point is None:
+            remarks += (f"near {near:.9g}: {event.sentence}, but no multiplier of the orbit found there is critical",)
+        else:
+            points += (point,)
+    return Found(points, remarks)
 
 
 def _confirmed(within: Within, place: Place) -> bool:

@@ -50,15 +50,15 @@ def special_point(
     Parameters
     ----------
     curve
-        Of the step.
+        Curve of the step.
     at
         Parts of the step, by where they end.
     place
-        What happens where.
+        Place within the step, with what happens there.
     between
         Places within which the step may be cut.
     blocks
-        Of the return map along the step.
+        Blocks of the return map along the step.
     """
     crossing, block = place.crossing, place.block
     low, high = between

@@ -60,9 +60,9 @@ class Frame(ReadOnlyArrays):
     Attributes
     ----------
     size
-        Of the states, shape (n,).
+        Size of the states, shape (n,).
     widths
-        Of the parameters' intervals, shape (2,).
+        Widths of the parameters' intervals, shape (2,).
     basis
         Orthonormal directions, in units of ``size``, shape (n, m).
     column, row
@@ -70,7 +70,7 @@ class Frame(ReadOnlyArrays):
     mixture
         Makes the k equations of the entries of G, shape (k, k * k).
     section
-        Where a return ends, of a system that does not depend on time.
+        Section on which a return ends, for a system that does not depend on time.
     """
 
     size: Array
@@ -117,9 +117,9 @@ class Evaluated(ReadOnlyArrays):
     Attributes
     ----------
     place, image
-        Where, and the return map there.
+        Place, and the return map there.
     jacobian
-        Of the return map in units of the frame, shape (n, n).
+        Jacobian of the return map in units of the frame, shape (n, n).
     residual
         Left sides of the equations, shape (m + k,).
     right, left
@@ -180,7 +180,7 @@ class Equations:
     target
         The critical multiplier of the return map: +1 or -1, or 0 for a pair.
     known
-        Whether to take the orbit that the systems know, which is then no unknown.
+        True to take the orbit that the systems know, which is then no unknown.
     box
         Lower and upper ends of both parameters' intervals, shape (2, 2): one row for each parameter.
     budget

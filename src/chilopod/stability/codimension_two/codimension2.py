@@ -60,21 +60,22 @@ class Codimension2(ReadOnlyArrays):
     Attributes
     ----------
     kind
-        What it is.
+        Kind of the point.
     values
-        Of both parameters, shape (2,).
+        Values of both parameters, shape (2,).
     error_bound
         Bounds on their errors, shape (2,): that of the test function over its rate of change along the curve, and that
         of the curve.
     orbit
         State on the orbit at time 0, shape (n,).
     multipliers
-        Of the return map, by falling modulus.
+        Multipliers of the return map, by falling modulus.
     next_coefficient, next_coefficient_error
-        Where the coefficient of the curve's normal form vanishes: the first one after it, of the same map and in the
-        same amplitude, and a bound on its error. That is c of a -> a + c a^3 at a cusp and a degenerate transcritical
-        point; e of a -> a + e a^5 at a degenerate pitchfork and, over two periods, at a generalised period doubling;
-        the second Lyapunov coefficient e of |a| -> |a| + e |a|^5 over one period at a Chenciner point. None elsewhere.
+        Next coefficient where that of the curve's normal form vanishes: the first one after it, of the same map and in
+        the same amplitude, and a bound on its error. That is c of a -> a + c a^3 at a cusp and a degenerate
+        transcritical point; e of a -> a + e a^5 at a degenerate pitchfork and, over two periods, at a generalised
+        period doubling; the second Lyapunov coefficient e of |a| -> |a| + e |a|^5 over one period at a Chenciner point.
+        None elsewhere.
     """
 
     kind: CodimensionTwo
@@ -99,7 +100,7 @@ class Start2(ReadOnlyArrays):
     outward
         Direction in which the curve leaves, shape (n + 2,): of the state, and of both parameters.
     periods
-        How many periods its orbits take. They need not have the systems' symmetry in time.
+        Number of periods that its orbits take. They need not have the systems' symmetry in time.
     """
 
     point: BifurcationPoint

@@ -29,9 +29,9 @@ class Point2(ReadOnlyArrays):
     Attributes
     ----------
     values
-        Of both parameters, shape (2,).
+        Values of both parameters, shape (2,).
     error_bound
-        How far both may be off, shape (2,), at right angles to the curve (in units of the box).
+        Bounds on the errors of both, shape (2,), at right angles to the curve (in units of the box).
     orbit
         State on the critical orbit at time 0, shape (n,).
     mode
@@ -43,9 +43,9 @@ class Point2(ReadOnlyArrays):
     frequency
         Angular frequency (1/s) of the critical mode over the full period, as of a :class:`BifurcationPoint`.
     coefficient, coefficient_error
-        Of the normal form, of the map that a :class:`BifurcationPoint` has it of (of two periods at a period doubling):
-        the quadratic one of a fold or a transcritical point, the cubic one of all others; None where there is none or
-        it was not asked for.
+        Coefficient and coefficient error of the normal form, of the map that a :class:`BifurcationPoint` has it of (of
+        two periods at a period doubling): the quadratic one of a fold or a transcritical point, the cubic one of all
+        others; None where there is none or it was not asked for.
     """
 
     values: Array
@@ -66,17 +66,17 @@ class Curve2(Result):
     Attributes
     ----------
     kind
-        What happens along it.
+        Kind of the bifurcation along it.
     points
         In order.
     special
         Points of codimension two, in order.
     endings
-        Why it ends, at its first point and at its last.
+        Reasons for which it ends, at its first point and at its last.
     reasons
-        What was the matter where it was lost, else empty: one for each end.
+        Details where it was lost, else empty: one for each end.
     periods
-        How many periods its orbits take.
+        Number of periods that its orbits take.
     """
 
     kind: Kind

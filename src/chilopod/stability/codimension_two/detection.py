@@ -86,13 +86,14 @@ class Critical(ReadOnlyArrays):
     spectrum
         All multipliers of the return map.
     others
-        Which of them are not the critical ones, shape (others,).
+        Numbers of those that are not critical, shape (others,).
     multiplier
         The critical one: +1, -1, or on the unit circle with positive imaginary part.
     mode, left
         Unit right eigenvector and left one with left^H mode = 1, shape (n,).
     overlap
-        Of the two where both have unit length in units of the frame: 0 where the multiplier is double. NaN for a pair.
+        Overlap of the two where both have unit length in units of the frame: 0 where the multiplier is double. NaN for
+        a pair.
     """
 
     spectrum: Spectrum
@@ -137,11 +138,11 @@ class Detector:
     Parameters
     ----------
     equations
-        Of the curve.
+        Equations of the curve.
     kind
-        What happens along it.
+        Kind of the bifurcation along it.
     coefficients
-        Whether normal forms are computed.
+        True if normal forms are computed.
     """
 
     def __init__(self, equations: Equations, kind: Kind, coefficients: bool) -> None:

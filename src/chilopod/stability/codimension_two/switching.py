@@ -106,7 +106,7 @@ class _Unfolding:
     response
         Change of the orbit and of the parameters, in coordinates of the frame, with the modulus of the multiplier.
     times
-        How many returns the coefficients are of.
+        Number of returns that the coefficients are of.
     """
 
     equations: Equations

@@ -75,14 +75,14 @@ def follow2(
     second
         The value of q at the start.
     rising
-        Whether to start towards rising or falling q; None for both, which makes one curve of the two halves. It means
+        True to start towards rising or falling q; None for both, which makes one curve of the two halves. It means
         nothing for a curve that leaves another one.
     points
         At most so many, in each direction.
     step, longest
         First and largest step along the curve, in units of the box and of the states.
     coefficients
-        Whether to compute normal forms, without which cusps and degenerate points are not found.
+        True to compute normal forms, without which cusps and degenerate points are not found.
     budget, seconds
         Number of return maps with derivatives (normal forms have a budget of their own), and time in s, after which the
         curve ends.

@@ -109,7 +109,7 @@ def described(
         symmetry=symmetry,
     )
     if not simple:
-        return replace(point, modes=_modes(spec, critical, orbit, block, symmetry))
+        return replace(point, modes=_modes(spec, critical, crossing.event, orbit, block, symmetry))
     return with_coefficients(point, form) if form is not None and with_normal_form else point
 
 
@@ -160,12 +160,21 @@ def _kind(crossing: Crossing, returns: int, form: NormalForm | None, broken: Sym
 
 
 def _modes(
-    spec: Spectrum, critical: NDArray[np.intp], orbit: Orbit, block: Block | None, symmetry: SymmetricCrossing | None
+    spec: Spectrum,
+    critical: NDArray[np.intp],
+    event: Event,
+    orbit: Orbit,
+    block: Block | None,
+    symmetry: SymmetricCrossing | None,
 ) -> ComplexArray:
     """Modes of several critical multipliers: along the axial branches where a symmetry makes them several, else as they
-    come."""
+    come, of real ones an orthonormal basis of their space."""
     if block is None or symmetry is None or not symmetry.branches or critical.size > 2 * block.dimension:
-        return spec.right[:, critical]
+        vectors = spec.right[:, critical]
+        if event is Event.PAIR:
+            return vectors
+        real = np.linalg.svd(np.hstack([vectors.real, vectors.imag]))[0][:, : critical.size]
+        return real.astype(np.complex128)
     values, vectors = np.linalg.eig(block.reduced(orbit.image.jacobian))
     eigenvector = vectors[:, np.abs(values - spec.values[critical[0]]).argmin()]
     modes = phased(np.stack([block.mode(eigenvector, branch.direction) for branch in symmetry.branches], axis=1))

@@ -45,6 +45,10 @@ class Sample(ReadOnlyArrays):
         nearest = complex(off[np.abs(off).argmin()]) if off.size else np.nan
         return nearest.real if nearest.imag == 0.0 else np.nan
 
+    def passes(self, other: Sample) -> bool:
+        """Whether the multiplier nearest +1 is on its other side in another sample."""
+        return self.beside_plus_one * other.beside_plus_one < 0.0
+
 
 @dataclass(frozen=True)
 class Course:

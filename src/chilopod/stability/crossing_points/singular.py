@@ -26,7 +26,6 @@ _REACH, _LEAST_REACH = 0.02, 1e-5  # of the course
 _SHORTER = 0.25
 _AGREES = 1e-6  # of the reach, between two interpolations
 _AT_HOME = 0.01  # of the reach, from where the root finder saw the point
-_REAL = 1e-3
 
 Bounded = Callable[[float, Array, Array, ReturnMap], Orbit]
 """The orbit at a place, with error bounds: from what was interpolated, how far that may be off, and a return map
@@ -48,9 +47,9 @@ def past_singular(course: Course, crossing: Crossing, bounded: Bounded) -> Regul
     """Place and orbit at a multiplier +1 of an orbit that is solved for.
 
     There H - 1 is singular, and Newton's method stops anywhere along the mode where the residual is round-off; so the
-    orbit and its critical multiplier are interpolated from places to both sides where that is not so, or to one side at
-    an end. They are taken closer together until interpolations of two orders agree: not far off the multiplier may meet
-    another one, and is no smooth function then. None where it is not singular, or there is no room.
+    orbit and the determinant of H' - 1 are interpolated from places to both sides where that is not so, or to one side
+    at an end. They are taken closer together until interpolations of two orders agree. None where it is not singular,
+    or there is no room.
     """
     if crossing.event is not Event.PLUS or crossing.multiplicity > 1 or crossing.collision:
         return None
@@ -72,7 +71,8 @@ def past_singular(course: Course, crossing: Crossing, bounded: Bounded) -> Regul
     place = crossing.value + reach * found.place
     orbit = bounded(place, found.orbit, found.orbit_error, found.beside.image)
     spec = spectrum(orbit.image)
-    uncertain = float(spec.error[spec.nearest(1.0)])
+    distances = np.abs(spec.values - 1.0)
+    uncertain = float(sum(error * np.delete(distances, i).prod() for i, error in enumerate(spec.error)))
     return Regular(place, bound + SAFETY * uncertain * reach / found.slope, found.orbit, orbit)
 
 
@@ -88,10 +88,10 @@ def _nodes(course: Course, place: float) -> Iterator[tuple[Array, float]]:
 
 
 class _Interpolation:
-    """Polynomials through the critical multiplier and the orbit at all nodes, and at all but the outermost."""
+    """Polynomials through the determinant of H' - 1 and the orbit at all nodes, and at all but the outermost."""
 
     def __init__(self, beside: Sequence[Sample], nodes: Array, fine: Polynomial, roots: list[float]) -> None:
-        # Place of the multiplier +1 and slope of the multiplier, in units of the reach from where it was seen.
+        # Zero of the determinant and its slope, in units of the reach from where the multiplier was seen.
         self.place, self.between = roots[0], abs(roots[0] - roots[1])
         self.slope = abs(float(fine.deriv()(self.place)))
         columns = np.array([each.orbit for each in beside]).T
@@ -110,19 +110,9 @@ def _interpolated(course: Course, place: float, nodes: Array, reach: float) -> _
         beside = course.at(place + reach * nodes)
     except AnalysisError:
         return None
-    spectra = [spectrum(each.image).values for each in beside]
-    # The multiplier nearest +1 beside the place, followed outward by how much it moves from node to node.
-    values = np.empty(nodes.size)
-    outward = np.argsort(np.abs(nodes), kind="stable")
-    for side in (outward[nodes[outward] < 0.0], outward[nodes[outward] > 0.0]):
-        expected = 1.0
-        for i in side:
-            real = spectra[i][np.abs(spectra[i].imag) < _REAL].real
-            if not real.size:
-                return None
-            values[i] = real[np.abs(real - expected).argmin()]
-            expected = values[i] + (values[i] - 1.0) * abs(nodes[side[0]] / nodes[i])
-    fits = [_fit(nodes[part], values[part] - 1.0) for part in _parts(nodes)]
+    # A product over all multipliers stays smooth where the critical one meets another, however close by.
+    values = np.array([(spectrum(each.image).values - 1.0).prod().real for each in beside])
+    fits = [_fit(nodes[part], values[part]) for part in _parts(nodes)]
     roots = [root for fit in fits if (root := _root_near_zero(fit, nodes)) is not None]
     return _Interpolation(beside, nodes, fits[0], roots) if len(roots) == 2 else None
 

@@ -219,12 +219,12 @@ def effect_of_bend(
     curve, found
         The curve and what was sampled on it.
     off
-        What H(W) and W differ by at every monomial, shape (n,): curves that are off by as much, with signs drawn at
+        Difference of H(W) and W at every monomial, shape (n,): curves that are off by as much, with signs drawn at
         random, are sampled as well.
     resonant
         As in :func:`solve_homological`, of every monomial.
     order
-        Of the coefficient.
+        Order of the coefficient.
     """
     n = at.state.size
     if n == (1 if at.real else 2):

@@ -46,13 +46,13 @@ class CriticalOrbit(ReadOnlyArrays):
     state
         The fixed point, shape (n,).
     jacobian
-        Of the return map there, shape (n, n).
+        Jacobian of the return map there, shape (n, n).
     multiplier
         nu: exactly +1, exactly -1, or the one of a complex pair whose mode is ``right``.
     right, left
         Critical eigenvectors, shape (n,), ``right`` of unit length in the user's units, left^H right = 1.
     returns
-        How many returns make a full period.
+        Number of returns in a full period.
     """
 
     state: Array
@@ -84,7 +84,7 @@ class Sampled:
     shrink
         Factor of the radius at which the series of the projection would fall to the noise that was to be expected.
     falling
-        Whether they still fall at their end; noise would not.
+        True if they still fall at their end; noise would not.
     size
         Largest distance from x, on the curve or of its image, of every state: shape (n,).
     radius

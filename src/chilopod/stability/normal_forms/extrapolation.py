@@ -41,7 +41,7 @@ class Series(ReadOnlyArrays):
     Attributes
     ----------
     coefficients
-        Of T_parity, T_(parity + 2), ..., shape (RADII, entries).
+        Coefficients of T_parity, T_(parity + 2), ..., shape (RADII, entries).
     parity
         0 for even functions, 1 for odd ones.
     """
@@ -68,7 +68,7 @@ class Series(ReadOnlyArrays):
         Parameters
         ----------
         order
-            Of the parity of the functions, at most RADII.
+            Order of the parity of the functions, at most RADII.
         noise
             Bounds on the errors of the samples, shape (entries,).
         """

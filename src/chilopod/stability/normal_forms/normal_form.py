@@ -41,7 +41,7 @@ class NormalForm:
     Attributes
     ----------
     status
-        Whether the numbers mean anything. Where it is neither FOUND nor LINEAR they are NaN, their errors infinite;
+        True if the numbers mean anything. Where it is neither FOUND nor LINEAR they are NaN, their errors infinite;
         except at the resonances 1:3 and 1:4, where they are those of Kuznetsov's normal form but decide nothing alone.
     quadratic, cubic
         Coefficients. A negative ``cubic`` bounds the growth: supercritical.
@@ -99,7 +99,7 @@ def normal_form(
         Sizes of the states, shape (n,), in their units: where the search for an amplitude starts. Without it, it
         starts from the size of the orbit, if that has one.
     orbit_error
-        How far off ``at.state`` may be along the mode (in the amplitude's unit); 0 where it is exact. Without it, what
+        Error of ``at.state`` along the mode (in the amplitude's unit); 0 where it is exact. Without it, what
         its residual and the noise allow: beside a singular H - 1 that is much.
 
     Returns

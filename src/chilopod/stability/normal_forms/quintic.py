@@ -67,7 +67,7 @@ def quintic(mapped: ReturnedStates, at: CriticalOrbit, amplitude: float, noise: 
         As for :func:`chilopod.stability.normal_forms.normal_form.normal_form`. A multiplier +1 is that of a pitchfork:
         a symmetry keeps terms of even order away.
     amplitude
-        That of the normal form of third order, where the search for a better one starts.
+        Amplitude of the normal form of third order, where the search for a better one starts.
 
     Returns
     -------

@@ -35,6 +35,7 @@ _SURE = 1e-4  # singular value of H - 1, in units, above which the orbit is as g
 _BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
 _FORESEEN, _SMALL = 0.3, 0.01  # of a change of the orbit, and of the sizes: what a prediction may miss
 _SAME = 1e-7  # of the sizes: orbits that are nearer to what was foreseen are solved for no better
+_HALVED, _CLOSER = 12, 0.75  # times, and by how much less samples beside a multiplier +1 are apart each time
 _HALFWAY = 0.25  # of a change: an orbit halfway between two is as near as that to their mean
 _BEYOND, _APART = 8, 0.1  # samples beyond two to choose from, and how far from these, of the distance of the two
 _BEHIND = 4  # samples by which the next one is foreseen
@@ -219,7 +220,10 @@ class Samples:
         """A sample between two that are there, from their orbits."""
         around = self._around(min(max(bisect.bisect(self._values, value), 1), len(self._values) - 1))
         try:
-            return self._sampled(value, self._foreseen(around, value), around[0])
+            found = self._sampled(value, self._foreseen(around, value), around[0])
+            if found.passes(around[0]) and found.passes(around[1]) and not self._goes_through(around[0], found):
+                raise AnalysisError("is another orbit", field="orbit")
+            return found
         except SpentError:
             raise
         except AnalysisError:
@@ -322,7 +326,10 @@ class Samples:
         change = found.orbit - last.orbit
         size = self.size * float((np.abs(change) / self.size).max())
         # Where a multiplier passes +1 another orbit may be as near as anything.
-        small = _SAME if last.beside_plus_one * found.beside_plus_one < 0.0 else _SMALL
+        passes = found.passes(last)
+        if passes and not self._goes_through(last, found):
+            return False
+        small = _SAME if passes else _SMALL
         if (np.abs(found.orbit - guess) <= np.maximum(_FORESEEN * size, small * self.size)).all():
             return True
         try:
@@ -330,6 +337,25 @@ class Samples:
         except AnalysisError:
             return False
         return bool((np.abs(middle.orbit - last.orbit - 0.5 * change) <= _HALFWAY * size).all())
+
+    def _goes_through(self, left: Sample, right: Sample) -> bool:
+        """Whether one orbit has a multiplier that passes +1 between two samples: then samples come together there.
+
+        Two orbits that pass each other at a distance have multipliers on either side, and none comes together.
+        """
+        apart = np.inf
+        for _ in range(_HALVED):
+            before, apart = apart, float((np.abs(right.orbit - left.orbit) / self.size).max())
+            if apart <= _SAME or apart > _CLOSER * before:
+                return apart <= _SAME
+            try:
+                middle = self._sampled(0.5 * (left.value + right.value), 0.5 * (left.orbit + right.orbit), left)
+            except SpentError:
+                raise
+            except AnalysisError:  # where it passes, H - 1 is singular
+                return bool(np.isfinite(before))
+            left, right = (left, middle) if middle.passes(left) else (middle, right)
+        return True
 
 
 def _sample(value: float, orbit: Orbit) -> Sample:

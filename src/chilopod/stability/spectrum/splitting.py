@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.stability.spectrum.errors import disturbed
+from chilopod.stability.spectrum.errors import DRAWS, SAFETY
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -32,13 +32,17 @@ _AT_REST = 1e-8
 """A basis that moves by less from one pass to the next has converged."""
 
 
-def split_product(factors: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]:
+def split_product(
+    factors: Sequence[Array], errors: Sequence[Array] | None = None
+) -> tuple[ComplexArray, ComplexArray, Array]:
     """Logarithms of the eigenvalues of ``factors[-1] @ ... @ factors[0]``, and its eigenvectors.
 
     Parameters
     ----------
     factors
         Square matrices (n, n), each invertible and of moderate condition.
+    errors
+        Bounds on the errors of their entries; zero by default.
 
     Returns
     -------
@@ -46,6 +50,8 @@ def split_product(factors: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]
         ln|eigenvalue| + i angle, by falling modulus, shape (n,).
     vectors
         Unit eigenvectors as columns, shape (n, n).
+    bounds
+        Bounds on how far the logarithms move by the errors, to first order between groups, shape (n,).
 
     Raises
     ------
@@ -53,10 +59,13 @@ def split_product(factors: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]
         If a factor has no finite inverse.
     """
     n = factors[0].shape[0]
+    errors = [np.zeros((n, n)) for _ in factors] if errors is None else errors
     if n == 1:  # nothing to be split
         values = np.array([factor[0, 0] for factor in factors])
         angle = np.pi if (values < 0.0).sum() % 2 else 0.0
-        return np.array([np.log(np.abs(values)).sum() + 1j * angle]), np.ones((1, 1), dtype=np.complex128)
+        with np.errstate(divide="ignore"):
+            bound = (np.array([error[0, 0] for error in errors]) / np.abs(values)).sum()
+        return np.array([np.log(np.abs(values)).sum() + 1j * angle]), np.ones((1, 1), dtype=np.complex128), bound[None]
     slow, stretches, slow_motion = _iterate(factors, n)
     inverses = _inverses(factors[::-1]) if stretches.all() else None
     if inverses is None:
@@ -75,15 +84,21 @@ def split_product(factors: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]
         ),
         n,
     ]
+    groups = [
+        [intersection(one[:, :b], other[:, : n - a], b - a) for one, other in zip(slow, fast, strict=True)]
+        for a, b in zip(borders, borders[1:], strict=False)
+    ]
     logarithms, vectors = [], []
-    for a, b in zip(borders, borders[1:], strict=False):
-        bases = [intersection(one[:, :b], other[:, : n - a], b - a) for one, other in zip(slow, fast, strict=True)]
-        values, columns = _restricted(factors, bases)
+    for bases in groups:
+        # From one known basis to the next: carried along, a fast direction would be swamped by the round-off of the
+        # slow ones.
+        following = [*bases[1:], bases[0]]
+        values, columns = _eigen([after.T @ f @ base for f, base, after in zip(factors, bases, following, strict=True)])
         logarithms.append(values)
-        vectors.append(columns)
+        vectors.append(bases[0] @ columns)
     log_all, vec_all = np.concatenate(logarithms), np.hstack(vectors)
     order = np.argsort(-log_all.real, kind="stable")
-    return log_all[order], vec_all[:, order]
+    return log_all[order], vec_all[:, order], _moved(factors, errors, groups, logarithms)[order]
 
 
 def split_leading(factors: Sequence[Array], count: int) -> tuple[ComplexArray, ComplexArray]:
@@ -94,23 +109,8 @@ def split_leading(factors: Sequence[Array], count: int) -> tuple[ComplexArray, C
     bases = [basis[:, :count] for basis in _iterate(factors, factors[0].shape[0])[0]]
     following = [*bases[1:], bases[0]]
     restricted = [after.T @ f @ before for f, before, after in zip(factors, bases, following, strict=True)]
-    logarithms, vectors = split_product(restricted)
+    logarithms, vectors, _ = split_product(restricted)
     return logarithms, bases[0] @ vectors
-
-
-def split_with_error(
-    factors: Sequence[Array], errors: Sequence[Array], count: int | None = None
-) -> tuple[ComplexArray, ComplexArray, Array]:
-    """The logarithms and eigenvectors of all or the ``count`` leading directions, and how far the logarithms move when
-    the factors change by their errors."""
-
-    def split(factors: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]:
-        return split_product(factors) if count is None else split_leading(factors, count)
-
-    logarithms, vectors = split(factors)
-    # A draw costs as much as the result: two have to do.
-    others = np.array([split(each)[0] for each in disturbed(np.array(factors), np.array(errors), draws=2)])
-    return logarithms, vectors, np.abs(logarithms[:, None] - others[:, None, :]).min(axis=2).max(axis=0)
 
 
 def _inverses(factors: Sequence[Array]) -> list[Array] | None:
@@ -146,15 +146,36 @@ def intersection(one: Array, other: Array, dimension: int) -> Array:
     return one @ left[:, :dimension]
 
 
-def _restricted(factors: Sequence[Array], bases: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]:
-    """Eigenvalues (as logarithms) and eigenvectors of the product on the invariant subspaces spanned by ``bases``."""
-    product, scale = np.eye(bases[0].shape[1]), 0.0
-    # From one known basis to the next: carried along, a fast direction would be swamped by the round-off of the slow
-    # ones.
-    for factor, before, after in zip(factors, bases, [*bases[1:], bases[0]], strict=True):
-        product = after.T @ factor @ before @ product
+def _eigen(factors: Sequence[Array]) -> tuple[ComplexArray, ComplexArray]:
+    """Eigenvalues (as logarithms) and eigenvectors of a product of factors of like scale."""
+    product, scale = np.eye(factors[0].shape[1]), 0.0
+    for factor in factors:
+        product = factor @ product
         size = float(np.abs(product).max())
         product /= size
         scale += float(np.log(size))
     values, columns = np.linalg.eig(product)
-    return np.log(np.abs(values)) + scale + 1j * np.angle(values), bases[0] @ columns
+    return np.log(np.abs(values)) + scale + 1j * np.angle(values), columns
+
+
+def _moved(
+    factors: Sequence[Array], errors: Sequence[Array], groups: Sequence[Sequence[Array]], known: Sequence[ComplexArray]
+) -> Array:
+    """How far logarithms move when factors are off by their errors, group by group: the farthest of some draws of signs
+    (what the factors add may cancel in one of them), with room for more."""
+    nodes = [np.hstack(bases) for bases in zip(*groups, strict=True)]
+    sizes = np.cumsum([0, *(len(values) for values in known)])
+    moved = np.zeros(sizes[-1])
+    try:
+        duals = [np.linalg.inv(node) for node in nodes]
+    except np.linalg.LinAlgError:
+        return np.full(moved.size, np.inf)
+    ends, random = [*duals[1:], duals[0]], np.random.default_rng(0)
+    for _ in range(DRAWS):
+        signs = [random.choice([-1.0, 1.0], factor.shape) for factor in factors]
+        others = [e @ (f + w * s) @ n for f, w, s, n, e in zip(factors, errors, signs, nodes, ends, strict=True)]
+        for values, a, b in zip(known, sizes, sizes[1:], strict=False):
+            apart = values[:, None] - _eigen([other[a:b, a:b] for other in others])[0]
+            apart = np.abs(apart.real + 1j * np.angle(np.exp(1j * apart.imag)))
+            moved[a:b] = np.maximum(moved[a:b], apart.min(axis=1))
+    return SAFETY * moved

@@ -16,11 +16,13 @@ from chilopod.flows.implicit.flow import Stretched
 from chilopod.stability.capabilities import FlowsFrames, SystemLike, is_autonomous
 from chilopod.stability.returns import ReturnMap
 from chilopod.stability.spectrum.cut import Cut, equal_cut, section_basis, turn_in_units
-from chilopod.stability.spectrum.splitting import intersection, split_with_error
+from chilopod.stability.spectrum.errors import SAFETY, disturbed
+from chilopod.stability.spectrum.splitting import intersection, split_leading
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
+_DRAWS = 3  # each costs as much as the result
 _PARTS = 64
 _PASSES = 12
 _DEEPEST = -7.0  # logarithm of the stretch within a part from which on a direction is left to the frame
@@ -60,7 +62,10 @@ def split_stiff(system: FlowsFrames, x: Array, image: ReturnMap) -> tuple[Comple
     modes: list[ComplexArray] = []
     moved = unsure.copy()
     if slow:
-        leading, vectors, moved[:slow] = split_with_error(cut.factors, cut.errors, slow)
+        leading, vectors = split_leading(cut.factors, slow)
+        for drawn in disturbed(np.array(cut.factors), np.array(cut.errors), _DRAWS):
+            others = np.abs(leading[:, None] - split_leading(drawn, slow)[0])
+            moved[:slow] = np.maximum(moved[:slow], SAFETY * others.min(axis=1))
         values, modes = [leading], [vectors]
     for k in range(slow, n):
         values.append(np.array([total[k] + (0.0 if signs[k] > 0 else 1j * np.pi)]))

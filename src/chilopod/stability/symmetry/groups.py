@@ -53,8 +53,8 @@ class Group(ReadOnlyArrays):
     to_orthogonal, from_orthogonal
         Coordinates y = to_orthogonal x in which every element is an orthogonal matrix, and back, shape (n, n) both.
     scales
-        Of the coordinates x, as the elements tell them, shape (n,): entry (i, j) of an element is of the order of
-        ``scales[i] / scales[j]`` at most. Between coordinates that no element mixes they say nothing.
+        Scales of the coordinates x, as the elements tell them, shape (n,): entry (i, j) of an element is of the order
+        of ``scales[i] / scales[j]`` at most. Between coordinates that no element mixes they say nothing.
     component
         Number of the set of coordinates that each one belongs to, shape (n,): elements mix only coordinates of one set,
         such as one kind of state over all cells of a ring. ``to_orthogonal`` does not mix the sets either, so that

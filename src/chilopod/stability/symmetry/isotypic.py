@@ -62,7 +62,8 @@ class Block(ReadOnlyArrays):
         Basis of what commutes with rho: the identity, and with the complex type a matrix J with J^2 = -1; shape
         (1, d, d) or (2, d, d).
     kernel
-        Which elements act as the identity, shape (order,): new orbits keep these symmetries whatever else they break.
+        Elements that act as the identity, truth values of shape (order,): new orbits keep these symmetries whatever
+        else they break.
     """
 
     type: Type
@@ -86,31 +87,6 @@ class Block(ReadOnlyArrays):
     def trivial(self) -> bool:
         """Whether every element acts as the identity: what happens in this block breaks no symmetry."""
         return bool(self.kernel.all())
-
-    @property
-    def repeated(self) -> int:
-        """How often a matrix that commutes with the group has each eigenvalue of its reduced matrix: d for the real
-        type; d/2 for the complex type, and their conjugates as often."""
-        return self.dimension if self.type is Type.REAL else self.dimension // 2
-
-    @property
-    def label(self) -> str:
-        """In words, such as ``2-dimensional, real, kernel of order 1``."""
-        if self.trivial:
-            return "trivial"
-        kernel = f"kernel of order {int(self.kernel.sum())}"
-        if self.dimension == 1:
-            return f"sign change, {kernel}"
-        return f"{self.dimension}-dimensional, {self.type.value}, {kernel}"
-
-    @property
-    def half_space(self) -> ComplexArray:
-        """Orthonormal basis, as columns, of the complex vectors that make eigenvectors (:meth:`mode`): all of C^d for
-        the real type, where J acts as i for the complex type, shape (d, d) or (d, d/2)."""
-        if self.type is Type.REAL:
-            return np.eye(self.dimension, dtype=np.complex128)
-        values, vectors = np.linalg.eigh(-1j * self.units[1])
-        return np.asarray(vectors[:, values > 0.0])
 
     def reduced(self, matrices: ArrayLike) -> Array | ComplexArray:
         """What is left of matrices that commute with the group.
@@ -158,9 +134,9 @@ class Block(ReadOnlyArrays):
         Parameters
         ----------
         eigenvector
-            Of the reduced matrix, shape (m,).
+            Eigenvector of the reduced matrix, shape (m,).
         direction
-            Any combination of the columns of :attr:`half_space`, shape (d,).
+            For the real type any vector, for the complex type one with J w = i w, shape (d,).
         """
         a, w = np.asarray(eigenvector, dtype=np.complex128), np.asarray(direction, dtype=np.complex128)
         return np.asarray(self.basis @ np.kron(a, w))

@@ -98,13 +98,18 @@ def tolerances(spectra: Spectra, root: Root) -> Array:
         errors = errors + changes * min(reach / (right - left), 1.0)
     if errors.max() <= _TELLING:
         return np.asarray(errors)
-    # Where the orbit itself is uncertain, multipliers are between those of the nearest places where it is not.
-    before = next((v for v in reversed(values[:here]) if spectra.margin_errors(v).max() <= _TELLING), None)
-    after = next((v for v in values[here:] if spectra.margin_errors(v).max() <= _TELLING), None)
-    if before is None or after is None:
+    # Where the orbit itself is uncertain, multipliers are between those of the nearest places where it is not, or
+    # between the one such place and an end of the interval.
+    sides = [
+        next((v for v in near if spectra.margin_errors(v).max() <= _TELLING), None)
+        for near in (values[:here][::-1], values[here:])
+    ]
+    telling = [side for side in sides if side is not None]
+    if not telling:
         return np.asarray(errors)
-    apart = np.maximum(spectra.margin_errors(before), spectra.margin_errors(after))
-    return np.minimum(errors, apart + np.abs(spectra.margins(after) - spectra.margins(before)))
+    first, last = (spectra.margins(root.place if side is None else side) for side in sides)
+    apart = np.max([spectra.margin_errors(side) for side in telling], axis=0)
+    return np.minimum(errors, apart + np.abs(last - first))
 
 
 def critical_at(spectra: Spectra, root: Root) -> list[Crossing]:

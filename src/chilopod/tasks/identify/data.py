@@ -47,14 +47,14 @@ class BaseSeries:
     radii
         Radius of the curve (m) at some springs, in the order in which they are to be listed.
     speeds
-        Of module 1 along its way (m/s) at some springs; none if they are not known.
+        Speeds of module 1 along its way (m/s) at some springs; none if they are not known.
     onset
         Where curves set in, by a square-root fit to the bend of joint 1 at the springs of ``curved``.
     law, shape
         Bends that evaluations begin near, roughly those of the data: all joints together
         ``law[0] * sqrt(1/k1 - law[1])`` rad, of which each joint has the share ``shape``, front to rear, (N-1,).
     tolerance
-        Of radii, speeds and onset, relative.
+        Tolerance of radii, speeds and onset, relative.
     """
 
     curved: tuple[float, ...]

@@ -137,7 +137,7 @@ def identify_planar(
     data
         What is fitted.
     points
-        Of the profile.
+        Points of the profile.
     variants
         Settings of the robot, by name, of which each point of the profile predicts the critical k1.
     progress

@@ -71,9 +71,9 @@ class Fit:
         Mean angle of each joint over the last 4.8 s, rad, over the springs of the series, shape (springs,
         joints); NaN where a walk failed.
     speeds
-        Of module 1 along its way over the same time, m/s, shape (springs,).
+        Speeds of module 1 along its way over the same time, m/s, shape (springs,).
     residuals
-        Of the data in units of their tolerance, see :func:`residuals`.
+        Residuals of the data in units of their tolerance, see :func:`residuals`.
     """
 
     constants: Array
@@ -208,9 +208,9 @@ def search(
     starts
         How many, spread over the ranges of the constants.
     generations
-        Of ten evaluations each, from every start.
+        Generations of ten evaluations each, from every start.
     seed
-        Of starts and evolution.
+        Seed of starts and evolution.
     folder
         Where evaluations are kept; a search that was stopped goes on where it was, because it asks for the same ones.
     progress
@@ -369,7 +369,7 @@ def identify_twin(
     robot, data, starts, generations, seed, folder, progress
         As for :func:`search`.
     fresh
-        Whether to begin without the known ones.
+        True to begin without the known ones.
     """
     engine_named("twin").common(robot)  # refuses a robot without a twin
     kept, fits = None if folder is None else check_folder(folder), []

@@ -24,7 +24,7 @@ class Constant:
     low, high
         Ends of the range, SI; of its ratio to `per` if that is given.
     logarithmic
-        Whether it is its logarithm that is searched evenly.
+        True if it is its logarithm that is searched evenly.
     per
         Path of another constant, before it among :data:`FREE`.
     """

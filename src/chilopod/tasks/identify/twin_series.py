@@ -44,7 +44,7 @@ class Series:
         Mean joint angles over 4.8 s, 12 s before the end and at the end, rad, shape (springs, joints); NaN where a walk
         failed.
     speeds
-        Of module 1 along its way, gait cycle by gait cycle, over the last 4.8 s, m/s, shape (springs,).
+        Speeds of module 1 along its way, gait cycle by gait cycle, over the last 4.8 s, m/s, shape (springs,).
     """
 
     before: Array
@@ -73,7 +73,7 @@ def base_series(
     springs
         Values of k1, N*mm/deg, if not those of the series.
     tolerance
-        Of the contact solver.
+        Tolerance of the contact solver.
     engine
         The twin, or one that is edited, see :class:`chilopod.twin.Edited`.
     duration
