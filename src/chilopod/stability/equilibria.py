@@ -93,17 +93,16 @@ class HopfForm:
     ----------
     eigenvalue
         lambda, with a positive imaginary part.
-    mode, left
-        Unit eigenvector and the left one, shape (n,), left^H mode = 1.
+    mode
+        Unit eigenvector, shape (n,).
     second, mean
-        Shape (n,).
+        Coefficients of the manifold, shape (n,).
     cubic, error
         Coefficient, and a bound on the error of its real part.
     """
 
     eigenvalue: complex
     mode: ComplexArray
-    left: ComplexArray
     second: ComplexArray
     mean: Array
     cubic: complex
@@ -315,9 +314,8 @@ def _hopf_form(system: Autonomous, x: Array, matrix: Array, frequency: float, dr
     if draws and wrong.any():
         others = [bent(each)[2] for each in disturbed(quadratic[:, 2], wrong[:, 2], draws)]
         error += SAFETY * float(np.abs(np.array(others) - cubic).max())
-    return HopfForm(
-        complex(values[index]), mode, left, second / reach**2, mean / reach**2, cubic / reach**3, error / reach**3
-    )
+    eigenvalue = complex(values[index])
+    return HopfForm(eigenvalue, mode, second / reach**2, mean / reach**2, cubic / reach**3, error / reach**3)
 
 
 def hopf_cycle(family: Family, point: BifurcationPoint) -> tuple[float, Orbit, Array]:

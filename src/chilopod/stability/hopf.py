@@ -279,18 +279,26 @@ def _hopf_point(
     )
 
 
+def _beside(
+    family: Family, between: tuple[float, float], value: float, state: Array
+) -> tuple[Array, list[tuple[Autonomous, Equilibrium]]]:
+    """Values of the parameter to both sides of one, shape (2,), with the systems and their equilibria there."""
+    values = np.clip(value + _BESIDE * (between[1] - between[0]) * np.array([-1.0, 1.0]), *between)
+    found = []
+    for each in values.tolist():
+        with UserCode("family", each):
+            system = autonomous(family(each))
+            found.append((system, find_equilibrium(system, state)))
+    return values, found
+
+
 def _rate(
     family: Family, between: tuple[float, float], point: BifurcationPoint, duration: float
 ) -> tuple[complex, float]:
     """How fast the critical eigenvalue moves, left^H dA mode, which holds however near others are, and its imaginary
     part."""
-    low, high = between
-    beside = _BESIDE * (high - low)
-    values = np.clip([point.value - beside, point.value + beside], low, high)
-    found = []
-    for each in values.tolist():
-        with UserCode("family", each):
-            found.append(find_equilibrium(family(each), point.orbit))
+    values, pair = _beside(family, between, point.value, point.orbit)
+    found = [here for _, here in pair]
     matrices = [each.jacobian for each in found]
     matrix = 0.5 * (matrices[0] + matrices[1])
     units = numerical_balance(matrix)
@@ -300,7 +308,7 @@ def _rate(
     index = int(upper.argmin())
     frequency = float(eigenvalues[index].imag)
     sides = [float(each.eigenvalues[np.abs(each.eigenvalues - 1j * frequency).argmin()].real) for each in found]
-    if low < values[0] and values[1] < high and sides[0] * sides[1] > 0.0:
+    if between[0] < values[0] and values[1] < between[1] and sides[0] * sides[1] > 0.0:
         raise AnalysisError("the pair only touches the imaginary axis", field="family", value=point.value)
     left, right = lefts[:, index].conj(), rights[:, index]
     change = left @ ((matrices[1] - matrices[0]) * ratios) @ right / (left @ right)
@@ -309,14 +317,10 @@ def _rate(
 
 def _change(family: Family, between: tuple[float, float], value: float, eigenvalue: complex, state: Array) -> float:
     """How fast the real part of the cubic coefficient changes with the parameter."""
-    values = np.clip(value + _BESIDE * (between[1] - between[0]) * np.array([-1.0, 1.0]), *between)
-    found = []
-    for each in values.tolist():
-        with UserCode("family", each):
-            system = autonomous(family(each))
-            here = find_equilibrium(system, state)
-            found.append(hopf_form(system, here.state, here.error, eigenvalue.imag).cubic.real)
-    return abs(found[1] - found[0]) / float(values[1] - values[0])
+    values, found = _beside(family, between, value, state)
+    with UserCode("family", value):
+        low, high = (hopf_form(system, here.state, here.error, eigenvalue.imag).cubic.real for system, here in found)
+    return abs(high - low) / float(values[1] - values[0])
 
 
 def _of_equilibria(remark: str) -> str:

@@ -35,6 +35,9 @@ Curve = Mapping[Powers, ComplexArray]
 
 _ANGLES = 8
 _HIGHEST = 5.0  # power of a radius that has to be a number
+_DRAWS = 3  # curves that are off at random
+_SURE = 2.0  # factor on the effect of the worst of them
+_WRONG = 0.3  # how far off they are, of what the states move
 
 
 @dataclass(frozen=True)
@@ -109,6 +112,11 @@ class Sampled:
         value, error = self.harmonics[(i - j) % len(self.harmonics)].taylor(order, self.noise)
         return value / self.radius**order, error / self.radius**order
 
+    def term(self, powers: Powers) -> tuple[complex, float]:
+        """Coefficient of a monomial in the projection of H(W(z)), and its error."""
+        value, error = self.taylor(powers)
+        return complex(value[-1]), float(error[-1])
+
 
 def turns(at: CriticalOrbit) -> ComplexArray:
     """Directions of z that are sampled: +-1 where it is real, else a circle."""
@@ -136,31 +144,6 @@ def images(mapped: ReturnedStates, at: CriticalOrbit, displaced: Array) -> Array
     return result if np.isfinite(result).all() else None
 
 
-def sample(mapped: ReturnedStates, at: CriticalOrbit, curve: Curve, radius: float, noise: float) -> Sampled | None:
-    """The map on a curve up to a radius; None where it does not exist. ``noise`` is relative, see
-    :func:`chilopod.stability.normal_forms.normal_form.normal_form`."""
-    directions = turns(at)
-    displaced = displacements(at, curve, radius * radii()[:, None] * directions)
-    highest = np.power(radius, _HIGHEST)
-    if not (0.0 < highest < np.inf and np.isfinite(displaced).all()):
-        return None
-    image = images(mapped, at, displaced)
-    if image is None:
-        return None
-    columns = np.concatenate([image, (image @ at.left.conj())[..., None]], axis=-1)
-    harmonics = np.fft.fft(columns, axis=1) / directions.size
-    if not np.isfinite(harmonics).all():
-        return None
-    found = tuple(series(harmonics[:, h], h % 2) for h in range(directions.size))
-    size = np.maximum(np.abs(displaced), np.abs(image)).max(axis=(0, 1))
-    blur, floor = (_expected_noise(at, reached, noise) for reached in (np.abs(at.state), np.abs(at.state) + size))
-    # Noise of the samples is spread evenly over the coefficients of a cosine transform, smaller by this factor.
-    seen = np.sqrt(RADII / 2.0) * np.max([one.roughness for one in found], axis=0)
-    shrink = float(min(1.0, floor[-1] / seen[-1]) ** (0.5 / (RADII - 2))) if seen[-1] > 0.0 else 1.0
-    falling = any(one.falling[-1] for one in found)
-    return Sampled(found, np.maximum(floor, seen), float(blur[-1]), shrink, falling, size, radius, harmonics[0, :, -1])
-
-
 def _expected_noise(at: CriticalOrbit, reached: Array, noise: float) -> Array:
     """Errors of images of a size, shape (n,), and of their projection: shape (n + 1,)."""
     rounding = 2.0 * np.finfo(float).eps * (reached + np.abs(at.jacobian) @ reached)
@@ -186,3 +169,133 @@ def solve_homological(
     bordered = np.block([[matrix, q[:, None]], [p.conj()[None], np.zeros((1, 1))]])
     padded = np.append(right_side - q * (p.conj() @ right_side), 0.0)
     return np.asarray(np.linalg.solve(bordered, padded)[:n], dtype=np.complex128)
+
+
+class Manifold:
+    """The centre manifold up to the order below that of a coefficient, improved on samples of the return map.
+
+    It has no part along q at resonant monomials. What it should be follows from H(W(z)) = W(g(z)), with the return map
+    H and the map g on the critical space (Kuznetsov, *Elements of Applied Bifurcation Theory*, sections 9.3 and 9.4;
+    Govaerts, Ghaziani, Kuznetsov & Meijer, SIAM J. Sci. Comput. 29, 2007).
+
+    Parameters
+    ----------
+    mapped, at, noise
+        As for :func:`chilopod.stability.normal_forms.normal_form.normal_form`.
+    order
+        Order of the coefficient: 3 or 5.
+    resonance
+        3 where the conjugate of the multiplier is its square.
+    """
+
+    def __init__(
+        self, mapped: ReturnedStates, at: CriticalOrbit, noise: float, order: int, resonance: int | None = None
+    ) -> None:
+        self._mapped, self._at, self._noise, self._order = mapped, at, noise, order
+        if at.real:
+            nu = at.multiplier.real
+            self._resonant = {(k, 0): nu**k == nu for k in range(2, order)}
+        else:
+            self._resonant = {(2, 0): resonance == 3, (1, 1): False}
+            if order == 5:  # z^4 does not reach z^3 conj(z)^2
+                self._resonant |= {(3, 0): False, (2, 1): True, (3, 1): False, (2, 2): False}
+        nothing = np.zeros(at.state.size, dtype=np.complex128)
+        self.curve: dict[Powers, ComplexArray] = {(1, 0): at.right.astype(np.complex128)}
+        self.curve |= dict.fromkeys(self._resonant, nothing)
+
+    def sample(self, radius: float) -> Sampled | None:
+        """The map on the manifold up to a radius; None where it does not exist."""
+        at = self._at
+        directions = turns(at)
+        displaced = displacements(at, self.curve, radius * radii()[:, None] * directions)
+        highest = np.power(radius, _HIGHEST)
+        if not (0.0 < highest < np.inf and np.isfinite(displaced).all()):
+            return None
+        image = images(self._mapped, at, displaced)
+        if image is None:
+            return None
+        columns = np.concatenate([image, (image @ at.left.conj())[..., None]], axis=-1)
+        harmonics = np.fft.fft(columns, axis=1) / directions.size
+        if not np.isfinite(harmonics).all():
+            return None
+        found = tuple(series(harmonics[:, h], h % 2) for h in range(directions.size))
+        size = np.maximum(np.abs(displaced), np.abs(image)).max(axis=(0, 1))
+        blur, floor = (
+            _expected_noise(at, reached, self._noise) for reached in (np.abs(at.state), np.abs(at.state) + size)
+        )
+        # Noise of the samples is spread evenly over the coefficients of a cosine transform, smaller by this factor.
+        seen = np.sqrt(RADII / 2.0) * np.max([one.roughness for one in found], axis=0)
+        shrink = float(min(1.0, floor[-1] / seen[-1]) ** (0.5 / (RADII - 2))) if seen[-1] > 0.0 else 1.0
+        falling = any(one.falling[-1] for one in found)
+        return Sampled(
+            found, np.maximum(floor, seen), float(blur[-1]), shrink, falling, size, radius, harmonics[0, :, -1]
+        )
+
+    def bend(self, found: Sampled) -> bool:
+        """Improve the manifold by what was sampled on it; whether that was called for."""
+        bent = False
+        for powers, (excess, error) in self._excess(found).items():
+            if (np.abs(excess) > 2.0 * error).any():
+                bent = True
+                resonant = self._resonant[powers]
+                self.curve[powers] = self.curve[powers] + solve_homological(self._at, powers, excess, resonant)
+        return bent
+
+    def coefficient(self, found: Sampled, powers: Powers) -> tuple[complex, float]:
+        """Coefficient of a resonant monomial of odd order, and a bound on its error, which knows that the sampled curve
+        is not quite the centre manifold: curves that are off by as much, with signs drawn at random, are sampled as
+        well."""
+        at, (value, error) = self._at, found.term(powers)
+        n = at.state.size
+        if n == (1 if at.real else 2):
+            return value, error
+        random, worst = np.random.default_rng(0), 0.0
+        directions = turns(at)
+        largest = found.radius * radii()[0]
+        z = largest * directions
+        off = {each: np.abs(excess) + uncertain for each, (excess, uncertain) in self._excess(found).items()}
+        for _ in range(_DRAWS):
+            wrong = {}
+            for each, difference in off.items():
+                signs = random.choice([-1.0, 1.0], n) if at.real else np.exp(2j * np.pi * random.random(n))
+                wrong[each] = solve_homological(at, each, signs * difference, self._resonant[each])
+            shift = displacements(at, wrong, z)
+            ratios = np.abs(shift).max(axis=0) / found.size
+            ratios = ratios[np.isfinite(ratios) & (ratios > 0.0)]
+            if not ratios.size:
+                continue
+            times = _WRONG / float(ratios.max())
+            image = images(self._mapped, at, displacements(at, self.curve, z) + times * shift)
+            if image is None:
+                return value, np.inf
+            harmonic = np.fft.fft(image @ at.left.conj())[1] / directions.size
+            worst = max(worst, float(abs(harmonic - found.outermost[1])) / (times * largest ** sum(powers)))
+        return value, error + _SURE * worst
+
+    def _excess(self, found: Sampled) -> dict[Powers, tuple[ComplexArray, Array]]:
+        """Excess of H(W) over W(g) at every monomial of the manifold, with its error: shape (n,) both."""
+        terms = {powers: found.taylor(powers) for powers in self._resonant}
+        inner = np.zeros((self._order, self._order), dtype=np.complex128)
+        inner[1, 0] = self._at.multiplier
+        for powers in (each for each, resonant in self._resonant.items() if resonant):
+            # At 1:3 z^2 is resonant in conj(g), and so conj(z)^2 in g.
+            own = powers if self._at.real or powers == (2, 1) else (0, 2)
+            inner[own] = found.term(own)[0]
+        outer = np.zeros((self._order, self._order, self._at.state.size), dtype=np.complex128)
+        for (i, j), coefficient in self.curve.items():
+            outer += _monomial(inner, i, j)[..., None] * coefficient
+            if not self._at.real and i != j:
+                outer += _monomial(inner, j, i)[..., None] * coefficient.conj()
+        return {powers: (value[:-1] - outer[powers], error[:-1]) for powers, (value, error) in terms.items()}
+
+
+def _monomial(inner: ComplexArray, i: int, j: int) -> ComplexArray:
+    """Coefficients of g^i conj(g)^j below the order of ``inner``, which has those of g."""
+    result = np.zeros_like(inner)
+    result[0, 0] = 1.0
+    for factor in [inner] * i + [inner.conj().T] * j:
+        product = np.zeros_like(inner)
+        for k, m in np.argwhere(factor):
+            product[k:, m:] += factor[k, m] * result[: len(inner) - k, : len(inner) - m]
+        result = product
+    return result

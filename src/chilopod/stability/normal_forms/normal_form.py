@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chilopod.flows.balance import numerical_balance
 from chilopod.stability.normal_forms.amplitude import Fit, NormalFormStatus, Search
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, ReturnedStates, images
-from chilopod.stability.normal_forms.resonances import strong_resonance, uncertainties
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -106,12 +106,16 @@ def normal_form(
     -------
     The normal form, with a status that says why where there is none.
     """
-    values, errors = uncertainties(at.jacobian, max(uncertainty, noise, 16.0 * np.finfo(float).eps))
+    values, errors = _uncertainties(at.jacobian, max(uncertainty, noise, 16.0 * np.finfo(float).eps))
     own = [int(np.abs(values - one).argmin()) for one in (at.multiplier, at.multiplier.conjugate())]
     others = np.delete(np.arange(values.size), own)
     if (np.abs(np.abs(values[others]) - 1.0) <= errors[others]).any():
         return NormalForm(NormalFormStatus.SEVERAL_CRITICAL)
-    resonance = None if at.real else strong_resonance(at.multiplier, float(errors[own[0]]))
+    resonance = None
+    if not at.real:  # where the terms z^(k-1) of the conjugate are resonant as well: Kuznetsov, sections 9.5.1 to 9.5.4
+        upper = complex(at.multiplier.real, abs(at.multiplier.imag))
+        near = (k for k in (1, 2, 3, 4) if abs(upper - np.exp(2j * np.pi / k)) <= errors[own[0]])
+        resonance = next(near, None)
     if resonance in (1, 2):
         return NormalForm(NormalFormStatus.STRONG_RESONANCE, resonance=resonance)
     # Far out, where nobody knows what is there, an overflow is an answer.
@@ -135,6 +139,24 @@ def normal_form(
         resonance=resonance,
     )
     return form if resonance is None else _with_resonant_terms(form, fit, at, resonance)
+
+
+def _uncertainties(jacobian: Array, relative: float) -> tuple[NDArray[np.complex128], Array]:
+    """Eigenvalues of a matrix and bounds on their errors, shape (n,) both, for a relative error of the matrix.
+
+    Norms are those of the balanced matrix, so that units do not matter.
+    """
+    units = numerical_balance(jacobian)
+    balanced = jacobian * units / units[:, None]
+    values, right = np.linalg.eig(balanced)
+    try:
+        left = np.linalg.inv(right).conj().T
+    except np.linalg.LinAlgError:
+        left = np.full(right.shape, np.inf)
+    error = relative * np.linalg.norm(balanced)
+    # To first order each is off by its condition; but even those of a defective pair not by more than the square root.
+    condition = np.linalg.norm(right, axis=0) * np.linalg.norm(left, axis=0)
+    return values.astype(np.complex128), np.minimum(error * condition, np.sqrt(error))
 
 
 def _start(at: CriticalOrbit, scale: ArrayLike | None) -> float:
@@ -170,9 +192,9 @@ def _of_full_period(
     fit: Fit, mapped: ReturnedStates, at: CriticalOrbit, noise: float, orbit_error: float | None
 ) -> NormalForm:
     """From one return at a real multiplier to the map whose multiplier is +1."""
-    quadratic, quadratic_error = fit.term((2, 0))
+    quadratic, quadratic_error = fit.sampled.term((2, 0))
     cubic, cubic_error = fit.cubic.real, fit.cubic_error
-    fourth, fourth_error = fit.term((4, 0))
+    fourth, fourth_error = fit.sampled.term((4, 0))
     off = orbit_error
     if off is None:
         off = _loose_by(mapped, at, noise, abs(quadratic), abs(cubic) + cubic_error)
@@ -196,7 +218,7 @@ def _of_full_period(
 
 def _with_resonant_terms(form: NormalForm, fit: Fit, at: CriticalOrbit, resonance: int) -> NormalForm:
     """The terms conj(a)^2 and conj(a)^3 of one return."""
-    resonant, error = fit.term((0, resonance - 1))
+    resonant, error = fit.sampled.term((0, resonance - 1))
     ratio = None
     if resonance == 4 and abs(resonant) > error:
         ratio = complex(-1j * fit.cubic / abs(resonant))
