@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from chilopod.labels import Labelled
 from chilopod.stability.normal_forms.center_manifold import (
     CriticalOrbit,
+    Curve,
     Manifold,
     Powers,
     ReturnedStates,
@@ -76,86 +77,80 @@ class Fit:
     cubic_error: float
 
 
-class Search:
-    """For the amplitude, and for the bend of the curve, at which the cubic coefficient is best known."""
+def fitted(mapped: ReturnedStates, at: CriticalOrbit, noise: float, resonance: int | None, radius: float) -> Fit | None:
+    """The terms at the amplitude, and with the bend of the curve, at which the cubic coefficient is best known.
 
-    def __init__(self, mapped: ReturnedStates, at: CriticalOrbit, noise: float, resonance: int | None) -> None:
-        self._mapped, self._at = mapped, at
-        self._third: Powers = (3, 0) if at.real else (2, 1)
-        self._manifold = Manifold(mapped, at, noise, 3, resonance)
-
-    def run(self, radius: float) -> Fit | None:
-        """Search on from an amplitude; None if there is none that serves."""
-        low, high = 0.0, np.inf  # amplitudes at which nothing is seen, and that are too large
-        manifold, best = self._manifold, None
-        best_error, status = np.inf, NormalFormStatus.LINEAR
-        bends = ups = downs = turned = 0
-        growing = 0.0
-        for _ in range(_TRIALS):
-            found = manifold.sample(radius)
-            share, order, seen = (np.inf, 2, True) if found is None else _departure(found, self._at)
-            if found is not None and found.blur > _BLURRED * radius:
-                low, factor = radius, _UP
-            elif found is None or share > _TOO_FAR:
-                high, factor = radius, _FIRST_DOWN if found is None else _toward(share, order)
-            elif (
-                seen
-                and status is NormalFormStatus.LINEAR
-                and downs < _DOWNS
-                and found.falling
-                and found.shrink < _RESOLVED
-            ):
-                high, factor, downs = radius, max(found.shrink, _FIRST_DOWN), downs + 1
-            elif bends < _BENDS and manifold.bend(found):
-                bends += 1
-                continue  # once more, along the better curve
-            elif not seen:
-                best, low, ups = (found, dict(manifold.curve)), radius, ups + 1
-                factor = self._linear_up(radius, high) if ups <= _UPS else np.inf
-            else:
-                value, error = found.term(self._third)
-                better = error < _BETTER * best_error
-                if error < best_error:
-                    best, best_error, status = (found, dict(manifold.curve)), error, NormalFormStatus.FOUND
-                full = _highest(found) > _FULL
-                if error <= _ENOUGH * abs(value) or (full and found.shrink > _RESOLVED):
-                    break
-                if growing == 0.0:
-                    growing = -1.0 if full else 1.0
-                elif not better:
-                    growing, turned = -growing, turned + 1
-                    radius = best[0].radius if best else radius
-                if turned > 1:
-                    break
-                factor = max(_toward(share, order) ** 0.5, 2.0) if growing > 0.0 else 0.5
-            bends = 0
-            nearer = _within(radius * factor, low, high)
-            if nearer is None:
-                break
-            radius = nearer
-        if best is None or (status is NormalFormStatus.LINEAR and np.isfinite(high)):
-            return None
-        found, manifold.curve = best
-        return Fit(status, found, *manifold.coefficient(found, self._third))
-
-    def _linear_up(self, radius: float, high: float) -> float:
-        """How many times as large an amplitude may be, at least, before anything nonlinear shows."""
-        at, factor = self._at, 1.0
-        reach = np.abs(at.jacobian)
-        for _ in range(_UPS):
-            factor *= _LONG_UP
-            if factor * radius >= high:
-                break
-            shift = displacements(at, self._manifold.curve, factor * radius * turns(at))
-            image = images(self._mapped, at, shift)
-            if image is None:
-                break
-            size = np.abs(at.state) + np.abs(shift) @ reach.T
-            if (np.abs(image - shift @ at.jacobian.T) > _LOST * size).any():
-                break
+    The search begins at an amplitude; None if there is none that serves.
+    """
+    third: Powers = (3, 0) if at.real else (2, 1)
+    manifold = Manifold(mapped, at, noise, 3, resonance)
+    low, high = 0.0, np.inf  # amplitudes at which nothing is seen, and that are too large
+    best = None
+    best_error, status = np.inf, NormalFormStatus.LINEAR
+    bends = ups = downs = turned = 0
+    growing = 0.0
+    for _ in range(_TRIALS):
+        found = manifold.sample(radius)
+        share, order, seen = (np.inf, 2, True) if found is None else _departure(found, at)
+        if found is not None and found.blur > _BLURRED * radius:
+            low, factor = radius, _UP
+        elif found is None or share > _TOO_FAR:
+            high, factor = radius, _FIRST_DOWN if found is None else _toward(share, order)
+        elif (
+            seen and status is NormalFormStatus.LINEAR and downs < _DOWNS and found.falling and found.shrink < _RESOLVED
+        ):
+            high, factor, downs = radius, max(found.shrink, _FIRST_DOWN), downs + 1
+        elif bends < _BENDS and manifold.bend(found):
+            bends += 1
+            continue  # once more, along the better curve
+        elif not seen:
+            best, low, ups = (found, dict(manifold.curve)), radius, ups + 1
+            factor = _linear_up(mapped, at, manifold.curve, radius, high) if ups <= _UPS else np.inf
         else:
-            return np.inf
-        return factor
+            value, error = found.term(third)
+            better = error < _BETTER * best_error
+            if error < best_error:
+                best, best_error, status = (found, dict(manifold.curve)), error, NormalFormStatus.FOUND
+            full = _highest(found) > _FULL
+            if error <= _ENOUGH * abs(value) or (full and found.shrink > _RESOLVED):
+                break
+            if growing == 0.0:
+                growing = -1.0 if full else 1.0
+            elif not better:
+                growing, turned = -growing, turned + 1
+                radius = best[0].radius if best else radius
+            if turned > 1:
+                break
+            factor = max(_toward(share, order) ** 0.5, 2.0) if growing > 0.0 else 0.5
+        bends = 0
+        nearer = _within(radius * factor, low, high)
+        if nearer is None:
+            break
+        radius = nearer
+    if best is None or (status is NormalFormStatus.LINEAR and np.isfinite(high)):
+        return None
+    found, manifold.curve = best
+    return Fit(status, found, *manifold.coefficient(found, third))
+
+
+def _linear_up(mapped: ReturnedStates, at: CriticalOrbit, curve: Curve, radius: float, high: float) -> float:
+    """How many times as large an amplitude may be, at least, before anything nonlinear shows."""
+    factor = 1.0
+    reach = np.abs(at.jacobian)
+    for _ in range(_UPS):
+        factor *= _LONG_UP
+        if factor * radius >= high:
+            break
+        shift = displacements(at, curve, factor * radius * turns(at))
+        image = images(mapped, at, shift)
+        if image is None:
+            break
+        size = np.abs(at.state) + np.abs(shift) @ reach.T
+        if (np.abs(image - shift @ at.jacobian.T) > _LOST * size).any():
+            break
+    else:
+        return np.inf
+    return factor
 
 
 def _departure(found: Sampled, at: CriticalOrbit) -> tuple[float, int, bool]:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.flows.balance import numerical_balance
-from chilopod.stability.normal_forms.amplitude import Fit, NormalFormStatus, Search
+from chilopod.stability.normal_forms.amplitude import Fit, NormalFormStatus, fitted
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, ReturnedStates, images
 
 Array = NDArray[np.float64]
@@ -120,7 +120,7 @@ def normal_form(
         return NormalForm(NormalFormStatus.STRONG_RESONANCE, resonance=resonance)
     # Far out, where nobody knows what is there, an overflow is an answer.
     with np.errstate(all="ignore"):
-        fit = Search(mapped, at, noise, resonance).run(_start(at, scale))
+        fit = fitted(mapped, at, noise, resonance, _start(at, scale))
     if fit is None:
         return NormalForm(NormalFormStatus.OUT_OF_REACH, resonance=resonance)
     if at.real:
