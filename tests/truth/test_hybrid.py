@@ -485,3 +485,23 @@ def test_an_orbit_may_be_given_where_an_impact_is_due_or_just_was():
         assert found.period == pytest.approx(flight(away)[0], rel=1e-12)
         assert found.values == pytest.approx([slope], rel=1e-8)
         assert found.error_bound < 1e-12
+
+
+def test_a_branch_of_orbits_with_impacts_is_within_its_bounds():
+    """A self-excited oscillator against a wall: its branch has units a thousand times larger than its orbits."""
+    wall = Event(lambda t, x, p: x[0] + 0.6285, lambda t, x, p: [x[0], 0.4342 * x[1]], -1)
+
+    def family(stiffness):
+        def rhs(t, x, p):
+            return [x[1], (0.3529 - 0.1408 * x[0] ** 2) * x[1] - 1.595 * p * x[0]]
+
+        return from_rhs(rhs, 2, None, args=(stiffness,), events=[wall], guess_period=4.7)
+
+    branch = follow(family, begin(family, 1.0, [1.096, 1.334], rising=False), (0.58, 1.0), points=40, step=0.07)
+    assert len(branch.points) > 5
+    for point in branch.points:
+        system = family(point.value)
+        again = system.flow(point.orbit, 0.0, point.period)[0]
+        assert np.abs(again - point.orbit).max() < 5e-12
+        known = multipliers(system, point.orbit)
+        assert np.abs(known.values - point.multipliers).max() <= known.error_bound + point.error_bound

@@ -45,6 +45,7 @@ PRECISION = 1e-12
 
 _COUNTED = 1e-10  # residuals above it count as corrections, by which steps grow or shrink
 _CLEAR = 10.0  # times the difference of two computations: a residual that may be the flow's error
+_SMALLEST = 1e-3  # of the units: an orbit that is smaller is solved for no more closely
 _LOOSE = 1e-6  # of a step: an orbit that may be so far off is corrected with a matrix of its own
 _MOST_CORRECTIONS = 12
 _FEWEST_NODES, _MANY_NODES = 3, 6  # a return that magnifies less is as good in one; that magnifies more is none
@@ -209,8 +210,9 @@ class Curve(FamilyReturns):
         if not tangent @ last.tangent >= _SHARPEST_TURN:
             raise AnalysisError("the curve turns too sharply", field="step")
         bordered[n] = tangent
-        # The derivative is that of a state so far off.
-        length = max(float(np.linalg.norm(moved)), float(np.finfo(float).tiny))
+        # The derivative is that of a state so far off; units may be much larger than the orbit.
+        reach = max(_SMALLEST, float(np.linalg.norm(moved[:n])), float(np.linalg.norm(x / self.units(n)[:n])))
+        length = max(min(reach, float(np.linalg.norm(moved))), float(np.finfo(float).tiny))
         bend = float(np.linalg.norm(bordered[:n] - anchor.matrix[:n])) / length
         # The flow's error, relative to what it may magnify, is a bound already.
         flow = float(self._scaled(image.error, n).max()) / max(1.0, float(np.linalg.norm(bordered[:n, :n])))
@@ -287,10 +289,10 @@ class Curve(FamilyReturns):
             now = float(np.abs(residual).max())
             if not np.isfinite(now) or (now > 10.0 * largest and now > CURVE.settled):
                 raise AnalysisError("corrections diverge", field="step")
-            size = max(1.0, float(np.abs(x / units[:n]).max()))
+            size = max(_SMALLEST, float(np.abs(x / units[:n]).max()))
             closed = now <= self.precision * size
             # A residual that no longer falls is what the flow is good to, if the matrix can make it fall.
-            settled = not closed and CURVE.stays(now / size, largest / size) and not singular
+            settled = not closed and CURVE.stays(now / max(1.0, size), largest / max(1.0, size)) and not singular
             settled = settled and now <= _CLEAR * self.noise(x, here, section)
             if closed or settled:
                 # Where it leaves another curve the matrix is so weak that a small residual is far from an orbit.

@@ -141,7 +141,8 @@ def _collision_error(course: Course, crossing: Crossing, image: ReturnMap) -> fl
     moved = max(abs(_collision(other, crossing) - here) for other in errors.disturbed(matrix, error))
     before, after, apart = course.jacobians(crossing.value)
     slope = abs(_collision(after, crossing) - _collision(before, crossing)) / apart
-    uncertain = errors.SAFETY * moved + abs(here)
+    # All of eight draws are less than a third of the root mean square in one case of 50 000.
+    uncertain = 3.0 * moved + abs(here)
     return SAFETY * uncertain / slope if slope > 0.0 else np.inf
 
 
