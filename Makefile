@@ -85,7 +85,7 @@ test-processors: $(DEV)  ## the numeric tests with the arithmetic of other proce
 
 # The core of the suite with other versions than the lock's, in an environment of its own. What has wheels counts; what
 # an old version does that is deprecated by now is its own affair.
-CORE := $(addprefix tests/,engine gym live planar report trials truth/test_duffing.py truth/test_hybrid.py twin) \
+CORE := $(addprefix tests/,engine gym live paper/page planar show trials truth/test_duffing.py truth/test_hybrid.py twin) \
 	$(wildcard tests/test_cli_*.py) $(addprefix tests/test_,compiled.py dual.py integrate.py lanes.py notebook.py \
 	numba_internals.py output.py package.py record_file.py)
 OTHERS = $(VENV)-$(@:test-%=%)

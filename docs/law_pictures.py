@@ -19,10 +19,10 @@ from PIL import Image
 
 from chilopod.output import write_atomic
 from chilopod.paper.courses.steps import steps
-from chilopod.report.figures.course import draw
-from chilopod.report.kit import style
-from chilopod.report.scene.frames import body_frames
 from chilopod.robot import load_robot
+from chilopod.show import style
+from chilopod.show.figures.course import draw
+from chilopod.show.scene.frames import body_frames
 from chilopod.steering import ARRIVAL_RADIUS, VARIABLE, course_named
 from chilopod.tasks import drive, driver
 

@@ -14,8 +14,8 @@ import av
 
 from chilopod.output import write_atomic
 from chilopod.paper.movies import together
-from chilopod.report.scene.film_3d import film_3d
 from chilopod.robot import load_robot
+from chilopod.show.scene.film_3d import film_3d
 from chilopod.steering import LegYawController, Target
 from chilopod.trials import Trial, run
 

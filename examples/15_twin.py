@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from chilopod import load_robot, units
-from chilopod.report import replay
+from chilopod.show import replay
 from chilopod.steering import ARRIVAL_RADIUS, Target, strategy_named
 from chilopod.tasks import turn
 from chilopod.twin import TwinModel

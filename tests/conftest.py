@@ -2,7 +2,6 @@
 
 import os
 import platform
-import runpy
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -49,13 +48,13 @@ def tiny(kept, tmp_path_factory) -> SimpleNamespace:
 
     Tests of one file run in one process, so all that need it are in one.
     """
+    from chilopod.paper.page import Report
     from chilopod.paper.section import Context
     from chilopod.paper.sections import SECTIONS, reproduce
     from chilopod.paper.size import Size
-    from chilopod.report import Report
+    from helpers.texts import watched
 
     context, folder = Context(size=Size.TINY, folder=kept), tmp_path_factory.mktemp("tiny")
-    watched = runpy.run_path(str(Path(__file__).parent / "report" / "texts.py"))["watched"]
     with watched() as painted, Report(SECTIONS, context, folder) as report:
         found = reproduce(SECTIONS, context, told=lambda found, section: report.add(found, [section]))
     return SimpleNamespace(folder=folder, found=found, failures=report.failures, painted=painted)

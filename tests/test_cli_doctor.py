@@ -77,7 +77,7 @@ def test_prints_a_line_each(capsys, monkeypatch):
 
 def test_without_opengl_and_encoder(capsys, monkeypatch):
     monkeypatch.setattr(gl, "find", lambda: gl.Found(None, missing="no OpenGL works", mend="plug one in"))
-    monkeypatch.setattr("chilopod.report.scene.encoder.ENCODER", "no-such-encoder")
+    monkeypatch.setattr("chilopod.show.scene.encoder.ENCODER", "no-such-encoder")
     found = findings(capsys)
     assert found["OpenGL"]["mend"] == "plug one in"
     assert "all but films and stills in 3-D works" in found["OpenGL"]["found"]

@@ -7,11 +7,11 @@ import sys
 import pytest
 
 import chilopod
-from chilopod import analysis, planar, tasks, trials
+from chilopod import analysis, planar, show, tasks, trials
 from chilopod.tasks import identify
 
 HEAVY = ("mujoco", "matplotlib", "xarray", "pandas", "h5netcdf", "av", "cmaes", "jinja2")
-PACKAGES = (chilopod, analysis, planar, tasks, identify, trials)
+PACKAGES = (chilopod, analysis, planar, show, tasks, identify, trials)
 
 
 def loaded(code, *modules):
@@ -33,6 +33,12 @@ def test_the_theory_loads_no_engine_in_3d_no_drawing_and_no_records():
 def test_what_walks_loads_the_twin_only_where_it_walks():
     code = "from chilopod.tasks import turn, radius_law\nfrom chilopod.trials import NONE, Trial, run, together"
     assert loaded(code, "mujoco", "matplotlib", "cmaes") == set()
+
+
+def test_the_live_page_and_the_environments_know_no_paper():
+    code = "import chilopod.live.server, chilopod.gym.envs, chilopod.show.walked, chilopod.show.files"
+    paper = [f"chilopod.paper{part}" for part in ("", ".printed", ".scatter", ".section", ".registry", ".table")]
+    assert loaded(code, *paper) == set()
 
 
 @pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.__name__)

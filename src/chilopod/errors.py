@@ -19,13 +19,13 @@ class ChilopodError(Exception):
     Parameters
     ----------
     problem
-        What is wrong, in a few words.
+        Problem, in a few words.
     field
         Dotted name of what is wrong, such as ``body.mass``.
     value
-        What was given; None when nothing was.
+        Value that was given; None when none was.
     allowed
-        What would have been right, in words.
+        Values that are allowed, in words.
     nearest
         The valid name nearest to the one given.
     source

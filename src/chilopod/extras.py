@@ -15,7 +15,7 @@ def needs(package: str, *, extra: str) -> None:
     package
         Its name where it is imported.
     extra
-        That of chilopod which brings it.
+        Name of the chilopod extra that installs it.
 
     Raises
     ------

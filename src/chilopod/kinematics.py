@@ -80,7 +80,7 @@ def foot_places(forward_offset: ArrayLike, half_width: ArrayLike, stroke: ArrayL
         Forward offset and half width of a foot at mid-stroke, ahead of the centre and to the side of the axis, m, one
         for all or shape (..., 1, 1).
     stroke
-        How far a foot is ahead of mid-stroke along its stroke, m, shape (..., N, 2).
+        Distance of a foot ahead of mid-stroke along its stroke, m, shape (..., N, 2).
     yaw
         Yaw of the strokes, about the feet at mid-stroke, left positive, rad, shape (..., N, 2).
 

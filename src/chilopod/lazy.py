@@ -35,7 +35,7 @@ def exports(package: str, names: Mapping[str, Sequence[str]]) -> tuple[Callable[
     package
         Its ``__name__``.
     names
-        What each of its submodules gives it.
+        Names that each of its submodules exports.
     """
     homes = {name: f"{package}.{submodule}" for submodule, given in names.items() for name in given}
     module = sys.modules[package]

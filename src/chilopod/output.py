@@ -102,7 +102,7 @@ def write_atomic(
     Parameters
     ----------
     path
-        Where to.
+        Path of the file.
     content
         Content of the file.
     replace
@@ -112,7 +112,7 @@ def write_atomic(
     folders
         True if its folder is made where there is none.
     temporary
-        How its name begins until it is whole; such a file stays where a process is killed.
+        Prefix of its name until it is whole; such a file stays where a process is killed.
 
     Returns
     -------
@@ -150,7 +150,7 @@ def write_all(files: Iterable[tuple[Path, Content]], *, replace: bool = True) ->
     Parameters
     ----------
     files
-        Where to, and what. They are written one after the other, as the iterable gives them.
+        Paths and contents. They are written one after the other, as the iterable gives them.
     replace
         True if files that are already there may be replaced.
 
@@ -185,7 +185,7 @@ def spool(path: Path, size: int = 0) -> IO[bytes]:
     Parameters
     ----------
     path
-        Where the result will go: the file is on the same disk, or where else :func:`write_all` would keep it.
+        Path of the result: the file is on the same disk, or where else :func:`write_all` would keep it.
     size
         Bytes that are set aside for it.
 

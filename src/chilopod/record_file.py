@@ -30,9 +30,9 @@ class RecordFile:
     Parameters
     ----------
     path
-        Where it will go.
+        Path of the file.
     robots
-        How many walks.
+        Number of walks.
     least
         Bytes that it will have, at least.
 

@@ -19,7 +19,7 @@ def read_text(path: str | Path, kind: str, refused: type[ChilopodError]) -> str:
     path
         The file.
     kind
-        What it should be, such as ``robot file``.
+        Kind of file that is expected, such as ``robot file``.
     refused
         The exception for a file that is not.
 

@@ -13,9 +13,9 @@ from chilopod.errors import AnalysisError, ParameterError
 from chilopod.netcdf import netcdf, sealed
 from chilopod.planar import PlanarModel
 from chilopod.planar.along import walk_means
-from chilopod.report import write_branch
-from chilopod.report.figures.branch import panel
 from chilopod.robot import load_robot
+from chilopod.show import write_branch
+from chilopod.show.figures.branch import panel
 from chilopod.stability.branches.branch_points import BranchPoint
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.returns import whole_period

@@ -5,8 +5,8 @@ import pytest
 
 from chilopod.analysis.undulation import undulating_walks
 from chilopod.errors import ParameterError
-from chilopod.report import write_undulation
 from chilopod.robot import load_robot
+from chilopod.show import write_undulation
 
 ROBOT = load_robot("aoi2022-planar")
 

@@ -7,8 +7,8 @@ from chilopod.kinematics import module_centres, module_headings
 from chilopod.live import Session, wishes
 from chilopod.live.body import KINDS, FlatBody
 from chilopod.live.body_3d import SolidBody
-from chilopod.report.scene.frames import body_frames
 from chilopod.robot import load_robot
+from chilopod.show.scene.frames import body_frames
 from chilopod.trials import NONE, Trial, run
 
 PLANAR, TWIN = load_robot("aoi2022-planar"), load_robot("aoi2022")

@@ -11,8 +11,8 @@ from chilopod.engine import Status
 from chilopod.errors import ParameterError
 from chilopod.live import Session, wishes
 from chilopod.live.state import STRIDES
-from chilopod.report.scene.replay import replay
 from chilopod.robot import load_robot
+from chilopod.show.scene.replay import replay
 
 PLANAR = load_robot("aoi2022-planar")
 SOFT = wishes.Spring(0, stiffness(8.0))

@@ -1,17 +1,12 @@
 """Radii at equal distance from each one's own onset: known ratios come out, whatever the onsets."""
 
-import runpy
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from chilopod.paper.equal_distance import change, law_ratio, radius_ratio
 from chilopod.paper.robot.walks import SPRINGS, VARIANT_SPRINGS
 from chilopod.paper.walk_measures import onset, radius_at, shares
-
-MADE_UP = runpy.run_path(str(Path(__file__).parent / "robot" / "made_up_robot.py"))
-series, AMPLITUDE = MADE_UP["series"], MADE_UP["AMPLITUDE"]
+from helpers.made_up_robot import AMPLITUDE, series
 
 
 @pytest.mark.parametrize("point", [23.0, 25.0, 31.0, 45.0])

@@ -44,7 +44,7 @@ class SquareRootFit:
     residual
         Root mean square of the residuals, in the unit of the angles.
     trials
-        How many were fitted.
+        Number of trials that were fitted.
     """
 
     critical: float
@@ -69,7 +69,7 @@ def square_root_fit(inverse: ArrayLike, angle: ArrayLike, resampled: int = RESAM
     angle
         Their mean angles, shape (trials,); the sign is ignored.
     resampled
-        How many times trials are drawn anew for the bootstrap; 0 for no bootstrap.
+        Number of times that trials are drawn anew for the bootstrap; 0 for no bootstrap.
     seed
         Seed of the drawing.
 

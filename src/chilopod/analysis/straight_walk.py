@@ -99,7 +99,7 @@ class WalkBifurcation(ReadOnlyArrays):
     Attributes
     ----------
     point
-        What it is and where, in SI units (see :class:`chilopod.stability.BifurcationPoint`).
+        Kind and place of the point, in SI units (see :class:`chilopod.stability.BifurcationPoint`).
     parameter, unit
         Dotted path of the parameter and the unit it is shown in.
     joint_components

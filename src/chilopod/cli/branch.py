@@ -84,7 +84,7 @@ def branch(
     # A branch that goes on where it is saved holds all it held before.
     replace = force or (folder is not None and resume is not None and folder.resolve() == resume.resolve())
     if folder:
-        from chilopod.report import files_of
+        from chilopod.show import files_of
 
         free(files_of("branch", folder), replace)
     with progress_bar("branch") as show:
@@ -100,7 +100,7 @@ def branch(
             data = resumed(saved, described, parameter, limits, side=-1 if left else None, **how)
 
     def write() -> list[Path]:
-        from chilopod.report import write_branch
+        from chilopod.show import write_branch
 
         return write_branch(data, folder, replace=replace) if folder else []
 

@@ -36,9 +36,9 @@ class Finding:
     Attributes
     ----------
     name
-        What it is.
+        Name of the check.
     says
-        What was found.
+        Result of the check.
     mend
         The line that mends it; empty if nothing is missing.
     essential
@@ -194,7 +194,7 @@ def _drawing() -> list[Finding]:
 
 def _encoder() -> list[Finding]:
     def encoder() -> Finding:
-        from chilopod.report.scene.encoder import has_encoder
+        from chilopod.show.scene.encoder import has_encoder
 
         if not has_encoder():
             return Finding("mp4 encoder", "PyAV has no H.264; all but mp4 films works", _again("av"))
@@ -208,7 +208,7 @@ def _fonts() -> list[Finding]:
         import matplotlib as mpl
         from matplotlib.font_manager import FontProperties, findfont
 
-        from chilopod.report.kit.style import house_style
+        from chilopod.show.style import house_style
 
         with house_style():
             families = list(mpl.rcParams["font.family"])

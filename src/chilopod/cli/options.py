@@ -165,7 +165,7 @@ def new_app(help_text: str, *, completion: bool = False) -> typer.Typer:
     Parameters
     ----------
     help_text
-        What it is for.
+        Help text of the command.
     completion
         True if it has the options that make a shell complete its commands; only the outermost can.
     """
@@ -249,7 +249,7 @@ class WalkOptions:
     def free_files_of(self, what: str, out: Path | None) -> None:
         """Make sure that the files of a ``turn`` or a ``course`` can be written into the folder, if there is one."""
         if out:
-            from chilopod.report.walked import files_of_walks
+            from chilopod.show.walked import files_of_walks
 
             free(files_of_walks(what, out), self.force)
 
@@ -257,7 +257,7 @@ class WalkOptions:
         """Function that writes them."""
 
         def write() -> Iterable[Path]:
-            from chilopod.report.walked import write_walks
+            from chilopod.show.walked import write_walks
 
             return write_walks(what, done, out, replace=self.force) if out else ()
 

@@ -26,7 +26,7 @@ def progress_bar(doing: str) -> Iterator[Callable[[str, float, str], None]]:
     Parameters
     ----------
     doing
-        What it does, to be shown as long as it says nothing itself.
+        Description of the work, shown until the work reports its own.
 
     Yields
     ------

@@ -24,13 +24,7 @@ from chilopod.cli.options import (
     walking_on,
 )
 from chilopod.cli.progress import progress_bar
-
-_SECTIONS = (
-    *("mode", "exponents", "variants", "modules", "uniform", "branch", "curved", "undulation", "turning", "movies"),
-    *("robot-walks", "robot-turning", "robot-movies", "identification", "robot-spread", "robot-numerics"),
-    *("robot-structures", "robot-why", "courses", "courses-robust", "robot-courses", "courses-movie"),
-)
-"""For the help, which loads nothing heavy; a test holds them to what there is."""
+from chilopod.paper.registry import REGISTRY
 
 if TYPE_CHECKING:
     from chilopod.paper.table import RobotRow, Row
@@ -54,8 +48,8 @@ def reproduce(
         typer.Option(
             "--only",
             metavar="SECTION",
-            help=f"Just this section; may be repeated: {', '.join(_SECTIONS)}.",
-            autocompletion=lambda: list(_SECTIONS),
+            help=f"Just this section; may be repeated: {', '.join(REGISTRY)}.",
+            autocompletion=lambda: list(REGISTRY),
         ),
     ] = None,
     out: Annotated[
@@ -91,9 +85,9 @@ def reproduce(
     sections = chosen(only, quick or tiny, paper)  # refuses an unknown section
     from chilopod.errors import OutputError, in_words
     from chilopod.paper import sections as computed
+    from chilopod.paper.page import Report, check_report
     from chilopod.paper.section import Context, Found, Section
     from chilopod.paper.size import Size
-    from chilopod.report import Report, check_report
 
     size = Size.TINY if tiny else Size.QUICK if quick else Size.FULL
     check_report(out, sections, size, replace=force)
@@ -183,7 +177,7 @@ def planar(
 
     described = read_robot(robot, overrides)
     from chilopod.paper.fit_data import critical_mode_data, variant_settings
-    from chilopod.report import files_of, identification_files
+    from chilopod.show import files_of, identification_files
     from chilopod.tasks.identify import identify_planar
 
     free([*files_of("identification", out), *_identified(out)], force)

@@ -101,7 +101,7 @@ class Actuators:
         time
             s, not before that of the last command.
         command
-            What is wanted.
+            Command of each actuator.
         walking
             Shape (robots,).
 

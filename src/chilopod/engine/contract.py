@@ -72,7 +72,7 @@ class Observation:
     leg_yaw
         Angles last commanded for the left and right leg of module 1, rad, shape (robots, 2).
     stiffness
-        That the springs of the yaw joints have at this moment, N*m/rad, shape (robots, N-1).
+        Stiffness of the springs of the yaw joints at this moment, N*m/rad, shape (robots, N-1).
     """
 
     time: float
@@ -97,8 +97,8 @@ class Command:
         Stiffness of the springs of the yaw joints, N*m/rad, positive, shape (robots, N-1). A spring that is not
         adjustable must be given the stiffness it has.
     joint_torque
-        That drives the yaw joints beside their springs, positive where it turns the rear module to the left, N*m,
-        shape (robots, N-1). Held until another torque is commanded.
+        Torque that drives the yaw joints beside their springs, positive where it turns the rear module to the left,
+        N*m, shape (robots, N-1). Held until another torque is commanded.
     within
         Time in which leg yaw and stiffness are to be reached, at constant rate, s; 0 for at once.
     """
@@ -277,7 +277,7 @@ class Traits:
     name
         As it is typed and recorded.
     sentence
-        What it is.
+        Description of the engine in a sentence.
     exact
         True if its walks are those of the planar theory (:mod:`chilopod.analysis`), so that branches hold for them.
     noisy
@@ -289,7 +289,7 @@ class Traits:
     a_round
         Walks that a search may spend on one round of trials.
     haste
-        How many times as long as at the speed of the straight walk without slip a task should be given.
+        Duration of a task, over its duration at the speed of the straight walk without slip.
     version
         Version of whatever else than chilopod decides what its records hold; empty for nothing.
     """
@@ -374,9 +374,10 @@ class Engine(Protocol):
         seeds
             Seeds of the noise of the sensors, one a walk; without them there is none.
         record
-            What is written down; by default the motion, :data:`chilopod.record.RATE` times a second. None: nothing.
+            Variables and rate of the record; by default the motion, :data:`chilopod.record.RATE` times a second. None:
+            no record.
         expected
-            How long the walk is likely to be, s, so that memory may be taken at once; 0: not known.
+            Expected duration of the walk, s, so that memory may be taken at once; 0: not known.
         options
             The engine's own.
 

@@ -148,7 +148,7 @@ def steer(
     controller
         Without one the robots walk on as they were told.
     bearing_noise
-        What is added to the bearing that the controller sees at its events, rad, shape (walks, at least as many as
+        Error added to the bearing that the controller sees at its events, rad, shape (walks, at least as many as
         events); the last axis is the order of events from the start of the walk.
     progress
         Called with the part done (0 to 1) and a few words.

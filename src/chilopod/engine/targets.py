@@ -19,7 +19,7 @@ class Targets:
     Parameters
     ----------
     robots
-        How many.
+        Number of robots.
     start
         Places at the start, m, shape (robots, 2), or None.
     keep

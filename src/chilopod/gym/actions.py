@@ -44,7 +44,7 @@ class Actions:
     softest, stiffest
         Softest and stiffest of these springs, N*m/rad.
     legs
-        Whose limit and swing it is.
+        Leg controller that defines yaw limit and swing.
     """
 
     robot: Robot

@@ -42,7 +42,7 @@ class CourseVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
     Parameters
     ----------
     num_envs
-        How many robots.
+        Number of robots.
     robot
         A preset, a robot file, or a robot; by default the paper's.
     engine
@@ -88,7 +88,7 @@ class CourseVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
         Parameters
         ----------
         seed
-            That of robot i is so much more than that of robot 0, or one each; None: as the generators go on.
+            Seed of robot 0, to which that of robot i adds i, or one each; None: as the generators go on.
         options
             Not used.
         """

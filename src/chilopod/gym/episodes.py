@@ -120,26 +120,26 @@ class Episodes:
     robot
         All are alike.
     count
-        How many.
+        Number of episodes at once.
     engine
         One of :data:`chilopod.engine.ENGINES`, or one's own as ``package.module:object``.
     springs
-        Which ones actions set, see :class:`chilopod.gym.Actions`.
+        Springs that actions set, see :class:`chilopod.gym.Actions`.
     targets
         Targets of an episode, one after the other, see :func:`chilopod.steering.random_course`.
     patience
         For each target, s; by default the engine's, see :func:`chilopod.tasks.course.patience_of`.
     disturbance
-        What differs at the start, and the noise of bearings, as in trials.
+        Disturbance of the start and of bearings, as in trials.
     rewards
-        What steps are worth.
+        Rewards of steps.
     remember
         True to keep :attr:`moments`.
 
     Attributes
     ----------
     actions, sight
-        What actions and observations mean.
+        Meaning of actions and of observations.
     moments
         Moments of the steps so far, as many as the longest episode has.
 

@@ -12,9 +12,9 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from chilopod.gym.episodes import Episodes, Moment
-from chilopod.report.scene.aims import Aim
-from chilopod.report.scene.film import PIXEL, FilmPanel
-from chilopod.report.scene.frames import BodyFrames, Floor, Outcome, Scene, bodies
+from chilopod.show.scene.aims import Aim
+from chilopod.show.scene.film import PIXEL, FilmPanel
+from chilopod.show.scene.frames import BodyFrames, Floor, Outcome, Scene, bodies
 from chilopod.steering import ARRIVAL_RADIUS
 
 Array = NDArray[np.float64]
@@ -31,9 +31,9 @@ class Picture:
     Parameters
     ----------
     episodes
-        That remember.
+        Episodes that are drawn.
     robot
-        Which.
+        Number of the robot.
     """
 
     def __init__(self, episodes: Episodes, robot: int) -> None:

@@ -34,9 +34,9 @@ class Steered:
     Attributes
     ----------
     controller
-        That steers by springs and leg yaw.
+        Controller that steers by springs and leg yaw.
     episodes
-        What actions and observations mean.
+        Episodes that define actions and observations.
     """
 
     controller: Controller
@@ -68,9 +68,9 @@ def baseline(name: str, episodes: Episodes, engine: str = "planar") -> Steered:
     name
         ``leg-yaw``: the paper's controller, the springs as they are; ``variable``: the first spring is set besides.
     episodes
-        Whose robots it is to steer.
+        Episodes of the robots that are steered.
     engine
-        Whose radius law ``variable`` stands on, see :func:`chilopod.tasks.radius_law`.
+        Engine of the radius law of ``variable``, see :func:`chilopod.tasks.radius_law`.
 
     Raises
     ------

@@ -29,7 +29,7 @@ class Sight:
     actions
         Actions of the same robot.
     range
-        How far its scanner sees, m.
+        Range of its scanner, m.
     """
 
     actions: Actions

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from chilopod.kinematics import from_modules
 from chilopod.live.state import Seen
-from chilopod.report.scene.frames import bodies
-from chilopod.report.scene.outline import SLIMNESS
+from chilopod.show.scene.frames import bodies
+from chilopod.show.scene.outline import SLIMNESS
 
 Array = NDArray[np.float64]
 KINDS = ("box", "rod", "ball", "pin")

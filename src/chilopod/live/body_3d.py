@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from chilopod.live.body import Placed
 from chilopod.live.state import Seen
-from chilopod.report.scene.outline_3d import drawn, yaw_joint
 from chilopod.robot import Robot
+from chilopod.show.scene.outline_3d import drawn, yaw_joint
 from chilopod.twin.model import compiled, without_springs
 
 Array = NDArray[np.float64]

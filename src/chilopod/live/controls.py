@@ -51,9 +51,9 @@ class Controls:
     server
         Server of the page.
     session
-        Whose box takes the wishes; nothing else of it is changed.
+        Session that takes the wishes; nothing else of it is changed.
     title
-        What walks.
+        Name of the robot.
     on_follow
         Called with whether the picture is to follow the robot.
     on_record

@@ -15,7 +15,7 @@ from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.live.state import Seen
 from chilopod.live.theory import Theory
 from chilopod.live.words import radius_of
-from chilopod.report.kit.style import BLUE, CURVES, GREY, VERMILLION
+from chilopod.show.style import BLUE, CURVES, GREY, VERMILLION
 
 Array = NDArray[np.float64]
 
@@ -33,9 +33,9 @@ class Plots:
     Parameters
     ----------
     gui
-        Where they are put.
+        Panel in which the plots are put.
     joints
-        How many yaw joints there are.
+        Number of yaw joints.
     """
 
     def __init__(self, gui: viser.GuiApi, joints: int) -> None:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from chilopod.live.body import KINDS, Placed
 from chilopod.live.state import Seen
-from chilopod.report.kit.style import BLACK, BLUE, GREY, ORANGE, SKY, VERMILLION
+from chilopod.show.style import BLACK, BLUE, GREY, ORANGE, SKY, VERMILLION
 from chilopod.steering import ARRIVAL_RADIUS
 
 Array = NDArray[np.float64]

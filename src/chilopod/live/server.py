@@ -74,11 +74,11 @@ class Live:
     seen
         The last frame.
     frames
-        How many were shown.
+        Number of frames that were shown.
     busy
         s that the thread of the walk was at work.
     failure
-        What ended that thread, if anything did.
+        Error that ended the thread, if one did.
 
     Raises
     ------
@@ -301,7 +301,7 @@ class Live:
             self._handing_out.append(self._drawing.submit(self._hand_out, name, record, self._wants_record))
 
     def _hand_out(self, name: str, record: xr.Dataset, to: viser.ClientHandle | None) -> None:
-        from chilopod.report import replay
+        from chilopod.show import replay
 
         content = netcdf(record)
         page = replay(record, titles=["the robot"], heading="A walk recorded at the live page").html

@@ -42,7 +42,7 @@ class Seen:
     clock
         To which the gait steps, s: at 0 it was at phase 0.
     robot
-        That walks, with its floor and steps; its springs may be others by now.
+        Robot that walks, with its floor and steps; its springs may have changed since.
     status
         ``WALKED`` while it walks.
     pose
@@ -58,7 +58,7 @@ class Seen:
     pulled
         Torques by which somebody pulls at joints, N*m, (N-1,).
     target
-        Where to, m; None: nowhere.
+        Place of the target, m; None without one.
     steering
         Name of the strategy that steers there, which is leg yaw while those of springs are not known; else empty.
     state

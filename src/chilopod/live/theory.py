@@ -45,9 +45,9 @@ class Theory:
     springs, radii, stable
         The curved walks from there on: first spring (N*m/rad), radius (m) and whether the walk is stable, (points,).
     law
-        How tightly which spring turns, for strategies; None where there is no such law.
+        Radius law of the springs, for strategies; None where there is none.
     remark
-        Why something is not known, or how far finding it is; empty once there is nothing to say.
+        Reason why something is not known, or progress of the search; empty when there is nothing to say.
     """
 
     robot: Robot | None = None

@@ -36,7 +36,7 @@ def sentences(seen: Seen, settings: Settings, theory: Theory, growth: Growth | N
     seen, settings
         The walk and how everything is set.
     theory, growth
-        What is known of this robot; of another robot it does not count.
+        Theory of this robot, and growth of its bend; not valid for another robot.
     """
     if seen.status is not Status.WALKED:
         return [f"It has stopped: {seen.status.sentence}. Press R to begin anew."]

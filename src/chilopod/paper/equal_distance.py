@@ -60,8 +60,8 @@ def radius_ratio(base: xr.Dataset, variant: xr.Dataset, drawn: int = DRAWN, seed
         :func:`chilopod.tasks.radius_law.end_of_walk` has them. What counts, see
         :func:`chilopod.paper.walk_measures.counted`.
     drawn
-        How many times trials are drawn anew at every spring for the standard errors, onsets fitted anew each time; 0
-        for none.
+        Number of times that trials are drawn anew at every spring for the standard errors, onsets fitted anew each
+        time; 0 for none.
     seed
         Seed of the drawing.
     """

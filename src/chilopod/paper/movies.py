@@ -77,11 +77,11 @@ def movies(
     best
         First spring for task A, N*m/rad; movie 2 shows it between one that is too stiff and one that is too soft.
     folder
-        Where records are kept.
+        Folder of the records.
     progress
         Called with the part done (0 to 1) and a few words.
     shorter
-        Which part of them is walked.
+        Part of the durations that is walked.
     """
 
     joints = robot.body.modules - 1

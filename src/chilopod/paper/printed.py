@@ -22,9 +22,9 @@ class Said:
     Attributes
     ----------
     words
-        What is said.
+        Statement, in words.
     asked
-        What counts as agreeing with it.
+        Condition that counts as agreement, in words.
     """
 
     words: str
@@ -63,7 +63,7 @@ class Number:
     value, unit
         As printed.
     tolerance
-        How far one that agrees may be off, in the same unit.
+        Largest deviation of a number that agrees, in the same unit.
     """
 
     value: float
@@ -111,17 +111,17 @@ class Task:
     Attributes
     ----------
     target
-        Where it is.
+        Place of the target.
     radius
         Radius of the circle to it, in so many digits.
     k_hat
         The spring whose walk has this radius.
     minima
-        Where all three criteria are smallest.
+        Springs at which all three criteria are smallest.
     outcomes
-        What became of walks with some springs.
+        Outcomes of walks with some springs.
     source
-        Where it stands.
+        Section or figure of the paper.
     """
 
     target: Target

@@ -1,4 +1,4 @@
-"""What a section of the report is, and what sections find."""
+"""Sections of the report, and what they find."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+from chilopod.paper.movies import Movie
 from chilopod.paper.size import Size
 from chilopod.paper.statements import ORDER
 from chilopod.paper.table import OfPlanar, OfTwin, RobotRow, Row, robot_rows
 from chilopod.progress import Progress
 from chilopod.robot import Robot, load_robot
+from chilopod.show.panel import Panel
 
 T = TypeVar("T")
 Line = Row | OfTwin | OfPlanar
@@ -28,9 +30,9 @@ class Context:
     whole
         Whole of the sections in three dimensions, with a twin.
     size
-        How much of everything is computed.
+        Amount of every computation.
     folder
-        Where the records of trials are kept, so that what was stopped goes on where it was; without one nothing is
+        Folder of the records of trials, with which a stopped computation is resumed; without one nothing is
         kept.
     """
 
@@ -42,22 +44,28 @@ class Context:
 
 @dataclass(frozen=True, eq=False)
 class Section(Generic[T]):
-    """A part of the report: something that is computed, and its lines of the tables.
+    """A part of the report: something that is computed, its lines of the tables, its figures and films.
 
     Attributes
     ----------
     name
-        What it is asked for by.
+        Name on the command line.
     chapter
-        That it stands in.
+        Chapter of the page.
     sentence
-        What it is.
+        Description in a few words.
     compute
         Finds it, given the context, what the sections it needs have found, and where to say how far it is.
     rows
         Its lines of the tables, given what it found and what the sections it needs have found.
+    panels
+        Its figures, given what it found and what the sections beside it have found.
+    films
+        Its films, given what it found.
     needs
         Other sections whose results it uses where they were computed; they come before it.
+    beside
+        Other sections that its figures show where they were computed; they are drawn once more when these are.
     beyond
         True if it goes beyond the paper's own experiments.
     on_request
@@ -71,7 +79,10 @@ class Section(Generic[T]):
     sentence: str
     compute: Callable[[Context, Found, Progress], T]
     rows: Callable[[T, Found], Sequence[Line]] = lambda value, found: ()
+    panels: Callable[[T, Found], Iterable[Panel]] = lambda value, found: ()
+    films: Callable[[T], Iterable[Movie]] = lambda value: ()
     needs: tuple[Section[Any], ...] = ()
+    beside: tuple[Section[Any], ...] = ()
     beyond: bool = False
     on_request: bool = False
     full: bool = False
@@ -84,11 +95,11 @@ class Found:
     Attributes
     ----------
     context
-        What it was computed from.
+        Robots, size and folder of the computation.
     values, rows, seconds
         Values, rows and seconds of the sections that were computed: result, lines of the tables, and how long it took.
     failures
-        Why others could not be.
+        Errors of sections that could not be computed.
     """
 
     context: Context = field(default_factory=Context)

@@ -7,40 +7,13 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from chilopod.errors import OutputError, ParameterError, nearest_name
-from chilopod.paper.courses.sections import COURSES, COURSES_FILM, ROBOT_COURSES, ROBUST
-from chilopod.paper.curved.sections import BRANCH, CURVED, UNDULATION
-from chilopod.paper.robot.sections import FILMS, NUMERICS, SPREAD, STRUCTURES, TASKS, WALKS, WHY
+from chilopod.paper.registry import load_sections
 from chilopod.paper.section import Context, Found, Section
-from chilopod.paper.straight.sections import EXPONENTS, IDENTIFICATION, MODE, MODULES, UNIFORM, VARIANTS
-from chilopod.paper.turning.sections import MOVIES, TURNING
 
 Progress = Callable[[str, float, str], None]
 """Called with what is done, the part of it that is (0 to 1), and a few words."""
 
-SECTIONS: tuple[Section[Any], ...] = (
-    MODE,
-    EXPONENTS,
-    VARIANTS,
-    MODULES,
-    UNIFORM,
-    BRANCH,
-    CURVED,
-    UNDULATION,
-    TURNING,
-    MOVIES,
-    WALKS,
-    TASKS,
-    FILMS,
-    IDENTIFICATION,
-    SPREAD,
-    NUMERICS,
-    STRUCTURES,
-    WHY,
-    COURSES,
-    ROBUST,
-    ROBOT_COURSES,
-    COURSES_FILM,
-)
+SECTIONS: tuple[Section[Any], ...] = load_sections()
 """All sections in the order they are computed: the paper's own experiments, then what goes beyond them."""
 
 

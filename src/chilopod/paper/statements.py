@@ -10,7 +10,8 @@ from chilopod.paper import printed
 from chilopod.paper.fit_data import walking_speed
 from chilopod.paper.printed import CRITERION_NAMES, Band, Number, Said
 from chilopod.paper.scatter import SURE
-from chilopod.paper.table import Kind, Statement, listing
+from chilopod.paper.table import Kind, Statement
+from chilopod.show.words import listing
 from chilopod.steering import Outcome
 
 _FITTED, _PREDICTED, _CHECKED = Kind

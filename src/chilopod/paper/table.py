@@ -38,11 +38,11 @@ class Row:
     quantity, paper, computed
         In words and numbers with units; ``paper`` says so where it prints none.
     where
-        Where of the paper.
+        Section or figure of the paper.
     verdict
         One of :data:`AGREES`, or :data:`NOT_PRINTED`.
     remark
-        Why it differs, if it does.
+        Reason for a difference, if there is one.
     """
 
     quantity: str
@@ -68,9 +68,9 @@ class Statement(Generic[S]):
     Attributes
     ----------
     quantity
-        What it is about.
+        Subject of the statement.
     said
-        What the paper says and what is asked of the twin, of a number if it is a :class:`Band`.
+        Statement of the paper and condition on the twin, on a number if it is a :class:`Band`.
     kind
         True if the twin was fitted to it.
     """
@@ -119,13 +119,13 @@ class RobotRow:
     quantity, robot
         See :class:`Statement`.
     twin, planar
-        What these do, in words and numbers with units; empty where they were not asked.
+        Results of both, in words and numbers with units; empty where nothing was computed.
     kind
         One of :class:`Kind`.
     verdict
         One of :data:`WITHIN`, or :data:`NOT_COMPUTED`.
     asked
-        What counts as within.
+        Condition for a verdict of *within*.
     """
 
     quantity: str
@@ -155,9 +155,3 @@ def robot_rows(found: Iterable[Row | OfTwin | OfPlanar], order: Iterable[Stateme
         if planar and not twins:
             lines.append(RobotRow(each.quantity, said.words, "", planar, kind, NOT_COMPUTED, said.asked))
     return lines
-
-
-def listing(items: Iterable[str]) -> str:
-    """Items joined by commas and a last "and"."""
-    names = list(items)
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)

@@ -126,7 +126,7 @@ class WalkMeans(ReadOnlyArrays):
     floor_power
         Mean power lost at the feet, W, never positive, shape (walks,).
     drifts
-        How each walk moves over the floor.
+        Motion of each walk over the floor.
     """
 
     mean_angle: Array

@@ -107,7 +107,7 @@ def powers(
     t
         s.
     stiffness_rate, joint_torque
-        How fast every spring stiffens, N*m/rad/s, and what drives its joint, N*m, shape (N-1,).
+        Rate at which every spring stiffens, N*m/rad/s, and torque that drives its joint, N*m, shape (N-1,).
     """
     x = np.asarray(x, dtype=np.float64)
     robot, gait = model.robot, model.robot.gait

@@ -38,13 +38,13 @@ def advance(
     Parameters
     ----------
     starts, widths
-        Where in its contact interval each piece starts and how long it lasts, s, shape (pieces,).
+        Start of each piece in its contact interval, and its duration, s, shape (pieces,).
     scalars, stiffness, damping
         Scalars, stiffness and damping of the robots, shapes (robots, 4), (robots, N-1), (robots, N-1).
     moments
         Contact moments at the start of the contact interval of every piece, shape (robots, pieces, N, 8).
     owner
-        Which robot a state belongs to, shape (states,).
+        Number of the robot to which a state belongs, shape (states,).
     states
         Reduced states, shape (states, 2N+1), or with poses behind, (states, 2N+4); float64 or complex128.
     tolerance

@@ -49,7 +49,7 @@ def simulate(
     target
         Its place on the floor, m, shape (2,) or (walks, 2), for the controller to see.
     bearing_noise
-        What is added to the bearing that the controller sees at its events, rad, shape (walks, at least as many as
+        Error added to the bearing that the controller sees at its events, rad, shape (walks, at least as many as
         events); the last axis is the order of events.
     rate
         Samples per second.

@@ -48,13 +48,13 @@ class Pieces(NamedTuple):
     Attributes
     ----------
     begins
-        When each piece begins, s, shape (pieces,).
+        Time at which each piece begins, s, shape (pieces,).
     starts, widths
-        Where in its contact interval each piece starts and how long it lasts, s, shape (pieces,).
+        Start of each piece in its contact interval, and its duration, s, shape (pieces,).
     interval
         The contact interval each piece belongs to, shape (pieces,).
     sample
-        Where in ``record`` the state at the end of a piece goes, -1 for nowhere, shape (pieces,).
+        Place in ``record`` of the state at the end of a piece, -1 for none, shape (pieces,).
     contact, stroke
         By interval: whether each foot stands, and where it is at the start (m ahead of mid-stroke), shape
         (intervals, N, 2).
@@ -114,7 +114,7 @@ class _Places(NamedTuple):
     Attributes
     ----------
     robot, piece
-        Which, or NOBODY; in which piece.
+        Number of the robot, or NOBODY, and of its piece.
     begin, end
         From where to where of the piece the present part is, s.
     next
@@ -365,7 +365,7 @@ def carry(
     Parameters
     ----------
     rows
-        Which robots, at least one; they walk.
+        Numbers of the robots that walk, at least one.
     pieces, robots
         See :class:`Pieces` and :class:`Robots`.
     tolerance

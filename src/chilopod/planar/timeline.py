@@ -38,7 +38,7 @@ class Timeline:
     Attributes
     ----------
     position
-        Where it is, as plain numbers: time of the last cut (s), number of the contact interval it lies in, counted
+        Place in time, as plain numbers: time of the last cut (s), number of the contact interval it lies in, counted
         from time 0, or ends, and number of the next sample.
     """
 

@@ -69,9 +69,9 @@ class Robot(Description):
     body, springs, legs, gait, ground
         The parts of the description, in SI units and radians.
     twin
-        What only the three-dimensional model reads; None for a robot that only the planar model knows.
+        Constants that only the three-dimensional model reads; None for a robot that only the planar model knows.
     provenance
-        Where numbers come from: text by dotted path.
+        Origin of the numbers: text by dotted path.
 
     Raises
     ------

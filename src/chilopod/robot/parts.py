@@ -23,7 +23,7 @@ class Body(Description):
     Attributes
     ----------
     modules
-        How many, from 2 to 1000.
+        Number of modules, from 2 to 1000.
     length
         Length of the whole chain, m.
     mass
@@ -48,7 +48,7 @@ class Springs(Description):
     Attributes
     ----------
     stiffness
-        When the walk begins, (modules-1,) N*m/rad, positive.
+        Stiffness when the walk begins, shape (modules-1,), N*m/rad, positive.
     damping
         (modules-1,) N*m*s/rad, zero or more.
     adjustable

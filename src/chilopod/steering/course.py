@@ -137,7 +137,7 @@ class Course:
         Whole angle ahead of module 1 within which its scanner sees, rad; by default that of the paper's (Hokuyo
         URG-04LX, section Robot).
     range
-        How far the scanner sees, m; by default that of the same one (its data sheet).
+        Range of the scanner, m; by default that of the same one (its data sheet).
     tightest
         Radius of the circles that the shortest path to a target is made of, m; 0 for a robot that turns on the spot.
         That of a radius law is the paper's measure, of the body axis: module 1 itself goes round in smaller circles, so
@@ -219,7 +219,7 @@ def random_course(seed: int, patience: float, count: int = 5) -> Course:
     patience
         For each target, s.
     count
-        How many targets.
+        Number of targets.
     """
     rng = np.random.default_rng(seed)
     bearings = rng.uniform(-_WIDEST_BEARING, _WIDEST_BEARING, count)

@@ -39,11 +39,11 @@ class Criteria(ReadOnlyArrays):
     effort
         Integral of the squared leg yaw of both legs over time, rad^2 s (epsilon 3).
     arrival
-        When the target was first within the arrival radius, s; NaN if never.
+        Time at which the target was first within the arrival radius, s; NaN if never.
     nearest
         Smallest distance of the target, m.
     outcome
-        What became of the task.
+        Outcome of the task.
     """
 
     time: float

@@ -24,9 +24,9 @@ def of_course(record: xr.Dataset, robot: Robot, brief: bool = False) -> xr.Datas
     ``goal_effort``
         Integral of the squared yaw of both legs, as commanded, rad^2 s.
     ``goal_spring_work``
-        That actuators did on springs, 1/2 theta^2 dk where it is positive, J: they take nothing back.
+        Work of actuators on springs, 1/2 theta^2 dk where it is positive, J: they take nothing back.
     ``goal_drive_work``
-        That joint torques did, joint by joint and command by command, where it is positive, J.
+        Work of joint torques, joint by joint and command by command, where it is positive, J.
 
     Parameters
     ----------

@@ -52,7 +52,7 @@ class RadiusLaw(ReadOnlyArrays):
             Along the branch, from the pitchfork on (itself included): the parameter in SI units, the radius in m, and
             whether the walk is stable, shape (points,).
         unit
-            That values are written in.
+            Unit of the values.
 
         Raises
         ------

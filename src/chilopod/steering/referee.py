@@ -258,7 +258,7 @@ def decisions(record: xr.Dataset, controller: Controller, gait: Gait) -> list[Co
     record
         Record of a course.
     controller, gait
-        That steered, and of the robots.
+        Controller that steered, and gait of the robots.
     """
     shown = {name: record[f"seen_{name}"].transpose("event", "robot", ...).values for name in _KEPT}
     until = float(record.event[-1]) + gait.period

@@ -32,7 +32,7 @@ def shortest_path(place: Array, radius: float, arrival: float = ARRIVAL_RADIUS) 
     radius
         Radius of the tightest circle, m; 0 for what turns on the spot.
     arrival
-        How near counts as arrived, m; 0 for the place itself.
+        Distance that counts as arrived, m; 0 for the place itself.
 
     Returns
     -------

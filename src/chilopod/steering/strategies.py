@@ -20,7 +20,7 @@ class Strategy:
     name
         As it is typed.
     sentence
-        What it is.
+        Description of the strategy in a sentence.
     springs
         The parameter it chooses: the dotted path of one spring or of all; None leaves the springs alone.
     leg_yaw

@@ -51,15 +51,15 @@ class Driver(Short):
     robot
         With the springs of the strategy, and the actuator that it needs.
     strategy
-        What was asked for.
+        As given to :func:`drive`.
     controller
-        What steers; None for nothing.
+        Controller of the walk; None without steering.
     law
         The robot's radius law; None where it has none and the strategy needs none.
     engine
         Name of the engine that the law belongs to and that walks.
     remarks
-        What is to be said of it.
+        Remarks on the result, a sentence each.
     """
 
     robot: Robot
@@ -77,9 +77,9 @@ class Driven(Short):
     Attributes
     ----------
     driver
-        What walked.
+        Driver of the walks.
     course
-        What was asked for.
+        As given to :func:`drive`.
     trials
         With all that makes each walk.
     records
@@ -225,15 +225,15 @@ def driver(
     strategy
         One of :data:`chilopod.steering.ON_COURSES`.
     spring
-        That the strategies ``pitchfork`` and ``hopf`` walk with, N*m/rad.
+        Spring with which the strategies ``pitchfork`` and ``hopf`` walk, N*m/rad.
     engine
-        Whose radius law it is, see :func:`chilopod.tasks.radius_law`.
+        Engine of the radius law, see :func:`chilopod.tasks.radius_law`.
     controller
         In place of the strategy's.
     law
         The robot's radius law, where it is known already.
     folder
-        Where trials of the radius law are kept.
+        Folder of the trials of the radius law.
     progress
         Called with the part done (0 to 1) and a few words.
 

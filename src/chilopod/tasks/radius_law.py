@@ -51,7 +51,7 @@ def radius_law(
     engine
         Name of an engine, see :func:`chilopod.engine.engine_named`.
     folder
-        Where trials are kept, if anywhere.
+        Folder of the trials; without one nothing is kept.
     progress
         Called with the part done (0 to 1) and a few words.
 

@@ -44,9 +44,9 @@ class Turn(Short):
     robot
         With the spring it walked with.
     target, strategy, engine
-        What was asked for.
+        As given to :func:`turn`.
     controller
-        What steered, if anything: the strategy's or one's own.
+        Controller of the walks, the strategy's or one's own; None without steering.
     by_law
         The spring whose settled walk has the radius of the circle to the target, the paper's k1-hat, N*m/rad; None
         where there is no such spring or none was asked for.
@@ -148,9 +148,9 @@ def turn(
     robot
         The robot.
     target
-        Where to.
+        Target of the turn.
     strategy
-        How, one of :data:`chilopod.steering.STRATEGIES`.
+        Strategy, one of :data:`chilopod.steering.STRATEGIES`.
     spring
         Spring of the strategy, N*m/rad; or ``law``: the paper's k1-hat, from the radius law; or ``auto``: what comes
         nearest to the target in undisturbed simulated trials, which takes into account that a walk needs time to bend.
@@ -166,7 +166,7 @@ def turn(
     controller
         In place of the strategy's: a frozen dataclass, see :class:`chilopod.trials.Trial`.
     folder
-        Where all trials are kept, those of the radius law and of the search too; without one nothing is kept.
+        Folder of all trials, of the radius law and of the search too; without one nothing is kept.
 
     Raises
     ------

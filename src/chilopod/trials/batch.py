@@ -35,7 +35,7 @@ def batches(trials: Sequence[Trial], on_cores: int | None = None) -> list[list[T
     trials
         In any order.
     on_cores
-        How many cores a batch has for itself; by default all there are.
+        Number of cores that a batch has for itself; by default all there are.
     """
     groups: dict[tuple[Any, ...], list[Trial]] = {}
     for trial in trials:

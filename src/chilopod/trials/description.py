@@ -33,7 +33,7 @@ def plain(value: object, field: str) -> Any:
         Number, text, None, enum, array, or a tuple or frozen dataclass of these: of classes their path, of a dataclass
         the fields that count in comparisons. What code they have is told by :func:`code_of`.
     field
-        What to call it where it is refused.
+        Name of the field where it is refused.
 
     Raises
     ------

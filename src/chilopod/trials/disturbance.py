@@ -103,13 +103,13 @@ def draw(
     Parameters
     ----------
     disturbance
-        How much.
+        Size of the disturbance.
     seed
         0 or more.
     modules
         Modules of the robot.
     looks
-        How often it looks at its target, at most.
+        Largest number of looks at its target.
     joint_angles
         About which those at the start are, rad; by default straight.
     """

@@ -36,9 +36,9 @@ class Contents:
     trials
         Called as records of trials are.
     aside
-        What stood in the place of a record and was none.
+        Files that stood in the place of a record and were none.
     unfinished
-        What processes write, or could not finish before they were killed.
+        Files that processes write, or could not finish before they were killed.
     foreign
         All else; chilopod did not write it.
     """
@@ -60,7 +60,7 @@ class Kept:
     size
         Size of the file, bytes.
     robot
-        What the robot is called.
+        Name of the robot.
     told
         The trial's text, see :attr:`chilopod.trials.Trial.text`.
     found
@@ -175,7 +175,7 @@ class Group:
     found
         See :class:`Kept`.
     robots
-        How many robots, told apart by their numbers.
+        Number of robots, told apart by their numbers.
     seeds
         Seeds of those that are disturbed, in order.
     count

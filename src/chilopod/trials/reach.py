@@ -81,7 +81,7 @@ class Reach:
     Attributes
     ----------
     chance
-        What was seen first that answers otherwise every time, see :mod:`chilopod.trials.chance`; empty if nothing.
+        First thing seen that answers otherwise every time, see :mod:`chilopod.trials.chance`; empty if nothing.
     """
 
     def __init__(self, own: str = "") -> None:

@@ -34,13 +34,13 @@ def run(
     trials
         In any order; the same trial may occur twice. All their records have to fit into memory, see :func:`run_each`.
     folder
-        Where records are kept, see :class:`chilopod.trials.Store`; without one nothing is kept. Several processes that
+        Folder of the records, see :class:`chilopod.trials.Store`; without one nothing is kept. Several processes that
         are given the same one share the work: each walks what no other has begun, and waits for the others' at the end.
     progress
         Called with the part done (0 to 1) and a few words.
     executor
-        What walks the batches; by default what :func:`using` says, and without that all cores of this machine. The
-        records are the same to the bit.
+        Executor that walks the batches; by default what :func:`using` says, and without that all cores of this machine.
+        The records are the same to the bit.
 
     Returns
     -------

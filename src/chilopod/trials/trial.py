@@ -43,12 +43,12 @@ class Trial:
     joint_angles
         At the start, before disturbance, rad, (N-1,); empty for straight.
     target
-        Where the robot is to go, if anywhere: one target, or a course of them, which ends the walk.
+        Target of the robot, if any: one target, or a course of them, which ends the walk.
     controller
-        What steers it, if anything: any frozen dataclass with ``events`` and ``act``, whose fields are plain data. Its
+        Controller, if any: any frozen dataclass with ``events`` and ``act``, whose fields are plain data. Its
         fields, and everything that the code of its class can reach, are part of what the trial is.
     disturbance
-        How much differs from trial to trial.
+        Size of the differences from trial to trial.
     rate
         Samples per second.
     forces
@@ -58,7 +58,7 @@ class Trial:
     poses
         True if the record has the positions of all joints, to be drawn, which not every engine has.
     brief
-        Of a course: whether only what became of its targets is kept, not what happened over time.
+        True to keep only the outcomes of a course's targets, not its motion over time.
 
     Raises
     ------

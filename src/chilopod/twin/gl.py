@@ -56,9 +56,9 @@ class Found:
     backend
         ``egl``, ``osmesa``, ``glfw`` or ``cgl``; None if none works.
     renderer
-        What the driver calls itself.
+        Name of the driver.
     missing
-        What is wrong, in a few words; empty if nothing is.
+        Missing part, in a few words; empty if there is none.
     mend
         The one thing to do about it.
     """

@@ -44,7 +44,7 @@ def joint_angles(twin: Twin, ahead: ArrayLike, below: ArrayLike) -> Array:
     twin
         Lengths of the links.
     ahead, below
-        Where the foot's centre is relative to the hip, m.
+        Position of the foot's centre relative to the hip, m.
 
     Returns
     -------

@@ -33,7 +33,7 @@ class Scanner:
     Parameters
     ----------
     twin
-        Whose scanner it is.
+        Twin that carries the scanner.
     batch
         The robots, where they start.
     seeds
@@ -59,7 +59,7 @@ class Scanner:
             Poses of module 1 at the end of every interval from ``before`` on: place and quaternion, shape
             (len(ids), intervals, 7).
         ids
-            Which robots.
+            Numbers of the robots.
         """
         number = int(now / self._every + _SAME_INSTANT)
         while self._tick_of(number) > now:  # the same number, however time is cut
@@ -119,7 +119,7 @@ def scan(twin: Twin, batch: Batch, poses: Array, ids: NDArray[np.intp], noise: A
     poses
         Poses of module 1 of all robots at the time of the scan: place and quaternion, shape (robots, 7).
     ids
-        Which of them.
+        Numbers of the robots.
     noise
         Standard normal deviates, shape (len(ids), beams); None for a scanner without noise.
 

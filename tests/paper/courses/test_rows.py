@@ -1,17 +1,13 @@
 """What is said of courses, on made-up ones: nothing that the intervals do not decide."""
 
-import runpy
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from chilopod.paper.courses.rows import compared_rows, robust_rows
 from chilopod.paper.courses.summary import summaries, verdicts
 from chilopod.paper.table import NOT_PRINTED
+from helpers.made_up_courses import compared, conditions
 
-_MADE_UP = runpy.run_path(str(Path(__file__).with_name("made_up_courses.py")))
-compared, conditions = _MADE_UP["compared"], _MADE_UP["conditions"]
 OTHERS = ["first spring 15", "all springs 7", "leg-yaw", "actuated"]
 
 

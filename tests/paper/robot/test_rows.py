@@ -1,9 +1,7 @@
 """The robot's table, on made-up findings: what the paper prints is within, and what is not lies outside."""
 
 import dataclasses
-import runpy
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,10 +16,7 @@ from chilopod.paper.robot.turning_rows import turning_rows
 from chilopod.paper.robot.walks import SPRINGS, VARIANT_SPRINGS
 from chilopod.paper.table import Kind, robot_rows
 from chilopod.paper.turning.hopf import saturated
-
-MADE_UP = runpy.run_path(str(Path(__file__).with_name("made_up_robot.py")))
-series, walks, durations, AMPLITUDE = (MADE_UP[name] for name in ("series", "walks", "durations", "AMPLITUDE"))
-task, turning = MADE_UP["task"], MADE_UP["turning"]
+from helpers.made_up_robot import AMPLITUDE, durations, series, task, turning, walks
 
 SOFT, SLOW, PHASE = "k2-5 = 28 N*mm/deg", "stride 1.8 cm", "module phase 180 deg"
 

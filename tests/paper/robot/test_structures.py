@@ -5,9 +5,9 @@ import xarray as xr
 from chilopod import load_robot
 from chilopod.engine import engine_named
 from chilopod.paper.robot import structures
+from chilopod.paper.robot.figures import structures as robot_structures
 from chilopod.paper.robot.spread import LOWER
 from chilopod.paper.robot.structures import STRUCTURES
-from chilopod.report.figures import robot_structures
 from chilopod.tasks.identify.twin_constants import FREE, constants_of, parts_of
 
 ROBOT = load_robot("aoi2022")

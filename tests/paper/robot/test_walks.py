@@ -9,6 +9,8 @@ import xarray as xr
 from chilopod import load_robot
 from chilopod.paper import printed, statements
 from chilopod.paper.robot import walks as robot_walks
+from chilopod.paper.robot.figures import turning as turning_figures
+from chilopod.paper.robot.figures import walks as walk_figures
 from chilopod.paper.robot.rows import walk_rows
 from chilopod.paper.robot.turning import RobotTurning
 from chilopod.paper.robot.turning_rows import turning_rows
@@ -23,8 +25,6 @@ from chilopod.paper.robot.walks import (
 from chilopod.paper.table import Kind
 from chilopod.paper.turning.trials import turning_task, without_leg_yaw
 from chilopod.paper.walk_measures import onset, radius_at, spring_for
-from chilopod.report.figures import robot_turning as turning_figures
-from chilopod.report.figures import robot_walks as walk_figures
 from chilopod.steering import Target
 from chilopod.tasks.radius_law import is_curved
 from chilopod.trials import Disturbance

@@ -41,6 +41,30 @@ _OTHER_FIT = ("ground.friction=256.5 N*s/m", "legs.half_width=72.8 mm", "legs.fo
 _ACTUATOR = ("springs.rate=20 N*mm/deg/s", "springs.lag=0.5 s")
 
 
+@dataclass(frozen=True, eq=False)
+class Robust:
+    """What the variable spring owes to its law, and what it stands.
+
+    Attributes
+    ----------
+    steps
+        See :func:`ablated`.
+    conditions
+        See :func:`under`.
+    """
+
+    steps: xr.Dataset
+    conditions: xr.Dataset
+
+
+@dataclass(frozen=True, eq=False)
+class Whole:
+    """The same of the whole robot: strategies, see :func:`chilopod.paper.courses.study.compared`, and conditions."""
+
+    compared: xr.Dataset
+    conditions: xr.Dataset
+
+
 @dataclass(frozen=True)
 class Condition:
     """Something that is not as the law takes it to be.
@@ -54,7 +78,7 @@ class Condition:
     disturbance
         Besides what the course's seed draws.
     engine
-        Where it walks.
+        Engine of the walks.
     own_law
         True if the law is made for what ``changes`` say, and drives the robot as it is.
     only_variable
@@ -132,7 +156,7 @@ def under(
     spring
         The one for all, N*mm/deg.
     conditions
-        Whose engines have the same patience.
+        Conditions of walks whose engines have the same patience.
     seeds, size, folder, progress
         As for :func:`chilopod.paper.courses.study.driven`, whose dataset this is, but over (condition, strategy,
         course, goal).

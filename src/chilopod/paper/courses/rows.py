@@ -16,7 +16,8 @@ from chilopod.paper.courses.summary import (
     titled,
     verdicts,
 )
-from chilopod.paper.table import NOT_PRINTED, Row, listing
+from chilopod.paper.table import NOT_PRINTED, Row
+from chilopod.show.words import listing
 from chilopod.steering import VARIABLE
 
 _WHERE = "section Conclusion and discussion"

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import xarray as xr
 
+from chilopod.paper.courses.figures import courses as figures
+from chilopod.paper.courses.figures import robust as robust_figures
 from chilopod.paper.courses.film import film
 from chilopod.paper.courses.robust import (
     PLANAR_COURSES,
     WHOLE_COURSES,
+    Robust,
+    Whole,
     ablated,
     planar_conditions,
     under,
@@ -27,30 +29,6 @@ CHAPTER = "One target after another"
 # N*mm/deg: the best for all of a course by the search, in the planar model and in the twin; what was found counts
 # where there is something.
 _BEST, _WHOLE_BEST = 14.0, 24.0
-
-
-@dataclass(frozen=True, eq=False)
-class Robust:
-    """What the variable spring owes to its law, and what it stands.
-
-    Attributes
-    ----------
-    steps
-        See :func:`chilopod.paper.courses.robust.ablated`.
-    conditions
-        See :func:`chilopod.paper.courses.robust.under`.
-    """
-
-    steps: xr.Dataset
-    conditions: xr.Dataset
-
-
-@dataclass(frozen=True, eq=False)
-class Whole:
-    """The same of the whole robot: strategies, see :func:`chilopod.paper.courses.study.compared`, and conditions."""
-
-    compared: xr.Dataset
-    conditions: xr.Dataset
 
 
 def _compared(context: Context, found: Found, report: Progress) -> xr.Dataset:
@@ -94,6 +72,7 @@ COURSES: Section[xr.Dataset] = Section(
     "random courses: a spring set on the way beside what does without",
     _compared,
     lambda data, found: compared_rows(data),
+    lambda data, found: figures.panels(data),
     beyond=True,
 )
 ROBUST: Section[Robust] = Section(
@@ -102,6 +81,7 @@ ROBUST: Section[Robust] = Section(
     "random courses: what the law owes to its steps, and what it stands",
     _robust,
     lambda data, found: robust_rows(data.steps, data.conditions),
+    lambda data, found: [robust_figures.panel(data)],
     needs=(COURSES,),
     beyond=True,
 )
@@ -111,6 +91,7 @@ ROBOT_COURSES: Section[Whole] = Section(
     "random courses of the whole robot in 3-D",
     _whole,
     lambda data, found: [*compared_rows(data.compared), *condition_rows(data.conditions)],
+    lambda data, found: [figures.strategies(data.compared), robust_figures.whole(data.conditions)],
     beyond=True,
     full=True,
 )
@@ -119,6 +100,7 @@ COURSES_FILM: Section[list[Movie]] = Section(
     CHAPTER,
     "an eight with a spring set on the way and with one for all",
     _film,
+    films=lambda films: films,
     needs=(COURSES,),
     beyond=True,
 )

@@ -50,7 +50,7 @@ def wilson(successes: int, count: int) -> Interval:
     Parameters
     ----------
     successes, count
-        How many of how many independent trials.
+        Number of successes, and of independent trials.
     """
     if count == 0:
         return Interval(float("nan"), float("nan"), float("nan"))
@@ -83,8 +83,8 @@ def bootstrap_ratio(of: ArrayLike, to: ArrayLike, seed: int = 0) -> Interval:
     Parameters
     ----------
     of, to
-        Of independent groups, which are drawn anew as a whole, shape (groups,); groups in which both are 0 count for
-        nothing.
+        Sums of independent groups, which are drawn anew as a whole, shape (groups,); groups in which both are 0 count
+        for nothing.
     seed
         Seed of what is drawn.
     """

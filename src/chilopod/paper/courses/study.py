@@ -41,7 +41,7 @@ class Plan:
     others
         Others of those on which the best spring of a strategy is found.
     springs
-        That are tried, by strategy, N*mm/deg.
+        Springs that are tried, by strategy, N*mm/deg.
     """
 
     courses: range
@@ -69,7 +69,7 @@ class Case:
     Attributes
     ----------
     name
-        What it is called.
+        Name of the case.
     driver
         Robot and controller.
     disturbance
@@ -102,7 +102,7 @@ def driven(
     size
         Courses of the whole robot have one near target if this is tiny.
     folder
-        Where trials are kept.
+        Folder of the trials.
     progress
         Called with the part done (0 to 1) and a few words.
 
@@ -163,7 +163,7 @@ def compared(
     variable
         It with the spring that is set on the way.
     plan
-        How much.
+        Amount of trials.
     size, folder, progress
         As for :func:`driven`.
 

@@ -142,13 +142,13 @@ class Verdicts:
     Attributes
     ----------
     fewer, as_many, more
-        That reach fewer targets, that cannot be told apart, that reach more.
+        Numbers of groups that reach fewer targets, that cannot be told apart, and that reach more.
     slower, as_fast, faster
         In the time spent for every target that is reached.
     later, as_soon, sooner
         At targets that both reach.
     costlier
-        That do more work; of those that do any.
+        Number of groups that do more work, of those that do any.
     """
 
     fewer: Sequence[str]

@@ -98,7 +98,7 @@ def curved_study(
     robot
         The paper's, as the springs of the trials are spread about its critical one.
     folder
-        Where trials are kept.
+        Folder of the trials.
     size
         If not full, three trials at every spring and two of the variants, in place of the paper's 10 and 5; if tiny, at
         fewer springs.

@@ -77,10 +77,10 @@ def curved_trials(
     disturbance
         By default that of all studies.
     e_folds
-        How long a trial walks, in e-folds of the slowest motion about the straight walk, but 180 s at least and 1200 s
+        Duration of a trial, in e-folds of the slowest motion about the straight walk, but 180 s at least and 1200 s
         at most.
     folder
-        Where trials are kept, see :func:`chilopod.trials.run`.
+        Folder of the trials, see :func:`chilopod.trials.run`.
     progress
         Called as trials are done.
 
@@ -125,7 +125,7 @@ def off_branch(robot: Robot, trials: xr.Dataset, branch: xr.Dataset) -> xr.DataA
     Parameters
     ----------
     robot
-        That of trials and branch.
+        Robot of trials and branch.
     trials
         From :func:`curved_trials`; without spread of friction, which the branch does not have.
     branch
@@ -190,7 +190,7 @@ def variant_trials(
     repeats
         At every spring; of ``base`` the first so many.
     folder
-        Where trials are kept.
+        Folder of the trials.
     progress
         Called as trials are done.
 

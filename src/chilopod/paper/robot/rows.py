@@ -23,8 +23,9 @@ from chilopod.paper.scatter import (
     with_error,
 )
 from chilopod.paper.statements import listed
-from chilopod.paper.table import WITHIN, OfTwin, Statement, listing, of_twin
+from chilopod.paper.table import WITHIN, OfTwin, Statement, of_twin
 from chilopod.paper.walk_measures import onset_with_error, radius_at, shares
+from chilopod.show.words import listing
 from chilopod.tasks.radius_law import in_settled_curve
 
 PAPER_SPRING = printed.TASKS["A"].k_hat.value

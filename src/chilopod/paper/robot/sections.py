@@ -7,6 +7,10 @@ import xarray as xr
 from chilopod.analysis.parameters import stiffness
 from chilopod.paper.movies import Movie, robot_movies
 from chilopod.paper.robot import numerics, why
+from chilopod.paper.robot.figures import structures as structure_figures
+from chilopod.paper.robot.figures import turning as turning_figures
+from chilopod.paper.robot.figures import walks as walk_figures
+from chilopod.paper.robot.figures import why as why_figures
 from chilopod.paper.robot.rows import walk_rows
 from chilopod.paper.robot.spread import twin_spread
 from chilopod.paper.robot.structures import structures
@@ -27,6 +31,7 @@ WALKS: Section[RobotWalks] = Section(
     "the whole robot in 3-D: its walks",
     lambda context, found, report: robot_walks(context.whole, context.folder, context.size, report),
     lambda walks, found: walk_rows(walks),
+    lambda walks, found: walk_figures.panels(walks),
 )
 TASKS: Section[RobotTurning] = Section(
     "robot-turning",
@@ -34,7 +39,9 @@ TASKS: Section[RobotTurning] = Section(
     "the whole robot in 3-D: turning to targets",
     lambda context, found, report: robot_turning(context.whole, context.folder, context.size, report),
     lambda tasks, found: turning_rows(tasks, found[WALKS]),
+    lambda tasks, found: turning_figures.panels(tasks, found[WALKS]),
     needs=(WALKS,),
+    beside=(WALKS,),
 )
 FILMS: Section[list[Movie]] = Section(
     "robot-movies",
@@ -43,12 +50,14 @@ FILMS: Section[list[Movie]] = Section(
     lambda context, found, report: robot_movies(
         context.whole, _FILMED, _TRIED, context.folder, report, shorter=context.size.cut(1.0, 0.02)
     ),
+    films=lambda films: films,
 )
 SPREAD: Section[xr.Dataset] = Section(
     "robot-spread",
     CHAPTER,
     "the whole robot in 3-D: other constants that fit as well",
     lambda context, found, report: twin_spread(context.whole, context.folder, context.size, report),
+    panels=lambda data, found: [why_figures.spread(data, found.context.whole)],
     beyond=True,
     full=True,
 )
@@ -65,6 +74,7 @@ STRUCTURES: Section[xr.Dataset] = Section(
     CHAPTER,
     "the whole robot in 3-D: what else it could be made of",
     lambda context, found, report: structures(context.whole, context.folder, context.size, report),
+    panels=lambda data, found: [structure_figures.panel(data)],
     beyond=True,
     on_request=True,
 )
@@ -74,5 +84,6 @@ WHY: Section[xr.Dataset] = Section(
     "why the robot bends earlier than the planar model",
     lambda context, found, report: why.ablation(context.whole, context.robot, context.folder, context.size, report),
     lambda data, found: why.rows(data),
+    lambda data, found: [why_figures.why(data)],
     beyond=True,
 )

@@ -103,7 +103,7 @@ def robot_walks(
     robot
         With a twin.
     folder
-        Where trials are kept.
+        Folder of the trials.
     size
         If not full, two repeats of the base series, one of the variants and of uniform springs, with fewer springs.
     progress
@@ -168,7 +168,7 @@ def walk_records(
     disturbance
         By default that of all studies.
     folder
-        Where trials are kept.
+        Folder of the trials.
     progress
         Called as trials are done.
     """

@@ -155,7 +155,7 @@ def growth(
     springs
         Values of k1, N*mm/deg.
     folder
-        Where trials are kept.
+        Folder of the trials.
     duration
         Duration of the walks, s.
 
@@ -274,7 +274,7 @@ def ablation(
     robot
         With a twin.
     planar
-        What the planar limit takes feet and friction from.
+        Planar model from which the planar limit takes feet and friction.
     folder, progress
         As for :func:`chilopod.paper.robot.walks.robot_walks`.
     size

@@ -5,6 +5,7 @@ from __future__ import annotations
 from chilopod.analysis.parameters import stiffness
 from chilopod.paper.movies import Movie, movies
 from chilopod.paper.section import Context, Found, Section
+from chilopod.paper.turning.figures import turning as figures
 from chilopod.paper.turning.rows import rows
 from chilopod.paper.turning.study import Turning, turning
 from chilopod.progress import Progress
@@ -28,5 +29,8 @@ TURNING: Section[Turning] = Section(
     "turning to targets",
     lambda context, found, report: turning(context.robot, context.folder, context.size, report),
     lambda tasks, found: rows(tasks),
+    lambda tasks, found: figures.panels(tasks),
 )
-MOVIES: Section[list[Movie]] = Section("movies", CHAPTER, "the paper's two movies", _movies, needs=(TURNING,))
+MOVIES: Section[list[Movie]] = Section(
+    "movies", CHAPTER, "the paper's two movies", _movies, films=lambda films: films, needs=(TURNING,)
+)

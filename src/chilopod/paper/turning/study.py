@@ -93,7 +93,7 @@ def turning(
     robot
         The paper's numbers are those of ``aoi2022-planar``.
     folder
-        Where trials are kept; without one nothing is kept.
+        Folder of the trials; without one nothing is kept.
     size
         If not full, fewer springs and fewer, nearer targets.
     progress

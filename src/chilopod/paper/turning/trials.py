@@ -52,7 +52,7 @@ class TurningTask:
     Attributes
     ----------
     target
-        Where it is.
+        Place of the target.
     criteria
         Over (instant, spring, repeat): ``distance`` (m), ``angle`` (rad) and ``effort`` (rad^2 s), epsilon 1 to 3, at
         the ``seconds`` of the two instants "earliest arrival" and "paper" (:data:`DURATION`); means over repeats and
@@ -103,7 +103,7 @@ def turning_task(
     robot
         Its other springs stay.
     target
-        Where to go.
+        Target of the walks.
     springs
         N*mm/deg.
     repeats
@@ -111,18 +111,18 @@ def turning_task(
     strategy
         One of :data:`chilopod.steering.STRATEGIES`.
     time
-        When epsilon 1 to 3 are taken, s; by default the earliest arrival of any of these trials, as in the paper, and
-        ``duration`` if none arrives.
+        Time at which epsilon 1 to 3 are taken, s; by default the earliest arrival of any of these trials, as in the
+        paper, and ``duration`` if none arrives.
     duration
         Duration of every trial, s, at least the paper's.
     disturbance
-        How much differs from trial to trial; by default what all studies have.
+        Differences from trial to trial; by default what all studies have.
     shown
         Springs of ``paths``, N*mm/deg.
     engine
         One of :data:`chilopod.engine.ENGINES`.
     folder
-        Where records are kept, so that a study that was stopped goes on where it was.
+        Folder of the records, with which a stopped study is resumed.
     progress
         Called with the part done (0 to 1) and a few words.
     """

@@ -18,13 +18,13 @@ class CriticalMode:
     Attributes
     ----------
     k1
-        Where it is, N*mm/deg.
+        Critical spring, N*mm/deg.
     components
         Joint angles of the critical mode, front to rear, of unit norm and positive sum, shape (N-1,).
     k1_tolerance, component_tolerance
-        How far off each of them may be.
+        Tolerance of each of them.
     between
-        Where the point is looked for, N*mm/deg.
+        Interval in which the point is located, N*mm/deg.
     """
 
     k1: float
@@ -49,7 +49,7 @@ class BaseSeries:
     speeds
         Speeds of module 1 along its way (m/s) at some springs; none if they are not known.
     onset
-        Where curves set in, by a square-root fit to the bend of joint 1 at the springs of ``curved``.
+        Spring at which curves set in, by a square-root fit to the bend of joint 1 at the springs of ``curved``.
     law, shape
         Bends that evaluations begin near, roughly those of the data: all joints together
         ``law[0] * sqrt(1/k1 - law[1])`` rad, of which each joint has the share ``shape``, front to rear, (N-1,).

@@ -135,7 +135,7 @@ def identify_planar(
     robot
         Everything but the free constants; their values are only looked at for comparison.
     data
-        What is fitted.
+        Data that are fitted.
     points
         Points of the profile.
     variants

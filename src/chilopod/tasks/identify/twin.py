@@ -113,7 +113,7 @@ class TwinIdentification(Short):
     given
         The robot, for what is not fitted.
     data
-        What was fitted.
+        Data that were fitted.
     fits
         All evaluations; first the best of those that walk into the curve from straight on, then by their objective.
     """
@@ -202,17 +202,17 @@ def search(
     Parameters
     ----------
     robot
-        What is not fitted.
+        Robot with the constants that are not fitted.
     data
-        What the robot's walks came to.
+        Data of the robot's walks.
     starts
-        How many, spread over the ranges of the constants.
+        Number of starts, spread over the ranges of the constants.
     generations
         Generations of ten evaluations each, from every start.
     seed
         Seed of starts and evolution.
     folder
-        Where evaluations are kept; a search that was stopped goes on where it was, because it asks for the same ones.
+        Folder of the evaluations; a stopped search is resumed, because it asks for the same ones.
     progress
         Called as evaluations are done.
 
@@ -267,7 +267,7 @@ def damped_step(law: Array, off: Array, moved: Array | float = 0.0) -> Array:
     off
         Residuals, (residuals,).
     moved
-        How far the constants are from where they belong, (constants,).
+        Distances of the constants from their ranges, shape (constants,).
     """
     normal = law.T @ law + np.eye(len(FREE)) / _PRIOR**2
     return np.asarray(-np.linalg.solve(normal, law.T @ off + moved / _PRIOR**2), dtype=np.float64)

@@ -1,0 +1,200 @@
+"""Courses: how many targets strategies reach, how soon, at what cost, and where targets are missed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from chilopod.paper.courses.rows import percent, said
+from chilopod.paper.courses.statistics import Interval
+from chilopod.paper.courses.summary import Summary, summaries, verdicts
+from chilopod.show import style
+from chilopod.show.panel import Panel
+from chilopod.show.words import listing, number, spring
+from chilopod.steering import STRATEGIES, VARIABLE
+
+Array = NDArray[np.float64]
+
+_STRATEGIES = (style.Layout("ABC", 3.4, widths=(1.2, 1.0, 1.0)), style.Layout("A;B;C", 8.6))
+_WHERE = (style.Layout("AB", 3.9), style.Layout("A;B", 7.4))
+_TITLES = {
+    VARIABLE.name: "k₁ set on the way",
+    "pitchfork": "one k₁",
+    "hopf": "springs alike",
+    "leg-yaw": "leg yaw alone",
+    "actuated": "torques at joints",
+}
+_BEARINGS = np.linspace(-75.0, 75.0, 11)  # deg
+_AWAY = np.linspace(0.8, 2.0, 7)  # m
+_FEWEST = 0.1  # of the targets of a field that are missed where the map's text speaks of it
+
+
+def panels(data: xr.Dataset) -> Iterator[Panel]:
+    """All figures of the planar comparison."""
+    yield strategies(data)
+    yield where(data)
+
+
+def strategies(data: xr.Dataset) -> Panel:
+    """Shares of targets and courses, time and work of every strategy."""
+    found, planar = summaries(data), data.attrs["engine"] == "planar"
+    ours = found[VARIABLE.name]
+    walks = f"{data.sizes['course']} random courses of {data.sizes['goal']} targets"
+    return Panel(
+        name="courses" if planar else "robot-courses",
+        title="One target after another" + ("" if planar else ": the robot in three dimensions"),
+        draw=lambda narrow: _draw(found, narrow),
+        alt=f"A: shares of targets and of whole courses that each strategy reaches. B: time for a target that is "
+        f"reached. C: work of the actuators. The spring that is set on the way reaches {percent(ours.targets)} of "
+        "targets.",
+        text=(
+            f"{walks}, the same for all strategies, each within {data.attrs['patience_s']:g}\u00a0s a target and seen "
+            "only within the scanner's view. The first spring is set once in every gait cycle by the spring law; "
+            f"beside it stand the best spring for all of a course ({spring(found['pitchfork'].spring, 2)}), the best "
+            f"for all joints alike ({spring(found['hopf'].spring, 2)}), both found on other courses, leg yaw with the "
+            "robot as it is, and a body axis bent by torques at all joints. Bars are intervals of 95 %. B has the time "
+            "spent on targets that are reached, and on all of them for every one that is reached.",
+            f"The spring that is set on the way reaches {percent(ours.targets)} of targets and "
+            f"{percent(ours.courses)} of courses. It {said(verdicts(found))}.",
+        ),
+        data=data,
+    )
+
+
+def _draw(found: dict[str, Summary], narrow: bool) -> Figure:
+    figure, axes = style.figure(*_STRATEGIES, narrow)
+    each = list(found.values())
+    rows = np.arange(len(each), dtype=np.float64)
+    titles = [_TITLES[one.name] + ("" if np.isnan(one.spring) else f" = {one.spring:g}") for one in each]
+    intervals(axes["A"], [one.targets for one in each], rows - 0.12, style.BLUE, "o", "targets", 100.0)
+    intervals(axes["A"], [one.courses for one in each], rows + 0.12, style.ORANGE, "s", "whole courses", 100.0)
+    axes["A"].set(xlim=(-3.0, 103.0), xlabel="reached (%)", title="A  Reached")
+    axes["A"].legend(loc="best")
+    intervals(axes["B"], [one.seconds for one in each], rows - 0.12, style.BLUE, "o", "on it")
+    intervals(axes["B"], [one.spent for one in each], rows + 0.12, style.ORANGE, "s", "on it and those missed")
+    axes["B"].set(xlabel="time for a target reached (s)", title="B  Time")
+    axes["B"].legend(loc="upper right")
+    left = np.zeros(len(each))
+    for values, color, name in (
+        ([one.spring_work for one in each], style.BLUE, "springs"),
+        ([one.drive_work for one in each], style.ORANGE, "joints"),
+    ):
+        axes["C"].barh(rows, values, 0.5, left=left, color=color, label=name)
+        left += np.array(values)
+    axes["C"].set(xlabel="work a course (J)", title="C  Work of the actuators")
+    axes["C"].legend(loc="best")
+    for letter, one in axes.items():
+        one.set_yticks(rows, titles if narrow or letter == "A" else [""] * len(rows))
+        one.set_ylim(len(rows) - 0.5, -0.5)
+        if letter != "A":
+            one.set_xlim(left=0.0)
+        style.grid(one, "x")
+    return figure
+
+
+def intervals(
+    axes: Axes,
+    found: Sequence[Interval],
+    rows: Array,
+    color: str,
+    marker: str,
+    label: str = "",
+    scale: float = 1.0,
+    alpha: float = 1.0,
+) -> None:
+    """Values with their intervals, a row each."""
+    value, low, high = (scale * np.array([getattr(each, name) for each in found]) for name in ("value", "low", "high"))
+    axes.errorbar(
+        value,
+        rows,
+        xerr=np.maximum(0.0, np.array([value - low, high - value])),
+        fmt=marker,
+        color=color,
+        markersize=5,
+        elinewidth=1.4,
+        capsize=2.5,
+        label=label or None,
+        alpha=alpha,
+    )
+
+
+def where(data: xr.Dataset) -> Panel:
+    """Where targets are missed, by the variable spring and by the best spring for all of a course."""
+    shown = (VARIABLE.name, STRATEGIES["pitchfork"].name)
+    maps = {name: share_map(data.sel(case=name)) for name in shown}
+    ours, fixed = (maps[name] for name in shown)
+    missed = _missed(ours)
+    return Panel(
+        name="courses-where",
+        title="Where targets are missed",
+        draw=lambda narrow: _draw_where(maps, narrow),
+        alt="Maps of the share of targets that are reached over angle and distance at which they are put up: with the "
+        "spring that is set on the way, and with one spring for all.",
+        text=(
+            "Targets by the angle and distance at which they are put up. One spring for all of a course is that of one "
+            f"circle: fields of its map range from {_percent(np.nanmin(fixed))} to {_percent(np.nanmax(fixed))}. With "
+            f"the spring that is set on the way the lowest has {_percent(np.nanmin(ours))}; "
+            + (
+                f"more than {_percent(_FEWEST)} are missed {missed}."
+                if missed
+                else f"none misses more than {_percent(_FEWEST)}."
+            ),
+        ),
+        data=xr.Dataset(
+            {
+                "reached": (
+                    ("strategy", "away", "bearing"),
+                    np.stack(list(maps.values())),
+                    {"units": "1"},
+                )
+            },
+            coords={
+                "strategy": list(shown),
+                "away": ("away", 0.5 * (_AWAY[1:] + _AWAY[:-1]), {"units": "m"}),
+                "bearing": ("bearing", 0.5 * (_BEARINGS[1:] + _BEARINGS[:-1]), {"units": "deg"}),
+            },
+        ),
+    )
+
+
+def share_map(one: xr.Dataset) -> Array:
+    """Share of targets that were reached, over distance and bearing; NaN where none was put up."""
+    at = np.rad2deg(one.bearing.values).ravel(), one.away.values.ravel()
+    reached = one.arrived.transpose("course", "goal").values.ravel()
+    all_, *_ = np.histogram2d(at[1], at[0], (_AWAY, _BEARINGS))
+    those, *_ = np.histogram2d(at[1], at[0], (_AWAY, _BEARINGS), weights=reached)
+    return np.asarray(np.where(all_ > 0, those / np.maximum(all_, 1), np.nan))
+
+
+def _missed(share: Array) -> str:
+    """Fields of a map where many are missed, in words."""
+    fields = [
+        f"at {abs(_BEARINGS[column]):.0f}° to {abs(_BEARINGS[column + 1]):.0f}° to the "
+        f"{'left' if _BEARINGS[column] >= 0.0 else 'right'} and {_AWAY[row]:.1f} to {_AWAY[row + 1]:.1f}\u00a0m"
+        for row, column in np.argwhere(share < 1.0 - _FEWEST)
+    ]
+    return listing(fields[:4]) + (" and elsewhere" if len(fields) > 4 else "")
+
+
+def _percent(share: float) -> str:
+    return f"{number(100.0 * share, 3)}\u00a0%" if share < 1.0 else "100\u00a0%"
+
+
+def _draw_where(maps: dict[str, Array], narrow: bool) -> Figure:
+    figure, axes = style.figure(*_WHERE, narrow)
+    for letter, (name, share) in zip("AB", maps.items(), strict=True):
+        mesh = axes[letter].pcolormesh(_BEARINGS, _AWAY, 100.0 * share, vmin=0.0, vmax=100.0, cmap="viridis")
+        axes[letter].set(
+            xlabel="angle of the target (deg)",
+            ylabel="distance (m)",
+            title=f"{letter}  {_TITLES[name]}",
+        )
+        axes[letter].set_xticks([-75, -45, -15, 15, 45, 75])
+        axes[letter].invert_xaxis()  # left is left
+    figure.colorbar(mesh, ax=list(axes.values()), label="targets reached (%)", shrink=0.8)
+    return figure

@@ -1,0 +1,273 @@
+"""The page: everything in one HTML file that needs nothing else."""
+
+from __future__ import annotations
+
+import platform
+from base64 import b64encode
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from enum import Enum
+from importlib.metadata import version
+from importlib.resources import files
+from typing import Any, Final
+
+import xarray as xr
+from jinja2 import Environment, StrictUndefined
+from markupsafe import Markup
+
+from chilopod import units
+from chilopod.errors import in_words
+from chilopod.paper.page.story import facts, summary
+from chilopod.paper.section import Found, Section
+from chilopod.paper.straight.sections import MODE
+from chilopod.paper.table import AGREES, NOT_COMPUTED, NOT_PRINTED, WITHIN, RobotRow, Row
+from chilopod.robot import Robot
+from chilopod.show.panel import Panel
+from chilopod.show.words import listing, minus, typeset
+
+_TITLE: Final = "A robot that turns by bifurcation: the paper and the computation"
+_MARKS: Final = {True: ("agrees", "✓"), False: ("differs", "≠"), None: ("undecided", "?")}
+_LOOKS: Final = {
+    **{words[answer]: mark for words in (AGREES, WITHIN) for answer, mark in _MARKS.items()},
+    **dict.fromkeys((NOT_PRINTED, NOT_COMPUTED), ("open", "–")),
+}
+"""Of verdicts: class and mark."""
+
+_RELOAD: Final = 10  # s
+_LIBRARIES: Final = ("numpy", "numba", "scipy", "xarray", "matplotlib")
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A figure in both layouts, as SVG."""
+
+    panel: Panel
+    wide: bytes
+    narrow: bytes
+
+
+@dataclass(frozen=True)
+class Film:
+    """A film beside the page.
+
+    Attributes
+    ----------
+    name
+        Name of its files.
+    title
+        Title of the film.
+    speed
+        Seconds of the walk per second of the film.
+    encoded
+        True if there is an mp4 beside the replay.
+    pictured
+        True if there is a png with moments of it.
+    """
+
+    name: str
+    title: str
+    speed: float
+    encoded: bool
+    pictured: bool = False
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What is drawn of a section."""
+
+    section: Section[Any]
+    figures: Sequence[Drawn]
+    films: Sequence[Film]
+
+
+class State(Enum):
+    """Whether a report is still being computed, is complete, or was stopped before it was."""
+
+    RUNNING = "running"
+    DONE = "done"
+    STOPPED = "stopped"
+
+
+def page(
+    found: Found,
+    sections: Sequence[Section[Any]],
+    opening: Sequence[Drawn],
+    shown: Sequence[Shown],
+    failures: Mapping[Section[Any], Exception],
+    waiting: Collection[Section[Any]],
+    robot_file: str,
+    state: State = State.DONE,
+) -> str:
+    """The page as HTML.
+
+    Parameters
+    ----------
+    found
+        Results computed so far.
+    sections
+        Sections that are shown in the end, in the order they are computed.
+    opening
+        Figures of the robot itself, at the beginning of the first chapter.
+    shown
+        Figures and films drawn so far, in the order they stand within its chapter; figures with a letter come first, in
+        the order of their letters.
+    failures
+        Errors of sections that could not be computed or drawn.
+    waiting
+        Sections that are still to be computed or drawn.
+    robot_file
+        Name of this robot on the command line: a preset, or the path of a file.
+    state
+        While it is running, the page reloads itself.
+    """
+    folder = files("chilopod.paper.page")
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    template = environment.from_string(folder.joinpath("page.html.j2").read_text(encoding="utf-8"))
+    return template.render(
+        title=_TITLE,
+        holds=" ".join([found.context.size.name, *(section.name for section in found.values)]),
+        css=Markup(folder.joinpath("page.css").read_text(encoding="utf-8")),
+        state=state.value,
+        reload=_RELOAD,
+        done=sum(section in found for section in sections),
+        count=len(sections),
+        summary=summary(found),
+        facts=facts(found),
+        first=_first([film for each in shown for film in each.films]),
+        tables=_tables(found),
+        robot_rows=[_row(row) for row in found.robot_rows()],
+        chapters=_chapters(sections, opening, shown, failures, waiting),
+        commands=commands(robot_file, found[MODE]),
+        robots=_robots(found),
+        versions=listing(
+            [f"chilopod {version('chilopod')}", f"Python {platform.python_version()}"]
+            + [f"{name} {version(name)}" for name in _LIBRARIES]
+        ),
+        seconds=", ".join(f"{section.sentence} {value:.1f}" for section, value in found.seconds.items()),
+    )
+
+
+def _first(films: Sequence[Film]) -> Film | None:
+    """The film that the page begins with: of the robot in three dimensions, if there is one."""
+    return next(
+        (film for film in reversed(films) if film.pictured), next((film for film in films if film.encoded), None)
+    )
+
+
+def commands(robot: str, mode: xr.Dataset | None) -> list[dict[str, str]]:
+    """Commands that lead on from here."""
+    soft = 10.0 if mode is None else float(f"{0.8 * mode.attrs['value']:.2g}")
+    quoted = f'"{robot}"' if " " in robot else robot
+    both = '--between "2 N*mm/deg" "75 N*mm/deg"'
+    return [
+        {
+            "why": "See every exponent and its mode just below the critical spring.",
+            "line": f'chilopod stability {quoted} --set "springs.stiffness[0]={soft:g} N*mm/deg"',
+        },
+        {
+            "why": "Find every bifurcation of the front spring, with error bounds and verdicts, as JSON.",
+            "line": f'chilopod bifurcation {quoted} --parameter "springs.stiffness[0]" {both} --json',
+        },
+        {
+            "why": "The same with all springs softened together, at a longer stride.",
+            "line": f'chilopod bifurcation {quoted} --set "gait.stride=4 cm" --parameter springs.stiffness {both}',
+        },
+        {
+            "why": "Follow the curved walks: how tightly they turn, and at what cost.",
+            "line": f"chilopod branch {quoted} --out curved",
+        },
+        {
+            "why": "Send the robot to a target of your choice, and watch it go in a browser.",
+            "line": f'chilopod turn {quoted} --target "30 deg, 2 m" --out turn',
+        },
+        {
+            "why": "Let the whole robot walk in three dimensions, and see it in a browser.",
+            "line": 'chilopod turn aoi2022 --engine twin --target "45 deg, 1.3 m" --k1 "21 N*mm/deg" --out turn-3d',
+        },
+        {
+            "why": "Take the whole robot into another simulator.",
+            "line": "chilopod robot export aoi2022 --out aoi2022.xml",
+        },
+        {
+            "why": "Fit the constants that the paper does not print once more, on their own.",
+            "line": "chilopod identify planar",
+        },
+        {
+            "why": "Describe a robot of your own, and ask the same of it.",
+            "line": "chilopod robot new my-robot.toml\nchilopod stability my-robot.toml",
+        },
+    ]
+
+
+def _tables(found: Found) -> list[dict[str, Any]]:
+    """The table paper | computed, one part a chapter."""
+    parts = found.planar_rows()
+    return [{"title": chapter, "rows": [_row(row) for row in rows]} for chapter, rows in parts.items()]
+
+
+def _chapters(
+    sections: Sequence[Section[Any]],
+    opening: Sequence[Drawn],
+    shown: Sequence[Shown],
+    failures: Mapping[Section[Any], Exception],
+    waiting: Collection[Section[Any]],
+) -> list[dict[str, Any]]:
+    chapters: list[dict[str, Any]] = []
+    for number, title in enumerate(dict.fromkeys(section.chapter for section in sections), 1):
+        here = [each for each in shown if each.section.chapter == title]
+        figures = [drawn for each in here for drawn in each.figures]
+        planned = [section for section in sections if section.chapter == title]
+        chapters.append(
+            {
+                "title": title,
+                "anchor": f"chapter-{number}",
+                "figures": [_figure(drawn) for drawn in sorted(figures, key=lambda drawn: drawn.panel.letter)],
+                "films": [film for each in here for film in each.films],
+                "coming": [each.sentence for each in planned if each in waiting],
+                "failed": {each.sentence: in_words(failures[each]) for each in planned if each in failures},
+            }
+        )
+    for first in chapters[:1]:
+        first["figures"][:0] = [_figure(drawn) for drawn in opening]
+    return chapters
+
+
+def _row(row: Row | RobotRow) -> dict[str, str]:
+    look, mark = _LOOKS[row.verdict]
+    return {**{name: typeset(text) for name, text in asdict(row).items()}, "look": look, "mark": mark}
+
+
+def _figure(drawn: Drawn) -> dict[str, Any]:
+    panel = drawn.panel
+    return {
+        "name": panel.name,
+        "letter": panel.letter,
+        "title": panel.title,
+        "alt": panel.alt,
+        "text": [paragraph for paragraph in panel.text if paragraph],
+        "wide": _embedded(drawn.wide),
+        "narrow": _embedded(drawn.narrow),
+    }
+
+
+def _embedded(svg: bytes) -> str:
+    return "data:image/svg+xml;base64," + b64encode(svg).decode("ascii")
+
+
+def _robots(results: Found) -> list[dict[str, Any]]:
+    """The robots of the report, with the files their numbers stand in."""
+    found = [("The robot of the planar model", results.context.robot, "robot.toml")]
+    if any(row.twin for row in results.robot_rows()):
+        found.append(("The robot in three dimensions", results.context.whole, "robot-3d.toml"))
+    return [{"says": says, "name": robot.name, "file": file, "numbers": _numbers(robot)} for says, robot, file in found]
+
+
+def _numbers(robot: Robot) -> list[dict[str, str]]:
+    return [
+        {
+            "path": path,
+            "value": minus(units.format(robot.get(path), robot.unit_of(path), digits=6)).replace("*", "·"),
+            "origin": robot.provenance_of(path) or "not said",
+        }
+        for path in robot.parameters()
+    ]

@@ -1,0 +1,198 @@
+"""The page of a report, which is there at once and fills in as sections are computed."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Collection, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any, TypeVar
+
+from chilopod.errors import OutputError
+from chilopod.output import check_folder, write_atomic
+from chilopod.paper.movies import Movie
+from chilopod.paper.page.movie import write_movie
+from chilopod.paper.page.page import Drawn, Shown, State, page
+from chilopod.paper.section import Context, Found, Section
+from chilopod.paper.sections import Progress
+from chilopod.robot import Robot, load_robot, presets
+from chilopod.show import style
+from chilopod.show.figures import schematic
+from chilopod.show.files import panel_files
+from chilopod.show.panel import Panel
+
+T = TypeVar("T")
+
+
+class Report:
+    """A page that opens from disk and shows all figures without any other file, whole at any time.
+
+    Beside ``index.html`` there are ``figures/NAME.png`` and ``.svg``, ``data/NAME.csv`` and ``.nc`` for every figure,
+    ``movies/NAME.mp4`` and ``.html``, and ``data/robot.toml`` and ``robot-3d.toml``. Files of these names are replaced,
+    each as a whole. Where films cannot be encoded, the replays are there without them.
+
+    Used as a context: the page is there as soon as it is entered, and complete when it is left. What is drawn is drawn
+    in a thread beside the computation of what comes next.
+
+    Parameters
+    ----------
+    sections
+        Sections that are shown.
+    context
+        Robots, size and folder of the computation.
+    folder
+        Created where there is none.
+    progress
+        Told how much is drawn.
+
+    Raises
+    ------
+    OutputError
+        If the folder cannot be written.
+    """
+
+    def __init__(
+        self,
+        sections: Sequence[Section[Any]],
+        context: Context,
+        folder: str | Path,
+        progress: Progress = lambda what, done, words: None,
+    ) -> None:
+        self.page = check_folder(folder) / "index.html"
+        self.failures: dict[Section[Any], Exception] = {}
+        """Why sections could not be computed or drawn."""
+        self._sections, self._progress = sections, progress
+        self._found = Found(context)
+        self._opening: list[Drawn] = []
+        self._shown: dict[Section[Any], Shown] = {}
+        self._films: deque[tuple[Section[Any], Movie]] = deque()
+        self._added = self._drawn = 0
+        self._stopped = False
+        self._thread = ThreadPoolExecutor(1, "drawing")
+
+    def __enter__(self) -> Report:
+        self._write(State.RUNNING)
+        self._opened = self._thread.submit(self._open)
+        return self
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        self._stopped = error is not None
+        self._thread.shutdown(cancel_futures=self._stopped)
+        if error is None:
+            self._progress("figures and films", 1.0, "done")
+            self._write(State.DONE)
+            self._opened.result()
+        else:
+            with suppress(OutputError):
+                self._write(State.STOPPED)
+
+    def add(self, found: Found, sections: Collection[Section[Any]]) -> None:
+        """Show sections that were computed, or that failed; returns at once."""
+        self._added += 1
+        self._thread.submit(self._add, found.copy(), sections)
+
+    def _open(self) -> None:
+        """Draw the robot, which needs nothing computed."""
+        panel = schematic.panel(self._found.context.robot)
+        self._opening = [_again(partial(self._draw_panel, panel))]
+        self._write_if_possible()
+
+    def _add(self, found: Found, sections: Collection[Section[Any]]) -> None:
+        self._found = found
+        self.failures |= found.failures
+        self._write_if_possible()
+        for section in self._sections:
+            new = section in sections
+            if section in found.values and (new or any(each in sections for each in section.beside)):
+                self._try(section, partial(self._draw, section, found, new))
+        self._drawn += 1
+        self._write_if_possible()
+        self._progress("figures and films", self._drawn / (len(self._sections) + 1), "")
+        # Films take long, and wait while there is anything else to draw.
+        while self._films and self._added == self._drawn and not self._stopped:
+            section, movie = self._films[0]
+            self._try(section, partial(self._film, section, movie))
+            self._films.popleft()
+            self._write_if_possible()
+
+    def _try(self, section: Section[Any], draw: Callable[[], Shown]) -> None:
+        try:
+            self._shown[section] = _again(draw)
+        except Exception as error:
+            self.failures[section] = error
+
+    def _draw(self, section: Section[Any], found: Found, new: bool) -> Shown:
+        value = found[section]
+        panels = section.panels(value, found.seen_by(section.beside))
+        figures = tuple(self._draw_panel(panel) for panel in panels)
+        if not new and section in self._shown:
+            return replace(self._shown[section], figures=figures)
+        self._films += ((section, movie) for movie in section.films(value))
+        return Shown(section, figures, ())
+
+    def _film(self, section: Section[Any], movie: Movie) -> Shown:
+        film, shown = write_movie(movie, self.page.parent / "movies"), self._shown[section]
+        return replace(shown, films=(*shown.films, film))
+
+    def _draw_panel(self, panel: Panel) -> Drawn:
+        folder = self.page.parent
+        files = dict(panel_files(panel, folder / "figures", folder / "data"))
+        for path, content in files.items():
+            write_atomic(path, content)
+        with style.house_style():
+            narrow = style.svg(panel.draw(True), panel.name)
+        return Drawn(panel, files[folder / "figures" / f"{panel.name}.svg"], narrow)
+
+    def _write_if_possible(self) -> None:
+        # Whoever deletes files while it runs does not stop it; whether the page can be written counts at the end.
+        with suppress(OutputError):
+            self._write(State.RUNNING)
+
+    def _write(self, state: State) -> None:
+        context, data = self._found.context, self.page.parent / "data"
+        robot_file = data / "robot.toml"
+        name = context.robot.name if _is_preset(context.robot) else str(robot_file)
+        shown = [self._shown[each] for each in self._sections if each in self._shown]
+        waiting = [section for section in self._sections if section not in self._found]
+        waiting += [section for section, _ in self._films]
+        html = page(self._found, self._sections, self._opening, shown, self.failures, waiting, name, state)
+        write_atomic(self.page, html)  # first: what is beside it is known by it to be ours
+        write_atomic(robot_file, context.robot.to_toml())
+        write_atomic(data / "robot-3d.toml", context.whole.to_toml())
+
+
+def write_report(found: Found, folder: str | Path) -> Path:
+    """Draw all that was found and write its page, see :class:`Report`.
+
+    Returns
+    -------
+    Path
+        Path of the page.
+
+    Raises
+    ------
+    OutputError
+        If the folder cannot be written.
+    """
+    sections = [*found.values, *found.failures]
+    with Report(sections, found.context, folder) as report:
+        report.add(found, sections)
+    for section, error in report.failures.items():
+        if section not in found.failures:
+            raise error
+    return report.page
+
+
+def _again(draw: Callable[[], T]) -> T:
+    """Draw, and once more if somebody deleted the folder meanwhile."""
+    try:
+        return draw()
+    except OutputError:
+        return draw()
+
+
+def _is_preset(robot: Robot) -> bool:
+    return robot.name in presets() and load_robot(robot.name) == robot

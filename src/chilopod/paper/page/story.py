@@ -1,0 +1,111 @@
+"""What a page tells first: what was found in a few sentences, and the numbers that matter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from chilopod.paper import printed, statements
+from chilopod.paper.section import Found
+from chilopod.paper.straight.sections import MODE, UNIFORM
+from chilopod.paper.table import AGREES, NOT_COMPUTED, WITHIN, Kind
+from chilopod.paper.turning.sections import TURNING
+from chilopod.paper.turning.trials import outcome_words, span
+from chilopod.show.words import SPRING_UNIT, listing, spring, typeset
+
+_MOST_LISTED: Final = 4
+_TOLD: Final = {
+    statements.ONSET: "front spring at which the robot begins to curve, in three dimensions",
+    statements.RADII[21.0]: "radius of its walk with a front spring of 21 N*mm/deg",
+    statements.ARRIVAL: "earliest arrival at the target of task A",
+}
+"""What is told of the twin at the top of the page."""
+
+
+@dataclass(frozen=True)
+class Fact:
+    """A number that matters.
+
+    Attributes
+    ----------
+    value
+        Value that is computed here.
+    about
+        Description of the value.
+    paper
+        Value that the paper prints; empty if there is no counterpart.
+    """
+
+    value: str
+    about: str
+    paper: str = ""
+
+
+def facts(found: Found) -> list[Fact]:
+    """The numbers that matter, of what was computed."""
+    told, mode = [], found[MODE]
+    if mode is not None:
+        about = "front spring at which the straight walk gives way, in the planar model"
+        told.append(Fact(spring(mode.attrs["value"], 5), about, typeset(str(printed.CRITICAL_K1))))
+    rows = {row.quantity: row for row in found.robot_rows() if row.verdict != NOT_COMPUTED}
+    for statement, about in _TOLD.items():
+        if row := rows.get(statement.quantity):
+            told.append(Fact(typeset(row.twin), typeset(about), typeset(row.robot)))
+    if predicted := _predictions(found):
+        about = "statements about the robot met by its twin that it was not fitted to"
+        told.append(Fact(f"{predicted.count(WITHIN[True])} of {len(predicted)}", about))
+    return told
+
+
+def _predictions(found: Found) -> list[str]:
+    """The verdicts on what the twin was not fitted to."""
+    rows = [row for row in found.robot_rows() if row.verdict != NOT_COMPUTED]
+    return [row.verdict for row in rows if row.kind == Kind.PREDICTED.value]
+
+
+def summary(results: Found) -> str:
+    """What was found, in a few plain sentences."""
+    parts, mode, uniform, turning = [], results[MODE], results[UNIFORM], results[TURNING]
+    modules = results.context.robot.body.modules
+    parts.append(
+        f"A {modules}-module robot walks straight as long as the springs between its modules are "
+        "stiff enough. Below a critical stiffness the straight walk cannot hold, and the body bends by itself."
+    )
+    if mode is not None:
+        found = mode.attrs
+        parts.append(
+            f"Softening the front spring alone, that happens at {spring(found['value'], 5)}: a {found['criticality']} "
+            f"{found['kind']}, and the robot turns left or right."
+        )
+    if uniform is not None:
+        found = uniform.attrs
+        parts.append(
+            f"Softening all springs together, it happens at {spring(found['value'], 5)} and the body undulates, once "
+            f"in {found['oscillation_period_s']:.1f} s."
+        )
+    if turning is not None:
+        task = turning.tasks["A"]
+        parts.append(
+            f"Sent to a target at {task.target}, it comes nearest with a front spring of {spring(task.best, 3)}; most "
+            f"walks have {outcome_words(task.criteria, span)}\u00a0{SPRING_UNIT}."
+        )
+    if predicted := _predictions(results):
+        open_ = predicted.count(WITHIN[None])
+        left = f"; {open_} more {'is' if open_ == 1 else 'are'} left open by the scatter of its trials" if open_ else ""
+        parts.append(
+            "The same robot in three dimensions, its unknown constants fitted to the paper's base series of walks and "
+            f"their speed alone, meets {predicted.count(WITHIN[True])} of {len(predicted)} further statements about "
+            f"the robot that it was not fitted to{left}."
+        )
+    rows = [row for part in results.planar_rows().values() for row in part]
+    counted = {word: sum(row.verdict == word for row in rows) for word in AGREES.values()}
+    if compared := sum(counted.values()):
+        differing = [typeset(row.quantity) for row in rows if row.verdict == AGREES[False]]
+        said = [f"{counted['agrees']} agree"]
+        if counted["undecided"]:
+            said.append(f"{counted['undecided']} are left open by the scatter of the trials")
+        if differing:
+            listed = f": {listing(differing)}" if len(differing) <= _MOST_LISTED else ""
+            said.append(f"{len(differing)} differ{listed}. The reasons are given below")
+        parts.append(f"Of {compared} statements of the paper about its planar model, {listing(said)}.")
+    return " ".join(parts)

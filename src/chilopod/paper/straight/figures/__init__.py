@@ -1,0 +1,1 @@
+"""Figures of the straight walk and where it bends."""

@@ -1,0 +1,1 @@
+"""Figures of turning to a target."""

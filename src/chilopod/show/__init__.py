@@ -1,0 +1,47 @@
+"""Pictures, films and replays of walks, branches and courses of any robot; computes nothing, knows no paper."""
+
+import logging
+from typing import TYPE_CHECKING
+
+from chilopod.lazy import exports
+
+# matplotlib reports a cache folder that it cannot write in three lines, and goes on.
+logging.getLogger("matplotlib").setLevel(logging.ERROR)
+
+if TYPE_CHECKING:
+    from chilopod.show.files import (
+        files_of,
+        identification_files,
+        write_branch,
+        write_identification,
+        write_undulation,
+    )
+    from chilopod.show.scene.played import Replay, replay
+    from chilopod.show.walked import files_of_walks, write_walks
+else:
+    __getattr__, __dir__ = exports(
+        __name__,
+        {
+            "files": (
+                "files_of",
+                "identification_files",
+                "write_branch",
+                "write_identification",
+                "write_undulation",
+            ),
+            "scene.played": ("Replay", "replay"),
+            "walked": ("files_of_walks", "write_walks"),
+        },
+    )
+
+__all__ = [
+    "Replay",
+    "files_of",
+    "files_of_walks",
+    "identification_files",
+    "replay",
+    "write_branch",
+    "write_identification",
+    "write_undulation",
+    "write_walks",
+]

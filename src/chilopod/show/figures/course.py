@@ -1,0 +1,144 @@
+"""A course: the way over the floor from target to target, the spring that bends it, and where the targets were seen."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+from matplotlib.ticker import LogLocator
+from numpy.typing import NDArray
+
+from chilopod import units
+from chilopod.show import style
+from chilopod.show.scene.frames import body_frames
+from chilopod.steering import ARRIVAL_RADIUS, Verdict
+from chilopod.tasks.course import Driven
+
+_LAYOUTS = (style.Layout("AB;AC", 4.6, widths=(1.5, 1.0)), style.Layout("A;B;C", 9.0, heights=(2.0, 1.0, 1.0)))
+_ON_WHITE = {"fc": "white", "ec": "none", "pad": 0.4}
+_ARRIVED = Verdict.ARRIVED.label
+_WAYS = tuple(each for each in style.CURVES if each != style.GREEN)  # which is for targets that were reached
+
+
+def draw(done: Driven, narrow: bool = False) -> Figure:
+    """The figure; call it within :func:`chilopod.show.style.house_style`."""
+    figure, axes = style.figure(*_LAYOUTS, narrow)
+    record = done.record
+    _floor(axes["A"], record)
+    axes["A"].set_title(title(done))
+    for robot in reversed(range(record.sizes["robot"])):
+        walk, color = record.isel(robot=robot), _WAYS[robot % len(_WAYS)]
+        # Of springs that nobody changed the record has one value for all times.
+        spring = units.from_si(1.0, "N*mm/deg") * walk.stiffness.isel(joint=0).broadcast_like(walk.time).values
+        axes["B"].plot(walk.time, spring, color=color, linewidth=1.2)
+        if "target" in walk:  # where none can be reached there is none
+            axes["C"].plot(walk.time, _bearing(walk), color=color, linewidth=1.2)
+    axes["B"].set_yscale("log")
+    axes["B"].set_ylabel("k1 (N·mm/deg)")
+    # As on other axes, and not as powers of ten.
+    axes["B"].yaxis.set_major_formatter("{x:g}")
+    axes["B"].yaxis.set_minor_locator(LogLocator(subs=(2.0, 4.0, 6.0)))
+    axes["B"].yaxis.set_minor_formatter("{x:g}")
+    if done.pitchfork is not None:
+        at = units.from_si(done.pitchfork, "N*mm/deg")
+        axes["B"].axhline(at, color=style.VERMILLION, linestyle=(0, (4, 2)), linewidth=1.2)
+        where = {"xycoords": ("axes fraction", "data"), "color": style.VERMILLION, "bbox": _ON_WHITE}
+        style.note(axes["B"], "bends below", (0.02, at), (0, 3), **where)
+    axes["C"].axhline(0.0, color=style.GREY, linewidth=0.8)
+    axes["C"].set_ylabel("target angle (deg)")
+    for name in "BC":
+        _turns(axes[name], record.isel(robot=0), numbered=name == "B")
+        axes[name].set_xlabel("time (s)")
+        style.grid(axes[name], "y")
+    return figure
+
+
+def title(done: Driven) -> str:
+    """Title of the picture."""
+    reached = (done.record.goal_verdict == _ARRIVED).values
+    return f"{done.strategy.name}: {reached.sum()} of {reached.size} targets"
+
+
+def _bearing(walk: xr.Dataset) -> NDArray[np.float64]:
+    """Of the target whose turn it is, deg; a line does not cross the picture where it jumps."""
+    place = walk.position.transpose("time", "axis")
+    # One that was the target all the time has one place for all times.
+    place, target = place.values, walk.target.broadcast_like(place).transpose("time", "axis").values
+    away = target - place
+    angle = np.arctan2(away[:, 1], away[:, 0]) - walk.heading.values
+    angle = np.rad2deg((angle + np.pi) % (2.0 * np.pi) - np.pi)
+    angle[1:][(np.abs(np.diff(angle)) > 180.0) | (np.diff(target, axis=0) != 0.0).any(-1)] = np.nan
+    return angle
+
+
+def _turns(axes: Axes, walk: xr.Dataset, *, numbered: bool) -> None:
+    """When each goal of the first walk had its turn: bands, and their numbers above."""
+    begins, ends = walk.goal_begin.values, walk.goal_end.values
+    for index, (begin, end) in enumerate(zip(begins, ends, strict=True)):
+        if not (np.isfinite(begin) and np.isfinite(end)):
+            continue
+        if index % 2 == 0:
+            axes.axvspan(begin, end, color=style.PALE, alpha=0.5, linewidth=0.0, zorder=0)
+        if numbered:
+            middle = (0.5 * (begin + end), 1.0)
+            look = {"ha": "center", "xycoords": ("data", "axes fraction"), "color": _color(walk, index)}
+            style.note(axes, str(index + 1), middle, (0, 2), **look)
+
+
+def _color(walk: xr.Dataset, goal: int) -> str:
+    return style.GREEN if str(walk.goal_verdict.values[goal]) == _ARRIVED else style.VERMILLION
+
+
+def _floor(axes: Axes, record: xr.Dataset) -> None:
+    """Paths and targets, and the first walk's body where it starts, arrives or gives up."""
+    axes.set_aspect("equal", adjustable="datalim")
+    for robot in reversed(range(record.sizes["robot"])):
+        walk = record.isel(robot=robot)
+        path = walk.position.transpose("time", "axis").values
+        color = _WAYS[robot % len(_WAYS)]
+        axes.plot(path[:, 0], path[:, 1], color=color, zorder=3, linewidth=1.8 if robot == 0 else 1.0)
+        _goals(axes, walk, named=robot == 0)
+    missed = _missed(record.isel(robot=0))
+    if missed and record.sizes["robot"] > 1:
+        missed = f"walk 1: {missed}"
+    style.note(axes, missed, (0.0, 0.0), (4, 4), xycoords="axes fraction", color=style.VERMILLION, bbox=_ON_WHITE)
+    _bodies(axes, record.isel(robot=[0]))
+    axes.set(xlabel="x (m)", ylabel="y (m)")
+    style.grid(axes)
+
+
+def _goals(axes: Axes, walk: xr.Dataset, *, named: bool) -> None:
+    """Rings; those of the walk that is told of with a number."""
+    places = walk.goal_place.transpose("goal", "axis").values
+    for index, (x, y) in enumerate(places):
+        if not np.isfinite([x, y]).all():
+            continue
+        color = _color(walk, index) if named else style.GREY
+        axes.add_patch(Circle((x, y), ARRIVAL_RADIUS, fill=False, ec=color, lw=1.5 if named else 0.8, zorder=4))
+        if not named:
+            continue
+        # A place that comes again, such as the crossing of an eight, has its numbers one above the other.
+        again = sum(bool(np.allclose(each, (x, y))) for each in places[:index])
+        look = {"color": color, "weight": "bold", "zorder": 6, "bbox": _ON_WHITE}
+        style.note(axes, f"{index + 1}", (x, y), (9, 9 + 12 * again), **look)
+        axes.plot(x, y, "+", color=color, markersize=6, markeredgewidth=1.5, zorder=4)
+
+
+def _missed(walk: xr.Dataset) -> str:
+    """Which targets were not reached, and why, such as "3, 5 out of time"."""
+    numbers: dict[str, list[str]] = {}
+    for number, verdict in enumerate(walk.goal_verdict.values, 1):
+        if verdict not in (_ARRIVED, ""):
+            numbers.setdefault(str(verdict), []).append(str(number))
+    return "; ".join(f"{', '.join(each)} {verdict}" for verdict, each in numbers.items())
+
+
+def _bodies(axes: Axes, record: xr.Dataset) -> None:
+    ends = record.goal_end.values[0]
+    walked = record.time.values[np.isfinite(record.heading.values[:, 0])]
+    moments = np.unique(np.clip([0.0, *ends[np.isfinite(ends)]], walked[0], walked[-1]))
+    for spine in body_frames(record, moments).spine[:, 0]:
+        axes.plot(spine[:, 0], spine[:, 1], "-o", color=style.BLACK, alpha=0.35, linewidth=2.5, markersize=3, zorder=2)
+        axes.plot(*spine[0], "o", color=style.BLACK, markersize=4.5, zorder=4)

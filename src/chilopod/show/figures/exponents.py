@@ -1,0 +1,294 @@
+"""B: Floquet exponents in the complex plane as k1 falls."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+from numpy.typing import NDArray
+
+from chilopod.show import style
+from chilopod.show.panel import Panel
+from chilopod.show.words import SPRING_UNIT, minus, number, spring
+
+Array = NDArray[np.float64]
+
+_WIDE = style.Layout("AA;BC", 7.4, heights=(1.15, 1.0))
+_NARROW = style.Layout("A;B;C", 10.6)
+_MARKED = (75.0, 41.0, 28.0, 21.0, 15.0, 8.0, 4.0, 2.0)  # the paper's springs, and some below its crossing
+
+_STAR: Any = {"marker": "*", "markersize": 15, "color": style.VERMILLION, "markeredgecolor": style.BLACK}
+
+
+def panel(data: xr.Dataset, mode: xr.Dataset | None) -> Panel:
+    """The exponents over k1; the crossing is the located pitchfork where it is there."""
+    crossing = None if mode is None else mode.attrs["value"]
+    critical = _critical(data)
+    count = data.sizes["exponent"]
+    first, last = float(data.k1[0]), float(data.k1[-1])
+    fastest = float(data["real"].min())
+    if critical is None:
+        seen = "None of them crosses the imaginary axis in this range, so the straight walk keeps its stability."
+    else:
+        value = crossing if crossing is not None else _crossing(data, critical)
+        born = np.flatnonzero(data["imaginary"].values[:, critical] == 0.0)
+        paired = bool(born.size) and born[0] > 0
+        rest = np.delete(data["real"].values, critical, axis=1)
+        seen = (
+            f"The one in vermillion (the paper's red) passes zero along the real axis at k₁ = {spring(value)}: below "
+            "that spring a small bend no longer dies out but grows, to the left or to the right, without swinging. "
+            "With the walk's symmetry of left and right that makes it a pitchfork. "
+            + ("All others stay in the left half. " if (rest < 0.0).all() else "")
+        ) + (
+            "For stiff springs it is one of a complex pair, a bend that swings as it dies out; the two meet on the "
+            f"real axis between k₁ = {number(float(data.k1[born[0] - 1]))} and {number(float(data.k1[born[0]]))}, and "
+            "only one of them goes on to the right."
+            if paired
+            else ""
+        )
+    return Panel(
+        name="exponents",
+        letter="B",
+        title="Floquet exponents as k₁ falls",
+        draw=lambda narrow: _draw(data, crossing, narrow),
+        alt=f"{count} Floquet exponents in the complex plane as the front spring falls from {first:g} to {last:g} "
+        + f"{SPRING_UNIT}: "
+        + ("one crosses into the right half-plane along the real axis." if critical is not None else "none crosses."),
+        text=(
+            f"Each curve is one of the {count} Floquet exponents of the straight walk, followed while the front "
+            f"spring k₁ is softened from {first:g} to {last:g} {SPRING_UNIT} and all other springs stay as they are. "
+            "An exponent says how fast a small disturbance grows (right of zero) or dies out (left of zero), and how "
+            "fast it swings (height).",
+            seen,
+            f"The exponents reach from near zero to {minus(f'{fastest:.0f}')} per second, so the scale is stretched "
+            "around zero where all are shown. The paper's three exponents that are always zero (place and heading on "
+            "the floor) are left out here by the choice of coordinates.",
+        ),
+        data=data,
+    )
+
+
+def _critical(data: xr.Dataset) -> int | None:
+    found = np.flatnonzero(data.follows_critical.values)
+    return int(found[0]) if found.size else None
+
+
+def _crossing(data: xr.Dataset, critical: int) -> float:
+    """Where the curve passes zero, read off between the values of the sweep."""
+    real = data["real"].values[:, critical]
+    after = int(np.flatnonzero(real > 0.0)[0])
+    share = real[after - 1] / (real[after - 1] - real[after])
+    ks = np.log(data.k1.values[after - 1 : after + 1])
+    return float(np.exp(ks[0] + share * (ks[1] - ks[0])))
+
+
+def _joined(data: xr.Dataset) -> tuple[Array, Array, Array]:
+    """The curves with the points where two of them meet and part filled in.
+
+    Where a complex pair becomes two real exponents or the other way round, the mean of the two and the square of half
+    their difference still change smoothly with k1; between two values of the sweep these are drawn as straight lines.
+    Without that the curves would cut the corner.
+
+    Returns
+    -------
+    k1, real and imaginary parts, with more values of k1 where needed.
+    """
+    values = data["real"].values + 1j * data["imaginary"].values
+    logs = np.log(data.k1.values)
+    rows, at = [values[:1]], [logs[:1]]
+    for index in range(len(logs) - 1):
+        start, end = values[index], values[index + 1]
+        changed = (start.imag == 0.0) != (end.imag == 0.0)
+        if not changed.any():
+            rows.append(values[index + 1 : index + 2])
+            at.append(logs[index + 1 : index + 2])
+            continue
+        pairs = []
+        for one in np.flatnonzero(changed):
+            paired = start if start[one].imag != 0.0 else end
+            other = int(np.abs(paired - paired[one].conjugate()).argmin())
+            ends = np.array([[start[one], end[one]], [start[other], end[other]]])
+            pairs.append((one, ends.mean(axis=0).real, 0.5 * (ends[0] - ends[1])))
+        meetings = [(half[0] ** 2 / (half[0] ** 2 - half[1] ** 2)).real for _, _, half in pairs]
+        share = np.unique(np.concatenate([np.linspace(0.0, 1.0, 33)[1:], meetings]))
+        between = start + share[:, None] * (end - start)
+        for one, mean, half in pairs:
+            square = (half**2).real
+            squares = square[0] + share * (square[1] - square[0])
+            squares[np.abs(squares) < 1e-12 * np.abs(square).max()] = 0.0
+            swinging, growing = half[square.argmin()].imag, half[square.argmax()].real
+            roots = np.where(
+                squares < 0.0,
+                1j * np.sign(swinging) * np.sqrt(np.abs(squares)),
+                np.sign(growing) * np.sqrt(np.abs(squares)),
+            )
+            between[:, one] = mean[0] + share * (mean[1] - mean[0]) + roots
+        rows.append(between)
+        at.append(logs[index] + share * (logs[index + 1] - logs[index]))
+    table = np.concatenate(rows)
+    return np.exp(np.concatenate(at)), table.real, table.imag
+
+
+def _draw(data: xr.Dataset, crossing: float | None, narrow: bool) -> Figure:
+    figure, axes = style.figure(_WIDE, _NARROW, narrow)
+    ks, real, imaginary = _joined(data)
+    critical = _critical(data)
+    lead = critical if critical is not None else 0
+    colors = _colors(data)
+    _near(axes["A"], real, imaginary, lead, colors)
+    _labels(axes["A"], ks, real[:, lead], imaginary[:, lead], _MARKED[::2] if narrow else _MARKED)
+    _all(axes["B"], real, imaginary, colors, ks)
+    over_k1(axes["C"], data, crossing)
+    if critical is not None:
+        value = crossing if crossing is not None else _crossing(data, critical)
+        axes["A"].plot(0.0, 0.0, zorder=8, **_STAR)
+        axes["A"].annotate(
+            f"crosses at\nk₁ = {number(value, 4)}\n{SPRING_UNIT}",
+            (0.0, 0.0),
+            (14, 42),
+            textcoords="offset points",
+            weight="bold",
+            arrowprops={"arrowstyle": "-", "color": style.BLACK, "lw": 0.8, "shrinkB": 7},
+        )
+    return figure
+
+
+def _colors(data: xr.Dataset) -> list[str]:
+    count, critical = data.sizes["exponent"], _critical(data)
+    colors = [style.CURVES[place % len(style.CURVES)] for place in range(count)]
+    return colors if critical is None else [*colors[:critical], style.VERMILLION, *colors[critical:-1]]
+
+
+def _near(axes: Axes, real: Array, imaginary: Array, lead: int, colors: list[str]) -> None:
+    axes.set_title("Near zero")
+    low, high = real[:, lead].min(), real[:, lead].max()
+    margin = 0.16 * (high - low)
+    reach = 1.45 * max(np.abs(imaginary[:, lead]).max(), 0.1 * (high - low))
+    axes.set(xlim=(low - 1.6 * margin, max(high, 0.0) + margin), ylim=(-reach, reach))
+    _half_planes(axes)
+    for index in _back_to_front(real.shape[1], lead):
+        axes.plot(real[:, index], imaginary[:, index], color=colors[index], lw=2.6 if index == lead else 1.8)
+        for share in (0.2, 0.55, 0.86):
+            _arrow(axes, real[:, index], imaginary[:, index], share, colors[index])
+    axes.set(xlabel="real part (1/s): dies out ← | → grows", ylabel="imaginary part (rad/s)")
+
+
+def _labels(axes: Axes, ks: Array, real: Array, imaginary: Array, marked: tuple[float, ...]) -> None:
+    """Values of k1 along the curve that crosses."""
+    for k1 in marked:
+        if not ks.min() - 1e-9 <= k1 <= ks.max() + 1e-9:
+            continue
+        x, y = (float(np.interp(np.log(k1), np.log(ks[::-1]), part[::-1])) for part in (real, imaginary))
+        axes.plot(x, y, "o", color="white", markeredgecolor=style.VERMILLION, markersize=5.5, zorder=6)
+        swings = abs(y) > 1e-3
+        stiffest = k1 == max(marked)
+        style.note(
+            axes,
+            f"k₁ =\n{k1:g}" if stiffest else f"{k1:g}",
+            (x, y),
+            (-8, 0) if stiffest else (4, 7) if swings else (0, -8),
+            ha="right" if stiffest else "left" if swings else "center",
+            va="center" if stiffest else "bottom" if swings else "top",
+        )
+
+
+def _all(axes: Axes, real: Array, imaginary: Array, colors: list[str], ks: Array) -> None:
+    axes.set_title(f"All {real.shape[1]}, scale stretched around zero")
+    axes.set_xscale("asinh", linear_width=0.05)
+    ticks = [-1000.0, -100.0, -10.0, -1.0, -0.1, 0.0, 0.1, 1.0, 10.0]
+    low, high = 1.6 * real.min(), max(1.6 * real.max(), 0.1)
+    axes.set_xlim(low, high)
+    axes.xaxis.set_major_locator(FixedLocator([tick for tick in ticks if low <= tick <= high]))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: minus(f"{value:g}")))
+    reach = 1.5 * max(np.abs(imaginary).max(), 0.05)
+    axes.set_ylim(-reach, reach)
+    _half_planes(axes)
+    for index in _back_to_front(real.shape[1], colors.index(style.VERMILLION) if style.VERMILLION in colors else 0):
+        axes.plot(real[:, index], imaginary[:, index], color=colors[index], lw=2.2)
+        axes.plot(real[0, index], imaginary[0, index], "o", color="white", markeredgecolor=colors[index], markersize=6)
+        axes.plot(real[-1, index], imaginary[-1, index], "o", color=colors[index], markersize=3.5)
+    axes.set(xlabel="real part (1/s)", ylabel="imaginary part (rad/s)")
+    axes.legend(
+        handles=[
+            Line2D(
+                [], [], marker="o", linestyle="", color="white", markeredgecolor=style.BLACK, label=f"k₁ = {ks[0]:g}"
+            ),
+            Line2D([], [], marker="o", linestyle="", color=style.BLACK, markersize=4, label=f"k₁ = {ks[-1]:g}"),
+        ],
+        loc="upper left",
+        handletextpad=0.2,
+        borderaxespad=0.1,
+    )
+
+
+def over_k1(axes: Axes, data: xr.Dataset, crossing: float | None) -> None:
+    """Draw the real parts of the slow exponents over k1.
+
+    Parameters
+    ----------
+    axes
+        Empty.
+    data
+        Section "exponents".
+    crossing
+        Point at which stability is lost, if it was located; otherwise it is read off the curve.
+    """
+    ks, real, _ = _joined(data)
+    critical, colors = _critical(data), _colors(data)
+    lead = critical if critical is not None else 0
+    axes.set_title("Growth rate of the slow ones")
+    axes.set_xscale("log")
+    axes.set_xlim(ks.max(), ks.min())
+    high = max(real[:, lead].max(), 0.05)
+    axes.set_ylim(-3.2 * max(high, np.abs(real[:, lead]).max()), 1.25 * high)
+    axes.axhspan(0.0, axes.get_ylim()[1], color=style.VERMILLION, alpha=0.1, lw=0)
+    axes.axhline(0.0, color=style.BLACK, lw=0.8)
+    for index in _back_to_front(real.shape[1], lead):
+        axes.plot(ks, real[:, index], color=colors[index], lw=2.6 if index == lead else 1.8)
+    if critical is not None:
+        value = crossing if crossing is not None else _crossing(data, critical)
+        axes.plot(value, 0.0, zorder=8, **_STAR)
+        axes.annotate(number(value), (value, 0.0), (-6, 9), textcoords="offset points", ha="right", weight="bold")
+    axes.text(
+        0.03, axes.get_ylim()[1] * 0.9, "unstable", transform=axes.get_yaxis_transform(), va="top", fontsize=style.SMALL
+    )
+    shown = [tick for tick in (100.0, 50.0, 20.0, 10.0, 5.0, 2.0, 1.0) if ks.min() <= tick <= ks.max()]
+    axes.xaxis.set_major_locator(FixedLocator(shown))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.set(xlabel=f"k₁ ({SPRING_UNIT}), softer →", ylabel="real part (1/s)")
+    style.grid(axes)
+
+
+def _half_planes(axes: Axes) -> None:
+    axes.axvspan(0.0, axes.get_xlim()[1], color=style.VERMILLION, alpha=0.1, lw=0)
+    axes.axhline(0.0, color=style.GREY, lw=0.7, zorder=1)
+    axes.axvline(0.0, color=style.BLACK, lw=0.8, zorder=1)
+
+
+def _back_to_front(count: int, lead: int) -> list[int]:
+    return [*(index for index in range(count) if index != lead), lead]
+
+
+def _arrow(axes: Axes, x: Array, y: Array, share: float, color: str) -> None:
+    """Draw an arrow head on a curve after some share of its length as it is seen, if it is long enough to be seen."""
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    steps = np.hypot(np.diff(x) / (right - left), np.diff(y) / (top - bottom))
+    length = np.concatenate([[0.0], np.cumsum(steps)])
+    inside = (x.min() > left) & (x.max() < right)
+    if not inside or length[-1] < 0.1:
+        return
+    index = int(np.searchsorted(length, share * length[-1]))
+    axes.annotate(
+        "",
+        (x[index], y[index]),
+        (x[index - 1], y[index - 1]),
+        zorder=7,
+        arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8, "mutation_scale": 15, "shrinkA": 0, "shrinkB": 0},
+    )

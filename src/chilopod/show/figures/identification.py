@@ -1,0 +1,194 @@
+"""G: how well the printed numbers determine the constants that the paper does not print."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from chilopod.robot import Robot
+from chilopod.show import style
+from chilopod.show.panel import Panel
+from chilopod.show.words import SPRING_UNIT, listing, number, typeset
+from chilopod.tasks.identify import Identification
+
+Array = NDArray[np.float64]
+
+_WIDE = style.Layout("ABC;DEF", 6.2)
+_NARROW = style.Layout("A;B;C;D;E;F", 17.0)
+_OWN = {
+    "friction",
+    "half_width",
+    "largest_residual",
+    "critical_k1",
+    "uniform",
+    "uniform_frequency",
+    "coefficient",
+    "verdict",
+}
+
+
+def panel(fit: Identification) -> Panel:
+    """The profile of a fit, with the robot it was given beside."""
+    data, best = fit.profile, fit.best
+    inside = _inside(data)
+    ours = np.abs(fit.preset_residuals).max()
+    met = np.abs(fit.residuals).max() <= 1.0
+    return Panel(
+        name="identification",
+        letter="G",
+        title="The constants the paper does not print",
+        draw=lambda narrow: _draw(fit, narrow),
+        alt="Six profiles over the forward offset of the feet: largest residual, friction, half-width, predictions for "
+        "the variants and for uniform springs, and the coefficient of the pitchfork with its change of sign.",
+        text=(
+            "How hard the feet hold on the floor (friction), how far they stand to the side (half-width) and how far "
+            "ahead of the middle of their module (forward offset) is not printed. They are fitted to six printed "
+            "numbers, the critical spring and the five components of the mode. A residual of 1 is half of the last "
+            "printed digit: below 1, a computed number rounds to the printed one.",
+            f"The best fit has {best.ground.friction:.1f} N·s/m, {1e3 * best.legs.half_width:.1f} mm and "
+            f"{1e3 * best.legs.forward_offset:.1f} mm, with a largest residual of "
+            f"{number(float(np.abs(fit.residuals).max()), 2)}: {'all six are met' if met else 'not all six are met'}. "
+            + f"This robot, with {1e3 * fit.given.legs.forward_offset:.1f} mm, has {number(float(ours), 3)}. "
+            + _valley(data, inside),
+            _predicted(data, inside),
+            _verdict(data, inside),
+        ),
+        data=data,
+    )
+
+
+def _inside(data: xr.Dataset) -> NDArray[np.bool_]:
+    allowed: NDArray[np.bool_] = data.largest_residual.values <= 1.0
+    return allowed
+
+
+def _valley(data: xr.Dataset, inside: NDArray[np.bool_]) -> str:
+    if not inside.any():
+        return "No forward offset of the profile meets all six."
+    offsets = 1e3 * data.forward_offset.values[inside]
+    return (
+        f"But the valley is flat: wherever the forward offset is fixed between {offsets.min():.0f} and "
+        f"{offsets.max():.0f} mm (shaded), the other two can be chosen so that all six printed numbers come out."
+    )
+
+
+def _others(data: xr.Dataset) -> list[str]:
+    return [str(name) for name in data.data_vars if name not in _OWN]
+
+
+def _predicted(data: xr.Dataset, inside: NDArray[np.bool_]) -> str:
+    if not inside.any():
+        return "So nothing can be said of numbers that were not fitted."
+
+    def span(name: str) -> str:
+        values = data[name].values[inside]
+        return f"{number(float(np.nanmin(values)))} to {number(float(np.nanmax(values)))}"
+
+    return (
+        "What does that leave open? Along the shaded valley the variants, which were not fitted, move little: "
+        + listing(f"{span(name)} for {typeset(name)}" for name in _others(data))
+        + f" (all in {SPRING_UNIT}). The critical spring of a uniform body moves much more: "
+        f"{span('uniform')} {SPRING_UNIT}. That one number, had it been printed for the planar "
+        "model, would narrow the forward offset."
+    )
+
+
+def _verdict(data: xr.Dataset, inside: NDArray[np.bool_]) -> str:
+    words = set(data.verdict.values[inside]) - {""}
+    where = _changes(data)
+    if len(words) > 1 and where.size:
+        return (
+            "The direction of the pitchfork changes within the valley: its coefficient passes zero near a forward "
+            f"offset of {listing(f'{1e3 * x:.1f} mm' for x in where)}, from {data.verdict.values[0]} on the left to "
+            f"{data.verdict.values[-1]} on the right. So the printed numbers do not decide whether the bend of this "
+            "model sets in gently or with a jump."
+        )
+    if len(words) == 1:
+        return f"The direction of the pitchfork is {words.pop()} everywhere in the valley."
+    return "The profile gives no direction of the pitchfork."
+
+
+def _changes(data: xr.Dataset) -> Array:
+    """Forward offsets at which the coefficient passes zero, read off between the points of the profile."""
+    x, y = data.forward_offset.values, data.coefficient.values
+    at = np.flatnonzero(y[:-1] * y[1:] < 0.0)
+    return np.asarray(x[at] - y[at] * (x[at + 1] - x[at]) / (y[at + 1] - y[at]))
+
+
+def _draw(fit: Identification, narrow: bool) -> Figure:
+    data = fit.profile
+    figure, axes = style.figure(_WIDE, _NARROW, narrow)
+    x = 1e3 * data.forward_offset.values
+    inside = _inside(data)
+    for one in axes.values():
+        if inside.any():
+            one.axvspan(x[inside].min(), x[inside].max(), color=style.PALE, lw=0, label="rounding allows")
+        one.set(xlim=(x[0], x[-1]), xlabel="forward offset (mm)")
+    _fitted(axes["A"], x, data.largest_residual.values, "How well the six fit", "largest residual")
+    axes["A"].axhline(1.0, color=style.BLACK, lw=1.0, linestyle=":")
+    axes["A"].set_ylim(0.0, 1.15 * max(data.largest_residual.values.max(), 1.0))
+    _fitted(axes["B"], x, data.friction.values, "Friction fitted", "friction (N·s/m)")
+    _fitted(axes["C"], x, 1e3 * data.half_width.values, "Half-width fitted", "half-width (mm)")
+    _mark(axes, fit.best, fit.residuals, marker="D", color=style.VERMILLION, markerfacecolor="white", label="best fit")
+    _mark(axes, fit.given, fit.preset_residuals, marker="o", color=style.BLUE, label="this robot")
+    _variants(axes["D"], x, data)
+    _fitted(axes["E"], x, data.uniform.values, "Not fitted: uniform springs", f"critical k ({SPRING_UNIT})")
+    _coefficient(axes["F"], x, data)
+    handles, labels = axes["A"].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper left", ncols=1 if narrow else 4)
+    return figure
+
+
+def _fitted(axes: Axes, x: Array, values: Array, title: str, label: str) -> None:
+    axes.plot(x, values, color=style.BLACK)
+    axes.set(title=title, ylabel=label)
+
+
+def _mark(axes: dict[str, Axes], robot: Robot, residuals: Array, **look: Any) -> None:
+    """Where a robot lies in the three panels of what is fitted."""
+    shown = {"A": np.abs(residuals).max(), "B": robot.ground.friction, "C": 1e3 * robot.legs.half_width}
+    for letter, value in shown.items():
+        axes[letter].plot(
+            1e3 * robot.legs.forward_offset, value, linestyle="", markeredgewidth=1.6, markersize=6.5, zorder=5, **look
+        )
+
+
+def _variants(axes: Axes, x: Array, data: xr.Dataset) -> None:
+    axes.set_title("Not fitted: variants")
+    for index, name in enumerate(_others(data)):
+        values = data[name].values
+        axes.plot(x, values, color=style.CURVES[index], linestyle=("-", "--", "-.")[index % 3])
+        # Curves rise: there is room above the left of the highest and below the right of the others.
+        top = name == max(_others(data), key=lambda each: float(data[each].mean()))
+        place = int(0.75 * len(x)) if top else len(x) // 3
+        style.note(
+            axes,
+            typeset(name),
+            (x[place], values[place]),
+            (0, 5 if top else -5),
+            ha="right" if top else "left",
+            va="bottom" if top else "top",
+        )
+    values = np.array([data[name].values for name in _others(data)])
+    axes.set(ylim=(np.nanmin(values) - 0.5, np.nanmax(values) + 0.5), ylabel=f"critical k₁ ({SPRING_UNIT})")
+
+
+def _coefficient(axes: Axes, x: Array, data: xr.Dataset) -> None:
+    values = data.coefficient.values
+    _fitted(axes, x, values, "Not fitted: direction", "coefficient (1/rad² per cycle)")
+    axes.axhline(0.0, color=style.BLACK, lw=0.8)
+    for word, fill, marker in (("supercritical", style.BLACK, "o"), ("subcritical", "white", "s")):
+        those = data.verdict.values == word
+        axes.plot(x[those], values[those], marker, color=style.BLACK, markerfacecolor=fill, markersize=4)
+    for place in 1e3 * _changes(data):
+        axes.axvline(place, color=style.VERMILLION, lw=1.2, linestyle="--")
+        style.note(axes, f"changes at\n{place:.1f} mm", (place, 0.0), (6, 10))
+    high = np.nanmax(np.abs(values))
+    axes.set_ylim(-1.5 * high, 1.5 * high)
+    axes.text(0.97, 0.97, "subcritical", transform=axes.transAxes, ha="right", va="top", fontsize=style.SMALL)
+    axes.text(0.97, 0.03, "supercritical", transform=axes.transAxes, ha="right", fontsize=style.SMALL)

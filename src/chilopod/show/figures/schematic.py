@@ -1,0 +1,290 @@
+"""A: the planar model, drawn from the robot file, and its gait."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+from matplotlib.ticker import MaxNLocator
+
+from chilopod import units
+from chilopod.robot import Robot
+from chilopod.show import style
+from chilopod.show.panel import Panel
+from chilopod.show.scene.outline import SLIMNESS, draw_modules
+from chilopod.show.words import SPRING_UNIT, k, minus, number
+
+_SIDES = ("left", "right")
+_COLORS = (style.BLUE, style.ORANGE)
+_WIDE = style.Layout("AA;BC", 6.0, heights=(1.0, 1.55), widths=(1.0, 1.15))
+_NARROW = style.Layout("A;B;C", 8.6, heights=(0.9, 1.5, 1.7))
+
+
+def panel(robot: Robot) -> Panel:
+    """The schematic; it needs nothing computed."""
+    data = legs(robot)
+    standing = [
+        f"{side} {module}"
+        for side in _SIDES
+        for module in data.module.values
+        if data.stands.sel(module=module, side=side)
+    ]
+    gait = robot.gait
+    return Panel(
+        name="schematic",
+        letter="A",
+        title="The model",
+        draw=lambda narrow: _draw(robot, data, narrow),
+        alt=f"Top view of {robot.body.modules} modules in a row joined by {robot.body.modules - 1} sprung yaw joints, "
+        f"one module enlarged with its measures, and a diagram of when each foot stands.",
+        text=(
+            f"The robot from above, drawn to scale from the robot file: {robot.body.modules} modules in a row, joined "
+            f"by yaw joints that only a torsional spring holds straight ({k(1)} at the front to "
+            f"{k(robot.body.modules - 1)} at the rear). No motor bends the body. Each foot is moved along its module "
+            "in a fixed rhythm: back from the anterior extreme position (AEP) to the posterior one (PEP) while it "
+            "stands, and forward through the air. Dots are feet that stand, dotted strokes those in the air.",
+            "A standing foot that slips is held back in proportion to the speed of its slip; a foot in the air does "
+            "nothing, so its way back is not part of the model. Where the body is drawn, its width is free. At the "
+            f"moment shown (t = 0) {len(standing)} of {2 * robot.body.modules} feet stand. On the straight walk, at "
+            f"{number(1e3 * gait.speed)}\u00a0mm/s, none of them slips and no spring is bent: whether that walk "
+            "survives a small push is what everything below is about.",
+        ),
+        data=data,
+    )
+
+
+def legs(robot: Robot) -> xr.Dataset:
+    """Where every foot is at t = 0 and when it touches down, over module and side."""
+    gait, n = robot.gait, robot.body.modules
+    phase = gait.leg_phases(n)
+    stands = gait.stands(phase)
+    centre = -robot.module_length * (np.arange(n) + 0.5)
+    ahead = np.where(stands, gait.stroke(phase), np.nan)
+    both = ("module", "side")
+    return xr.Dataset(
+        {
+            "phase": (both, phase, {"units": "1", "about": "at t = 0, in cycles; 0 is touch-down"}),
+            "stands": (both, stands, {"about": "at t = 0"}),
+            "touch_down": (both, (-phase % 1.0) * gait.period, {"units": "s"}),
+            "foot_x": (
+                both,
+                centre[:, None] + robot.legs.forward_offset + ahead,
+                {"units": "m", "about": "at t = 0, from the front end, NaN in the air"},
+            ),
+            "centre_x": (("module",), centre, {"units": "m", "about": "from the front end"}),
+        },
+        coords={"module": np.arange(1, n + 1), "side": np.array(_SIDES, dtype=object)},
+        attrs={"robot": robot.name, "period_s": gait.period, "stance_s": gait.stance},
+    )
+
+
+def _draw(robot: Robot, data: xr.Dataset, narrow: bool) -> Figure:
+    figure, axes = style.figure(_WIDE, _NARROW, narrow)
+    _whole(axes["A"], robot, data, narrow)
+    _one_module(axes["B"], robot)
+    _gait(axes["C"], robot, data)
+    return figure
+
+
+def _whole(axes: Axes, robot: Robot, data: xr.Dataset, narrow: bool) -> None:
+    style.bare(axes)
+    axes.set_title(
+        "From above, at t = 0" + ("" if narrow else ": dots are standing feet, dotted strokes feet in the air")
+    )
+    length, b, n = robot.module_length, robot.legs.half_width, robot.body.modules
+    centres = data.centre_x.values
+    draw_modules(axes, np.column_stack([centres, np.zeros(n)]), np.zeros(n), length, fc=style.PALE, ec=style.BLACK)
+    reach = max(b, 0.5 * SLIMNESS * length)
+    for module in range(n):
+        for side, sign in enumerate((1.0, -1.0)):
+            _foot(axes, robot, centres[module], float(data.foot_x[module, side]), sign, _COLORS[side])
+    for x, module in zip(centres, data.module.values, strict=True):
+        axes.text(x, 0.0, str(module), ha="center", va="center", fontsize=style.SMALL)
+    size = min(0.16 * length, 0.4 * b)
+    few = n <= (7 if narrow else 12)
+    for joint in range(1, n):
+        x = -joint * length
+        _spring(axes, x, 0.0, size)
+        if few or joint in (1, n - 1):
+            axes.annotate(
+                k(joint),
+                (x, 0.25 * reach),
+                (x, 1.45 * reach),
+                ha="center",
+                va="bottom",
+                fontsize=10,
+                arrowprops={"arrowstyle": "-", "color": style.GREY, "lw": 0.7, "shrinkA": 0, "shrinkB": 2},
+            )
+    end = 0.05 * robot.body.length
+    axes.annotate(
+        "",
+        (0.45 * end + end, 0.0),
+        (0.25 * end, 0.0),
+        arrowprops={"arrowstyle": "-|>", "color": style.BLACK, "lw": 1.8, "shrinkA": 0, "shrinkB": 0},
+    )
+    y = -1.7 * reach
+    bar = _round(0.15 * robot.body.length)
+    axes.plot([-robot.body.length, -robot.body.length + bar], [y, y], color=style.BLACK, lw=3, solid_capstyle="butt")
+    axes.text(-robot.body.length + 1.15 * bar, y, f"{number(100 * bar, 2)} cm", va="center", fontsize=style.SMALL)
+    axes.text(0.0, y, "walks this way →", ha="right", va="center", fontsize=style.SMALL)
+    low = y - (1.3 * reach if narrow else 0.0)
+    axes.text(-0.5 * robot.body.length, low, _springs(robot), ha="center", va="center", fontsize=style.SMALL)
+    axes.set(
+        xlim=(-robot.body.length - 0.02 * robot.body.length, 0.08 * robot.body.length),
+        ylim=(low - 0.6 * reach, 2.3 * reach),
+    )
+
+
+def _springs(robot: Robot) -> str:
+    """The springs in one line; of many different ones the first three and the last."""
+    values = [f"{units.from_si(value, 'N*mm/deg'):.4g}" for value in robot.springs.stiffness]
+    last = len(values)
+    if len(set(values)) == 1:
+        return f"{k(1)} to {k(last)} = {values[0]} {SPRING_UNIT}" if last > 1 else f"{k(1)} = {values[0]} {SPRING_UNIT}"
+    shown = values if last <= 6 else [*values[:3], "…", values[-1]]
+    return f"{k(1)} to {k(last)} = {', '.join(shown)} {SPRING_UNIT}"
+
+
+def _foot(axes: Axes, robot: Robot, centre: float, foot: float, sign: float, color: str) -> None:
+    """A leg with its stroke; the foot itself only while it stands."""
+    middle, half, y = centre + robot.legs.forward_offset, 0.5 * robot.gait.stride, sign * robot.legs.half_width
+    standing = not np.isnan(foot)
+    axes.plot(
+        [middle - half, middle + half],
+        [y, y],
+        color=color if standing else style.GREY,
+        lw=2.2 if standing else 1.2,
+        linestyle="-" if standing else (0, (1.5, 1.5)),
+        solid_capstyle="butt",
+    )
+    if standing:
+        root = sign * 0.5 * SLIMNESS * robot.module_length
+        axes.plot([middle, foot], [root, y], color=color, lw=1.2)
+        axes.plot(foot, y, "o", color=color, markeredgecolor=style.BLACK, markersize=6, zorder=5)
+
+
+def _spring(axes: Axes, x: float, y: float, size: float) -> None:
+    turns = np.linspace(0.0, 2.5, 160)
+    radius = size * (0.15 + 0.85 * turns / turns[-1])
+    angle = 2.0 * np.pi * turns
+    axes.add_patch(Circle((x, y), 1.1 * size, color="white", zorder=2))
+    axes.plot(x + radius * np.cos(angle), y + radius * np.sin(angle), color=style.BLACK, lw=1.0, zorder=3)
+    axes.plot(x, y, "o", color=style.BLACK, markersize=2, zorder=4)
+
+
+def _one_module(axes: Axes, robot: Robot) -> None:
+    style.bare(axes)
+    axes.set_title("One module, enlarged")
+    length, b, x0, stride = robot.module_length, robot.legs.half_width, robot.legs.forward_offset, robot.gait.stride
+    draw_modules(axes, np.zeros((1, 2)), np.zeros(1), length, fc=style.PALE, ec=style.BLACK)
+    axes.plot(0.0, 0.0, "+", color=style.BLACK, markersize=9)
+    for x in (-0.5 * length, 0.5 * length):
+        axes.plot(x, 0.0, "o", color="white", markeredgecolor=style.BLACK, markersize=6)
+    reach = max(b, 0.5 * SLIMNESS * length)
+    step = 0.3 * max(reach, 0.3 * length)
+    for sign, color in ((1.0, _COLORS[0]), (-1.0, _COLORS[1])):
+        y = sign * b
+        axes.plot([x0, x0], [sign * 0.5 * SLIMNESS * length, y], color=color, lw=1.2)
+        axes.plot([x0 - 0.5 * stride, x0 + 0.5 * stride], [y, y], color=color, lw=3, solid_capstyle="butt")
+        axes.plot([x0 - 0.5 * stride, x0 + 0.5 * stride], [y, y], "|", color=color, markersize=10, markeredgewidth=2)
+    axes.text(
+        x0 - 0.7 * stride,
+        b,
+        "PEP",
+        ha="right",
+        va="center",
+        fontsize=style.SMALL,
+        bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
+    )
+    axes.text(x0 + 0.7 * stride, b, "AEP", ha="left", va="center", fontsize=style.SMALL)
+    top = reach + step
+    _measure(axes, (x0 - 0.5 * stride, top), (x0 + 0.5 * stride, top), f"stride {_mm(stride)}", (x0, top + 0.3 * step))
+    low = -reach - step
+    if x0 != 0.0:
+        _measure(axes, (0.0, low), (x0, low), f"forward offset {_mm(x0)}", (0.5 * x0, low - 0.35 * step), below=True)
+    axes.plot([0.0, 0.0], [0.0, low], color=style.GREY, lw=0.7, linestyle=":")
+    axes.plot([x0, x0], [-b, low], color=style.GREY, lw=0.7, linestyle=":")
+    low -= 2.0 * step
+    _measure(
+        axes,
+        (-0.5 * length, low),
+        (0.5 * length, low),
+        f"module length {_mm(length)}",
+        (0.0, low - 0.2 * step),
+        below=True,
+    )
+    side = -0.28 * length
+    _measure(
+        axes,
+        (side, 0.0),
+        (side, b),
+        f"half-width\n{_mm(b)}",
+        (side - 0.03 * length, 0.5 * (b + 0.5 * SLIMNESS * length)),
+        left=True,
+    )
+    axes.plot([side, x0 - 0.5 * stride], [b, b], color=style.GREY, lw=0.7, linestyle=":", zorder=0)
+    axes.set(xlim=(-0.66 * length, 0.66 * length), ylim=(low - 1.6 * step, top + 1.6 * step))
+
+
+def _measure(
+    axes: Axes,
+    start: tuple[float, float],
+    end: tuple[float, float],
+    label: str,
+    at: tuple[float, float],
+    below: bool = False,
+    left: bool = False,
+) -> None:
+    axes.annotate(
+        "",
+        end,
+        start,
+        arrowprops={
+            "arrowstyle": "|-|, widthA=0.25, widthB=0.25",
+            "color": style.BLACK,
+            "lw": 1.0,
+            "shrinkA": 0,
+            "shrinkB": 0,
+        },
+    )
+    axes.text(
+        *at,
+        label,
+        ha="right" if left else "center",
+        va="center" if left else "top" if below else "bottom",
+        fontsize=style.SMALL,
+    )
+
+
+def _gait(axes: Axes, robot: Robot, data: xr.Dataset) -> None:
+    period, stance, n = robot.gait.period, robot.gait.stance, robot.body.modules
+    axes.set_title("When each foot stands")
+    names = []
+    for side, color in enumerate(_COLORS):
+        for module in range(n):
+            row = side * (n + 0.6) + module
+            names.append((row, f"{_SIDES[side]} {module + 1}" if n <= 12 or module % 2 == 0 else ""))
+            start = float(data.touch_down[module, side])
+            for shift in (0.0, -period):
+                left, right = max(0.0, start + shift), min(period, start + shift + stance)
+                if right > left:
+                    axes.barh(row, right - left, left=left, height=0.66, color=color)
+    axes.set_yticks([row for row, _ in names], [name for _, name in names])
+    axes.tick_params(axis="y", length=0)
+    axes.invert_yaxis()
+    axes.set_xlim(0.0, period)
+    axes.xaxis.set_major_locator(MaxNLocator(6))
+    axes.set_xlabel("time over one gait cycle (s)")
+    axes.spines["left"].set_visible(False)
+
+
+def _mm(value: float) -> str:
+    return minus(f"{1e3 * value:.4g} mm")
+
+
+def _round(value: float) -> float:
+    """The largest of 1, 2, 5 times a power of ten that is no larger."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(max(step * power for step in (1, 2, 5) if step * power <= value * (1 + 1e-9)))

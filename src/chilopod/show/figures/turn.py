@@ -1,0 +1,92 @@
+"""One turn to a target: the way over the floor with the body on it, and how near the target came."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from chilopod import units
+from chilopod.show import style
+from chilopod.show.scene.frames import body_frames
+from chilopod.steering import ARRIVAL_RADIUS
+from chilopod.tasks import Turn
+
+_LAYOUTS = (style.Layout("AB;AC", 4.6, widths=(1.5, 1.0)), style.Layout("A;B;C", 9.0, heights=(2.0, 1.0, 1.0)))
+_STILLS = 5
+
+
+def draw(done: Turn, narrow: bool = False) -> Figure:
+    """The figure; call it within :func:`chilopod.show.style.house_style`."""
+    figure, axes = style.figure(*_LAYOUTS, narrow)
+    record, ends = done.record[["distance", "bearing"]], done.criteria.arrival
+    _floor(axes["A"], done)
+    axes["A"].set_title(title(done))
+    for robot in range(record.sizes["robot"]):
+        walk = record.isel(robot=robot)
+        walk = walk.where(walk.time <= ends[robot], drop=True) if np.isfinite(ends[robot]) else walk
+        color = style.CURVES[robot % len(style.CURVES)]
+        axes["B"].plot(walk.time, walk.distance, color=color)
+        # A line does not cross the picture where the angle jumps from -180 to 180.
+        angle = np.rad2deg(walk.bearing.values.copy())
+        angle[1:][np.abs(np.diff(angle)) > 180.0] = np.nan
+        axes["C"].plot(walk.time, angle, color=color)
+    axes["B"].axhline(ARRIVAL_RADIUS, color=style.GREY, linestyle=(0, (4, 2)), linewidth=1.2)
+    style.note(
+        axes["B"], "arrived below", (0.02, ARRIVAL_RADIUS), (0, 3), xycoords=("axes fraction", "data"), color=style.GREY
+    )
+    axes["B"].set_ylim(bottom=0.0)
+    axes["B"].set_ylabel("target distance (m)")
+    axes["C"].axhline(0.0, color=style.GREY, linewidth=0.8)
+    axes["C"].set_ylabel("target angle (deg)")
+    for name in "BC":
+        axes[name].set_xlabel("time (s)")
+        style.grid(axes[name])
+    return figure
+
+
+def title(done: Turn) -> str:
+    """Title of the picture."""
+    spring = ""
+    if done.stiffness is not None:
+        which = "k1" if done.strategy.springs and done.strategy.springs.endswith("[0]") else "k"
+        spring = f", {which} = {units.format(done.stiffness, 'N*mm/deg', digits=3).replace('*', '·')}"
+    return f"{done.strategy.name}{spring}"
+
+
+def _floor(axes: Axes, done: Turn) -> None:
+    """Paths, target, the circle to it, and the first walk's body at several times."""
+    record, target = done.record, done.target.position
+    axes.set_aspect("equal", adjustable="datalim")
+    if np.isfinite(done.target.radius):
+        # From the origin along x; its centre lies on the target's side.
+        side = np.sign(done.target.bearing)
+        turned = np.linspace(0.0, 2.0 * abs(done.target.bearing), 200)
+        radius = done.target.radius
+        label = f"circle of {radius:.2f} m"
+        x, y = radius * np.sin(turned), side * radius * (1.0 - np.cos(turned))
+        axes.plot(x, y, color=style.GREY, linestyle=(0, (1, 2)), label=label)
+    for robot in range(record.sizes["robot"]):
+        walk, end = record[["position"]].isel(robot=robot), done.criteria.arrival[robot]
+        walk = walk.where(walk.time <= end, drop=True) if np.isfinite(end) else walk
+        place = walk.position.transpose("time", "axis").values
+        name = "path of module 1" if robot == 0 else None
+        axes.plot(place[:, 0], place[:, 1], color=style.CURVES[robot % len(style.CURVES)], label=name, zorder=3)
+    _bodies(axes, record.isel(robot=[0]), float(done.criteria.arrival[0]))
+    axes.add_patch(
+        Circle((float(target[0]), float(target[1])), ARRIVAL_RADIUS, fill=False, ec=style.VERMILLION, lw=1.5)
+    )
+    axes.plot(*target, "+", color=style.VERMILLION, markersize=9, markeredgewidth=2, label="target", linestyle="none")
+    axes.set(xlabel="x (m)", ylabel="y (m)")
+    axes.legend(loc="best")
+    style.grid(axes)
+
+
+def _bodies(axes: Axes, record: xr.Dataset, arrival: float) -> None:
+    end = arrival if np.isfinite(arrival) else float(record.time[np.isfinite(record.heading.values[:, 0])][-1])
+    frames = body_frames(record, np.linspace(0.0, end, _STILLS))
+    for spine in frames.spine[:, 0]:
+        axes.plot(spine[:, 0], spine[:, 1], "-o", color=style.BLACK, alpha=0.35, linewidth=2.5, markersize=3, zorder=2)
+        axes.plot(*spine[0], "o", color=style.BLACK, markersize=4.5, zorder=4)

@@ -1,0 +1,99 @@
+"""Undulating walks below the Neimark-Sacker point: how far and how fast the body swings, beside the normal form."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from chilopod.show import style
+from chilopod.show.panel import Panel
+from chilopod.show.words import number, spring
+
+_LAYOUTS = (style.Layout("ABC", 3.7), style.Layout("A;B;C", 9.5))
+
+
+def panel(data: xr.Dataset) -> Panel:
+    """The figure of :func:`chilopod.analysis.undulation.undulating_walks`."""
+    near = data.isel(distance=int(data.distance.values.argmin()))
+    off = 100.0 * abs(float(near.amplitude / near.predicted_amplitude) - 1.0)
+    return Panel(
+        name="undulation",
+        title="Undulating walks of uniform springs",
+        draw=lambda narrow: _draw(data, narrow),
+        alt="Amplitude and frequency of the settled undulation over the springs, and how far the normal form is off, "
+        "in proportion to the distance from the point.",
+        text=(
+            f"Below {spring(data.attrs['value'], 5)} the body swings. The amplitude grows as the square root of the "
+            f"distance and the frequency moves in proportion to it; {number(100.0 * float(near.distance), 2)} % below "
+            f"the point the normal form misses the simulated amplitude by {number(off, 2)} %.",
+        ),
+        data=data,
+    )
+
+
+def _draw(data: xr.Dataset, narrow: bool) -> Figure:
+    figure, axes = style.figure(*_LAYOUTS, narrow)
+    data = data.sortby("distance")
+    distance, k = data.distance.values, data.k.values
+    label = f"all springs ({data.attrs['unit'].replace('*', '·')})"
+
+    # The prediction between the simulated springs: square root and straight line through the point itself.
+    fine = np.linspace(0.0, distance[-1], 200)
+    root = np.interp(fine, np.append(0.0, distance), np.append(0.0, data.predicted_amplitude.values**2)) ** 0.5
+    axes["A"].plot(data.attrs["value"] * (1.0 - fine), np.rad2deg(root), color=style.ORANGE, label="normal form")
+    _dots(axes["A"], k, np.rad2deg(data.amplitude.values), "simulated")
+    axes["A"].set(ylabel="amplitude, norm over the joints (deg)", title="How far the body swings")
+
+    first = data.attrs["frequency_rad_s"]
+    at = np.append(data.attrs["value"], k)
+    axes["B"].plot(at, np.append(first, data.predicted_frequency.values), color=style.ORANGE, label="normal form")
+    axes["B"].plot(
+        at,
+        np.append(first, data.linear_frequency.values),
+        color=style.GREY,
+        linestyle=(0, (4, 2)),
+        label="small undulation",
+    )
+    _dots(axes["B"], k, data.frequency.values, "simulated")
+    axes["B"].set(ylabel="frequency (rad/s)", title="How fast")
+
+    amplitude_off = np.abs(data.predicted_amplitude.values / data.amplitude.values - 1.0)
+    shift = data.frequency.values - first
+    frequency_off = np.abs((data.predicted_frequency.values - first) / shift - 1.0)
+    axes["C"].loglog(100 * distance, 100 * amplitude_off, "o-", color=style.BLUE, label="amplitude")
+    axes["C"].loglog(100 * distance, 100 * frequency_off, "s-", color=style.GREEN, label="change of frequency")
+    axes["C"].loglog(
+        100 * distance,
+        70 * amplitude_off[0] * distance / distance[0],
+        color=style.GREY,
+        linestyle=(0, (1, 2)),
+        label="in proportion",
+    )
+    axes["C"].set(
+        xlabel="distance below the point (%)", ylabel="normal form is off by (%)", title="How sure the normal form is"
+    )
+
+    for letter in "AB":
+        axes[letter].plot(
+            data.attrs["value"],
+            0.0 if letter == "A" else first,
+            linestyle="none",
+            marker="D",
+            color=style.VERMILLION,
+            label="Neimark-Sacker",
+            zorder=5,
+            clip_on=False,
+        )
+        axes[letter].set_xlabel(label)
+        style.grid(axes[letter])
+    style.grid(axes["C"])
+    axes["A"].legend(loc="lower left")
+    axes["B"].legend(loc="best")
+    axes["C"].legend(loc="upper left")
+    return figure
+
+
+def _dots(axes: Axes, x: np.ndarray, y: np.ndarray, name: str) -> None:
+    axes.plot(x, y, linestyle="none", marker="o", color=style.BLUE, label=name, zorder=4)

@@ -1,0 +1,95 @@
+"""Writing figures and the data behind them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import xarray as xr
+
+from chilopod.netcdf import netcdf, sealed
+from chilopod.output import write_all
+from chilopod.show import style, tables
+from chilopod.show.figures import branch, identification, undulation
+from chilopod.show.panel import Panel
+from chilopod.tasks.identify import Identification
+
+
+def files_of(name: str, folder: str | Path) -> list[Path]:
+    """What is written of the figure of that name alone."""
+    return [Path(folder) / f"{name}.{kind}" for kind in ("png", "svg", "csv", "nc")]
+
+
+def write_identification(found: Identification, folder: str | Path, *, replace: bool = True) -> list[Path]:
+    """Write the profile of an identification as ``identification``, with the same endings as :func:`write_branch`."""
+    write_all(identification_files(found, folder), replace=replace)
+    return files_of("identification", folder)
+
+
+def identification_files(found: Identification, folder: str | Path) -> Iterator[tuple[Path, bytes]]:
+    """The files of :func:`write_identification`, see :func:`panel_files`."""
+    return panel_files(identification.panel(found), Path(folder), Path(folder))
+
+
+def write_branch(data: xr.Dataset, folder: str | Path, *, replace: bool = True) -> list[Path]:
+    """Write a branch of curved walks as ``branch`` with ``.png``, ``.svg``, ``.csv`` and ``.nc``.
+
+    The netCDF file holds all that the branch goes on from, the table what a reader wants.
+
+    Parameters
+    ----------
+    data
+        From :mod:`chilopod.analysis.branch`.
+    folder
+        Created where there is none.
+    replace
+        True if files that are already there may be replaced.
+
+    Returns
+    -------
+    The files.
+
+    Raises
+    ------
+    OutputError
+        If a file cannot be written; it says where it is kept instead.
+    """
+    return _write_alone(branch.panel(data), folder, replace, branch.table(data), sealed(netcdf(data)))
+
+
+def write_undulation(data: xr.Dataset, folder: str | Path, *, replace: bool = True) -> list[Path]:
+    """Write undulating walks as ``undulation``, with the same endings as :func:`write_branch`."""
+    return _write_alone(undulation.panel(data), folder, replace)
+
+
+def panel_files(
+    panel: Panel, figures: Path, data: Path, table: xr.Dataset | None = None, stored: bytes | None = None
+) -> Iterator[tuple[Path, bytes]]:
+    """The files of a figure: the data behind it as ``.nc`` and ``.csv``, then, as ``.svg`` and ``.png``, what is drawn
+    when these are asked for.
+
+    Parameters
+    ----------
+    panel
+        The figure.
+    figures, data
+        Folders.
+    table
+        For the ``.csv``, in place of the data.
+    stored
+        For the ``.nc``, in place of the data.
+    """
+    yield data / f"{panel.name}.nc", netcdf(panel.data) if stored is None else stored
+    yield data / f"{panel.name}.csv", tables.csv(panel.data if table is None else table).encode()
+    with style.house_style():
+        drawn = panel.draw(False)
+        vector, pixels = style.svg(drawn, panel.name), style.png(drawn)
+    yield figures / f"{panel.name}.svg", vector
+    yield figures / f"{panel.name}.png", pixels
+
+
+def _write_alone(
+    panel: Panel, folder: str | Path, replace: bool, table: xr.Dataset | None = None, stored: bytes | None = None
+) -> list[Path]:
+    write_all(panel_files(panel, Path(folder), Path(folder), table, stored), replace=replace)
+    return files_of(panel.name, folder)

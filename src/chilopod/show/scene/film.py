@@ -1,0 +1,370 @@
+"""A recorded walk as an mp4 film, drawn like the replay."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, Patch
+from matplotlib.patheffects import withStroke
+from matplotlib.text import Text
+from numpy.typing import NDArray
+
+from chilopod.errors import OutputError, ParameterError
+from chilopod.show import style
+from chilopod.show.scene.encoder import ENCODER, encoded, has_encoder
+from chilopod.show.scene.frames import Outcome, Scene, scene
+from chilopod.show.scene.outline import SLIMNESS
+from chilopod.show.scene.replay import COLORS
+
+Array = NDArray[np.float64]
+
+_SMALLEST, LARGEST = 240, 4096
+_SLOWEST, FASTEST = 0.01, 1000.0  # s of a walk in one of a film
+PIXEL: Final = 72.0  # points in an inch: at so many dots per inch, matplotlib's sizes are pixels
+GAP: Final = 12.0  # to the edges and from row to row, pixels
+APART: Final = 28.0  # from column to column: outcome and next title stand side by side
+_MARKS: Final = {"arrived": ("✓ ", "#00563f"), "stopped": ("✕ ", "#8f3d00"), "ended": ("", style.BLACK)}
+
+
+def filmed(
+    record: xr.Dataset,
+    *,
+    titles: Mapping[Any, str] | Sequence[str],
+    heading: str,
+    fps: int = 25,
+    speed: float = 1.0,
+    size: tuple[int, int] = (960, 480),
+) -> bytes:
+    """A record as a film, H.264 in mp4: browsers and presentations play it before it is loaded whole.
+
+    Parameters
+    ----------
+    record
+        As described in :mod:`chilopod.show.scene.frames`.
+    titles
+        Names of the robots: by label in the record, or in the order of the record.
+    heading
+        Text above all panels.
+    fps
+        Frames per second of the film.
+    speed
+        Seconds of the walk per second of the film.
+    size
+        Width and height, pixels, both even.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is out of range, the record does not go with its robot, or a robot has no title.
+    OutputError
+        If PyAV was built without its H.264 encoder.
+    """
+    times = frame_times(record, size, fps, speed)
+    return encoded(_frames(scene(record, titles, times), heading, size, speed), fps, size)
+
+
+def frame_times(record: xr.Dataset, size: tuple[int, int], fps: int, speed: float) -> Array:
+    """When the frames of a film are, s of the record.
+
+    Raises
+    ------
+    ParameterError
+        If it cannot be encoded in this size, or at this rate or speed.
+    OutputError
+        If PyAV was built without its H.264 encoder.
+    """
+    if not 1 <= fps <= 120:
+        raise ParameterError("is no frame rate", field="fps", value=fps, allowed="1 to 120 per second")
+    if not _SLOWEST <= speed <= FASTEST:
+        raise ParameterError("is no speed", field="speed", value=speed, allowed=f"{_SLOWEST:g} to {FASTEST:g}")
+    if any(side % 2 or not _SMALLEST <= side <= LARGEST for side in size):
+        allowed = f"two even numbers from {_SMALLEST} to {LARGEST}"
+        raise ParameterError("is no size of a film", field="size", value=size, allowed=allowed)
+    if not has_encoder():
+        raise OutputError(f"PyAV was built without the encoder {ENCODER}, which movies need")
+    recorded = record["time"].values.astype(np.float64)
+    # The last frame is the last sample, with what it came to; the tolerance is for round-off in the duration.
+    count = math.ceil((recorded[-1] - recorded[0]) * fps / speed - 1e-6) + 1
+    times: Array = np.minimum(recorded[0] + np.arange(count) * (speed / fps), recorded[-1])
+    return times
+
+
+def _frames(shown: Scene, heading: str, size: tuple[int, int], speed: float) -> Iterator[NDArray[np.uint8]]:
+    """Every frame, (height, width, 4); the next one overwrites it."""
+    with style.house_style():
+        stage = Stage(shown, heading, size, speed)
+        for index in range(len(shown.frames.time)):
+            yield stage.drawn(index)
+
+
+@dataclass(frozen=True)
+class _Captions:
+    """Titles and outcomes of all panels, and how wide the widest pair is in one line, pixels."""
+
+    titles: list[Text]
+    outcomes: list[Text]
+    longest: float
+
+
+class Stage:
+    """The panels, and what moves in them drawn anew over what does not."""
+
+    def __init__(self, shown: Scene, heading: str, size: tuple[int, int], speed: float) -> None:
+        self.shown, self.size = shown, size
+        self.font = max(12.0, min(size[1] / 32.0, size[0] / 48.0))
+        self.figure = Figure(figsize=(size[0] / PIXEL, size[1] / PIXEL), dpi=PIXEL)
+        self.canvas: Any = FigureCanvasAgg(self.figure)  # matplotlib does not say what its methods take and give
+        width, height = size
+        top = height - 0.45 * self.font
+        self.clock = self._text(width - GAP, top, "", ha="right", va="top", animated=True)
+        self.pace = "" if speed == 1.0 else f"   ({speed:g}×)"
+        self.clock.set_text(self._time(len(shown.frames.time) - 1))
+        room = width - 3.0 * GAP - self._extent(self.clock)
+        title = self._text(GAP, top, heading, va="top", fontsize=1.2 * self.font, weight="bold")
+        self._fit(title, room)
+        below = self._legend()
+        self._panels(GAP + below, top - 1.9 * self.font)
+        self.known: tuple[object, ...] = ()
+        self.background: Any = None
+
+    def drawn(self, index: int) -> NDArray[np.uint8]:
+        """The frame of a time."""
+        now = self.shown.frames.time[index]
+        known = tuple(panel.known(now) for panel in self.panels)
+        if self.background is None or known != self.known:
+            for panel in self.panels:
+                panel.tell(now)
+            self.canvas.draw()
+            self.known, self.background = known, self.canvas.copy_from_bbox(self.figure.bbox)
+        self.canvas.restore_region(self.background)
+        renderer = self.canvas.get_renderer()
+        self.clock.set_text(self._time(index))
+        self.clock.draw(renderer)
+        for panel in self.panels:
+            for artist in panel.placed(index):
+                artist.draw(renderer)
+        return np.asarray(self.canvas.buffer_rgba())
+
+    def _time(self, index: int) -> str:
+        time = self.shown.frames.time
+        return f"{time[index]:.1f} s of {time[-1]:.1f} s{self.pace}"
+
+    def _text(self, x: float, y: float, text: str, **look: Any) -> Text:
+        return self.figure.text(x / self.size[0], y / self.size[1], text, **{"fontsize": self.font, **look})
+
+    def _extent(self, artist: Text | Legend) -> float:
+        return float(artist.get_window_extent(self.canvas.get_renderer()).width)
+
+    def _fit(self, text: Text, room: float) -> None:
+        """Cut a text that is wider than its room."""
+        whole = text.get_text()
+        for kept in range(len(whole), 0, -1):
+            if self._extent(text) <= room:
+                return
+            text.set_text(whole[: kept - 1].rstrip() + "…")
+
+    def _legend(self) -> float:
+        """Draw the key in as few lines as it takes; returns its height."""
+        handles: list[Patch | Line2D] = [
+            Patch(fc=COLORS["edge"], ec=COLORS["edge"], label="module 1"),
+            Patch(fc=COLORS["body"], ec=COLORS["edge"], label="other modules"),
+            _dot(COLORS["ink"], COLORS["ink"], 0.6 * self.font, label="standing foot"),
+            _dot("white", COLORS["air"], 0.6 * self.font, label="foot in the air"),
+            Line2D([], [], color=COLORS["path"], label="path of module 1"),
+        ]
+        if any(self.shown.aims):
+            handles.append(
+                Line2D([], [], ls="", marker="+", ms=0.8 * self.font, mew=2, color=COLORS["target"], label="target")
+            )
+        for rows in range(1, len(handles) + 1):
+            legend = self.figure.legend(
+                handles=handles,
+                loc="lower left",
+                ncols=math.ceil(len(handles) / rows),
+                fontsize=max(12.0, 0.85 * self.font),
+                borderaxespad=0.4,
+                columnspacing=1.4,
+                handlelength=1.5,
+                handletextpad=0.5,
+            )
+            if self._extent(legend) <= self.size[0] - GAP:
+                break
+            legend.remove()
+        return float(legend.get_window_extent(self.canvas.get_renderer()).height)
+
+    def _captions(self) -> _Captions:
+        """Titles and outcomes, still to be placed."""
+        said = (self.shown.titles, map(says, self.shown.outcomes))
+        titles, outcomes = ([self._text(0.0, 0.0, each, weight="bold", va="top") for each in texts] for texts in said)
+        longest = max(self._extent(a) + self._extent(b) for a, b in zip(titles, outcomes, strict=True)) + self.font
+        return _Captions(titles, outcomes, longest)
+
+    def _tall(self, lines: int) -> float:
+        """Height of a caption."""
+        return (0.35 + 1.35 * lines) * self.font
+
+    def _place(self, captions: _Captions, index: int, at: tuple[float, float], across: float, lines: int) -> None:
+        """Put a caption over its panel: title and outcome in one line, or in two."""
+        x, y = at
+        outcome = (x + across, y) if lines == 1 else (x, y - 1.35 * self.font)
+        captions.outcomes[index].set_horizontalalignment("right" if lines == 1 else "left")
+        for text, place in ((captions.titles[index], at), (captions.outcomes[index], outcome)):
+            text.set_position((place[0] / self.size[0], place[1] / self.size[1]))
+            self._fit(text, across)
+
+    def _panels(self, bottom: float, top: float) -> None:
+        """Lay the panels out as large as they fit, with title and outcome in one line if there is room for both."""
+        floor, width = self.shown.floor, self.size[0] - 2.0 * GAP
+        count, aspect = len(self.shown.titles), (floor.y1 - floor.y0) / (floor.x1 - floor.x0)
+        captions = self._captions()
+        for lines in (1, 2):
+            caption = self._tall(lines)
+            sizes = []
+            for columns in range(1, count + 1):
+                rows = math.ceil(count / columns)
+                wide = (width - APART * (columns - 1)) / columns
+                sizes.append((min(wide, ((top - bottom - GAP * (rows - 1)) / rows - caption) / aspect), columns))
+            across, columns = max(sizes)
+            if captions.longest <= across:
+                break
+        across = max(across, 40.0)
+        left = GAP + 0.5 * (width - columns * across - (columns - 1) * APART)
+        rows = math.ceil(count / columns)
+        top -= max(0.0, 0.5 * (top - bottom + GAP - rows * (across * aspect + caption + GAP)))
+        self.panels = []
+        for index, outcome in enumerate(captions.outcomes):
+            x = left + (index % columns) * (across + APART)
+            y = top - (index // columns) * (across * aspect + caption + GAP)
+            self._place(captions, index, (x, y), across, lines)
+            box = (x, y - caption - across * aspect, across, across * aspect)
+            axes = self.figure.add_axes(tuple(np.array(box) / np.tile(self.size, 2)))
+            self.panels.append(FilmPanel(self.shown, index, axes, across / (floor.x1 - floor.x0), self.font, outcome))
+
+
+class FilmPanel:
+    """One robot on its floor; `zoom` in pixels per metre."""
+
+    def __init__(self, shown: Scene, robot: int, axes: Axes, zoom: float, font: float, label: Text) -> None:
+        self.shown, self.robot, self.label = shown, robot, label
+        self.outcome, self.told = shown.outcomes[robot], label.get_text()
+        self.rings: list[tuple[Circle, Line2D]] = []
+        floor, frames = shown.floor, shown.frames
+        axes.set(xlim=(floor.x0, floor.x1), ylim=(floor.y0, floor.y1), xticks=[], yticks=[])
+        axes.spines[:].set(visible=True, color=COLORS["grid"])
+        for line in np.arange(math.ceil(floor.x0 / floor.grid), floor.x1 / floor.grid):
+            axes.axvline(line * floor.grid, color=COLORS["grid"], lw=1.0)
+        for line in np.arange(math.ceil(floor.y0 / floor.grid), floor.y1 / floor.grid):
+            axes.axhline(line * floor.grid, color=COLORS["grid"], lw=1.0)
+        self._scale_bar(axes, zoom, font)
+        for aim in shown.aims[robot]:
+            ring = Circle(aim.place, shown.arrival_radius, ec=COLORS["target"], lw=1.5)
+            axes.add_patch(ring)
+            (cross,) = axes.plot(*aim.place, "+", color=COLORS["target"], ms=10.0, mew=2.0)
+            self.rings.append((ring, cross))
+
+        length = frames.robot.module_length
+        thin = max(0.8, min(1.5, 0.02 * length * zoom))
+        foot, joint = 2.0 * max(2.0, 0.055 * length * zoom), 2.0 * max(1.5, 0.05 * length * zoom)
+        n = frames.robot.body.modules
+        self.outline = _outline(length)
+        offset, side = frames.robot.legs.forward_offset, 0.5 * SLIMNESS * length
+        self.hips = np.array([[offset, side], [offset, -side]])
+        self.modules = PolyCollection(
+            [], facecolors=[COLORS["edge"], *[COLORS["body"]] * (n - 1)], edgecolors=COLORS["edge"], linewidths=thin
+        )
+        self.legs = LineCollection([], linewidths=thin)
+        self.path = Line2D([], [], color=COLORS["path"], lw=2.0)
+        self.joints = _dot("white", COLORS["ink"], joint, thin)
+        self.swinging = _dot("white", COLORS["air"], foot, thin)
+        self.standing = _dot(COLORS["ink"], COLORS["ink"], foot, thin)
+        self.artists = (self.legs, self.modules, self.path, self.joints, self.swinging, self.standing)
+        for artist in self.artists:
+            artist.set_animated(True)
+            axes.add_artist(artist)
+            artist.set_clip_path(axes.patch)
+
+    def known(self, now: float) -> tuple[object, ...]:
+        """What :meth:`tell` shows depends on this alone: the outcome, and of each target that has begun its own."""
+        begun = self.shown.begun(self.robot, now)
+        return (bool(now >= self.outcome.time - 1e-9), *(aim.is_reached(now) for aim in begun))
+
+    def tell(self, now: float) -> None:
+        """Show the outcome, or that there is none yet, and the targets so far."""
+        known, *reached = self.known(now)
+        self.label.set_text(self.told if known else "walking")
+        self.label.set_color(_MARKS[self.outcome.kind][1] if known else "#555555")
+        self.label.set_fontweight("bold" if known else "normal")
+        for index, (ring, cross) in enumerate(self.rings):
+            # Of those that have had their turn a faint ring stays.
+            now_or_before, present = index < len(reached), index == len(reached) - 1
+            ring.set_visible(now_or_before)
+            cross.set_visible(present)
+            arrived = now_or_before and reached[index]
+            ring.set_facecolor((COLORS["target"], (0.35 if arrived else 0.1) if present else 0.0))
+            ring.set_edgecolor((COLORS["target"], 1.0 if present else 0.4))
+            ring.set_linestyle("-" if arrived else (0, (4, 3)))
+
+    def placed(self, index: int) -> Sequence[Any]:
+        """What moves, where it is then."""
+        frames, robot = self.shown.frames, self.robot
+        spine, centres, stands = frames.spine[index, robot], frames.centres[index, robot], frames.stands[index, robot]
+        if np.isnan(spine).any():
+            return ()
+        headings, feet = frames.headings[index, robot], frames.feet[index, robot]
+        self.modules.set_verts(list(_on_modules(centres, headings, self.outline)))
+        self.modules.set_alpha(1.0 if frames.walks[index, robot] or self.outcome.kind != "stopped" else 0.45)
+        hips = _on_modules(centres, headings, self.hips)
+        self.legs.set_segments(list(np.stack([hips, feet], axis=-2).reshape(-1, 2, 2)))
+        self.legs.set_color([COLORS["ink"] if each else COLORS["air"] for each in stands.ravel()])
+        self.path.set_data(*frames.centres[: index + 1, robot, 0].T)
+        self.joints.set_data(*spine[1:-1].T)
+        self.standing.set_data(*feet[stands].T)
+        self.swinging.set_data(*feet[~stands].T)
+        return self.artists
+
+    def _scale_bar(self, axes: Axes, zoom: float, font: float) -> None:
+        floor = self.shown.floor
+        bar = floor.grid if (floor.x1 - floor.x0) > 1.6 * floor.grid else 0.1 * floor.grid
+        x, y = floor.x0 + 12.0 / zoom, floor.y0 + 0.9 * font / zoom
+        axes.plot([x, x + bar], [y, y], color=COLORS["ink"], lw=3.0, solid_capstyle="butt")
+        axes.plot([x, x + bar], [y, y], "|", color=COLORS["ink"], ms=11.0, mew=1.5)
+        halo = [withStroke(linewidth=4.0, foreground="white")]
+        small = max(12.0, 0.85 * font)
+        axes.text(x + bar + 6.0 / zoom, y, f"{bar:g} m", va="center_baseline", fontsize=small, path_effects=halo)
+
+
+def says(outcome: Outcome) -> str:
+    """An outcome in words, behind its mark."""
+    return _MARKS[outcome.kind][0] + outcome.text
+
+
+def _dot(face: str, edge: str, size: float, line: float = 1.2, **more: Any) -> Line2D:
+    return Line2D([], [], ls="", marker="o", ms=size, mfc=face, mec=edge, mew=line, **more)
+
+
+def _on_modules(centres: NDArray[Any], headings: NDArray[Any], points: NDArray[Any]) -> NDArray[np.float64]:
+    """Points (V, 2) that are fixed in every module, on the floor: (N, V, 2)."""
+    cos, sin = np.cos(headings)[:, None], np.sin(headings)[:, None]
+    x, y = points.T
+    return centres[:, None] + np.stack([x * cos - y * sin, x * sin + y * cos], axis=-1)
+
+
+def _outline(length: float) -> NDArray[np.float64]:
+    """A rounded box about the origin that leaves room for the joints, (V, 2)."""
+    width = SLIMNESS * length
+    radius = 0.4 * width
+    angles = np.linspace(0.0, 2.0 * np.pi, 20, endpoint=False) + np.pi / 20.0
+    around = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    corner = np.array([0.46 * length - radius, 0.5 * width - radius])
+    return np.sign(around) * corner + radius * around

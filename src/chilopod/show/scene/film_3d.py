@@ -1,0 +1,283 @@
+"""Walks of the twin in three dimensions: films of walks side by side, and stills of their moments.
+
+Both take a record as described in :mod:`chilopod.show.scene.frames` that has ``pose`` as well, from
+:func:`chilopod.twin.simulate` with ``poses=True``. Both need OpenGL, see :mod:`chilopod.twin.gl`; a caller that gets
+their OutputError without it still has :func:`chilopod.show.scene.film.filmed`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from numpy.typing import ArrayLike, NDArray
+
+from chilopod.errors import ParameterError
+from chilopod.show import style
+from chilopod.show.scene.aims import places_of
+from chilopod.show.scene.encoder import encoded
+from chilopod.show.scene.film import APART, GAP, LARGEST, PIXEL, FilmPanel, Stage, frame_times
+from chilopod.show.scene.frames import Scene, scene
+from chilopod.show.scene.stage_3d import TILE, Look, Studio, View, framing
+from chilopod.twin import gl
+
+Array = NDArray[np.float64]
+
+_TALL: Final = 0.15  # m above the floor that pictures leave room for, more than any robot's back
+_BESIDE: Final = 0.1  # m to the side of the middle of the body, likewise
+_POLE: Final = 0.42  # m, likewise for the pole
+_CALM: Final = 12  # frames before and after over which a camera that follows is held
+_PICTURE: Final = (640, 400)
+_MOST_PICTURES: Final = 60
+_NARROWEST, _LOWEST = 120, 80
+
+
+def film_3d(
+    record: xr.Dataset,
+    *,
+    titles: Mapping[Any, str] | Sequence[str],
+    heading: str,
+    fps: int = 25,
+    speed: float = 1.0,
+    size: tuple[int, int] = (1440, 400),
+    follow: bool = False,
+) -> bytes:
+    """Walks of the twin as a film, side by side, H.264 in mp4.
+
+    Parameters
+    ----------
+    record
+        As described at the top of this module; the film is no smoother.
+    titles, heading, fps, speed, size
+        As for :func:`chilopod.show.scene.film.filmed`.
+    follow
+        True if every panel follows its robot; otherwise all show the same piece of floor, with all of all walks.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is out of range, the record has no poses or does not go with its robot, or a robot has no title.
+    OutputError
+        If there is no OpenGL, or PyAV was built without its H.264 encoder.
+    """
+    times = frame_times(record, size, fps, speed)
+    walks = _Walks(record, titles, times)
+    with gl.context(*size), style.house_style():
+        stage = _Stage3D(walks, heading, size, speed, follow)
+        try:
+            return encoded((stage.drawn(index) for index in range(len(times))), fps, size)
+        finally:
+            stage.studio.close()
+
+
+def stills(
+    record: xr.Dataset,
+    times: ArrayLike,
+    *,
+    titles: Mapping[Any, str] | Sequence[str] | None = None,
+    heading: str = "",
+    size: tuple[int, int] = _PICTURE,
+) -> bytes:
+    """Moments of walks as pictures in one PNG, all of the same piece of floor; a row for every robot.
+
+    Parameters
+    ----------
+    record, titles, heading
+        As for :func:`film_3d`; by default without titles and heading.
+    times
+        Times of the moments, s, shape (T,); the nearest samples are shown.
+    size
+        Width and height of a picture, pixels.
+
+    Raises
+    ------
+    ParameterError
+        If a time is not in the record, there are too many, the record has no poses or does not go with its robot, or a
+        robot has no title.
+    OutputError
+        If there is no OpenGL.
+    """
+    wanted, recorded = np.atleast_1d(np.asarray(times, dtype=np.float64)), record["time"].values
+    robots = record.sizes["robot"]
+    if not 1 <= wanted.size * robots <= _MOST_PICTURES:
+        allowed = f"1 to {_MOST_PICTURES} pictures in all"
+        raise ParameterError("has too few or too many", field="times", value=wanted.size, allowed=allowed)
+    outside = ~((wanted >= recorded[0] - 1e-9) & (wanted <= recorded[-1] + 1e-9))
+    if outside.any():
+        allowed = f"{recorded[0]:g} to {recorded[-1]:g} s"
+        raise ParameterError("is not in the record", field="times", value=float(wanted[outside][0]), allowed=allowed)
+    if any(not _NARROWEST <= side <= LARGEST for side in size):
+        allowed = f"{_NARROWEST} to {LARGEST} pixels"
+        raise ParameterError("is no size of a picture", field="size", value=size, allowed=allowed)
+    walks = _Walks(record, [""] * robots if titles is None else titles, wanted)
+    with gl.context(*size), style.house_style():
+        studio = Studio(walks.shown.frames.robot, size, walks.view(size), fine=True)
+        try:
+            return style.png(_arranged(walks, studio, heading, size), dpi=PIXEL)
+        finally:
+            studio.close()
+
+
+class _Walks:
+    """What a record holds at the samples nearest to some times."""
+
+    def __init__(self, record: xr.Dataset, titles: Mapping[Any, str] | Sequence[str], times: Array) -> None:
+        if "pose" not in record:
+            allowed = "one of the twin, simulated with poses=True"
+            raise ParameterError("has no poses to draw", field="record", allowed=allowed)
+        recorded = record["time"].values.astype(np.float64)
+        above = np.searchsorted(recorded, times).clip(1, max(1, len(recorded) - 1))
+        above = np.minimum(above, len(recorded) - 1)
+        nearer = np.abs(recorded[above - 1] - times) <= np.abs(recorded[above] - times) + 1e-9
+        self.samples = np.where(nearer, np.maximum(above - 1, 0), above)
+        self.shown: Scene = scene(record, titles, recorded[self.samples])
+        self.poses: Array = record["pose"].transpose("time", "robot", "coordinate").values
+        self.positions: Array = record["position"].transpose("time", "robot", "axis").values
+        good = np.isfinite(self.poses).all(axis=-1)
+        rows = np.where(good, np.arange(len(recorded))[:, None], -1)
+        self.last = np.maximum.accumulate(rows, axis=0)
+
+    def view(self, size: tuple[int, int], robot: int | None = None, index: int = 0) -> View:
+        """Of everything, or of the surroundings of a robot at a time."""
+        frames, floor = self.shown.frames, self.shown.floor
+        if robot is not None:
+            around = slice(max(0, index - _CALM), index + _CALM + 1)
+            middle = frames.spine[around, robot].mean(axis=(0, 1))
+            reach = 0.55 * frames.robot.body.length
+            places = middle + reach * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
+        else:
+            path = self.positions[: self.samples.max() + 1]
+            places = np.concatenate([frames.spine.reshape(-1, 2), path.reshape(-1, 2)])
+            low, high = np.array([floor.x0, floor.y0]), np.array([floor.x1, floor.y1])
+            # A robot that diverged may be anywhere; the floor is where the others are.
+            places = places[np.isfinite(places).all(axis=-1)]
+            places = places[((places >= low) & (places <= high)).all(axis=-1)]
+        if not len(places) or not np.isfinite(places).all():
+            places = np.array([[floor.x0, floor.y0], [floor.x1, floor.y1]])
+        beside = _BESIDE * np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])
+        solid = [np.concatenate([_at(places + each, 0.0), _at(places + each, _TALL)]) for each in beside]
+        targets = places_of(self.shown.aims)
+        if robot is None:
+            solid += [_at(targets + self.shown.arrival_radius * each, 0.0) for each in np.sign(beside)]
+            solid += [_at(targets, _POLE)]
+        return framing(np.concatenate(solid), size[0] / size[1])
+
+    def look(self, index: int, robot: int) -> Look:
+        """Of a robot at a time."""
+        shown, sample = self.shown, int(self.samples[index])
+        last, now = int(self.last[sample, robot]), float(shown.frames.time[index])
+        begun = shown.begun(robot, now)
+        return Look(
+            pose=self.poses[last, robot] if last >= 0 else None,
+            stands=shown.frames.stands[index, robot],
+            walks=bool(shown.frames.walks[index, robot]) or shown.outcomes[robot].kind != "stopped",
+            path=self.positions[: last + 1, robot],
+            target=np.array(begun[-1].place) if begun else None,
+            radius=shown.arrival_radius,
+            arrived=bool(begun) and begun[-1].is_reached(now),
+        )
+
+
+class _Stage3D(Stage):
+    """A film's heading, clock and key around panels in three dimensions."""
+
+    def __init__(self, walks: _Walks, heading: str, size: tuple[int, int], speed: float, follow: bool) -> None:
+        self.walks, self.follow = walks, follow
+        self.studio: Studio
+        super().__init__(walks.shown, heading, size, speed)
+
+    def _panels(self, bottom: float, top: float) -> None:
+        """Lay the panels out, all of one size, with title and outcome in one line if there is room for both."""
+        width, count = self.size[0] - 2.0 * GAP, len(self.shown.titles)
+        columns = _columns(count)
+        rows = math.ceil(count / columns)
+        across = max(_NARROWEST, int((width - APART * (columns - 1)) / columns))
+        captions = self._captions()
+        lines = 1 if captions.longest <= across else 2
+        caption = self._tall(lines)
+        tall = max(_LOWEST, int((top - bottom - GAP * (rows - 1)) / rows - caption))
+        robot, panel = self.shown.frames.robot, (across, tall)
+        self.studio = Studio(robot, panel, self.walks.view(panel, 0 if self.follow else None))
+        self.panels = []
+        for index, outcome in enumerate(captions.outcomes):
+            x = GAP + (index % columns) * (across + APART)
+            y = top - (index // columns) * (tall + caption + GAP)
+            self._place(captions, index, (x, y), across, lines)
+            corner = (round(x), round(self.size[1] - y + caption))
+            self.panels.append(_Panel3D(self, index, panel, corner, outcome))
+        note = self._text(self.size[0] - GAP, GAP, f"tiles of {TILE:g} m", ha="right", fontsize=0.85 * self.font)
+        note.set_visible(self._room_beside_key(note))
+
+    def _room_beside_key(self, note: Text) -> bool:
+        renderer = self.canvas.get_renderer()
+        key = self.figure.legends[0].get_window_extent(renderer)
+        return bool(note.get_window_extent(renderer).x0 > key.x1 + self.font)
+
+
+class _Panel3D(FilmPanel):
+    """One robot in its piece of floor."""
+
+    def __init__(
+        self, stage: _Stage3D, robot: int, size: tuple[int, int], corner: tuple[int, int], label: Text
+    ) -> None:
+        self.stage, self.shown, self.robot, self.size, self.label = stage, stage.shown, robot, size, label
+        self.outcome, self.told, self.rings = stage.shown.outcomes[robot], label.get_text(), []
+        (left, above), (width, height) = corner, size
+        self.box = (slice(above, above + height), slice(left, left + width), slice(0, 3))
+        self.whole = stage.walks.view(size)
+        self.index = 0
+
+    def placed(self, index: int) -> Sequence[Any]:
+        """What to draw at a time."""
+        self.index = index
+        return (self,)
+
+    def draw(self, renderer: Any) -> None:
+        """Put the picture into the frame as it is; matplotlib would take as long as OpenGL to place it."""
+        walks, follow = self.stage.walks, self.stage.follow
+        view = walks.view(self.size, self.robot, self.index) if follow else self.whole
+        picture = self.stage.studio.picture(walks.look(self.index, self.robot), view)
+        frame = np.asarray(renderer.buffer_rgba())[self.box]
+        frame[:] = picture[: frame.shape[0], : frame.shape[1]]
+
+
+def _columns(count: int) -> int:
+    """Side by side as long as panels are not too narrow, then in rows that are as full as can be."""
+    rows = math.ceil(count / 3)
+    return math.ceil(count / rows)
+
+
+def _arranged(walks: _Walks, studio: Studio, heading: str, size: tuple[int, int]) -> Figure:
+    """Pictures in rows under their captions."""
+    shown, view = walks.shown, walks.view(size)
+    count, robots = len(walks.samples), len(shown.titles)
+    columns = count if robots > 1 else _columns(count)
+    rows = robots if robots > 1 else math.ceil(count / columns)
+    font = max(12.0, size[0] / 32.0)
+    caption, above = 1.7 * font, 2.2 * font if heading else 0.5 * GAP
+    width = columns * (size[0] + GAP) + GAP
+    height = rows * (size[1] + caption) + above + GAP
+    figure = Figure(figsize=(width / PIXEL, height / PIXEL), dpi=PIXEL)
+    if heading:
+        figure.text(GAP / width, 1.0 - 0.5 * font / height, heading, fontsize=1.2 * font, weight="bold", va="top")
+    for number in range(count * robots):
+        index, robot = number % count, number // count
+        x = GAP + (number % columns) * (size[0] + GAP)
+        y = height - above - (number // columns) * (size[1] + caption)
+        says = f"{shown.frames.time[index]:.1f} s"
+        title = shown.titles[robot] if index == 0 else ""
+        figure.text(x / width, (y - 0.3 * font) / height, title, fontsize=font, weight="bold", va="top")
+        figure.text((x + size[0]) / width, (y - 0.3 * font) / height, says, fontsize=font, va="top", ha="right")
+        picture = studio.picture(walks.look(index, robot), view).copy()
+        figure.figimage(picture, round(x), round(y - caption - size[1]))
+    return figure
+
+
+def _at(places: Array, height: float) -> Array:
+    """Places on the floor (P, 2) at a height."""
+    return np.column_stack([places, np.full(len(places), height)])

@@ -1,0 +1,328 @@
+"""Where every module and every foot of a recorded walk is, and what else a replay or a movie of it shows.
+
+A *record* is a dataset over ``time`` (s), ``robot``, ``axis`` (x, y), ``joint`` and ``side`` (left, right) with
+``position`` (m, centre of module 1), ``heading`` (rad), ``joint_angle`` (rad, heading of a module less that of the one
+in front of it), ``leg_yaw`` (rad, of the legs of module 1) and ``status`` (text). Where there was a task there are
+``target`` (m), over time if it moved, and ``distance`` (m) as well; where there was a course, over ``robot`` and
+``goal``, ``goal_place`` (m), ``goal_begin`` and ``goal_end`` (s) and ``goal_verdict`` (text). After a robot stopped its
+values are NaN. The attribute ``robot`` is the text of the robot file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from chilopod.engine import Status
+from chilopod.errors import ParameterError
+from chilopod.kinematics import directions, foot_places, from_modules, module_centres, module_headings
+from chilopod.robot import Robot
+from chilopod.show.scene.aims import Aim, aims_of, places_of
+from chilopod.steering import ARRIVAL_RADIUS
+
+Array = NDArray[np.float64]
+
+# Phases such as 0.62/0.31 miss their integer by round-off; a foot nearer than this (in cycles) to a switch has made it.
+_SAME_PHASE: Final = 1e-9
+_MARGIN: Final = 0.06
+_FOOT_ROOM: Final = 0.12  # for the scale bar below all bodies
+_FLATTEST, _TALLEST = 2.4, 0.8
+
+
+@dataclass(frozen=True)
+class BodyFrames:
+    """Bodies seen from above at T times, of R robots with N modules.
+
+    Attributes
+    ----------
+    robot
+        Description of the robots, but for their springs.
+    time
+        (T,) s.
+    spine
+        (T, R, N+1, 2) m: front end of module 1, the yaw joints, rear end of module N.
+    centres
+        (T, R, N, 2) m, of the modules.
+    headings
+        (T, R, N) rad, of the modules, left positive.
+    feet
+        (T, R, N, 2, 2) m, by module, side (left, right) and axis.
+    stands
+        (T, R, N, 2) whether the foot is on the floor.
+    walks
+        (T, R) whether the record has the robot then. Once it has not, all of the above stay as they were last; of a
+        robot that never started they are NaN, and no foot stands.
+    """
+
+    robot: Robot
+    time: Array
+    spine: Array
+    centres: Array
+    headings: Array
+    feet: Array
+    stands: NDArray[np.bool_]
+    walks: NDArray[np.bool_]
+
+
+def body_frames(record: xr.Dataset, times: ArrayLike | None = None) -> BodyFrames:
+    """Place modules and feet.
+
+    Standing feet move back along their module as the gait has it, swinging ones forward as a half ellipse looks from
+    above.
+
+    Parameters
+    ----------
+    record
+        As described at the top of this module.
+    times
+        (T,) s; between samples the body is interpolated, while the feet keep the gait's exact clock. By default those
+        of the record.
+
+    Raises
+    ------
+    ParameterError
+        If the record does not go with its robot.
+    """
+    robot = robot_of(record)
+    recorded = record["time"].values.astype(np.float64)
+    time = recorded if times is None else np.asarray(times, dtype=np.float64)
+    position, heading, angles, leg_yaw = (
+        _interpolated(record[name].transpose("time", "robot", ...).values, recorded, time)
+        for name in ("position", "heading", "joint_angle", "leg_yaw")
+    )
+    return bodies(robot, time, position, heading, angles, leg_yaw)
+
+
+def bodies(
+    robot: Robot, time: Array, position: Array, heading: Array, joint_angles: Array, leg_yaw: Array
+) -> BodyFrames:
+    """Place modules and feet of robots under way.
+
+    Parameters
+    ----------
+    robot
+        Description of the robots, but for their springs.
+    time
+        (T,) s.
+    position, heading, joint_angles, leg_yaw
+        As in a record, NaN after a robot stopped: (T, R, 2), (T, R), (T, R, N-1) and (T, R, 2), m and rad.
+    """
+    walks = np.isfinite(position).all(-1) & np.isfinite(heading) & np.isfinite(joint_angles).all(-1)
+    walks &= np.isfinite(leg_yaw).all(-1)
+    headings = module_headings(heading, joint_angles)
+    centres = module_centres(position, headings, robot.module_length)
+    half = 0.5 * robot.module_length * directions(headings)[0]
+    spine = np.concatenate([centres[..., :1, :] + half[..., :1, :], centres - half], axis=-2)
+    reach, stands = _strokes(robot, time)
+    feet = _feet(robot, centres, headings, reach, leg_yaw)
+
+    # Index of the last sample, at each time, at which the robot walked.
+    last = np.maximum.accumulate(np.where(walks, np.arange(len(time))[:, None], 0), axis=0)
+    rows, started = (last, np.arange(walks.shape[1])), np.maximum.accumulate(walks, axis=0)
+    standing = stands[last] & started[..., None, None]
+    return BodyFrames(robot, time, spine[rows], centres[rows], headings[rows], feet[rows], standing, walks)
+
+
+def robot_of(record: xr.Dataset) -> Robot:
+    """The robot that a record says it is of.
+
+    Raises
+    ------
+    ParameterError
+        If it says nothing, or has other joints.
+    """
+    if "robot" not in record.attrs:
+        raise ParameterError("has no robot", field="record", allowed="the text of a robot file in attrs['robot']")
+    robot = Robot.from_toml(record.attrs["robot"])
+    if record.sizes["joint"] != robot.body.modules - 1:
+        raise ParameterError(
+            f"has {record.sizes['joint']} joints",
+            field="record",
+            allowed=f"{robot.body.modules - 1}, those of its robot",
+        )
+    return robot
+
+
+def _interpolated(values: NDArray[Any], recorded: Array, times: Array) -> Array:
+    """Values over time at other times; NaN next to NaN and where a value is infinite."""
+    known = np.where(np.isfinite(values), values, np.nan).astype(np.float64)
+    place = np.interp(times, recorded, np.arange(len(recorded)))
+    below = np.floor(place + _SAME_PHASE).astype(np.intp)
+    above = np.minimum(below + 1, len(recorded) - 1)
+    share = (place - below).reshape(-1, *[1] * (known.ndim - 1))
+    # On a sample its neighbour does not count, not even as 0 times NaN.
+    return np.where(share <= _SAME_PHASE, known[below], (1.0 - share) * known[below] + share * known[above])
+
+
+def _strokes(robot: Robot, time: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """How far every foot is ahead of mid-stroke (m) and whether it stands, both (T, N, 2)."""
+    phase = (robot.gait.phases(time, robot.body.modules) + _SAME_PHASE) % 1.0
+    return robot.gait.stroke(phase), robot.gait.stands(phase)
+
+
+def _feet(robot: Robot, centres: Array, headings: Array, reach: Array, leg_yaw: Array) -> Array:
+    """Feet on the floor, (T, R, N, 2, 2); `reach` as from :func:`_strokes`, `leg_yaw` (T, R, 2)."""
+    yaw = np.zeros((*headings.shape, 2))
+    yaw[:, :, 0] = leg_yaw
+    places = foot_places(robot.legs.forward_offset, robot.legs.half_width, reach[:, None], yaw)
+    return from_modules(centres, headings, places)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a robot.
+
+    Attributes
+    ----------
+    text
+        Such as "arrived at 18.4 s", "3 of 5 targets", or the status; nothing is said before its time.
+    kind
+        "arrived", "stopped" (its record ends early) or "ended" (with the record, or where it was told to halt).
+    time
+        From when on it is known, s.
+    """
+
+    text: str
+    kind: str
+    time: float
+
+
+@dataclass(frozen=True)
+class Floor:
+    """The piece of the floor that is shown, alike for all robots.
+
+    Attributes
+    ----------
+    x0, x1, y0, y1
+        Its edges, m.
+    grid
+        Distance of the grid lines, which pass through the origin, m.
+    """
+
+    x0: float
+    x1: float
+    y0: float
+    y1: float
+    grid: float
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Everything that is drawn.
+
+    Attributes
+    ----------
+    frames
+        The bodies.
+    floor
+        Part of the floor that is seen.
+    titles, outcomes
+        One for each robot.
+    aims
+        One sequence for each robot: its targets in the order of their turns.
+    arrival_radius
+        m; 0 where there are no targets.
+    """
+
+    frames: BodyFrames
+    floor: Floor
+    titles: tuple[str, ...]
+    outcomes: tuple[Outcome, ...]
+    aims: tuple[tuple[Aim, ...], ...]
+    arrival_radius: float
+
+    def begun(self, robot: int, now: float) -> tuple[Aim, ...]:
+        """The targets of a robot that have had their turn at a time (s), or have it."""
+        return tuple(aim for aim in self.aims[robot] if now >= aim.since - 1e-9)
+
+
+def scene(record: xr.Dataset, titles: Mapping[Any, str] | Sequence[str], times: ArrayLike | None = None) -> Scene:
+    """Everything that is drawn of a record.
+
+    Parameters
+    ----------
+    record
+        As described at the top of this module.
+    titles
+        Title of each robot: by its label in the record, or in the order of the record.
+    times
+        As for :func:`body_frames`.
+
+    Raises
+    ------
+    ParameterError
+        If the record does not go with its robot, or a robot has no title.
+    """
+    frames = body_frames(record, times)
+    aims = aims_of(record)
+    radius = ARRIVAL_RADIUS if any(aims) else 0.0
+    return Scene(
+        frames,
+        _floor(frames, places_of(aims), radius),
+        _titles(record, titles),
+        tuple(_outcome(record, frames, robot, each) for robot, each in enumerate(aims)),
+        aims,
+        radius,
+    )
+
+
+def _titles(record: xr.Dataset, titles: Mapping[Any, str] | Sequence[str]) -> tuple[str, ...]:
+    labels = record["robot"].values.tolist()
+    if isinstance(titles, Mapping):
+        missing = [label for label in labels if label not in titles]
+        if missing:
+            raise ParameterError(f"has none for robot {missing[0]!r}", field="titles")
+        return tuple(titles[label] for label in labels)
+    if len(titles) != len(labels):
+        raise ParameterError(f"has {len(titles)} titles", field="titles", allowed=f"{len(labels)}, one for each robot")
+    return tuple(titles)
+
+
+def _outcome(record: xr.Dataset, frames: BodyFrames, robot: int, aims: tuple[Aim, ...]) -> Outcome:
+    status, walks = str(record["status"].values[robot]), frames.walks[:, robot]
+    reached = [aim.reached for aim in aims if aim.reached is not None]
+    goals = record.sizes.get("goal", max(len(aims), 1))
+    if len(reached) == goals:
+        words = f"arrived at {reached[-1]:.1f} s" if goals == 1 else f"all {goals} targets by {reached[-1]:.1f} s"
+        return Outcome(words, "arrived", reached[-1])
+    if not walks.any():
+        return Outcome(status, "stopped", float(frames.time[0]))
+    end = float(frames.time[walks][-1])
+    if not walks[-1] and status != Status.HALTED.label:
+        return Outcome(f"{status} at {end:.1f} s", "stopped", end)
+    if goals > 1:
+        return Outcome(f"{len(reached)} of {goals} targets", "ended", end)
+    return Outcome("target not reached" if aims else status, "ended", end)
+
+
+def _floor(frames: BodyFrames, aims: Array, radius: float) -> Floor:
+    """The box around all bodies and targets, a little larger, and neither a slit nor a tower."""
+    robot, n = frames.robot, frames.robot.body.modules
+    flat = np.concatenate([frames.spine, frames.feet.reshape(*frames.centres.shape[:2], 2 * n, 2)], axis=2)
+    seen = frames.walks[..., None] & np.isfinite(flat).all(-1)
+    # A robot that diverges may be anywhere in its last samples, and must not shrink all others to a dot.
+    duration = frames.time[-1] - frames.time[0]
+    furthest = 2.0 * (robot.body.length + robot.gait.speed * duration)
+    start = frames.centres[:1, :, :1]
+    seen &= np.abs(np.where(seen[..., None], flat - start, np.inf)).max(axis=-1) <= furthest
+    points = np.concatenate([flat[seen], aims - radius, aims + radius, np.zeros((0 if seen.any() else 1, 2))])
+    low, high = points.min(axis=0), points.max(axis=0)
+    low[1] -= _FOOT_ROOM * max(high[1] - low[1], (high[0] - low[0]) / _FLATTEST)
+    middle, size = 0.5 * (low + high), np.maximum(high - low, 0.5 * robot.body.length)
+    size *= 1.0 + 2.0 * _MARGIN
+    size = np.array([max(size[0], _TALLEST * size[1]), max(size[1], size[0] / _FLATTEST)])
+    (x0, y0), (x1, y1) = middle - 0.5 * size, middle + 0.5 * size
+    return Floor(float(x0), float(x1), float(y0), float(y1), _grid(float(size.max())))
+
+
+def _grid(extent: float) -> float:
+    """1 m where that makes a readable grid, otherwise 1, 2 or 5 times the power of ten that does."""
+    if 2.0 <= extent <= 14.0:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(extent / 3.0))
+    return float(max(step * power for step in (1, 2, 5) if step * power <= extent / 3.0 * (1.0 + 1e-9)))

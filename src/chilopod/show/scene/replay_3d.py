@@ -1,0 +1,170 @@
+"""A walk of the three-dimensional robot as one HTML page that plays it, seen from wherever one likes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import mujoco
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from chilopod.errors import ParameterError
+from chilopod.show.scene.frames import Scene, scene
+from chilopod.show.scene.outline_3d import drawn, yaw_joint
+from chilopod.show.scene.replay_page import LARGEST, encoded, packed, page, shown_times, span
+from chilopod.twin.model import TwinModel, compiled
+
+Array = NDArray[np.float64]
+
+_SCRIPTS: Final = ("replay_3d_pose.js", "replay_3d_paint.js", "replay_3d.js")
+_FINE: Final = 10  # thin grid lines from one to the next
+_WILDEST: Final = 10.0  # m and rad: what diverges is drawn no further than that
+
+
+def replay_3d(record: xr.Dataset, *, titles: Mapping[Any, str] | Sequence[str], heading: str) -> str:
+    """The record as a page: one panel per robot, in three dimensions, with controls to play it and to look around.
+
+    The page opens from disk and plays as :func:`chilopod.show.scene.replay.replay` does. Its address may end in
+    ``#t=12.5`` (s; it waits there), ``view=`` with oblique, behind, side or above, and ``follow``, joined by ``&``.
+    It holds the joints' positions at 25 Hz as whole numbers of 16 bits; the script puts the bodies where they are.
+
+    Parameters
+    ----------
+    record
+        From :func:`chilopod.twin.simulate.simulate` with ``poses=True``.
+    titles, heading
+        As for :func:`chilopod.show.scene.replay.replay`.
+
+    Returns
+    -------
+    str
+        The HTML.
+
+    Raises
+    ------
+    ParameterError
+        If the record has no poses or does not go with its robot, or a robot has no title.
+    """
+    if "pose" not in record:
+        raise ParameterError(
+            "has no poses, so the robot cannot be drawn in three dimensions",
+            field="record",
+            allowed="a record of the twin, simulated with poses=True",
+        )
+    times = shown_times(record)
+    shown = scene(record, titles, times)
+    plan = compiled(shown.frames.robot)
+    poses = record["pose"].transpose("time", "robot", "coordinate")
+    if poses.sizes["coordinate"] != plan.model.nq:
+        raise ParameterError(
+            f"has poses of {poses.sizes['coordinate']} coordinates",
+            field="record",
+            allowed=f"{plan.model.nq}, those of its robot",
+        )
+    kept = _continued(poses.sel(time=times).values, _quaternions(plan.model))
+    view = "the robot on the floor, in three dimensions"
+    fine = f"{shown.floor.grid / _FINE:g} m"
+    data = _data(shown, plan, kept)
+    return page("replay_3d.html.j2", shown, heading, view, data, _SCRIPTS, fine=fine)
+
+
+def _quaternions(model: mujoco.MjModel) -> list[int]:
+    """Where quaternions begin among the coordinates: those of free joints."""
+    free = model.jnt_type == mujoco.mjtJoint.mjJNT_FREE
+    return [int(at) + 3 for at in model.jnt_qposadr[free]]
+
+
+def _continued(poses: Array, quaternions: Sequence[int]) -> Array:
+    """Poses (T, R, coordinates) that stay as they were once a robot stops, with quaternions that do not jump."""
+    known = np.isfinite(poses).all(axis=-1)
+    last = np.maximum.accumulate(np.where(known, np.arange(len(poses))[:, None], 0), axis=0)
+    poses = poses[last, np.arange(poses.shape[1])]
+    # A quaternion and its opposite are the same rotation, but the way from one to the other is not none.
+    for at in quaternions:
+        turn = poses[..., at : at + 4]
+        turn[:] = turn.clip(-1.0, 1.0)  # of a robot that blows up, anything may be there
+        agree = (turn[1:] * turn[:-1]).sum(axis=-1, keepdims=True)
+        turn[1:] *= np.cumprod(np.where(agree < 0.0, -1.0, 1.0), axis=0)
+    return poses
+
+
+def _data(shown: Scene, plan: TwinModel, poses: Array) -> dict[str, Any]:
+    """What the script of the page reads; coordinates are little-endian, in base64."""
+    origin, step = _scale(shown, poses)
+    steps = packed(poses, origin, step)
+    pole = plan.model.geom("pole").size
+    return {
+        "fine": _FINE,
+        "scale": {"origin": origin.tolist(), "step": step.tolist()},
+        "length": plan.robot.body.length,
+        "pole": {"radius": float(pole[0]), "height": 2.0 * float(pole[1])},
+        "bodies": _bodies(plan.model),
+        "shapes": _shapes(plan) + _pins(plan),
+        "robots": [{"pose": encoded(steps[:, robot])} for robot in range(poses.shape[1])],
+    }
+
+
+def _scale(shown: Scene, poses: Array) -> tuple[Array, Array]:
+    """Middle and step of every coordinate."""
+    with np.errstate(invalid="ignore"):
+        finite = np.where(np.isfinite(poses), poses, 0.0).clip(-_WILDEST, _WILDEST)
+    low, high = finite.min(axis=(0, 1)), finite.max(axis=(0, 1))
+    middle, reach = 0.5 * (low + high), 0.5 * (high - low)
+    middle[:2], reach[:2] = span(shown.floor)
+    # Of what does not change a step of any size will do.
+    return middle, np.maximum(reach, 1e-9) / LARGEST
+
+
+def _bodies(model: mujoco.MjModel) -> list[dict[str, Any]]:
+    """The chain of bodies, each after the one it hangs on: where it is there, and the joints that it moves about."""
+    return [
+        {
+            "parent": int(model.body_parentid[body]),
+            "place": model.body_pos[body].tolist(),
+            "turn": model.body_quat[body].tolist(),
+            "joints": [
+                {
+                    "free": bool(model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE),
+                    "at": int(model.jnt_qposadr[joint]),
+                    "axis": model.jnt_axis[joint].tolist(),
+                    "anchor": model.jnt_pos[joint].tolist(),
+                }
+                for joint in range(model.body_jntadr[body], model.body_jntadr[body] + model.body_jntnum[body])
+            ],
+        }
+        for body in range(model.nbody)
+    ]
+
+
+def _shapes(plan: TwinModel) -> list[dict[str, Any]]:
+    """What is drawn of the model: on which body, where there, what it is and how large (half sizes, m)."""
+    model, feet = plan.model, {int(geom) for geom in plan.feet.ravel()}
+    front = int(model.body("module1").id)
+    shapes = []
+    for geom, kind in drawn(model).items():
+        body = int(model.geom_bodyid[geom])
+        role = "foot" if geom in feet else "leg"
+        if kind == "box":
+            role = "front" if body == front else "module"
+        place, turn = model.geom_pos[geom].tolist(), model.geom_quat[geom].tolist()
+        size = model.geom_size[geom].tolist()
+        shapes.append({"body": body, "kind": kind, "role": role, "size": size, "place": place, "turn": turn})
+    return shapes
+
+
+def _pins(plan: TwinModel) -> list[dict[str, Any]]:
+    """The yaw joints, which have no geometry in the model."""
+    model, size = plan.model, [*yaw_joint(plan.model), 0.0]
+    return [
+        {
+            "body": int(model.jnt_bodyid[joint]),
+            "kind": "cylinder",
+            "role": "joint",
+            "size": size,
+            "place": model.jnt_pos[joint].tolist(),
+            "turn": [1.0, 0.0, 0.0, 0.0],
+        }
+        for joint in plan.yaw_joints
+    ]

@@ -1,0 +1,69 @@
+"""Numbers and names as they stand in running text and on axes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+
+SPRING_UNIT = "N·mm/deg"
+
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
+
+
+def number(value: float, digits: int = 3) -> str:
+    """A number with so many significant digits, trailing zeros and all, and a true minus sign."""
+    text = f"{value:#.{digits}g}".rstrip(".")
+    return minus(text if "e" not in text else f"{value:.{digits - 1}e}")
+
+
+def signed(value: float, digits: int = 0) -> str:
+    """A number with its sign and so many decimals."""
+    return minus(f"{value:+.{digits}f}")
+
+
+def minus(text: str) -> str:
+    """Text with true minus signs."""
+    return text.replace("-", "−")
+
+
+def spring(value: float, digits: int = 4) -> str:
+    """A spring constant with its unit."""
+    return f"{number(value, digits)}\u00a0{SPRING_UNIT}"
+
+
+def k(joint: int) -> str:
+    """Name of a spring, counted from 1 at the front."""
+    return "k" + str(joint).translate(_SUBSCRIPTS)
+
+
+def typeset(text: str) -> str:
+    """Text of the studies with proper signs for units, powers and springs, and no break between number and unit."""
+    text = text.replace("*", "·").replace("k2-5", "k₂–k₅").replace(" deg", "°").replace("critical k1", "critical k₁")
+    text = re.sub(r"(\d)e([-+]?)0*(\d+)", lambda found: _power(found[1], found[2], found[3]), text)
+    text = re.sub(r"(?<![\w.])-(?=\d)", "−", text)
+    return re.sub(r"([\d⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=(?:N·|mm|cm|s\b|rad/s|%))", "\\1\u00a0", text)
+
+
+def _power(digit: str, sign: str, power: str) -> str:
+    return f"{digit}×10{(sign.strip('+') + power).translate(_SUPERSCRIPTS)}"
+
+
+def spans(counts: Sequence[int]) -> str:
+    """Whole numbers in rising order with runs drawn together: "4, 7 to 18 and 20"."""
+    runs: list[list[int]] = []
+    for count in counts:
+        if runs and count == runs[-1][-1] + 1:
+            runs[-1].append(count)
+        else:
+            runs.append([count])
+    parts: list[str] = []
+    for run in runs:
+        parts += [f"{run[0]} to {run[-1]}"] if len(run) > 2 else [str(each) for each in run]
+    return listing(parts)
+
+
+def listing(items: Iterable[str]) -> str:
+    """Items joined by commas and a last "and"."""
+    names = list(items)
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)

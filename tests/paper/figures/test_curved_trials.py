@@ -1,0 +1,48 @@
+"""Figures of the trials of curved walks say and show what was found."""
+
+import numpy as np
+import pytest
+
+from chilopod import load_robot
+from chilopod.netcdf import netcdf
+from chilopod.paper.curved.figures import trials as curved_trials
+from chilopod.paper.curved.figures import variants as curved_variants
+from chilopod.paper.curved.study import curved_study
+from chilopod.paper.size import Size
+from chilopod.show import style
+from chilopod.show.tables import csv
+
+PANELS = {
+    "walks": curved_trials.walks,
+    "joints": curved_trials.joints,
+    "onset": curved_trials.onset,
+    "variants": curved_variants.panel,
+}
+
+
+@pytest.fixture(scope="module")
+def study(kept):
+    return curved_study(load_robot("aoi2022-planar"), kept, Size.TINY)
+
+
+@pytest.mark.parametrize("name", PANELS)
+def test_panels_say_what_is_drawn_and_store_it(study, name):
+    panel = PANELS[name](study)
+    assert panel.alt
+    assert all(panel.text)
+    assert "nan" not in " ".join((panel.alt, *panel.text))
+    assert netcdf(panel.data)
+    assert csv(panel.data).count("\n") > 5
+
+
+def test_the_fork_shows_every_mean(study):
+    with style.house_style():
+        axes = curved_trials.walks(study).draw(False).axes
+    (fork,) = (each for each in axes if each.get_ylabel() == "mean angle of joint 1 (deg)")
+    shown = np.concatenate([line.get_ydata() for line in fork.get_lines() if line.get_marker() == "o"])
+    angles = np.rad2deg(study.trials.mean_angle.sel(joint=1))
+    for side in ("left", "right"):
+        here = study.trials.direction == side
+        means = angles.where(here).mean("repeat").where(here.sum("repeat") > 1).values
+        for mean in means[np.isfinite(means)]:
+            assert np.nanmin(np.abs(shown - mean)) < 1e-9

@@ -1,0 +1,174 @@
+"""A page that is there at once and whole at any time, whatever happens while it fills in."""
+
+import json
+import re
+import shutil
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.figure import Figure
+
+from chilopod.cli import main
+from chilopod.errors import OutputError
+from chilopod.paper import sections
+from chilopod.paper.page import Report, write_report
+from chilopod.paper.page.page import Film
+from chilopod.paper.section import Context, Found, Section
+from chilopod.paper.sections import reproduce
+from chilopod.paper.table import Row
+from chilopod.show.panel import Panel
+from helpers.html_page import Page as PAGE
+
+RELOAD = '<meta http-equiv="refresh"'
+CONTEXT = Context()
+
+
+def rows(value, found):
+    return [Row(f"quantity {value}", "1", "1", "here", "agrees")]
+
+
+def panel(name):
+    data = xr.Dataset({"y": ("x", np.arange(3.0))})
+    return Panel(name, f"Figure {name}", lambda narrow: Figure(), "nothing to be seen", (), data)
+
+
+def figure(name):
+    return lambda value, found: [panel(name)]
+
+
+ONE = Section("one", "First chapter", "the first", lambda context, found, report: 1, rows, figure("one"))
+TWO = Section("two", "Second chapter", "the second", lambda context, found, report: 2, rows, figure("two"))
+
+
+def failing(*_):
+    raise ValueError("no <luck>")
+
+
+@pytest.fixture(autouse=True)
+def _schematic(monkeypatch):
+    """Little is drawn of the robot itself."""
+    monkeypatch.setattr("chilopod.paper.page.report.schematic.panel", lambda robot: panel("schematic"))
+
+
+def text(report):
+    html = report.page.read_text(encoding="utf-8")
+    PAGE(html)  # whole and valid at any time
+    return html
+
+
+def test_page_is_there_before_anything_is_computed(tmp_path):
+    with Report([ONE, TWO], CONTEXT, tmp_path) as report:
+        html = text(report)
+        assert RELOAD in html
+        assert "0 of 2 sections" in html
+        assert re.findall("Still to come:</b> (.*).</p>", html) == ["the first", "the second"]
+
+
+def test_the_first_line_says_where_the_page_is(monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr(sections, "SECTIONS", (ONE,))
+    assert main(["reproduce", "--out", str(tmp_path)]) == 0
+    assert capsys.readouterr().out.splitlines()[0] == f"The page is {tmp_path / 'index.html'}"
+
+
+def test_every_section_is_on_the_page_before_the_next_is_drawn(tmp_path):
+    seen = []
+    two = replace(TWO, panels=lambda value, found: seen.append(text(report)) or [panel("two")])
+    with Report([ONE, two], CONTEXT, tmp_path) as report:
+        reproduce([ONE, two], CONTEXT, told=lambda found, section: report.add(found, [section]))
+    (between,) = seen
+    assert RELOAD in between
+    for expected, html in ((["one"], between), (["one", "two"], text(report))):
+        assert re.findall('<section id="(one|two)"', html) == expected
+        assert "quantity 1" in html
+    assert RELOAD not in text(report)
+    assert "Still to come" not in text(report)
+
+
+def test_what_is_shown_beside_others_is_drawn_once_more(tmp_path):
+    seen = []
+    one = replace(ONE, panels=lambda value, found: seen.append(found[TWO]) or (), beside=(TWO,))
+    with Report([one, TWO], CONTEXT, tmp_path) as report:
+        reproduce([one, TWO], CONTEXT, told=lambda found, section: report.add(found, [section]))
+    assert seen == [None, 2]
+    write_report(Found(values={one: 1, TWO: 2}), tmp_path)
+    assert seen == [None, 2, 2]
+
+
+def test_films_wait_while_there_is_anything_else_to_draw(monkeypatch, tmp_path):
+    seen, added = [], threading.Event()
+
+    def film(movie, folder):
+        seen.append(movie)
+        assert re.findall("Still to come:</b> (.*).</p>", text(report)) == ["the first"]
+        return Film(movie, "A walk", 1.0, False)
+
+    def panels(value, found):
+        added.wait(60.0)
+        return [panel("one")]
+
+    monkeypatch.setattr("chilopod.paper.page.report.write_movie", film)
+    two = replace(TWO, panels=lambda value, found: seen.append("two") or ())
+    one = replace(ONE, panels=panels, films=lambda value: ["film"], beside=(two,))
+    with Report([one, two], CONTEXT, tmp_path) as report:
+        reproduce([one, two], CONTEXT, told=lambda found, section: report.add(found, [section]))
+        added.set()
+    assert not report.failures
+    assert seen == ["two", "film"]
+    assert 'href="movies/film.html"' in text(report)
+    assert '<section id="one"' in text(report)
+
+
+@pytest.mark.parametrize("what", ["computed", "drawn"])
+def test_what_fails_is_said_and_the_others_are_there(monkeypatch, capsys, tmp_path, what):
+    one = replace(ONE, rows=lambda value, found: (), **{"compute" if what == "computed" else "panels": failing})
+    monkeypatch.setattr(sections, "SECTIONS", (one, TWO))
+    assert main(["reproduce", "--out", str(tmp_path), "--json"]) == 1
+    out, err = capsys.readouterr()
+    assert json.loads(out)["failures"] == {"one": "ValueError: no <luck>"}
+    assert str(tmp_path / "index.html") in err.splitlines()[0]
+    assert err.splitlines()[-1] == "failed: the first: ValueError: no <luck>"
+    html = (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert "Failed:</b> the first. ValueError: no &lt;luck&gt;" in html
+    assert '<section id="two"' in html
+    assert RELOAD not in html
+    assert main(["--debug", "reproduce", "--out", str(tmp_path), "--json"]) == 1
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_a_figure_that_cannot_be_drawn_is_no_secret(tmp_path):
+    with pytest.raises(ValueError, match="no <luck>"):
+        write_report(Found(values={replace(ONE, panels=failing): 1}), tmp_path)
+
+
+def test_a_reader_may_delete_everything_meanwhile(tmp_path):
+    folder = tmp_path / "report"
+
+    def delete(context, found, report):
+        shutil.rmtree(folder, ignore_errors=True)
+        return 2
+
+    two = replace(TWO, compute=delete)
+    with Report([ONE, two], CONTEXT, folder) as report:
+        reproduce([ONE, two], CONTEXT, told=lambda found, section: report.add(found, [section]))
+    assert not report.failures
+    assert "quantity 1" in text(report)
+    assert (folder / "figures" / "two.png").is_file()
+
+
+def test_one_that_is_stopped_says_so(tmp_path):
+    with pytest.raises(KeyboardInterrupt), Report([ONE, TWO], CONTEXT, tmp_path) as report:
+        raise KeyboardInterrupt
+    assert RELOAD not in text(report)
+    assert "Stopped: 0 of 2 sections" in text(report)
+    assert "Not computed:</b> the second" in text(report)
+
+
+def test_a_page_that_cannot_be_written_in_the_end_is_an_error(tmp_path):
+    report = Report([ONE], CONTEXT, tmp_path).__enter__()
+    report.page.unlink()
+    report.page.mkdir()
+    with pytest.raises(OutputError, match="folder"):
+        report.__exit__(None, None, None)

@@ -1,0 +1,88 @@
+"""Films decode, are as long and as large as asked for, and show what the record holds."""
+
+import io
+
+import av
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+
+from chilopod.errors import OutputError, ParameterError
+from chilopod.show import style
+from chilopod.show.scene.film import filmed
+from helpers.walks import on_course, walk
+
+
+def decoded(film) -> np.ndarray:
+    """All frames, (T, height, width, 3)."""
+    with av.open(io.BytesIO(film)) as container:
+        (stream,) = container.streams.video
+        assert (stream.codec_context.name, stream.codec_context.pix_fmt) == ("h264", "yuv420p")
+        return np.stack([frame.to_ndarray(format="rgb24") for frame in container.decode(stream)])
+
+
+def right_end_of(frame, color) -> float:
+    """Pixels from the left to where something of nearly this colour ends, below the heading and above the key."""
+    near = np.abs(frame[30:-40].astype(float) - 255.0 * np.array(to_rgb(color))).max(axis=-1) < 40.0
+    return np.argwhere(near)[:, 1].max() if near.any() else np.nan
+
+
+@pytest.mark.parametrize(("fps", "speed", "count"), [(25, 1.0, 51), (25, 4.0, 14), (30, 0.5, 121)])
+def test_length_and_size(fps, speed, count):
+    """What lies between two frames at the end has one of its own: it says what the walk came to."""
+    film = filmed(
+        walk(0.0, 0.5, duration=2.0),
+        titles=["a", "b"],
+        heading="h",
+        fps=fps,
+        speed=speed,
+        size=(480, 320),
+    )
+    assert decoded(film).shape == (count, 320, 480, 3)
+    with av.open(io.BytesIO(film)) as container:
+        assert container.streams.video[0].average_rate == fps
+
+
+def test_targets_of_a_course_appear_when_their_turn_comes():
+    record = on_course(walk(0.0), [[[0.5, 0.0], [1.5, 0.0]]], [[[0.0, 3.0], [3.0, 6.0]]], [["given up", "given up"]])
+    frames = decoded(filmed(record, titles=["a"], heading="h", fps=1))
+    x = [right_end_of(frame, style.GREEN) for frame in frames]
+    assert x[0] == pytest.approx(x[2], abs=2.0)
+    assert x[3] > x[2] + 50.0
+
+
+def test_index_stands_in_front():
+    content = filmed(walk(0.0, duration=1.0), titles=["a"], heading="h")
+    assert content.index(b"moov") < content.index(b"mdat")
+
+
+def test_module_1_moves_to_the_right_until_the_robot_stops():
+    record = walk(0.0, duration=4.0, stops=[(0, 2.01)])
+    frames = decoded(filmed(record, titles=["a"], heading="h", fps=10))
+    # Stopped robots are pale, so that only moving ones have the colour of module 1.
+    x = np.array([right_end_of(frame, style.BLUE) for frame in frames[:20]])
+    assert (np.diff(x) > 0.0).all()
+    assert np.isnan(right_end_of(frames[30], style.BLUE))
+
+    def changed(one: int, other: int) -> float:
+        """The part of the picture, below the clock, that is not the same."""
+        return float((np.abs(frames[one].astype(int) - frames[other])[30:].max(axis=2) > 30).mean())
+
+    assert changed(25, 35) < 1e-4  # nothing but the noise of the encoder along an edge
+    assert changed(15, 35) > 1e-2
+
+
+def test_robot_that_never_started():
+    record = walk(0.0, 0.3, duration=0.4, stops=[(1, 0.0)], targets=[[0.3, 0.0], [np.nan, np.nan]])
+    film = filmed(record, titles=["x" * 200, "b"], heading="y" * 200, size=(240, 240))
+    assert decoded(film).shape == (11, 240, 240, 3)
+
+
+def test_what_cannot_be_filmed(monkeypatch):
+    record = walk(0.0, duration=0.2)
+    for wrong in ({"size": (481, 320)}, {"size": (480, 100)}, {"fps": 0}, {"speed": 0.0}, {"speed": float("nan")}):
+        with pytest.raises(ParameterError, match=next(iter(wrong))):
+            filmed(record, titles=["a"], heading="h", **wrong)
+    monkeypatch.setattr("chilopod.show.scene.encoder.ENCODER", "no-such-encoder")
+    with pytest.raises(OutputError, match="PyAV was built without the encoder"):
+        filmed(record, titles=["a"], heading="h")

@@ -1,0 +1,38 @@
+"""Docstrings begin with a noun, or a verb of what a function does, and never with a fragment."""
+
+import ast
+import re
+from pathlib import Path
+
+import chilopod
+
+SOURCES = Path(chilopod.__file__).parent
+FRAGMENT = re.compile(r"(Of|That|Whose|What|Whether|Which|Where|When|Why|Who|How)\b")
+TERM = re.compile(r"[\w*`]+(, [\w*`]+)*")
+
+
+def descriptions(docstring):
+    """First lines of the descriptions of parameters, attributes and results of a docstring of numpydoc's form."""
+    lines = docstring.split("\n")
+    for term, line in zip(lines, lines[1:], strict=False):
+        deeper = len(line) - len(line.lstrip()) > len(term) - len(term.lstrip())
+        if deeper and TERM.fullmatch(term.strip()):
+            yield line.strip()
+
+
+def fragments(source):
+    """First lines of docstrings, and of the descriptions in them, that begin with a fragment."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
+            text = node.value.value
+            yield from (line for line in descriptions(text) if FRAGMENT.match(line))
+
+
+def test_descriptions_begin_with_a_noun():
+    found = {str(path): list(fragments(path.read_text(encoding="utf-8"))) for path in SOURCES.rglob("*.py")}
+    assert {name: lines for name, lines in found.items() if lines} == {}
+
+
+def test_a_fragment_is_found():
+    source = 'def f(x):\n    """Do it.\n\n    Parameters\n    ----------\n    x\n        That of chilopod.\n    """\n'
+    assert list(fragments(source)) == ["That of chilopod."]
