@@ -10,7 +10,7 @@ from chilopod.paper.section import Context, Found
 from chilopod.paper.sections import chosen, reproduce
 from chilopod.paper.size import Size
 from chilopod.paper.straight.sections import EXPONENTS, IDENTIFICATION, MODE, MODULES
-from chilopod.paper.table import Row
+from chilopod.paper.table import Result, Row, Verdict
 from chilopod.paper.turning.sections import MOVIES
 from chilopod.tasks.identify import Identification
 from helpers.walks import walk as WALK
@@ -20,7 +20,7 @@ from helpers.walks import walk as WALK
 def results() -> Found:
     found = reproduce(chosen(["mode", "variants", "uniform"]), Context(size=Size.QUICK))
     assert not found.failures
-    odd = Row("a <b> & c", "1 N*mm/deg", "-2e-10 N*mm/deg", "nowhere", "differs", "for <script>")
+    odd = Row("a <b> & c", "1 N*mm/deg", Result("-2e-10 N*mm/deg"), "nowhere", Verdict.DIFFERS, "for <script>")
     found.rows[MODE] = [*found.rows[MODE], odd]
     # What a sweep and a count of modules look like, without computing them.
     k1 = np.geomspace(75.0, 2.0, 40)

@@ -8,7 +8,7 @@ from chilopod.paper.section import Context, Found, Section
 from chilopod.paper.sections import SECTIONS, chosen, reproduce
 from chilopod.paper.size import Size
 from chilopod.paper.straight.sections import MODE, UNIFORM
-from chilopod.paper.table import Row
+from chilopod.paper.table import Result, Row, Verdict
 
 
 def names(sections):
@@ -66,7 +66,7 @@ def test_rows_put_the_paper_beside_what_was_computed():
 
 
 def one(value):
-    return Row("one", "1", str(value), "here", "agrees")
+    return Row("one", "1", Result(str(value)), "here", Verdict.AGREES)
 
 
 ONE = Section("one", "chapter", "one", lambda context, found, report: 1, lambda value, found: [one(value)])

@@ -1,10 +1,13 @@
 """What is asked of numbers: a number just inside agrees, one just outside does not."""
 
+import json
+
+import numpy as np
 import pytest
 
 from chilopod.paper import printed, statements
 from chilopod.paper.printed import Band
-from chilopod.paper.table import Kind, OfPlanar, OfTwin, Statement, of_twin, robot_rows
+from chilopod.paper.table import Kind, OfPlanar, OfTwin, Result, Statement, Verdict, of_twin, robot_rows
 
 MEASURED = [each for each in statements.ORDER if isinstance(each.said, Band)]
 
@@ -14,12 +17,14 @@ def test_every_measured_statement_on_both_sides(statement):
     low, high = statement.said.low, statement.said.high
     for value, verdict in ((low, "outside"), (high, "outside"), (0.5 * (low + high), "within")):
         beyond = value + (1e-6 * (value - 0.5 * (low + high)))
-        (row,) = robot_rows([of_twin(statement, "", beyond, 0.0)], ())
+        (row,) = robot_rows([of_twin(statement, Result("", beyond, 0.0))], ())
         assert row.verdict == verdict
     for value in (low, high):
         inside = value - 1e-6 * (value - 0.5 * (low + high))
-        assert [row.verdict for row in robot_rows([of_twin(statement, "", inside)], ())] == ["within"]
-        assert [row.verdict for row in robot_rows([of_twin(statement, "", inside, high - low)], ())] == ["undecided"]
+        assert [row.verdict for row in robot_rows([of_twin(statement, Result("", inside, 0.0))], ())] == ["within"]
+        assert [row.verdict for row in robot_rows([of_twin(statement, Result("", inside, high - low))], ())] == [
+            "undecided"
+        ]
 
 
 def test_tolerances_are_those_that_the_rows_name():
@@ -39,9 +44,14 @@ def test_statements_are_told_apart():
 def test_lines_stand_in_the_order_of_the_statements_whoever_found_them_first():
     first, second = statements.ONSET, statements.UNIFORM
     other = Statement("one of a new section", printed.Said("1", "2"), Kind.CHECKED)
-    found = [OfTwin(other, "3", True), OfPlanar(second, "6.58"), OfTwin(first, "33", True), OfPlanar(first, "12")]
+    found = [
+        OfTwin(other, Result("3"), Verdict.WITHIN),
+        OfPlanar(second, Result("6.58")),
+        OfTwin(first, Result("33"), Verdict.WITHIN),
+        OfPlanar(first, Result("12")),
+    ]
     rows = robot_rows(found, statements.ORDER)
-    assert [(row.quantity, row.twin, row.planar, row.verdict) for row in rows] == [
+    assert [(row.quantity, row.data()["twin"], row.data()["planar"], row.verdict) for row in rows] == [
         (first.quantity, "33", "12", "within"),
         (second.quantity, "", "6.58", "not computed"),
         ("one of a new section", "3", "", "within"),
@@ -50,9 +60,30 @@ def test_lines_stand_in_the_order_of_the_statements_whoever_found_them_first():
 
 def test_readings_of_a_statement_have_a_line_each():
     said = statements.VARIANTS["stride 1.8 cm"].onset
-    found = [of_twin(said, "25", 25.0, reading="one"), of_twin(said, "40", 40.0, reading="other"), OfPlanar(said, "11")]
+    found = [
+        of_twin(said, Result("25", 25.0, 0.0), "one"),
+        of_twin(said, Result("40", 40.0, 0.0), "other"),
+        OfPlanar(said, Result("11")),
+    ]
     rows = robot_rows(found, statements.ORDER)
-    assert [(row.quantity, row.planar, row.verdict) for row in rows] == [
+    assert [(row.quantity, row.data()["planar"], row.verdict) for row in rows] == [
         (f"{said.quantity} (one)", "11", "within"),
         (f"{said.quantity} (other)", "11", "outside"),
     ]
+
+
+def test_a_line_is_data_too():
+    """Words for people, and beside them the number, its error and its unit."""
+    said = statements.ONSET
+    found = [of_twin(said, Result("", 33.2, 0.4, "N*mm/deg", 1)), OfPlanar(said, Result(value=12.0, unit="N*mm/deg"))]
+    (line,) = (row.data() for row in robot_rows(found, ()))
+    assert line["twin"] == "33.2 ± 0.4 N*mm/deg"
+    assert (line["value"], line["error"], line["unit"], line["planar_value"]) == (33.2, 0.4, "N*mm/deg", 12.0)
+    json.dumps(line, allow_nan=False)
+
+
+def test_what_is_not_determined_is_not_outside():
+    lost = of_twin(statements.ONSET, Result("not determined by trials", np.nan, np.nan, "N*mm/deg"))
+    assert lost.verdict is Verdict.NOT_DETERMINED
+    (line,) = (row.data() for row in robot_rows([lost], ()))
+    assert (line["value"], line["error"], line["twin"]) == (None, None, "not determined by trials")

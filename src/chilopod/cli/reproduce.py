@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import traceback
-from dataclasses import asdict
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -118,8 +117,8 @@ def reproduce(
                 "robot": context.robot.name,
                 "whole_robot": context.whole.name,
                 "report": str(report.page),
-                "rows": [asdict(row) for row in rows],
-                "robot_rows": [asdict(row) for row in robot_rows],
+                "rows": [row.data() for row in rows],
+                "robot_rows": [row.data() for row in robot_rows],
                 "seconds": {section.name: value for section, value in found.seconds.items()},
                 "failures": {section.name: in_words(failure) for section, failure in report.failures.items()},
             }
@@ -140,14 +139,14 @@ def _print(rows: list[Row], robot_rows: list[RobotRow], page: Path) -> None:
     for row in rows:
         typer.echo(f"{row.verdict:<12} {row.quantity}")
         typer.echo(f"{'':<12}   paper: {row.paper}")
-        typer.echo(f"{'':<12}   here:  {row.computed}")
+        typer.echo(f"{'':<12}   here:  {row.computed.words}")
     for line in robot_rows:
         typer.echo(f"{line.verdict:<12} {line.quantity} ({line.kind})")
         typer.echo(f"{'':<12}   robot:  {line.robot}")
         if line.twin:
-            typer.echo(f"{'':<12}   twin:   {line.twin}")
+            typer.echo(f"{'':<12}   twin:   {line.twin.words}")
         if line.planar:
-            typer.echo(f"{'':<12}   planar: {line.planar}")
+            typer.echo(f"{'':<12}   planar: {'; '.join(each.words for each in line.planar)}")
     typer.echo("")
     typer.echo(f"The report is {page}")
     typer.echo("Next, try:")

@@ -6,27 +6,71 @@ found by different sections, and put into one line by :func:`robot_rows`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
-from enum import Enum
-from typing import Generic, TypeVar
+from enum import Enum, StrEnum
+from typing import Any, Generic, TypeVar
+
+import numpy as np
 
 from chilopod.paper.printed import Band, Said
-from chilopod.paper.scatter import Answer
+from chilopod.paper.scatter import Answer, with_error
 
 S = TypeVar("S", bound=Said, covariant=True)
 
-AGREES: Mapping[Answer, str] = {True: "agrees", False: "differs", None: "undecided"}
-"""Verdicts on the planar model; undecided is what the scatter of trials leaves open."""
 
-NOT_PRINTED = "not printed"
-"""In place of a verdict on what the paper does not say of its planar model."""
+class Verdict(StrEnum):
+    """Result of a comparison: of the planar model with the paper's, of the twin with the paper's robot, or none."""
 
-WITHIN: Mapping[Answer, str] = {True: "within", False: "outside", None: "undecided"}
-"""Verdicts on the twin."""
+    AGREES = "agrees"
+    DIFFERS = "differs"
+    WITHIN = "within"
+    OUTSIDE = "outside"
+    UNDECIDED = "undecided"  # the scatter of trials leaves it open
+    NOT_DETERMINED = "not determined"  # the trials give no number
+    NOT_PRINTED = "not printed"
+    NOT_COMPUTED = "not computed"
 
-NOT_COMPUTED = "not computed"
-"""In place of a verdict on a twin that was not asked."""
+
+def agreement(answer: Answer) -> Verdict:
+    """Verdict on the planar model."""
+    return Verdict.UNDECIDED if answer is None else Verdict.AGREES if answer else Verdict.DIFFERS
+
+
+def within(answer: Answer) -> Verdict:
+    """Verdict on the twin."""
+    return Verdict.UNDECIDED if answer is None else Verdict.WITHIN if answer else Verdict.OUTSIDE
+
+
+@dataclass(frozen=True)
+class Result:
+    """Result of a computation.
+
+    Attributes
+    ----------
+    text
+        Words, for what is not one number, or with more than its number; by default the number with its error and unit.
+    value, error, unit
+        The number that is compared, and its standard error or the bound of its error; NaN where there is none.
+    digits
+        Number of decimals that are shown.
+    """
+
+    text: str = ""
+    value: float = np.nan
+    error: float = np.nan
+    unit: str = ""
+    digits: int = 2
+
+    @property
+    def words(self) -> str:
+        """Text, or the number with its error and unit."""
+        return self.text or f"{with_error(self.value, self.error, self.digits)} {self.unit}".rstrip()
+
+    def data(self) -> dict[str, Any]:
+        """Number, error and unit as plain data, None where there is none."""
+        number = float(self.value) if np.isfinite(self.value) else None
+        return {"value": number, "error": float(self.error) if self.error > 0.0 else None, "unit": self.unit or None}
 
 
 @dataclass(frozen=True)
@@ -35,22 +79,30 @@ class Row:
 
     Attributes
     ----------
-    quantity, paper, computed
-        In words and numbers with units; ``paper`` says so where it prints none.
+    quantity
+        Subject of the line.
+    paper
+        Statement of the paper, in words; it says so where the paper prints none.
+    computed
+        Result of the computation.
     where
         Section or figure of the paper.
     verdict
-        One of :data:`AGREES`, or :data:`NOT_PRINTED`.
+        Verdict of the comparison.
     remark
         Reason for a difference, if there is one.
     """
 
     quantity: str
     paper: str
-    computed: str
+    computed: Result
     where: str
-    verdict: str
+    verdict: Verdict
     remark: str = ""
+
+    def data(self) -> dict[str, Any]:
+        """The line as plain data, with the result in words and as a number."""
+        return {**vars(self), "computed": self.computed.words, **self.computed.data()}
 
 
 class Kind(Enum):
@@ -88,17 +140,17 @@ class OfTwin:
     ----------
     statement
         Statement of the paper's robot.
-    words
-        In words and numbers with units.
-    answer
-        True if that is what is asked.
+    result
+        Result of the twin's walks.
+    verdict
+        Verdict of the comparison.
     reading
         Reading of what the paper leaves open, if the twin has several.
     """
 
     statement: Statement[Said]
-    words: str
-    answer: Answer
+    result: Result
+    verdict: Verdict
     reading: str = ""
 
 
@@ -107,7 +159,7 @@ class OfPlanar:
     """What the planar model does where the paper speaks of its robot; nobody says that it should do the same."""
 
     statement: Statement[Said]
-    words: str
+    result: Result
 
 
 @dataclass(frozen=True)
@@ -116,30 +168,46 @@ class RobotRow:
 
     Attributes
     ----------
+    statement
+        Statement of the paper's robot.
     quantity, robot
-        See :class:`Statement`.
+        Its subject, with the reading of it if there are several, and its words.
     twin, planar
         Results of both, in words and numbers with units; empty where nothing was computed.
     kind
         One of :class:`Kind`.
     verdict
-        One of :data:`WITHIN`, or :data:`NOT_COMPUTED`.
+        Verdict on the twin.
     asked
         Condition for a verdict of *within*.
     """
 
+    statement: Statement[Said]
     quantity: str
     robot: str
-    twin: str
-    planar: str
+    twin: Result | None
+    planar: tuple[Result, ...]
     kind: str
-    verdict: str
+    verdict: Verdict
     asked: str
 
+    def data(self) -> dict[str, Any]:
+        """The line as plain data, with results in words and as numbers."""
+        words = {"twin": self.twin.words if self.twin else "", "planar": "; ".join(each.words for each in self.planar)}
+        twin = (self.twin or Result()).data()
+        planar = (self.planar[0] if len(self.planar) == 1 else Result()).data()
+        line = {name: value for name, value in vars(self).items() if name != "statement"}
+        return {**line, **words, **twin, "planar_value": planar["value"]}
 
-def of_twin(statement: Statement[Band], words: str, value: float, error: float = 0.0, reading: str = "") -> OfTwin:
-    """A number, with its standard error, beside what is asked of it."""
-    return OfTwin(statement, words, statement.said.answer(value, error), reading)
+
+def of_twin(statement: Statement[Band], result: Result, reading: str = "") -> OfTwin:
+    """A number beside the band in which it is to lie: undecided if its error is not known, not determined without it.
+
+    A number that has no error, such as the earliest of several, has 0 as its error and says so in its words.
+    """
+    if not np.isfinite(result.value):
+        return OfTwin(statement, result, Verdict.NOT_DETERMINED, reading)
+    return OfTwin(statement, result, within(statement.said.answer(result.value, result.error)), reading)
 
 
 def robot_rows(found: Iterable[Row | OfTwin | OfPlanar], order: Iterable[Statement[Said]]) -> list[RobotRow]:
@@ -147,11 +215,13 @@ def robot_rows(found: Iterable[Row | OfTwin | OfPlanar], order: Iterable[Stateme
     rows, lines = [row for row in found if not isinstance(row, Row)], []
     for each in dict.fromkeys([*order, *(row.statement for row in rows)]):
         said, kind = each.said, each.kind.value
-        planar = "; ".join(row.words for row in rows if isinstance(row, OfPlanar) and row.statement == each)
+        planar = tuple(row.result for row in rows if isinstance(row, OfPlanar) and row.statement == each)
         twins = [row for row in rows if isinstance(row, OfTwin) and row.statement == each]
         for twin in twins:
             quantity = f"{each.quantity} ({twin.reading})" if twin.reading else each.quantity
-            lines.append(RobotRow(quantity, said.words, twin.words, planar, kind, WITHIN[twin.answer], said.asked))
+            lines.append(RobotRow(each, quantity, said.words, twin.result, planar, kind, twin.verdict, said.asked))
         if planar and not twins:
-            lines.append(RobotRow(each.quantity, said.words, "", planar, kind, NOT_COMPUTED, said.asked))
+            lines.append(
+                RobotRow(each, each.quantity, said.words, None, planar, kind, Verdict.NOT_COMPUTED, said.asked)
+            )
     return lines

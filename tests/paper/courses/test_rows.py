@@ -5,7 +5,7 @@ import pytest
 
 from chilopod.paper.courses.rows import compared_rows, robust_rows
 from chilopod.paper.courses.summary import summaries, verdicts
-from chilopod.paper.table import NOT_PRINTED
+from chilopod.paper.table import Verdict
 from helpers.made_up_courses import compared, conditions
 
 OTHERS = ["first spring 15", "all springs 7", "leg-yaw", "actuated"]
@@ -45,8 +45,8 @@ def test_what_the_intervals_decide_is_said():
     assert not any((found.as_many, found.more, found.as_fast, found.faster, found.as_soon, found.sooner))
     rows = compared_rows(compared())
     assert len(rows) == 6
-    assert {row.verdict for row in rows} == {NOT_PRINTED}
-    assert "reaches more targets than first spring 15, all springs 7, leg-yaw and actuated" in rows[-1].computed
+    assert {row.verdict for row in rows} == {Verdict.NOT_PRINTED}
+    assert "reaches more targets than first spring 15, all springs 7, leg-yaw and actuated" in rows[-1].computed.words
 
 
 def test_what_they_leave_open_is_called_open():
@@ -59,12 +59,12 @@ def test_what_they_leave_open_is_called_open():
 
 def test_who_reaches_nothing_has_no_time():
     rows = compared_rows(compared(arrived=np.zeros_like))
-    assert "nan" not in " ".join(f"{row.computed} {row.remark}" for row in rows)
+    assert "nan" not in " ".join(f"{row.computed.words} {row.remark}" for row in rows)
 
 
 def test_steps_and_conditions():
     steps = compared().isel(case=slice(4))
     rows = robust_rows(steps, conditions(worse=["one"]))
     assert [row.quantity for row in rows][1:] == [f"40 courses, {name}" for name in ("as usual", "one", "another")]
-    assert "variable 0.0 % (0.0 to 1.9) of targets" in rows[2].computed
-    assert "first spring 15 80.0 %" in rows[3].computed
+    assert "variable 0.0 % (0.0 to 1.9) of targets" in rows[2].computed.words
+    assert "first spring 15 80.0 %" in rows[3].computed.words

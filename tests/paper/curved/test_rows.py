@@ -46,7 +46,7 @@ def study(mode=MODE, bends=(1.2, 0.8, 0.0, 0.0), scatter=(0.02, 0.02, 0.0, 0.0),
 
 
 def beside(found):
-    return {row.statement: row.words for row in curved_rows.rows(found) if isinstance(row, OfPlanar)}
+    return {row.statement: row.result.words for row in curved_rows.rows(found) if isinstance(row, OfPlanar)}
 
 
 def test_the_order_of_the_joints_is_held_against_the_paper_s_mode():

@@ -144,7 +144,7 @@ def test_a_small_study_says_what_it_found(kept):
     found = curved_rows.rows(study)
     said = {row.quantity: row for row in found if isinstance(row, Row)}
     assert said["joints by how far they bend"].verdict == "agrees"
-    beside = {row.statement: row.words for row in found if isinstance(row, OfPlanar)}
+    beside = {row.statement: row.result.words for row in found if isinstance(row, OfPlanar)}
     assert beside[statements.STRAIGHT] == "straight from 41 N*mm/deg up"
     assert beside[statements.CURVED].startswith("curved up to 10 N*mm/deg, ")
     assert beside[statements.ONSET].endswith("; the point is at 11.99")

@@ -18,7 +18,7 @@ from chilopod.paper.page import Report, write_report
 from chilopod.paper.page.page import Film
 from chilopod.paper.section import Context, Found, Section
 from chilopod.paper.sections import reproduce
-from chilopod.paper.table import Row
+from chilopod.paper.table import Result, Row, Verdict
 from chilopod.show.panel import Panel
 from helpers.html_page import Page as PAGE
 
@@ -27,7 +27,7 @@ CONTEXT = Context()
 
 
 def rows(value, found):
-    return [Row(f"quantity {value}", "1", "1", "here", "agrees")]
+    return [Row(f"quantity {value}", "1", Result("1"), "here", Verdict.AGREES)]
 
 
 def panel(name):

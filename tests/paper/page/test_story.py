@@ -5,7 +5,7 @@ from chilopod.paper.page.page import Film, Shown, page
 from chilopod.paper.page.story import Fact, facts
 from chilopod.paper.robot.sections import WALKS
 from chilopod.paper.section import Found
-from chilopod.paper.table import Kind, OfPlanar, OfTwin, Statement
+from chilopod.paper.table import Kind, OfPlanar, OfTwin, Result, Statement, Verdict, within
 from helpers.html_page import Page
 
 
@@ -14,21 +14,21 @@ def found(*rows):
 
 
 def test_numbers_of_the_twin_stand_beside_those_of_the_robot():
-    told = facts(found(OfTwin(statements.ONSET, "33.2 N*mm/deg (-2 %)", True)))
+    told = facts(found(OfTwin(statements.ONSET, Result("33.2 N*mm/deg (-2 %)"), Verdict.WITHIN)))
     about = "front spring at which the robot begins to curve, in three dimensions"
     assert told == [Fact("33.2\u00a0N·mm/deg (−2\u00a0%)", about, "34\u00a0N·mm/deg")]
 
 
 def test_what_was_predicted_is_counted():
     def row(name, answer, kind=Kind.PREDICTED):
-        return OfTwin(Statement(name, statements.RISING.said, kind), "5", answer)
+        return OfTwin(Statement(name, statements.RISING.said, kind), Result("5"), within(answer))
 
     rows = [row("a", True), row("b", False), row("c", None), row("d", True, Kind.FITTED)]
     assert [fact.value for fact in facts(found(*rows))] == ["1 of 3"]
 
 
 def test_what_was_not_computed_is_not_told():
-    assert facts(found(OfPlanar(statements.ONSET, "12 N*mm/deg"))) == []
+    assert facts(found(OfPlanar(statements.ONSET, Result("12 N*mm/deg")))) == []
     assert facts(Found()) == []
 
 

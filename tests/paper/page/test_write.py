@@ -18,7 +18,7 @@ from chilopod.paper.robot.sections import WALKS
 from chilopod.paper.section import Context, Found
 from chilopod.paper.sections import SECTIONS
 from chilopod.paper.straight.sections import IDENTIFICATION, MODE
-from chilopod.paper.table import Kind, OfPlanar, OfTwin, Row, Statement
+from chilopod.paper.table import Kind, OfPlanar, OfTwin, Result, Row, Statement, Verdict, within
 from chilopod.show import write_identification
 from chilopod.show.figures import schematic
 from helpers.html_page import Page
@@ -182,12 +182,15 @@ def test_unwritable_folder(results, tmp_path):
 
 def test_what_scatter_leaves_open_has_its_own_mark_and_is_counted(results, tmp_path):
     def row(kind, answer, words="2"):
-        return OfTwin(Statement(f"{kind}, {answer}, {words}", Said("1", "10 %"), kind), words, answer)
+        return OfTwin(Statement(f"{kind}, {answer}, {words}", Said("1", "10 %"), kind), Result(words), within(answer))
 
     answers = ((True, "2"), (True, "3"), (False, "2"), (None, "2"))
     rows = [*(row(Kind.PREDICTED, *each) for each in answers), row(Kind.FITTED, None), row(Kind.CHECKED, True)]
-    rows.append(OfPlanar(Statement("of the planar model alone", Said("1", "10 %"), Kind.PREDICTED), "4"))
-    planar = [Row(each, "1", "2", "here", each) for each in ("agrees", "differs", "undecided", "not printed")]
+    rows.append(OfPlanar(Statement("of the planar model alone", Said("1", "10 %"), Kind.PREDICTED), Result("4")))
+    planar = [
+        Row(each, "1", Result("2"), "here", each)
+        for each in (Verdict.AGREES, Verdict.DIFFERS, Verdict.UNDECIDED, Verdict.NOT_PRINTED)
+    ]
     found = Found(rows={MODE: planar, WALKS: rows})
     page = Page(write_report(found, tmp_path).read_text(encoding="utf-8"))
     text = " ".join(page.text.split())
@@ -201,12 +204,19 @@ def test_what_scatter_leaves_open_has_its_own_mark_and_is_counted(results, tmp_p
 
 def test_the_robot_has_a_table_and_its_numbers(results, tmp_path):
     said = Statement("where <it> bends", Said("34 N*mm/deg", "10 %"), Kind.PREDICTED)
-    planar = Found(rows={WALKS: [OfPlanar(said, "12 N*mm/deg")]})
+    planar = Found(rows={WALKS: [OfPlanar(said, Result("12 N*mm/deg"))]})
     page = Page(write_report(planar, tmp_path / "planar").read_text(encoding="utf-8"))
     assert "– not computed" in " ".join(page.text.split())
     assert "further statements about the robot" not in page.text
     assert "twin.clearance" not in page.text
-    found = Found(rows={WALKS: [OfPlanar(said, "12 N*mm/deg"), OfTwin(said, "33.2 N*mm/deg (-2 %)", False)]})
+    found = Found(
+        rows={
+            WALKS: [
+                OfPlanar(said, Result("12 N*mm/deg")),
+                OfTwin(said, Result("33.2 N*mm/deg (-2 %)"), Verdict.OUTSIDE),
+            ]
+        }
+    )
     page = Page(write_report(found, tmp_path).read_text(encoding="utf-8"))
     assert "robot-table" in [attrs.get("id") for tag, attrs in page.tags if tag == "section"]
     assert "33.2 N·mm/deg (−2 %)" in page.text.replace("\u00a0", " ")

@@ -22,7 +22,7 @@ from chilopod.paper.robot.walks import (
     walk_ends,
     walk_records,
 )
-from chilopod.paper.table import Kind
+from chilopod.paper.table import Kind, Verdict
 from chilopod.paper.turning.trials import turning_task, without_leg_yaw
 from chilopod.paper.walk_measures import onset, radius_at, spring_for
 from chilopod.steering import Target
@@ -134,6 +134,6 @@ def test_rows_and_words_of_the_tasks(tasks, walks):
     rows = turning_rows(tasks, walks)
     assert [row.statement for row in rows if row.statement.kind is not Kind.PREDICTED] == [statements.ARRIVAL]
     # Of a strategy beside itself nothing is lower.
-    assert next(row for row in rows if row.statement == statements.HOPF).answer is None
+    assert next(row for row in rows if row.statement == statements.HOPF).verdict is Verdict.UNDECIDED
     assert rows[0].statement == statements.TASKS["A"].k_hat
     assert all(text for panel in turning_figures.panels(tasks, walks) for text in panel.text)

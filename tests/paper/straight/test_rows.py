@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from chilopod.paper import printed, statements
+from chilopod.paper import printed
 from chilopod.paper.straight.rows import mode_rows, module_rows, uniform_rows, variant_rows
 from chilopod.paper.table import OfPlanar, Row
 
@@ -93,4 +93,4 @@ def test_a_robot_with_other_joints_has_no_printed_mode():
 
 
 def test_the_planar_model_s_undulation_stands_beside_the_robot_s():
-    assert OfPlanar(statements.UNIFORM, "6.50 N*mm/deg") in uniform()
+    assert [row.result.words for row in uniform() if isinstance(row, OfPlanar)] == ["6.50 N*mm/deg"]

@@ -14,7 +14,7 @@ import xarray as xr
 from chilopod.errors import ParameterError
 from chilopod.paper import statements
 from chilopod.paper.size import Size
-from chilopod.paper.table import NOT_PRINTED, OfPlanar, Row
+from chilopod.paper.table import OfPlanar, Row, Verdict
 from chilopod.paper.turning.minima import minima
 from chilopod.paper.turning.rows import rows
 from chilopod.paper.turning.study import turning
@@ -148,12 +148,12 @@ def test_springs_where_a_walk_failed_have_no_mean():
 
 def test_geometry_is_held_against_the_paper_and_walks_stand_beside_the_robot(found):
     table = rows(found)
-    judged = [row for row in table if isinstance(row, Row) and row.verdict != NOT_PRINTED]
-    assert [(row.paper, row.computed, row.verdict) for row in judged] == [
+    judged = [row for row in table if isinstance(row, Row) and row.verdict != Verdict.NOT_PRINTED]
+    assert [(row.paper, row.computed.words, row.verdict) for row in judged] == [
         ("0.88 m", "0.919 m", "differs"),
         ("1.2 m", "1.167 m", "agrees"),
     ]
-    beside = {row.statement: row.words for row in table if isinstance(row, OfPlanar)}
+    beside = {row.statement: row.result.words for row in table if isinstance(row, OfPlanar)}
     tasks = [each for task in statements.TASKS.values() for each in (task.k_hat, task.outcomes, *task.minima.values())]
     others = {statements.ARRIVAL, statements.WITHOUT, statements.HOPF, statements.HOPF_SPRINGS}
     assert set(beside) == {*tasks, *others}
@@ -165,7 +165,8 @@ def test_geometry_is_held_against_the_paper_and_walks_stand_beside_the_robot(fou
 def test_tasks_that_are_swapped_are_noticed(found):
     swapped = replace(found, tasks={"A": found.tasks["B"], "B": found.tasks["A"]})
     here, there = (
-        {row.statement: row.words for row in rows(each) if isinstance(row, OfPlanar)} for each in (found, swapped)
+        {row.statement: row.result.words for row in rows(each) if isinstance(row, OfPlanar)}
+        for each in (found, swapped)
     )
     first, second = statements.TASKS.values()
     for one, other in ((first.k_hat, second.k_hat), (first.outcomes, second.outcomes)):
@@ -236,4 +237,4 @@ def test_findings_of_another_robot(found):
     stiff = turning_task(ROBOT, TASK_A, (60.0, 75.0), repeats=2, duration=5.0, shown=(60.0, 60.0, 75.0))
     assert springs_by_outcome(stiff.criteria)[Outcome.ARRIVED] == []
     table = rows(replace(found, tasks={"A": stiff, "B": found.tasks["B"]}))
-    assert next(row.words for row in table if getattr(row, "statement", None) == statements.TASKS["A"].outcomes)
+    assert next(row.result.words for row in table if getattr(row, "statement", None) == statements.TASKS["A"].outcomes)

@@ -16,7 +16,7 @@ from chilopod.paper.courses.summary import (
     titled,
     verdicts,
 )
-from chilopod.paper.table import NOT_PRINTED, Row
+from chilopod.paper.table import Result, Row, Verdict
 from chilopod.show.words import listing
 from chilopod.steering import VARIABLE
 
@@ -115,4 +115,4 @@ def condition_rows(data: xr.Dataset) -> list[Row]:
 
 
 def _row(quantity: str, computed: str, remark: str) -> Row:
-    return Row(quantity, NOT_PRINTED, computed, _WHERE, NOT_PRINTED, remark)
+    return Row(quantity, Verdict.NOT_PRINTED, Result(computed), _WHERE, Verdict.NOT_PRINTED, remark)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.paper import printed, statements
 from chilopod.paper.curved.study import CurvedStudy, axis_radius, bend_order, bent, fluctuation
 from chilopod.paper.equal_distance import change, radius_ratio
 from chilopod.paper.scatter import INCREASES, increases
-from chilopod.paper.table import AGREES, NOT_PRINTED, OfPlanar, Row
+from chilopod.paper.table import OfPlanar, Result, Row, Verdict, agreement
 
 
 def rows(study: CurvedStudy) -> list[Row | OfPlanar]:
@@ -27,27 +28,33 @@ def _model_rows(study: CurvedStudy) -> list[Row]:
         Row(
             "joints by how far they bend",
             f"{', '.join(map(str, printed.MODE_ORDER))} (mode)",
-            f"{', '.join(map(str, order))} (trials at {float(stiffest.spring[0]):g} N*mm/deg: "
-            + " ".join(f"{value:.2f}" for value in ratios / np.linalg.norm(ratios))
-            + ")",
+            Result(
+                f"{', '.join(map(str, order))} (trials at {float(stiffest.spring[0]):g} N*mm/deg: "
+                + " ".join(f"{value:.2f}" for value in ratios / np.linalg.norm(ratios))
+                + ")"
+            ),
             printed.ANALYSIS,
-            AGREES[order == printed.MODE_ORDER],
+            agreement(order == printed.MODE_ORDER),
         ),
         Row(
             "how the bend of joint 1 grows from the point",
             "not printed (robot: fitted by a square root of 1/k1)",
-            f"power {float(below.power):.2f} of the distance {100 * (1 - float(below.softest) / exact):.1f} % below, "
-            f"{float(law.power[0]):.2f} at {100 * (1 - float(law.softest[0]) / exact):.2g} %",
+            Result(
+                f"power {float(below.power):.2f} of the distance {100 * (1 - float(below.softest) / exact):.1f} % "
+                f"below, {float(law.power[0]):.2f} at {100 * (1 - float(law.softest[0]) / exact):.2g} %"
+            ),
             printed.EXPERIMENTS,
-            NOT_PRINTED,
+            Verdict.NOT_PRINTED,
         ),
         Row(
             "where trials settle",
-            NOT_PRINTED,
-            f"within {float(study.agreement.max()):.0e} rad of the branch, "
-            f"{int(study.agreement.notnull().sum())} trials",
+            Verdict.NOT_PRINTED,
+            Result(
+                f"within {float(study.agreement.max()):.0e} rad of the branch, "
+                f"{int(study.agreement.notnull().sum())} trials"
+            ),
             printed.EXPERIMENTS,
-            NOT_PRINTED,
+            Verdict.NOT_PRINTED,
             "with even feet: uneven ones make each trial's robot another one"
             + (f"; of uneven ones {unsettled} of {trials.settled.size} had not settled" if unsettled else ""),
         ),
@@ -64,17 +71,18 @@ def _beside_robot(study: CurvedStudy) -> list[OfPlanar]:
     rising = increases([row for row in angles if np.isfinite(row).any()][::-1])
     wider, softest, stiffest = fluctuation(trials)
     words = [
-        OfPlanar(statements.STRAIGHT, f"straight from {min(straight):g} N*mm/deg up"),
+        OfPlanar(statements.STRAIGHT, Result(f"straight from {min(straight):g} N*mm/deg up")),
         OfPlanar(
-            statements.CURVED, f"curved up to {max(curving):g} N*mm/deg, {left} to the left and {right} to the right"
+            statements.CURVED,
+            Result(f"curved up to {max(curving):g} N*mm/deg, {left} to the left and {right} to the right"),
         ),
-        OfPlanar(statements.ONSET, f"{study.fit.critical:.2f} N*mm/deg; the point is at {exact:.2f}"),
-        OfPlanar(statements.RISING, INCREASES[rising]),
-        OfPlanar(statements.FLUCTUATION, f"{wider} at {softest:g} than at {stiffest:g} N*mm/deg"),
+        OfPlanar(statements.ONSET, _onset(study.fit.critical, exact)),
+        OfPlanar(statements.RISING, Result(INCREASES[rising])),
+        OfPlanar(statements.FLUCTUATION, Result(f"{wider} at {softest:g} than at {stiffest:g} N*mm/deg")),
     ]
     for spring, statement in statements.RADII.items():
         radius = float(axis_radius(study.branch, spring / printed.ONSET.value * exact))
-        words.append(OfPlanar(statement, f"{radius:.2f} m at the same share of its point"))
+        words.append(OfPlanar(statement, Result(f"{radius:.2f} m at the same share of its point", radius, unit="m")))
     return words
 
 
@@ -84,11 +92,19 @@ def _variants_beside_robot(study: CurvedStudy) -> list[OfPlanar]:
         at = study.comparison.sel(variant=name)
         ratio = radius_ratio(study.variants[printed.AS_BUILT], study.variants[name])
         words += [
-            OfPlanar(statement.onset, f"{float(at.fitted_k1):.2f} N*mm/deg; the point is at {float(at.exact_k1):.2f}"),
+            OfPlanar(statement.onset, _onset(float(at.fitted_k1), float(at.exact_k1))),
             OfPlanar(
                 statement.radius,
-                f"{change(ratio.distance, ratio.distance_error)} at equal distance from its own onset; "
-                f"{change(float(at.equal_spring))} at the same spring",
+                Result(
+                    f"{change(ratio.distance, ratio.distance_error)} at equal distance from its own onset; "
+                    f"{change(float(at.equal_spring))} at the same spring",
+                    ratio.distance,
+                    ratio.distance_error,
+                ),
             ),
         ]
     return words
+
+
+def _onset(fitted: float, exact: float) -> Result:
+    return Result(f"{fitted:.2f} {PAPER_UNIT}; the point is at {exact:.2f}", fitted, unit=PAPER_UNIT)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 from base64 import b64encode
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from enum import Enum
 from importlib.metadata import version
 from importlib.resources import files
@@ -20,18 +20,19 @@ from chilopod.errors import in_words
 from chilopod.paper.page.story import facts, summary
 from chilopod.paper.section import Found, Section
 from chilopod.paper.straight.sections import MODE
-from chilopod.paper.table import AGREES, NOT_COMPUTED, NOT_PRINTED, WITHIN, RobotRow, Row
+from chilopod.paper.table import RobotRow, Row, Verdict
 from chilopod.robot import Robot
 from chilopod.show.panel import Panel
 from chilopod.show.words import listing, minus, typeset
 
 _TITLE: Final = "A robot that turns by bifurcation: the paper and the computation"
-_MARKS: Final = {True: ("agrees", "✓"), False: ("differs", "≠"), None: ("undecided", "?")}
 _LOOKS: Final = {
-    **{words[answer]: mark for words in (AGREES, WITHIN) for answer, mark in _MARKS.items()},
-    **dict.fromkeys((NOT_PRINTED, NOT_COMPUTED), ("open", "–")),
+    **dict.fromkeys((Verdict.AGREES, Verdict.WITHIN), ("agrees", "✓")),
+    **dict.fromkeys((Verdict.DIFFERS, Verdict.OUTSIDE), ("differs", "≠")),
+    **dict.fromkeys((Verdict.UNDECIDED, Verdict.NOT_DETERMINED), ("undecided", "?")),
+    **dict.fromkeys((Verdict.NOT_PRINTED, Verdict.NOT_COMPUTED), ("open", "–")),
 }
-"""Of verdicts: class and mark."""
+"""Class and mark of each verdict."""
 
 _RELOAD: Final = 10  # s
 _LIBRARIES: Final = ("numpy", "numba", "scipy", "xarray", "matplotlib")
@@ -234,7 +235,8 @@ def _chapters(
 
 def _row(row: Row | RobotRow) -> dict[str, str]:
     look, mark = _LOOKS[row.verdict]
-    return {**{name: typeset(text) for name, text in asdict(row).items()}, "look": look, "mark": mark}
+    texts = {name: typeset(text) for name, text in row.data().items() if isinstance(text, str)}
+    return {**texts, "look": look, "mark": mark}
 
 
 def _figure(drawn: Drawn) -> dict[str, Any]:

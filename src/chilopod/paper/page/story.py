@@ -8,7 +8,7 @@ from typing import Final
 from chilopod.paper import printed, statements
 from chilopod.paper.section import Found
 from chilopod.paper.straight.sections import MODE, UNIFORM
-from chilopod.paper.table import AGREES, NOT_COMPUTED, WITHIN, Kind
+from chilopod.paper.table import Kind, Verdict
 from chilopod.paper.turning.sections import TURNING
 from chilopod.paper.turning.trials import outcome_words, span
 from chilopod.show.words import SPRING_UNIT, listing, spring, typeset
@@ -47,20 +47,19 @@ def facts(found: Found) -> list[Fact]:
     if mode is not None:
         about = "front spring at which the straight walk gives way, in the planar model"
         told.append(Fact(spring(mode.attrs["value"], 5), about, typeset(str(printed.CRITICAL_K1))))
-    rows = {row.quantity: row for row in found.robot_rows() if row.verdict != NOT_COMPUTED}
+    twins = {row.statement: row.twin for row in found.robot_rows() if row.twin}
     for statement, about in _TOLD.items():
-        if row := rows.get(statement.quantity):
-            told.append(Fact(typeset(row.twin), typeset(about), typeset(row.robot)))
+        if twin := twins.get(statement):
+            told.append(Fact(typeset(twin.words), typeset(about), typeset(statement.said.words)))
     if predicted := _predictions(found):
         about = "statements about the robot met by its twin that it was not fitted to"
-        told.append(Fact(f"{predicted.count(WITHIN[True])} of {len(predicted)}", about))
+        told.append(Fact(f"{predicted.count(Verdict.WITHIN)} of {len(predicted)}", about))
     return told
 
 
-def _predictions(found: Found) -> list[str]:
-    """The verdicts on what the twin was not fitted to."""
-    rows = [row for row in found.robot_rows() if row.verdict != NOT_COMPUTED]
-    return [row.verdict for row in rows if row.kind == Kind.PREDICTED.value]
+def _predictions(found: Found) -> list[Verdict]:
+    """Verdicts on statements that the twin was not fitted to."""
+    return [row.verdict for row in found.robot_rows() if row.twin and row.kind == Kind.PREDICTED.value]
 
 
 def summary(results: Found) -> str:
@@ -90,22 +89,23 @@ def summary(results: Found) -> str:
             f"walks have {outcome_words(task.criteria, span)}\u00a0{SPRING_UNIT}."
         )
     if predicted := _predictions(results):
-        open_ = predicted.count(WITHIN[None])
+        open_, none = predicted.count(Verdict.UNDECIDED), predicted.count(Verdict.NOT_DETERMINED)
         left = f"; {open_} more {'is' if open_ == 1 else 'are'} left open by the scatter of its trials" if open_ else ""
+        left += f"; of {none} its trials determine nothing" if none else ""
         parts.append(
             "The same robot in three dimensions, its unknown constants fitted to the paper's base series of walks and "
-            f"their speed alone, meets {predicted.count(WITHIN[True])} of {len(predicted)} further statements about "
+            f"their speed alone, meets {predicted.count(Verdict.WITHIN)} of {len(predicted)} further statements about "
             f"the robot that it was not fitted to{left}."
         )
     rows = [row for part in results.planar_rows().values() for row in part]
-    counted = {word: sum(row.verdict == word for row in rows) for word in AGREES.values()}
-    if compared := sum(counted.values()):
-        differing = [typeset(row.quantity) for row in rows if row.verdict == AGREES[False]]
-        said = [f"{counted['agrees']} agree"]
-        if counted["undecided"]:
-            said.append(f"{counted['undecided']} are left open by the scatter of the trials")
+    judged = [row.verdict for row in rows if row.verdict is not Verdict.NOT_PRINTED]
+    if judged:
+        differing = [typeset(row.quantity) for row in rows if row.verdict is Verdict.DIFFERS]
+        said = [f"{judged.count(Verdict.AGREES)} agree"]
+        if open_ := judged.count(Verdict.UNDECIDED):
+            said.append(f"{open_} are left open by the scatter of the trials")
         if differing:
             listed = f": {listing(differing)}" if len(differing) <= _MOST_LISTED else ""
             said.append(f"{len(differing)} differ{listed}. The reasons are given below")
-        parts.append(f"Of {compared} statements of the paper about its planar model, {listing(said)}.")
+        parts.append(f"Of {len(judged)} statements of the paper about its planar model, {listing(said)}.")
     return " ".join(parts)

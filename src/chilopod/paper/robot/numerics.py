@@ -10,7 +10,7 @@ from chilopod.errors import AnalysisError
 from chilopod.paper.fit_data import base_series_data
 from chilopod.paper.size import Size
 from chilopod.paper.statements import NUMERICS
-from chilopod.paper.table import OfTwin, of_twin
+from chilopod.paper.table import OfTwin, Result, of_twin
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.tasks.identify.twin_series import DURATION, base_series
@@ -82,4 +82,4 @@ def rows(data: xr.Dataset) -> list[OfTwin]:
     )
     move = largest_move(data)
     words = f"{said}; largest move of onset, and radii and speeds at 15 to 28 N*mm/deg, {100.0 * move:.1f} %"
-    return [of_twin(NUMERICS, words, move)]
+    return [of_twin(NUMERICS, Result(f"{words} (one walk each, without an error)", move, 0.0))]

@@ -23,7 +23,7 @@ from chilopod.paper.scatter import (
     with_error,
 )
 from chilopod.paper.statements import listed
-from chilopod.paper.table import WITHIN, OfTwin, Statement, of_twin
+from chilopod.paper.table import OfTwin, Result, Statement, Verdict, of_twin, within
 from chilopod.paper.walk_measures import onset_with_error, radius_at, shares
 from chilopod.show.words import listing
 from chilopod.tasks.radius_law import in_settled_curve
@@ -40,7 +40,7 @@ def walk_rows(found: RobotWalks) -> list[OfTwin]:
         _curved(base),
         _spring(statements.ONSET, onset_with_error(base)),
         *(_radius(base, spring, statement) for spring, statement in statements.RADII.items()),
-        of_twin(statements.SPEED, f"{with_error(speed, error, 4)} m/s", speed, error),
+        of_twin(statements.SPEED, Result("", speed, error, "m/s", 4)),
         _rising(base),
         _fluctuation(base),
         _spring(statements.UNIFORM, (uniform["critical_k"], uniform["critical_k_error"])),
@@ -58,13 +58,13 @@ def _spring(statement: Statement[Band], twin: tuple[float, float], reading: str 
     value, error = twin
     off = f"{with_error(value, error, 1)} {PAPER_UNIT} ({100.0 * (value / statement.said.middle - 1.0):+.0f} %)"
     words = off if np.isfinite(value) else "not determined by trials"
-    return of_twin(statement, words, value, error, reading)
+    return of_twin(statement, Result(words, value, error, PAPER_UNIT), reading)
 
 
 def _straight(base: xr.Dataset) -> OfTwin:
     springs = printed.STRAIGHT
     words = f"straight: {_counts(base, 'straight', springs)}"
-    return OfTwin(statements.STRAIGHT, words, _most(shares(base).straight, springs))
+    return OfTwin(statements.STRAIGHT, Result(words), within(_most(shares(base).straight, springs)))
 
 
 def _curved(base: xr.Dataset) -> OfTwin:
@@ -72,13 +72,13 @@ def _curved(base: xr.Dataset) -> OfTwin:
     directions = base.direction.sel(spring=list(springs)).values
     left, right = (int((directions == side).sum()) for side in ("left", "right"))
     words = f"curved: {_counts(base, 'curved', springs)}; {left} to the left, {right} to the right"
-    return OfTwin(statements.CURVED, words, _most(shares(base).curved, springs) and min(left, right) > 0)
+    both = min(left, right) > 0
+    return OfTwin(statements.CURVED, Result(words), within(_most(shares(base).curved, springs) and both))
 
 
 def _radius(base: xr.Dataset, spring: float, statement: Statement[Band]) -> OfTwin:
     mean, error = radius_at(base, spring)
-    words = "no two trials curve" if np.isnan(mean) else f"{with_error(mean, error, 2)} m"
-    return of_twin(statement, words, mean, error)
+    return of_twin(statement, Result("no two trials curve" if np.isnan(mean) else "", mean, error, "m"))
 
 
 def _curved_angles(base: xr.Dataset) -> dict[float, NDArray[np.float64]]:
@@ -91,18 +91,20 @@ def _curved_angles(base: xr.Dataset) -> dict[float, NDArray[np.float64]]:
 
 def _rising(base: xr.Dataset) -> OfTwin:
     rising = increases(_curved_angles(base).values())
-    return OfTwin(statements.RISING, INCREASES[rising], rising)
+    return OfTwin(statements.RISING, Result(INCREASES[rising]), within(rising))
 
 
 def _fluctuation(base: xr.Dataset) -> OfTwin:
     several = {spring: row for spring, row in _curved_angles(base).items() if row.size > 1}
     if len(several) < 2:
-        return OfTwin(statements.FLUCTUATION, "no two springs at which two trials curve", None)
+        return OfTwin(
+            statements.FLUCTUATION, Result("no two springs at which two trials curve"), Verdict.NOT_DETERMINED
+        )
     (stiff, one), *_, (soft, other) = several.items()
     wider = spread_difference(other, one)
     spreads = [f"{np.rad2deg(row.std(ddof=1)):.2f} deg at {k:g}" for k, row in ((stiff, one), (soft, other))]
     words = f"{' and '.join(spreads)} {PAPER_UNIT} (standard deviation): {wider}"
-    return OfTwin(statements.FLUCTUATION, words, wider.higher)
+    return OfTwin(statements.FLUCTUATION, Result(words), within(wider.higher))
 
 
 def variant_rows(base: xr.Dataset, data: xr.Dataset, name: str, reading: str = "") -> list[OfTwin]:
@@ -130,7 +132,7 @@ def variant_rows(base: xr.Dataset, data: xr.Dataset, name: str, reading: str = "
         )
     return [
         _spring(said.onset, onset_with_error(data), reading),
-        of_twin(said.radius, "; ".join(words), ratio.distance, ratio.distance_error, reading),
+        of_twin(said.radius, Result("; ".join(words), ratio.distance, ratio.distance_error), reading),
     ]
 
 
@@ -158,14 +160,14 @@ def duration_rows(data: xr.Dataset) -> list[OfTwin]:
 def _duration_row(data: xr.Dataset, statement: Statement[Said], values: str, answers: Sequence[Answer]) -> OfTwin:
     """Whether a quantity is judged alike after every duration."""
     times, last = [f"{each:g}" for each in data.duration.values], answers[-1]
-    by = {word: [t for t, each in zip(times, answers, strict=True) if each is key] for key, word in WITHIN.items()}
+    by = {within(key): [t for t, one in zip(times, answers, strict=True) if one is key] for key in (True, False, None)}
     judged = [
         f"{word} after {listing(those) if len(those) < len(times) else 'each'}" for word, those in by.items() if those
     ]
     return OfTwin(
         statement,
-        f"{values} after {listing(times)} s: {', '.join(judged)}",
-        every(None if None in (each, last) else each == last for each in answers),
+        Result(f"{values} after {listing(times)} s: {', '.join(judged)}"),
+        within(every(None if None in (each, last) else each == last for each in answers)),
     )
 
 

@@ -10,8 +10,7 @@ from chilopod.paper import printed, statements
 from chilopod.paper.printed import Task
 from chilopod.paper.robot.turning import RobotTurning
 from chilopod.paper.robot.walks import RobotWalks
-from chilopod.paper.scatter import with_error
-from chilopod.paper.table import OfTwin, of_twin
+from chilopod.paper.table import OfTwin, Result, of_twin, within
 from chilopod.paper.turning import hopf
 from chilopod.paper.turning.minima import SCALES, around, minima
 from chilopod.paper.turning.trials import LegYaw, arrivals, by_leg_yaw, outcome_words, springs_by_outcome
@@ -26,10 +25,10 @@ def turning_rows(found: RobotTurning, walks: RobotWalks | None) -> list[OfTwin]:
         said = statements.TASKS[letter]
         if walks is not None:
             own, error = spring_for(walks.base, task.target.radius)
-            words = f"{with_error(own, error, 1)} {PAPER_UNIT}" if np.isfinite(own) else "none of the springs walked"
-            rows.append(of_twin(said.k_hat, words, own, error))
+            words = "" if np.isfinite(own) else "none of the springs walked"
+            rows.append(of_twin(said.k_hat, Result(words, own, error, PAPER_UNIT, 1)))
         words = outcome_words(task.criteria, lambda springs: ", ".join(f"{k:g}" for k in springs))
-        rows.append(OfTwin(said.outcomes, words, _became(task.criteria, printed.TASKS[letter])))
+        rows.append(OfTwin(said.outcomes, Result(words), within(_became(task.criteria, printed.TASKS[letter]))))
         low = minima(task.criteria)
         for name, statement in said.minima.items():
             at, (factor, unit) = low.sel(criterion=name), SCALES[name]
@@ -37,21 +36,27 @@ def turning_rows(found: RobotTurning, walks: RobotWalks | None) -> list[OfTwin]:
                 f"{factor * float(at['mean']):.3g} ± {factor * float(at['error']):.2g} {unit} at k1 = "
                 f"{float(at['at']):.3g} (no worse: {float(at.softest):g} to {float(at.stiffest):g})"
             )
-            rows.append(OfTwin(statement, words, around(at, statement.said)))
+            rows.append(
+                OfTwin(statement, Result(words, float(at["at"]), unit=PAPER_UNIT), within(around(at, statement.said)))
+            )
     task = found.tasks["A"]
     time = task.time if (task.criteria.outcome == Outcome.ARRIVED.label).any() else np.nan
+    arrival = f"{time:.1f} s, the earliest, which has no error" if np.isfinite(time) else "none arrives"
     own = walks.uniform.attrs["critical_k"] if walks else np.nan
     words, below = hopf.softest_minima(found.hopf, own if np.isfinite(own) else printed.UNIFORM.value)
     return [
         *rows,
-        of_twin(statements.ARRIVAL, f"{time:.1f} s" if np.isfinite(time) else "none arrives", time),
-        *(OfTwin(statements.WITHOUT, str(each), _needs_leg_yaw(each)) for each in by_leg_yaw(found.without)),
+        of_twin(statements.ARRIVAL, Result(arrival, time, 0.0, "s")),
+        *(
+            OfTwin(statements.WITHOUT, Result(str(each)), within(_needs_leg_yaw(each)))
+            for each in by_leg_yaw(found.without)
+        ),
         OfTwin(
             statements.HOPF,
-            f"{hopf.words(task, found.hopf)} ({hopf.saturation(task, found.hopf)})",
-            hopf.all_lower(task, found.hopf),
+            Result(f"{hopf.words(task, found.hopf)} ({hopf.saturation(task, found.hopf)})"),
+            within(hopf.all_lower(task, found.hopf)),
         ),
-        OfTwin(statements.HOPF_SPRINGS, words, below),
+        OfTwin(statements.HOPF_SPRINGS, Result(words), within(below)),
     ]
 
 

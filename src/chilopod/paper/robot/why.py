@@ -29,7 +29,7 @@ from chilopod.errors import AnalysisError
 from chilopod.paper import printed
 from chilopod.paper.size import Size
 from chilopod.paper.statements import PLANAR_LIMIT
-from chilopod.paper.table import OfPlanar, OfTwin, of_twin
+from chilopod.paper.table import OfPlanar, OfTwin, Result, of_twin
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot, Twin
 from chilopod.tasks.radius_law import CURVED
@@ -326,5 +326,8 @@ def _shape(robot: Robot) -> Array:
 def rows(data: xr.Dataset) -> list[OfTwin | OfPlanar]:
     """The line of the robot's table: whether the engines vouch for each other."""
     point, exact = data.attrs["vouched"], data.attrs["exact"]
-    words = f"{point:.2f} N*mm/deg ({100.0 * (point / exact - 1.0):+.1f} %)"
-    return [of_twin(PLANAR_LIMIT, words, point / exact), OfPlanar(PLANAR_LIMIT, f"{exact:.4f} N*mm/deg")]
+    words = f"{point:.2f} {PAPER_UNIT} ({100.0 * (point / exact - 1.0):+.1f} %, without an error)"
+    return [
+        of_twin(PLANAR_LIMIT, Result(words, point / exact, 0.0)),
+        OfPlanar(PLANAR_LIMIT, Result(value=exact, unit=PAPER_UNIT, digits=4)),
+    ]

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.paper import printed, statements
 from chilopod.paper.scatter import every
-from chilopod.paper.table import AGREES, NOT_PRINTED, OfPlanar, Row
+from chilopod.paper.table import OfPlanar, Result, Row, Verdict, agreement
 from chilopod.tasks.identify import Identification
 
 
@@ -18,16 +19,18 @@ def mode_rows(data: xr.Dataset) -> list[Row]:
         Row(
             "critical k1",
             str(printed.CRITICAL_K1),
-            f"{value:.9f} ± {data.attrs['error_bound']:.0e} N*mm/deg",
+            _located(data),
             printed.ANALYSIS,
-            AGREES[printed.CRITICAL_K1.answer(value)],
+            agreement(printed.CRITICAL_K1.answer(value)),
         ),
         Row(
             "kind and direction",
             f"{printed.KIND} (from the exponent crossing on the real axis)",
-            f"{kind}, {data.attrs['criticality']} (coefficient {data.attrs['coefficient']:.4g} /rad² per cycle)",
+            Result(
+                f"{kind}, {data.attrs['criticality']} (coefficient {data.attrs['coefficient']:.4g} /rad² per cycle)"
+            ),
             printed.ANALYSIS,
-            AGREES[kind == printed.KIND],
+            agreement(kind == printed.KIND),
             "the paper's linear analysis does not give a direction",
         ),
     ]
@@ -38,9 +41,9 @@ def mode_rows(data: xr.Dataset) -> list[Row]:
             Row(
                 f"critical mode, joint {joint}",
                 f"{paper.value:.2f}",
-                f"{computed:.4f}",
+                Result(value=computed, error=0.0, digits=4),
                 printed.ANALYSIS,
-                AGREES[paper.answer(computed)],
+                agreement(paper.answer(computed)),
                 f"beyond rounding by {beyond:.4f}" if beyond > 0.0 else "",
             )
         )
@@ -57,9 +60,9 @@ def variant_rows(data: xr.Dataset) -> list[Row]:
             Row(
                 f"critical k1, {name}",
                 variant.model.words,
-                f"{value:.3f} N*mm/deg ({100 * (value / base - 1):+.0f} %)",
+                Result(f"{value:.3f} {PAPER_UNIT} ({100 * (value / base - 1):+.0f} %)", value, unit=PAPER_UNIT),
                 "figure Floquet analysis, C",
-                AGREES[variant.model.answer(value / base)],
+                agreement(variant.model.answer(value / base)),
             )
         )
     return rows
@@ -73,9 +76,9 @@ def module_rows(data: xr.Dataset) -> list[Row]:
         Row(
             f"critical k1 for 7 to {int(data.modules[-1])} modules of the same size",
             said.words,
-            f"{float(longer.min()):.2f} to {float(longer.max()):.2f} N*mm/deg",
+            Result(f"{float(longer.min()):.2f} to {float(longer.max()):.2f} {PAPER_UNIT}"),
             f"{printed.ANALYSIS}, figure D",
-            AGREES[every(said.answer(float(value) / base) for value in longer)],
+            agreement(every(said.answer(float(value) / base) for value in longer)),
         )
     ]
 
@@ -86,20 +89,22 @@ def uniform_rows(data: xr.Dataset) -> list[Row | OfPlanar]:
     return [
         Row(
             "uniform springs: critical k",
-            NOT_PRINTED,
-            f"{found['value']:.9f} ± {found['error_bound']:.0e} N*mm/deg",
+            Verdict.NOT_PRINTED,
+            _located(data),
             printed.COMPARISON,
-            NOT_PRINTED,
+            Verdict.NOT_PRINTED,
         ),
         Row(
             "uniform springs: kind",
             f'{printed.UNIFORM_KIND} ("Hopf")',
-            f"{found['kind']}, {found['criticality']}, {found['frequency_rad_s']:.4f} rad/s: "
-            f"a cycle of {found['oscillation_period_s']:.1f} s",
+            Result(
+                f"{found['kind']}, {found['criticality']}, {found['frequency_rad_s']:.4f} rad/s: "
+                f"a cycle of {found['oscillation_period_s']:.1f} s"
+            ),
             printed.ANALYSIS,
-            AGREES[found["kind"] == printed.UNIFORM_KIND],
+            agreement(found["kind"] == printed.UNIFORM_KIND),
         ),
-        OfPlanar(statements.UNIFORM, f"{found['value']:.2f} N*mm/deg"),
+        OfPlanar(statements.UNIFORM, Result(value=found["value"], unit=PAPER_UNIT)),
     ]
 
 
@@ -112,12 +117,20 @@ def identification_rows(found: Identification) -> list[Row]:
     return [
         Row(
             "foot friction, half-width, forward offset",
-            NOT_PRINTED,
-            f"{best.ground.friction:.1f} N*s/m, {1e3 * best.legs.half_width:.1f} mm, "
-            f"{1e3 * best.legs.forward_offset:.1f} mm",
+            Verdict.NOT_PRINTED,
+            Result(
+                f"{best.ground.friction:.1f} N*s/m, {1e3 * best.legs.half_width:.1f} mm, "
+                f"{1e3 * best.legs.forward_offset:.1f} mm"
+            ),
             printed.ANALYSIS,
-            NOT_PRINTED,
+            Verdict.NOT_PRINTED,
             f"best fit, largest residual {np.abs(found.residuals).max():.2f} of rounding "
             f"(this robot: {np.abs(found.preset_residuals).max():.2f}); rounding allows forward offsets of {span}",
         )
     ]
+
+
+def _located(data: xr.Dataset) -> Result:
+    """Critical spring with the bound of its error."""
+    value, bound = float(data.attrs["value"]), float(data.attrs["error_bound"])
+    return Result(f"{value:.9f} ± {bound:.0e} {PAPER_UNIT}", value, bound, PAPER_UNIT)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.paper import printed, statements
 from chilopod.paper.printed import CRITERION_NAMES
-from chilopod.paper.table import AGREES, NOT_PRINTED, OfPlanar, Row
+from chilopod.paper.table import OfPlanar, Result, Row, Verdict, agreement
 from chilopod.paper.turning import hopf
 from chilopod.paper.turning.minima import SCALES, minima
 from chilopod.paper.turning.study import ROUGH, Turning
@@ -20,10 +20,10 @@ def rows(found: Turning) -> list[Row | OfPlanar]:
         *(_radius(found, letter) for letter in found.tasks),
         _rough(found),
         *beside,
-        OfPlanar(statements.ARRIVAL, f"{found.tasks['A'].time:.1f} s"),
-        OfPlanar(statements.WITHOUT, without),
-        OfPlanar(statements.HOPF, hopf.counted(found.tasks["A"], found.hopf)),
-        OfPlanar(statements.HOPF_SPRINGS, hopf.softest_minima(found.hopf, found.hopf_point)[0]),
+        OfPlanar(statements.ARRIVAL, Result(value=found.tasks["A"].time, unit="s", digits=1)),
+        OfPlanar(statements.WITHOUT, Result(without)),
+        OfPlanar(statements.HOPF, Result(hopf.counted(found.tasks["A"], found.hopf))),
+        OfPlanar(statements.HOPF_SPRINGS, Result(hopf.softest_minima(found.hopf, found.hopf_point)[0])),
     ]
 
 
@@ -32,9 +32,9 @@ def _radius(found: Turning, letter: str) -> Row:
     return Row(
         f"task {letter} ({task.target}): radius of the circle to the target",
         str(task.radius),
-        f"{radius:.3f} m",
+        Result(value=radius, unit="m", digits=3),
         task.source,
-        AGREES[task.radius.answer(radius)],
+        agreement(task.radius.answer(radius)),
         "geometry alone, R/(2 sin ψ)",
     )
 
@@ -43,14 +43,14 @@ def _beside_robot(found: Turning, letter: str) -> list[OfPlanar]:
     task, said = found.tasks[letter], statements.TASKS[letter]
     low, late = minima(task.criteria), minima(task.criteria, 1)
     words = [
-        OfPlanar(said.k_hat, f"{found.laws.k_hat(task.target.radius)[0]:.1f} {PAPER_UNIT}"),
-        OfPlanar(said.outcomes, outcome_words(task.criteria, span)),
+        OfPlanar(said.k_hat, Result(value=found.laws.k_hat(task.target.radius)[0], unit=PAPER_UNIT, digits=1)),
+        OfPlanar(said.outcomes, Result(outcome_words(task.criteria, span))),
     ]
     for name, statement in said.minima.items():
         (factor, unit), at = SCALES[name], low.sel(criterion=name)
         where = f"{factor * float(at['mean']):.3g} {unit} at k1 = {float(at['at']):.3g}"
         afterwards = f"after {printed.ARRIVAL} at {float(late['at'].sel(criterion=name)):.3g}"
-        words.append(OfPlanar(statement, f"{where} ({afterwards})"))
+        words.append(OfPlanar(statement, Result(f"{where} ({afterwards})", float(at["at"]), unit=PAPER_UNIT)))
     return words
 
 
@@ -63,9 +63,9 @@ def _rough(found: Turning) -> Row:
     ]
     return Row(
         f"task A, disturbances {ROUGH:g} times as large: springs of the smallest criteria",
-        NOT_PRINTED,
-        ", ".join(pairs) + f" {PAPER_UNIT}",
+        Verdict.NOT_PRINTED,
+        Result(", ".join(pairs) + f" {PAPER_UNIT}"),
         printed.TURNING,
-        NOT_PRINTED,
+        Verdict.NOT_PRINTED,
         f"evaluated at {found.rough.time:.2f} s, the earliest arrival there",
     )

@@ -20,7 +20,7 @@ _STYLES = tuple(zip((style.BLUE, style.VERMILLION, style.GREEN, style.ORANGE), "
 def panel(data: xr.Dataset) -> Panel:
     """Onset, radii and shares of curved walks over the duration of the walks."""
     times = listing(f"{each:g}" for each in data.duration.values)
-    said = "; ".join(f"{row.statement.quantity.partition(',')[0]} {row.words}" for row in duration_rows(data))
+    said = "; ".join(f"{row.statement.quantity.partition(',')[0]} {row.result.words}" for row in duration_rows(data))
     return Panel(
         name="robot-durations",
         title="The robot in three dimensions: what if its walks had been shorter",
