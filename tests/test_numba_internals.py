@@ -96,6 +96,7 @@ def test_versions_with_internals_are_capped():
 def test_what_is_above_compiles_nothing():
     """Its changes do not count for compiled code; that nothing compiled imports it hold the contracts of layers."""
     for name in ABOVE:
+        assert (PACKAGE / name / "__init__.py").is_file(), name
         for path in (PACKAGE / name).rglob("*.py"):
             text = path.read_text(encoding="utf-8")
             assert not re.search(r"chilopod\.compiled|\bnjit\b|from numba|numba\.extending", text), path

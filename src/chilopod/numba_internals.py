@@ -25,7 +25,7 @@ from chilopod import sources
 
 __all__ = ["COMPILING", "Conversion", "cgutils", "ir", "keep", "pointer_to", "signature"]
 
-ABOVE = ("analysis", "cli", "gym", "live", "paper", "report", "tasks", "trials", "twin")
+ABOVE = ("analysis", "cli", "gym", "live", "paper", "show", "tasks", "trials", "twin")
 """Subpackages that compile nothing, and that nothing compiled can reach: they may change without compiling anew."""
 
 NOTICED = 1.0

@@ -24,7 +24,7 @@ from chilopod.trials.disturbance import Disturbance
 from chilopod.trials.reach import UnknownKindError
 
 _DIGITS = 16
-_ABOVE = ("analysis", "cli", "gym", "live", "paper", "report", "stability", "tasks")
+_ABOVE = ("analysis", "cli", "gym", "live", "paper", "show", "stability", "tasks")
 """Subpackages that no walk is made with: who edits these finds trials that were kept before."""
 
 
