@@ -13,7 +13,8 @@ In a page these are results:
   A path leads through the printed JSON by keys, positions and names of rows; ``* 1000`` behind it scales the number,
   ``~ at (.*?) m`` takes its part of a text. A number is written with as many decimals as it had.
 
-``make torture`` in such a comment stands for what its last run counted: ten minutes are not spent again.
+``make torture`` and the campaign of branches stand for what their last run counted: those minutes are not spent
+again.
 
 ``make renew ARGS=docs/tutorial.md`` does so for some pages only.
 
@@ -42,7 +43,10 @@ from chilopod.cli import main
 from chilopod.robot import load_robot, presets
 
 DOCS = Path(__file__).resolve().parent
-COUNTED = {"make torture": DOCS.parent / "torture" / "results.json"}
+COUNTED = {
+    "make torture": DOCS.parent / "torture" / "results.json",
+    "python torture/branches.py --count 1000 --seed 1123": DOCS.parent / "torture" / "branches.json",
+}
 PAGES = (DOCS.parent / "README.md", *sorted(DOCS.rglob("*.md")))
 RESULTS = DOCS / "results.json"
 QUICK = 2.0
@@ -53,7 +57,7 @@ _BLOCK = re.compile(
     r"^<!-- run by make renew -->\n```python\n(?P<command>.*?)(?P<output>(?:^# [^\n]*\n)+)```$", re.M | re.S
 )
 _NAMED = re.compile(
-    r"^<!-- (?P<command>(?:chilopod|make) [^\n]*)\n(?P<names>.*?) -->\n+(?P<text>.*?)(?=\n\n|\Z)", re.M | re.S
+    r"^<!-- (?P<command>(?:chilopod|make|python) [^\n]*)\n(?P<names>.*?) -->\n+(?P<text>.*?)(?=\n\n|\Z)", re.M | re.S
 )
 _NAME = re.compile(r"^\s*(?P<text>\S.*?) = (?P<path>.*?)(?: \* (?P<scale>[\d.e]+))?(?: ~ (?P<part>.*))?$", re.M)
 

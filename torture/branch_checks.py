@@ -93,7 +93,9 @@ def _orbit(found: Verdict, orbits: Orbits, point: Any) -> Solved | None:
         return None
     found.counts["orbits"] += 1
     off = float(np.abs(here.off).max())
-    own = float(np.abs(here.off - orbits.returned(z, COARSE).off).max())
+    # Beside a canard an orbit magnifies within what it has forgotten at its end: both programs are rounded there.
+    rounded = _ROUNDING * float(np.abs(here.by_parameter).max())
+    own = max(rounded, float(np.abs(here.off - orbits.returned(z, COARSE).off).max()))
     # Orbits are solved for to a precision of the branch's own sizes, which may be larger than they are.
     coarse = _PRECISION * float((point.units[:-1] / orbits.sizes).max())
     found.counts["coarse"] += off > _CLOSES * max(1.0, norm) + 3.0 * own

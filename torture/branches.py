@@ -29,6 +29,7 @@ from in_process import Place
 from outcomes import FoundFault, Kind, Outcome
 from own_flow import Surface, guard
 
+RESULTS = Path(__file__).with_name("branches.json")
 _FAULTS = ("not closed", "multipliers", "period", "not there", "off", "kind", "missed", "end", "raised")
 _COLUMNS = (
     "branches",
@@ -181,9 +182,9 @@ def case(task: tuple[int, str, int]) -> dict[str, Any]:
     return {"seed": seed, "kind": kind, "number": number, **found}
 
 
-def table(results: Sequence[dict[str, Any]]) -> str:
-    """What came of all, by kind."""
-    rows = [["kind", *_COLUMNS, "seconds"]]
+def counted(results: Sequence[dict[str, Any]]) -> dict[str, dict[str, int]]:
+    """The numbers of the table, by kind and column."""
+    rows = {}
     kinds = [kind for kind in KINDS if any(each["kind"] == kind for each in results)]
     for kind in [*kinds, "all"]:
         these = [each for each in results if kind in (each["kind"], "all")]
@@ -192,8 +193,15 @@ def table(results: Sequence[dict[str, Any]]) -> str:
             counts.update(each["counts"])
             counts["own failures"] += len(each["own"])
         counts["other faults"] = sum(counts[name] for name in _FAULTS if name not in ("not there", "missed"))
-        seconds = sum(each["seconds"] for each in these)
-        rows.append([kind, *(str(counts[column]) for column in _COLUMNS), f"{seconds:.0f}"])
+        counts["seconds"] = round(sum(each["seconds"] for each in these))
+        rows[kind] = {column: counts[column] for column in (*_COLUMNS, "seconds")}
+    return rows
+
+
+def table(results: Sequence[dict[str, Any]]) -> str:
+    """The counts as text, a line for each kind."""
+    counts = counted(results)
+    rows = [["kind", *counts["all"]], *([kind, *map(str, row.values())] for kind, row in counts.items())]
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     return "\n".join("  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in rows)
 
@@ -229,6 +237,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("interrupted; so far:")
     print(table(results))
+    if asked.save:
+        RESULTS.write_text(json.dumps({"kinds": counted(results)}, indent=1) + "\n", encoding="utf-8")
     return int(any(each["faults"] for each in results))
 
 
@@ -255,6 +265,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--kinds", default="", help=f"some of {','.join(KINDS)}")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--kept", type=Path, help="file for what is found, to go on from")
+    parser.add_argument("--save", action="store_true", help=f"keep the counts in {RESULTS.name}, for the docs")
     parser.add_argument("--verbose", action="store_true", help="print gaps and what this program cannot do as well")
     return parser
 
