@@ -7,6 +7,7 @@ from pathlib import Path
 import chilopod
 
 SOURCES = Path(chilopod.__file__).parent
+HEAD = re.compile(r"(Of|That|Whose|What|Whether|Which)\b")
 FRAGMENT = re.compile(r"(Of|That|Whose|What|Whether|Which|Where|When|Why|Who|How)\b")
 TERM = re.compile(r"[\w*`]+(, [\w*`]+)*")
 
@@ -25,6 +26,7 @@ def fragments(source):
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
             text = node.value.value
+            yield from (line for line in text.split("\n")[:1] if HEAD.match(line))
             yield from (line for line in descriptions(text) if FRAGMENT.match(line))
 
 
@@ -36,3 +38,7 @@ def test_descriptions_begin_with_a_noun():
 def test_a_fragment_is_found():
     source = 'def f(x):\n    """Do it.\n\n    Parameters\n    ----------\n    x\n        That of chilopod.\n    """\n'
     assert list(fragments(source)) == ["That of chilopod."]
+    assert list(fragments(source.replace("Do it.", "Whether it is done."))) == [
+        "Whether it is done.",
+        "That of chilopod.",
+    ]

@@ -85,7 +85,7 @@ class Gait(Description):
 
     @property
     def half_period_symmetric(self) -> bool:
-        """Whether the right legs do half a period later what the left legs do: side_phase is half a turn."""
+        """True if the right legs do half a period later what the left legs do: side_phase is half a turn."""
         return abs((self.side_phase / _TURN) % 1.0 - 0.5) <= _SAME_PHASE
 
     def leg_phases(self, modules: int) -> NDArray[np.float64]:

@@ -117,7 +117,7 @@ def foot_velocities(places: Array, rates: Array, speed: float, yaw: ArrayLike = 
 
 
 def from_modules(centres: Array, headings: Array, inside: Array) -> Array:
-    """What is known of feet in the frames of their modules, on the axes that headings are measured from.
+    """Positions and velocities of feet, from the frames of their modules, on the axes that headings are measured from.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ from chilopod.compiled import njit
 from chilopod.numba_internals import Conversion, cgutils, ir, signature
 
 LANES = 8
-"""Of double precision that fill the widest registers there are; narrower ones are used two or four at a time."""
+"""Lanes of double precision that fill the widest registers there are; narrower ones are used two or four at a time."""
 
 _CACHE_LINE = 8  # numbers
 _INDEX = ir.IntType(32)
@@ -172,7 +172,7 @@ def larger(a: Any, b: Any) -> Any:
 
 @intrinsic
 def any_less(typing: Any, a: Any, b: Any) -> Any:
-    """Whether a < b in any lane."""
+    """True if a < b in any lane."""
     width = _kind(a, b).width
 
     def generate(context: Any, builder: Any, sig: Any, values: Any) -> Any:

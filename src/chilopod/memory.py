@@ -13,7 +13,7 @@ _CONTAINER = (
     ("memory.max", "memory.current", "memory.stat"),
     ("memory/memory.limit_in_bytes", "memory/memory.usage_in_bytes", "memory/memory.stat"),
 )
-"""What a container may have, has, and what that is: of the second version of control groups and of the first."""
+"""Files with the limit and the use of a container's memory: version 2 of control groups and version 1."""
 
 
 def available() -> float:

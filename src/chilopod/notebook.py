@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 INK = "#808080"
-"""Of frames and of text in drawings."""
+"""Colour of frames and of text in drawings."""
 
 COLORS = ("#3a8fd0", "#e69f00", "#00a67a", "#d679a8", "#b07d4f", "#8a7fd0")
-"""Of what is to be told apart."""
+"""Colours of what is to be told apart."""
 
 _SMALL = 11  # px, of text
 _STYLE: Any = {

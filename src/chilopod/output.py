@@ -15,7 +15,7 @@ from chilopod import memory
 from chilopod.errors import OutputError
 
 Content = str | bytes | bytearray | IO[bytes]
-"""Of a file: text, to be written as UTF-8, bytes, or what another open file holds, such as one of :func:`spool`."""
+"""Content of a file: text, to be written as UTF-8, bytes, or another open file, such as one of :func:`spool`."""
 
 _COPIED = 2**24  # bytes at a time
 

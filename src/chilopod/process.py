@@ -1,4 +1,4 @@
-"""What the process of the command line owes whoever started it: streams that may fail, an end at any moment.
+"""Manners of the process of the command line: streams that may fail, an end at any moment.
 
 Nothing is imported here but small modules of Python itself: this comes before everything else.
 """

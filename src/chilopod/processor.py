@@ -21,7 +21,7 @@ def processor() -> str:
 
 
 def compiled_for() -> str:
-    """What LLVM calls the processor that numba compiles for."""
+    """LLVM's name of the processor that numba compiles for."""
     from llvmlite import binding
     from numba import config
 

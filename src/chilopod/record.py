@@ -1,4 +1,4 @@
-"""What every engine writes down of a walk, under the same names and in the same units."""
+"""Record of a walk, the same names and units for every engine."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LONGEST = 1e5
 """s, more than a day: anything longer is a slip of the pen."""
 
 MOST_NUMBERS = 5e8
-"""Of a record (4 GB)."""
+"""Largest number of values of a record (4 GB)."""
 
 LARGEST = 1e100
 """No number in a record is larger, in its unit: sums of squares stay finite."""
@@ -66,7 +66,7 @@ cannot be adjusted, and targets that stay, are not over time."""
 
 @dataclass(frozen=True)
 class Recording:
-    """What is to be written down of a walk.
+    """Contents of a record.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class Recording:
         return np.arange(int(np.floor(until * self.rate * (1.0 + 1e-12))) + 1) / self.rate
 
     def least_bytes(self, modules: int, until: float) -> float:
-        """What a robot's record up to a time, s, takes in every engine, at least."""
+        """Least memory of a robot's record up to a time, s, in every engine."""
         # Place, heading and their rates; joints and theirs; leg yaw; forces along the floor.
         numbers = 6 + 2 * (modules - 1) + 2 + (4 * modules if self.forces else 0)
         return 8.0 * numbers * (until * self.rate + 1.0)

@@ -135,7 +135,7 @@ class RecordFile:
 
 
 class _Medium:
-    """What HDF5 writes into: an open file that never raises, because HDF5 dies of that; it remembers what failed."""
+    """File that HDF5 writes into: it never raises, because HDF5 dies of that; it remembers what failed."""
 
     def __init__(self, file: IO[bytes]) -> None:
         self.file = file
@@ -144,7 +144,7 @@ class _Medium:
         self._error: OSError | None = None
 
     def failure(self, path: Path) -> OutputError | None:
-        """What failed, if anything."""
+        """Failure of the file, if any."""
         if self._error is None:
             return None
         return OutputError(f"cannot be written ({self._error.strerror})", source=str(path))

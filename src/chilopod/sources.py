@@ -57,7 +57,7 @@ def digest(without: Sequence[str] = ()) -> str:
 
 
 def edited(without: Sequence[str] = ()) -> bool:
-    """Whether a Python file that counts was changed, added or removed since this process began: it may run both.
+    """True if a Python file that counts was changed, added or removed since this process began: it may run both.
 
     The files are looked at once a second at most.
     """

@@ -31,10 +31,10 @@ from chilopod.stability.spectrum.errors import VERDICTS
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-10
-"""Of the nonlinear flow along a branch; orbits are then good to about 1e-10 (the tests hold 1e-9 against 1e-14)."""
+"""Tolerance of the nonlinear flow along a branch; orbits are good to 1e-10 (the tests hold 1e-9 against 1e-14)."""
 
 VERSION = 2
-"""Of what a branch is kept as: goes up whenever its data mean something else, or would go on in another way."""
+"""Version of the file of a branch: goes up whenever its data mean something else, or would go on in another way."""
 
 GRAVITY = 9.80665
 """m/s^2, standard."""
@@ -269,12 +269,12 @@ def _shown(robot: Robot, parameter: str, points: int, progress: Progress) -> Cal
 
 
 def _verdict(robot: Robot, parameter: str, fork: WalkBifurcation, branch: Branch) -> dict[str, Any]:
-    """What the normal form says of the pitchfork, and whether the branch goes that way."""
+    """The normal form's verdict on the pitchfork, and whether the branch goes that way."""
     make, critical = family(robot, parameter), fork.point.value
     gone = next((point.value for point in branch.points[1:] if point.value != critical), critical)
 
     def largest(value: float) -> float:
-        """Of the multipliers of the straight walk, the modulus of the critical one."""
+        """Modulus of the critical multiplier of the straight walk."""
         found = stability.multipliers(make(value))
         nu = found.values if found.half_period is None else found.half_period
         return float(np.abs(nu[np.abs(nu - fork.point.multiplier).argmin()]))
@@ -314,7 +314,7 @@ def _branch_of(data: xr.Dataset, sizes: Array) -> Branch:
 def _walked(
     robot: Robot, parameter: str, between: tuple[float, float], branch: Branch, attributes: dict[str, Any]
 ) -> xr.Dataset:
-    """What the robot does on every orbit of a branch."""
+    """Walk of the robot on every orbit of a branch."""
     points, make, unit = branch.points, _followed(robot, parameter), robot.unit_of(parameter)
     models = [make(point.value) for point in points]
     means = walk_means(models, [point.orbit for point in points])

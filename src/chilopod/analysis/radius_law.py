@@ -16,12 +16,12 @@ from chilopod.robot import Robot
 from chilopod.steering import RadiusLaw
 
 _BETWEEN = (1.0 / 20.0, 3.0)
-"""Of the stiffest spring: where the pitchfork of the first one is looked for and its branch followed."""
+"""Interval, relative to the stiffest spring, in which the pitchfork of the first one is looked for."""
 
 
 @dataclass(frozen=True)
 class RadiusLaws(Short):
-    """Which k1 turns how tightly, by two measures of a radius.
+    """Radii over k1, by two measures of a radius.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class RadiusLaws(Short):
         return by_axis, by_path
 
     def joint_angles(self, spring: float) -> tuple[float, ...]:
-        """Of the settled left turn at phase 0 with a spring (N*mm/deg), rad, (N-1,)."""
+        """Joint angles of the settled left turn at phase 0 with a spring (N*mm/deg), rad, (N-1,)."""
         walks = self.walks
         # Beside the pitchfork angles grow as the square root of the distance.
         root = np.sqrt(np.maximum(walks.parameter_si.values[0] - walks.parameter_si.values, 0.0))

@@ -48,7 +48,7 @@ class StraightWalk(ReadOnlyArrays):
 
     @property
     def stable(self) -> bool | None:
-        """Whether every disturbance dies out; None where the errors of the multipliers leave it undecided."""
+        """True if every disturbance dies out; None where the errors of the multipliers leave it undecided."""
         return self.exponents.multipliers.stable
 
     @property

@@ -23,7 +23,7 @@ _PACKAGES = {
     "matplotlib": "matplotlib",
     "av": "av",
 }
-"""What is imported, and what it is called where it comes from."""
+"""Packages that are imported, and their names where they come from."""
 
 BROKEN = 3
 """Exit code where something is missing that nothing works without."""
@@ -230,7 +230,7 @@ def _again(package: str) -> str:
 
 
 def _guarded(name: str, look: Callable[[], Finding]) -> Finding:
-    """What was found, even where a package that it takes is not there."""
+    """Finding of a check, even where a package that it takes is not there."""
     from chilopod.errors import briefly
 
     try:

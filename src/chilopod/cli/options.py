@@ -146,7 +146,7 @@ def _as_typed(error: ChilopodError, ctx: Any) -> None:
 
 @contextmanager
 def reading(option: str) -> Iterator[None]:
-    """What is wrong in this block is wrong with what was typed for an option (its name in Python)."""
+    """Errors in this block are errors of what was typed for an option (its name in Python)."""
     try:
         yield
     except ChilopodError as error:

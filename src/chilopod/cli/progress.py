@@ -68,7 +68,7 @@ def _lines(doing: str, told: _Told, over: threading.Event) -> None:
 
 
 def _compiling() -> bool:
-    """Whether compiling has taken a while; asked of what is loaded, since a command may need no compiled code."""
+    """True if compiling has taken a while; asked of what is loaded, since a command may need no compiled code."""
     numba = sys.modules.get("chilopod.numba_internals")
     return numba is not None and numba.COMPILING.seconds() > numba.NOTICED
 

@@ -212,7 +212,7 @@ def _identified(folder: Path) -> tuple[Path, Path]:
 
 
 def _texts(result: dict[str, Any], best: Robot) -> tuple[str, str]:
-    """Of the files of :func:`_identified`."""
+    """Texts of the files of :func:`_identified`."""
     return json_text(result) + "\n", best.with_(name="identified").to_toml()
 
 

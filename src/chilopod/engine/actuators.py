@@ -1,4 +1,4 @@
-"""What a batch of robots is told to do, and what its actuators make of it: limits, ramps, lag, and a log of it all.
+"""Commands of a batch of robots, and what its actuators make of them: limits, ramps, lag, and a log of it all.
 
 One object serves one walk of any engine. It knows the stiffness of every spring at every moment in closed form, so that
 an engine can integrate the ramp itself: a commanded stiffness is first held within the range of its actuator, then
@@ -90,7 +90,7 @@ class Actuators:
 
     @property
     def adjustable(self) -> bool:
-        """Whether any spring of any robot is."""
+        """True if any spring of any robot is."""
         return bool(self._adjustable.any())
 
     def command(self, time: float, command: Command, walking: NDArray[np.bool_]) -> None:
@@ -152,11 +152,11 @@ class Actuators:
         self._leg_yaw.restart(which)
 
     def stiffness(self, time: float) -> Array:
-        """Of every spring at a time from the last command on, N*m/rad, shape (robots, N-1)."""
+        """Stiffness of every spring at a time from the last command on, N*m/rad, shape (robots, N-1)."""
         return _stiffness(self.profile, self.lag, time) if self.driven.any() else self._start.copy()
 
     def mean_stiffness(self, times: Array) -> Array:
-        """Of every spring between each of some times and the next, N*m/rad, shape (times - 1, robots, N-1)."""
+        """Mean stiffness of every spring from each time to the next, N*m/rad, shape (times - 1, robots, N-1)."""
         edges = times.reshape(-1, 1, 1)
         return np.diff(_integral(self.profile, self.lag, edges), axis=0) / np.diff(edges, axis=0)
 
@@ -326,7 +326,7 @@ def _rate(profile: Array, lag: Array, time: Any) -> Array:
 
 
 def _integral(profile: Array, lag: Array, time: Any) -> Array:
-    """Of the stiffness over time, from the command on."""
+    """Integral of the stiffness over time, from the command on."""
     ramped = np.clip(time, profile[SINCE], profile[UNTIL]) - profile[SINCE]
     held = np.maximum(time - profile[UNTIL], 0.0)
     ramp = (profile[FROM] - profile[SLOPE] * lag + 0.5 * profile[SLOPE] * ramped) * ramped

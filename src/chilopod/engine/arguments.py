@@ -102,7 +102,7 @@ def as_robot(robot: object) -> Robot:
 
 
 def check_wishes(record: object, expected: object) -> float:
-    """What is to be recorded, and for how long, s, as engines are asked at the start; that time is returned.
+    """Duration of a walk, s, checked together with what an engine is to record.
 
     Raises
     ------

@@ -25,7 +25,7 @@ _BENT = 0.2  # rad in all at the start
 
 
 class Broken(Exception):
-    """What was seen where something else was promised."""
+    """A broken promise: what was seen where something else was promised."""
 
 
 class Trial:
@@ -52,7 +52,7 @@ class Trial:
         return self.engine.start([self.robots[i] for i in which], initial=initial, seeds=chosen, **given)  # type: ignore[arg-type]
 
     def commands(self, which: Sequence[int] = (0, 1, 2)) -> list[Command]:
-        """What every walk is told, at :data:`TIMES`."""
+        """Commands of every walk, at :data:`TIMES`."""
         count, joints = len(which), self.robot.body.modules - 1
         stiffness = np.array([self.robots[i].springs.stiffness for i in which])
         stiffness[:, 0] *= 0.6

@@ -1,4 +1,4 @@
-"""What an engine is: it starts walks that go on step by step, see, and obey.
+"""The contract of an engine: it starts walks that go on step by step, see, and obey.
 
 A controller knows neither the engine nor the robot's place on the floor: at instants of the gait it sees what the
 robot's sensors give, and answers with a command. Everything comes as arrays with the robots of a batch in front, so one
@@ -56,7 +56,7 @@ class Event:
 
 @dataclass(frozen=True)
 class Observation:
-    """What the robots of a batch see at an instant; the arrays are the controller's to keep.
+    """Observation of the robots of a batch at an instant; the arrays are the controller's to keep.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ class Observation:
 
 @dataclass(frozen=True, kw_only=True)
 class Command:
-    """What is wanted of the actuators; what is None goes on as it is. One row for all robots, or one a robot.
+    """Setpoints of the actuators, one row for all robots or one a robot; None leaves an actuator as it is.
 
     What the robot's actuators allow (``[springs]`` of its file) is seen to by :class:`chilopod.engine.Actuators`.
 
@@ -119,7 +119,7 @@ class Controller(Protocol):
         """Instants of the cycle at which :meth:`act` is to be called."""
 
     def act(self, event: Event, seen: Observation) -> Command:
-        """What to do, given what is seen."""
+        """Command for the robots, given what is seen."""
 
 
 @runtime_checkable
@@ -140,14 +140,14 @@ class Walk(Protocol):
 
     @property
     def time(self) -> float:
-        """That it has been advanced to, s; the gait is at phase 0 at time 0."""
+        """Time that the walk has been advanced to, s; the gait is at phase 0 at time 0."""
 
     @property
     def status(self) -> tuple[Status, ...]:
         """One a robot: ``WALKED`` while it walks."""
 
     def observe(self) -> Observation:
-        """What the robots see now."""
+        """Observation of the robots now."""
 
     def pose(self) -> Array:
         """Where the robots are now: x and y of the centre of module 1, m, and its heading, rad, up to whole turns.
@@ -264,13 +264,13 @@ class Walk(Protocol):
 
 
 def missing_parts(walk: object) -> list[str]:
-    """What an object lacks to be a :class:`Walk`."""
+    """Names of what an object lacks to be a :class:`Walk`."""
     return [name for name in vars(Walk) if not name.startswith("_") and not hasattr(walk, name)]
 
 
 @dataclass(frozen=True)
 class Traits:
-    """What one needs to know of an engine before it walks.
+    """Properties of an engine that are known before it walks.
 
     Attributes
     ----------
@@ -310,10 +310,10 @@ class Engine(Protocol):
 
     @property
     def traits(self) -> Traits:
-        """What it is like."""
+        """Properties of the engine."""
 
     def common(self, robot: Robot) -> Hashable:
-        """What robots must have in common to walk in one batch.
+        """Properties that robots must have in common to walk in one batch.
 
         Raises
         ------

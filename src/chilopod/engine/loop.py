@@ -53,7 +53,7 @@ class Spent:
 
     @property
     def share(self) -> float:
-        """Of controllers, 0 to 1."""
+        """Share of the controllers, 0 to 1."""
         return self.controller / self.total if self.total > 0.0 else 0.0
 
 
@@ -84,7 +84,7 @@ class Referee(Protocol):
         """Look, aim, halt, and say whether the walk is to go on."""
 
     def through(self, index: int, seen: Observation) -> Observation:
-        """What gets through to the controller of what is sensed at the event of that number."""
+        """Part of an observation that gets through to the controller at the event of that number."""
 
 
 def event_times(controller: Controller, gait: Gait, duration: float) -> Iterator[tuple[float, Event]]:

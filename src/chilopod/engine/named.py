@@ -16,7 +16,7 @@ from chilopod.robot import Robot
 _MODULES: Final[Mapping[str, str]] = {"planar": "chilopod.planar", "twin": "chilopod.twin"}
 
 ENGINES: Final = tuple(_MODULES)
-"""What walks: the planar model, or the whole robot in three dimensions."""
+"""Engines by name: the planar model, or the whole robot in three dimensions."""
 
 _PARTS: Final = ("traits", "common", "initial_states", "start", "resume")
 _SAME_TIME: Final = 1e-9  # s
@@ -117,7 +117,7 @@ class _OwnWalk:
 
 
 def _theirs(who: str, what: str, call: Callable[..., Any], /, *arguments: Any, **named: Any) -> Any:
-    """What somebody else's code gives; what goes wrong in it is said to be its own fault."""
+    """Result of somebody else's code; what goes wrong in it is said to be its own fault."""
     try:
         return call(*arguments, **named)
     except (ChilopodError, KeyboardInterrupt):

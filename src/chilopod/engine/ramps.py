@@ -31,7 +31,7 @@ class Ramps:
 
     @property
     def goal(self) -> Array:
-        """What was told last."""
+        """Setpoint of the last command."""
         return self._ramps[1]
 
     def to(self, goal: Array, now: float, within: float) -> None:

@@ -38,7 +38,7 @@ class Targets:
 
     @property
     def there(self) -> NDArray[np.bool_]:
-        """Which robots have one now, shape (robots,)."""
+        """Mask of the robots that have a target now, shape (robots,)."""
         there: NDArray[np.bool_] = np.isfinite(self.present[:, 0])
         return there
 

@@ -76,7 +76,7 @@ def finite_array(value: Any, shape: tuple[int, ...], field: str) -> Array:
 
 
 def numbers(result: Any, shape: tuple[int, ...], field: str) -> Array:
-    """What a user's function returned, as an array of the shape it should have."""
+    """Values of a user's function, as an array of the shape it should have."""
     try:
         # None would pass for NaN.
         array = None if result is None else np.asarray(result, dtype=np.float64)

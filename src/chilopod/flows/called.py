@@ -147,7 +147,7 @@ class CalledFlow:
         return np.asarray(y * sizes)
 
     def _missed(self, x: Array, parts: Parts, derivative: Array, sizes: Array) -> float:
-        """What the derivative lacks of differences of the flow: where f jumps with the state, that stays however small
+        """Error of the derivative by differences of the flow: where f jumps with the state, it stays however small
         the difference is taken."""
         direction = np.cos(5.0 * np.arange(x.size) + 0.7)
         off = []
@@ -255,7 +255,7 @@ def _cut(parts: Parts) -> Parts:
 
 
 def _is_analytic(rhs: Callable[..., ArrayLike], args: tuple[Any, ...], x: Array, sizes: Array, times: Array) -> bool:
-    """Whether a right-hand side takes complex states, and complex steps agree with differences on both sides of zero,
+    """True if a right-hand side takes complex states, and complex steps agree with differences on both sides of zero,
     at all of some times."""
     step = sizes * np.cos(2.0 * np.arange(x.size) + 0.1)
     shift = sizes * np.cos(np.arange(x.size) + 0.3)

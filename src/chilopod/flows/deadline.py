@@ -52,7 +52,7 @@ class Deadline:
 
     @property
     def late(self) -> bool:
-        """Whether the time is over."""
+        """True if the time is over."""
         return _now() > self._ends
 
     def prolong(self, seconds: float) -> None:
@@ -86,7 +86,7 @@ class Deadline:
 
 
 def stop() -> Array:
-    """What compiled code looks at, shape (1,): not zero once the time is over.
+    """Flag that compiled code looks at, shape (1,): not zero once the time is over.
 
     Raises
     ------

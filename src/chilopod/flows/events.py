@@ -98,7 +98,7 @@ def check_events(events: tuple[Event, ...], args: tuple[Any, ...], times: Array,
 def _value(
     function: Callable[..., Any], t: float, x: Array, args: tuple[Any, ...], shape: tuple[int, ...], name: str
 ) -> Array | None:
-    """What a guard or a reset returns; None where it raises an exception."""
+    """Value of a guard or a reset; None where it raises an exception."""
     try:
         with np.errstate(all="ignore"):
             result = function(t, x.copy(), *args)

@@ -1,4 +1,4 @@
-"""What an action of -1 to 1 means to the actuators of a robot, and when in the gait cycle it acts."""
+"""Meaning of an action of -1 to 1 for the actuators of a robot, and its time in the gait cycle."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from chilopod.steering.leg_yaw import SIDES, LegYawController
 Array = NDArray[np.float64]
 
 SPRINGS = ("first", "all")
-"""Which springs an action sets."""
+"""Springs that an action sets."""
 
 _SOFTEST = 1.0 / 7.0
 """Part of the stiffest spring, where the robot file says nothing: at it the paper's robot turns, and bends, ever more
@@ -94,7 +94,7 @@ class Actions:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What each number of an action sets."""
+        """Name of each number of an action."""
         return (
             *(f"spring of joint {joint + 1}" for joint in self.joints),
             *(f"yaw of the {side} leg" for side in SIDES),
@@ -129,7 +129,7 @@ class Actions:
         return np.clip(array, -1.0, 1.0)
 
     def stiffness(self, actions: Array) -> Array:
-        """Of the springs that an action sets, N*m/rad, shape (robots, len(joints))."""
+        """Stiffness of the springs that an action sets, N*m/rad, shape (robots, len(joints))."""
         low, high = np.log(self.softest), np.log(self.stiffest)
         return np.asarray(np.exp(low + 0.5 * (actions[:, : len(self.joints)] + 1.0) * (high - low)))
 
@@ -139,7 +139,7 @@ class Actions:
         return np.clip(2.0 * (np.log(stiffness) - low) / (high - low) - 1.0, -1.0, 1.0)
 
     def commands(self, actions: Array, leg_yaw: Array) -> list[tuple[float, Command]]:
-        """What actions make of a gait cycle: parts of the cycle and the commands that come then.
+        """Commands of a gait cycle by actions: parts of the cycle and the commands that come then.
 
         Parameters
         ----------

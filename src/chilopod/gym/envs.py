@@ -197,7 +197,7 @@ def _episodes(
 
 
 def _spaces(episodes: Episodes) -> tuple[Space[Row], Space[Row]]:
-    """Of observations and actions of one robot."""
+    """Spaces of observations and actions of one robot."""
     low, high = episodes.sight.bounds
     observations: Any = Box(low.astype(np.float32), high.astype(np.float32), dtype=np.float32)
     actions: Any = Box(-1.0, 1.0, (len(episodes.actions.names),), dtype=np.float32)

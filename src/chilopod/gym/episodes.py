@@ -38,7 +38,7 @@ _SEEDS = 1 << 31  # of episodes that nobody gave one, less than this
 
 @dataclass(frozen=True)
 class Rewards:
-    """What a step is worth.
+    """Reward of a step.
 
     A robot that fails is charged as if it walked straight away from its targets until their time is over, with the
     penalty for failing on top: walking on to the end of the time is then never worse, whatever the robot does with it.
@@ -68,7 +68,7 @@ class Rewards:
 
 @dataclass(frozen=True)
 class Step:
-    """What comes of a step, for every robot of a batch; the arrays are the caller's to keep.
+    """Result of a step, for every robot of a batch; the arrays are the caller's to keep.
 
     Attributes
     ----------
@@ -207,16 +207,16 @@ class Episodes:
 
     @property
     def robot(self) -> Robot:
-        """That walks, with the actuators that actions need."""
+        """Robot that walks, with the actuators that actions need."""
         return self.actions.robot
 
     @property
     def period(self) -> float:
-        """Of a step, s."""
+        """Length of a step, s."""
         return self._period
 
     def steps(self, robot: int) -> int:
-        """That the present episode of a robot has had so far."""
+        """Number of steps that the present episode of a robot has had so far."""
         return int(self._cycle - self._since[robot])
 
     def begin(self, generators: Sequence[np.random.Generator], seeds: Sequence[int | None]) -> Step:
@@ -351,7 +351,7 @@ class Episodes:
         return np.asarray(reward)
 
     def _through(self, seen: Observation) -> Observation:
-        """What gets through to the robots, with noise and the view that scanners have."""
+        """Observation that gets through to the robots, with noise and the view that scanners have."""
         look = self._cycle - self._since
         if not self._engine.traits.noisy:
             bearing = seen.bearing + self._errors[np.arange(self._count), look]

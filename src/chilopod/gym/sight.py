@@ -1,4 +1,4 @@
-"""What a robot senses, as one row of bounded numbers."""
+"""Senses of a robot, as one row of bounded numbers."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Sight:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What each number is."""
+        """Name of each number."""
         joints = range(1, self.actions.robot.body.modules)
         springs = self.actions.names
         return (
@@ -56,7 +56,7 @@ class Sight:
         return low, high
 
     def row(self, seen: Observation) -> NDArray[np.float32]:
-        """What robots sense, shape (robots, len(names)), single precision, within the bounds."""
+        """Observations of robots, shape (robots, len(names)), single precision, within the bounds."""
         known = np.isfinite(seen.bearing)
         bearing = np.where(known, seen.bearing, 0.0)
         target = [known, np.where(known, np.sin(bearing), 0.0), np.where(known, np.cos(bearing), 0.0)]
@@ -67,7 +67,7 @@ class Sight:
         return np.clip(row.astype(np.float32), low, high)
 
     def seen(self, rows: NDArray[np.float32], time: float = 0.0) -> Observation:
-        """What a controller would be shown, of rows of shape (robots, len(names)): the other way round.
+        """Observation of a controller, from rows of shape (robots, len(names)): the inverse of :meth:`row`.
 
         Springs that actions do not set are those of the robot file.
         """

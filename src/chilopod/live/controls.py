@@ -1,4 +1,4 @@
-"""What can be dragged, pressed and typed at the page. Every control leaves a wish and does nothing itself."""
+"""Controls of the page: what can be dragged, pressed and typed. Each leaves a wish and does nothing itself."""
 
 from __future__ import annotations
 
@@ -269,7 +269,7 @@ class Controls:
 
 
 async def _do(do: Callable[..., object], *to: object) -> None:
-    """What a key does; by the thread of the server, as no other may change what browsers show."""
+    """Action of a key; by the thread of the server, as no other may change what browsers show."""
     do(*to[:-1])  # the last is the event of the key
 
 

@@ -168,7 +168,7 @@ class Gate:
     # ---------------------------------------------------------------------------------------------------------------
 
     def message(self, connection: ServerConnection, raw: Any) -> bytes | None:
-        """What was checked of a message, written down anew for viser to read; None if it is refused."""
+        """Checked part of a message, written down anew for viser to read; None if it is refused."""
         read: Any = None
         try:
             read = msgspec.msgpack.decode(raw)
@@ -185,7 +185,7 @@ class Gate:
         return msgspec.msgpack.encode(read) if offered else None
 
     def _offers(self, connection: ServerConnection, message: Any) -> bool:
-        """Whether the page has what a message is about."""
+        """True if the page has what a message is about."""
         server = self._viser
         assert server is not None
         there = list(server._websock_server._live_connections.items())
@@ -226,7 +226,7 @@ class _Guarded(ServerConnection):
 
 
 def _bounded(value: Any) -> bool:
-    """Whether all numbers are finite and no text is long."""
+    """True if all numbers are finite and no text is long."""
     if isinstance(value, dict):
         return _bounded([*value.keys(), *value.values()])
     if isinstance(value, list):
@@ -237,7 +237,7 @@ def _bounded(value: Any) -> bool:
 
 
 def _takes(handle: Any, value: Any) -> bool:
-    """Whether an element can be set to a value by hand."""
+    """True if an element can be set to a value by hand."""
     if handle.disabled or not handle.visible:
         return False
     if isinstance(handle, viser.GuiCheckboxHandle):
@@ -253,7 +253,7 @@ def _takes(handle: Any, value: Any) -> bool:
 
 
 def _is_local(host: str) -> bool:
-    """Whether an address is this machine's own, which nobody else reaches."""
+    """True if an address is this machine's own, which nobody else reaches."""
     try:
         return host == "localhost" or ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -270,7 +270,7 @@ def _only(values: list[str]) -> str | None:
 
 
 def _policy(host: str) -> str:
-    """What a page may load and who may frame it: its own two scripts, and nothing from elsewhere."""
+    """Content policy of a page, and who may frame it: its own two scripts, and nothing from elsewhere."""
     return (
         f"default-src 'none'; script-src {_scripts()} 'wasm-unsafe-eval'; worker-src blob:; "
         "style-src 'unsafe-inline'; img-src data: blob:; font-src data:; "

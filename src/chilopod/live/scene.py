@@ -42,7 +42,7 @@ _FRONT = _lit(VERMILLION)
 
 
 class View:
-    """What is seen in three dimensions.
+    """View in three dimensions.
 
     Parameters
     ----------

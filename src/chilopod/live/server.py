@@ -373,12 +373,12 @@ def _body(robot: Robot, engine: str) -> Body:
 
 
 def _but_first_spring(robot: Robot) -> tuple[object, ...]:
-    """What the theory of a robot depends on, whatever its first spring."""
+    """Numbers of a robot that its theory depends on, whatever its first spring."""
     return robot.springs.stiffness[1:], robot.gait, robot.ground, robot.twin
 
 
 def _quiet() -> contextlib.AbstractContextManager[object]:
-    """What viser prints of where it listens, and that it ends, is for us to say."""
+    """Silence of viser, which would print where it listens and that it ends."""
     return contextlib.redirect_stdout(io.StringIO())
 
 

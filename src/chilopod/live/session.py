@@ -111,7 +111,7 @@ class Session:
         return self._engine_name
 
     def seen(self) -> Seen:
-        """What there is to see now."""
+        """State of the walk that there is to see now."""
         looked = self._walk.observe()
         means = np.array(self._looks).mean(axis=0)
         return Seen(
@@ -132,13 +132,13 @@ class Session:
         )
 
     def said(self) -> list[str]:
-        """What happened since this was asked last, in sentences."""
+        """Sentences on what happened since this was asked last."""
         sentences = list(self._said)
         self._said.clear()
         return sentences
 
     def records(self) -> list[xr.Dataset]:
-        """What was written down since this was asked last, see :func:`chilopod.record.walk_record`: one record for
+        """Records written since this was asked last, see :func:`chilopod.record.walk_record`: one record for
         every stretch of a walk with one floor and one gait."""
         records, self._records = self._records, []
         return records
@@ -241,7 +241,7 @@ class Session:
         return (self._bends[-1] - self._bends[0]) / self._period if len(self._bends) > LOOKS else 0.0
 
     def _between_cycles(self) -> None:
-        """What can be done between two gait cycles only."""
+        """Changes that are possible between two gait cycles only."""
         if self._written and self._walk.time > _LONGEST:
             self._said.append(f"the recording ended by itself, after {_LONGEST / 60.0:g} minutes")
             self.stop_recording()

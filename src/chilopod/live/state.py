@@ -1,4 +1,4 @@
-"""What there is to see of a live walk, how everything is set, and what it may be set to."""
+"""States of a live walk that can be seen, its settings, and their limits."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ SPEEDS = (1.0, 20.0)
 """Slowest and fastest, times real time."""
 
 FRICTIONS = (0.3, 3.0)
-"""Of what the robot file has."""
+"""Range of the friction, relative to the robot file."""
 
 STRIDES = (0.2, 1.5)
-"""Of what the robot file has."""
+"""Range of the stride, relative to the robot file."""
 
 
 @dataclass(frozen=True)
 class Seen:
-    """What there is to see at an instant.
+    """State of a walk at an instant.
 
     Attributes
     ----------

@@ -34,7 +34,7 @@ _GROWTH = 30.0  # s that a short question may take
 
 @dataclass(frozen=True)
 class Theory:
-    """What is known of a robot with any first spring.
+    """Theory of a robot with any first spring.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ class Growth:
 
 
 def growth_of(robot: Robot) -> Growth:
-    """Of the straight walk in the planar theory."""
+    """Growth about the straight walk in the planar theory."""
     from chilopod.analysis import straight_walk
 
     exponents = straight_walk(robot, longest=_GROWTH).as_json()["exponents_per_s"]
@@ -198,7 +198,7 @@ class Beside:
         self._send("growth", robot)
 
     def answers(self) -> list[Theory | Growth]:
-        """What was found since this was asked last; never waits."""
+        """Answers that came since this was asked last; never waits."""
         found: list[Theory | Growth] = []
         with suppress(EOFError, OSError):
             while self._here.poll():

@@ -1,4 +1,4 @@
-"""What somebody at a page wants of the walk, and the box in which it waits for the thread that owns the walk."""
+"""Wishes of somebody at a page, and the box in which they wait for the thread that owns the walk."""
 
 from __future__ import annotations
 

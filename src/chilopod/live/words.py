@@ -1,4 +1,4 @@
-"""What am I seeing? A few sentences about a walk that change with it."""
+"""Sentences about a walk, which change with it."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def radius_of(seen: Seen) -> float:
 
 
 def sentences(seen: Seen, settings: Settings, theory: Theory, growth: Growth | None) -> list[str]:
-    """What is to be said of a walk now, the most important first.
+    """Sentences on a walk now, the most important first.
 
     Parameters
     ----------
@@ -117,5 +117,5 @@ def _percent(growth: Growth) -> str:
 
 
 def described(robot: Robot, engine: str) -> str:
-    """What walks here, in a line."""
+    """Line that describes the robot that walks."""
     return f"{robot.name}, {robot.body.modules} modules, {engine}"

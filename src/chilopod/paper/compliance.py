@@ -1,4 +1,4 @@
-"""What figures over the compliance 1/k1 have in common."""
+"""Parts that figures over the compliance 1/k1 have in common."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def draw_times(axes: Axes, walk: xr.Dataset) -> tuple[float, float]:
 
 
 def draw_asked(axes: Axes, asked: Sequence[tuple[str, float, Band]]) -> None:
-    """What the paper prints of its robot over a band of what agrees with it, a row for each, under its name."""
+    """Band of what agrees with the paper's robot, a row for each printed number, under its name."""
     for row, (_, paper, band) in enumerate(asked):
         axes.plot([band.low, band.high], [row, row], color=style.PALE, lw=9, zorder=1, solid_capstyle="butt")
         axes.plot(paper, row, "D", color=style.ORANGE, markersize=8, label=None if row else "robot, paper")

@@ -92,7 +92,7 @@ def onset_of_bend(data: xr.Dataset) -> float:
 
 
 def change(ratio: float, error: float = 0.0) -> str:
-    """What a ratio is more or less than one, in per cent, with its standard error if that is known and not zero."""
+    """Change that a ratio means, in per cent, with its standard error if that is known and not zero."""
     if np.isnan(ratio):
         return "not determined"
     return f"{round(100.0 * (ratio - 1.0)):+d}" + (f" ± {100.0 * error:.0f}" if error > 0.0 else "") + " %"

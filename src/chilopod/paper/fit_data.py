@@ -1,4 +1,4 @@
-"""What the paper prints, as the tables that constants are fitted to."""
+"""Printed numbers of the paper, as the tables that constants are fitted to."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from chilopod.tasks.identify import BaseSeries, CriticalMode
 
 
 def critical_mode_data() -> CriticalMode:
-    """Of the planar model: six numbers, of which half the last digit is left open."""
+    """Critical mode of the planar model: six numbers, of which half the last digit is left open."""
     return CriticalMode(
         k1=printed.CRITICAL_K1.value,
         components=tuple(each.value for each in printed.MODE),
@@ -26,8 +26,10 @@ def variant_settings() -> Mapping[str, Sequence[str]]:
 
 
 def base_series_data() -> BaseSeries:
-    """Of the robot: walks with k2 to k5 = 41 N*mm/deg and a stride of 3 cm, straight at k1 = 75 and 41, curved at 28,
-    21, 17 and 15, set in at 34, radius 1.2 m at 26 and 0.88 m at 21, at a speed of 0.056 m/s (:func:`walking_speed`).
+    """Base series of the robot: walks with k2 to k5 = 41 N*mm/deg and a stride of 3 cm.
+
+    They are straight at k1 = 75 and 41, curved at 28, 21, 17 and 15; curves set in at 34, with a radius
+    of 1.2 m at 26 and 0.88 m at 21, at a speed of 0.056 m/s (:func:`walking_speed`).
 
     The tolerance is half of what the report calls agreeing.
     """

@@ -1,4 +1,4 @@
-"""What the paper prints, and beside each number what is asked of one that is to agree with it.
+"""Printed numbers of the paper, and beside each what is asked of one that is to agree with it.
 
 S. Aoi et al., "Advanced turning maneuver of a many-legged robot using pitchfork bifurcation", IEEE Transactions on
 Robotics, 2022: of its planar model, and of its robot. Springs are in N*mm/deg, as it has them.
@@ -50,7 +50,7 @@ class Band(Said):
         return 0.5 * (self.low + self.high)
 
     def answer(self, value: float, error: float = 0.0) -> Answer:
-        """Whether a number with a standard error lies between the bounds."""
+        """True if a number with a standard error lies between the bounds."""
         return between(value, error, self.low, self.high)
 
 
@@ -75,12 +75,12 @@ class Number:
 
     @property
     def band(self) -> Band:
-        """What is asked of a number that is to agree."""
+        """Band of numbers that agree."""
         low, high = self.value - self.tolerance, self.value + self.tolerance
         return Band(str(self), f"{100.0 * self.tolerance / self.value:.0f} %", low, high)
 
     def answer(self, value: float, error: float = 0.0) -> Answer:
-        """Whether a number with a standard error agrees."""
+        """True if a number with a standard error agrees."""
         return self.band.answer(value, error)
 
 
@@ -153,7 +153,7 @@ def _around(k_hat: float) -> Band:
 
 ANALYSIS = "section Verification by Floquet analysis"
 CRITICAL_K1 = Number(12.0, PAPER_UNIT, 0.5)
-"""Of the planar model, without decimals."""
+"""Critical k1 of the planar model, printed without decimals."""
 
 MODE = tuple(Number(value, "", 0.005) for value in (0.64, 0.36, 0.48, 0.46, 0.16))
 """Joint components of the planar model's critical mode, with two decimals."""
@@ -162,17 +162,17 @@ MODE_ORDER = tuple(sorted(range(1, 6), key=lambda joint: -MODE[joint - 1].value)
 """Joints by how far they bend in it, the most first."""
 
 KIND, UNIFORM_KIND = "pitchfork", "Neimark-Sacker"
-"""Of bifurcation, of the planar model: with k1 alone, and with all springs alike."""
+"""Kinds of bifurcation of the planar model: with k1 alone, and with all springs alike."""
 
 LOWER = Band("lower", "5 % lower", 0.0, 0.95)
 LITTLE_CHANGE = Band("little change", "10 %", 0.9, 1.1)
-"""Of the planar model's critical k1, over that as built: also with more modules."""
+"""Change of the planar model's critical k1, relative to that as built: also with more modules."""
 
 _UNCHANGED = Band("almost unchanged", "15 %, at equal distance", 0.85, 1.15)
 _SMALLER = Band("smaller", "not wider than as built, at equal distance", 0.0, 1.0)
 
 ONSET = _onset(34.0)
-"""Of the robot, by a square-root fit to its walks."""
+"""Onset of curved walks of the robot, by a square-root fit."""
 
 VARIANTS: Mapping[str, Variant] = {
     "k2-5 = 28 N*mm/deg": Variant(("springs.stiffness=28 N*mm/deg",), LOWER, _onset(23.0), _UNCHANGED),
@@ -188,16 +188,16 @@ STRAIGHT, CURVED = (41.0, 75.0), (15.0, 17.0, 21.0, 28.0)
 
 EXPERIMENTS = "section Pitchfork bifurcation of straight walk, experimental results of the robot"
 RADII = {21.0: Number(0.88, "m", 0.088), 26.0: Number(1.2, "m", 0.12)}
-"""Of the robot's curved walks, by k1."""
+"""Radii of the robot's curved walks, by k1."""
 
 UNIFORM = _onset(18.0)
-"""Of the robot with all springs alike, its Hopf point; the planar model's own is not printed."""
+"""Hopf point of the robot with all springs alike; the planar model's own is not printed."""
 
 COMPARISON = "section Comparison with previous strategy"
 TURNING = "section Turning maneuverability"
 
 CRITERION_NAMES = {"distance": "ε1, distance", "angle": "ε2, angle", "effort": "ε3, leg yaw"}
-"""Of its criteria."""
+"""Names of the robot's criteria."""
 
 ARRIVAL = Number(23.0, "s", 0.15 * 23.0)
 """The robot's earliest, in task A."""

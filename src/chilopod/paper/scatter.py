@@ -1,4 +1,4 @@
-"""What trials that scatter say beyond doubt, and what they leave open.
+"""Statements about trials that scatter: decided beyond doubt, or left open.
 
 Every answer is yes, no, or undecided: True, False or None.
 """
@@ -17,7 +17,7 @@ Answer = bool | None
 """True, False, or None where the scatter leaves it open."""
 
 INCREASES: Mapping[Answer, str] = {True: "increases", False: "not throughout", None: "not told apart everywhere"}
-"""What :func:`increases` says, in words."""
+"""Words for the answers of :func:`increases`."""
 
 SURE = 2.0
 """Standard errors beyond which two means, or a mean and a bound, are told apart."""
@@ -38,14 +38,14 @@ class Difference:
 
     @property
     def lower(self) -> Answer:
-        """Whether the first mean is the lower one."""
+        """True if the first mean is the lower one."""
         if np.isnan(self.value) or not abs(self.value) > SURE * self.error:
             return None
         return bool(self.value < 0.0)
 
     @property
     def higher(self) -> Answer:
-        """Whether the first mean is the higher one."""
+        """True if the first mean is the higher one."""
         return None if self.lower is None else not self.lower
 
     def __str__(self) -> str:
@@ -96,7 +96,7 @@ def with_error(value: float, error: float, digits: int) -> str:
 
 
 def between(value: float, error: float, low: float, high: float) -> Answer:
-    """Whether a mean lies between two bounds: undecided within :data:`SURE` standard errors of the nearer bound.
+    """True if a mean lies between two bounds: undecided within :data:`SURE` standard errors of the nearer bound.
 
     What is not finite lies nowhere; a mean whose error is not known (NaN) is undecided.
     """
@@ -117,7 +117,7 @@ def every(answers: Iterable[Answer]) -> Answer:
 
 
 def increases(trials: Iterable[ArrayLike]) -> Answer:
-    """Whether the mean rises from every set of independent trials to the next; undecided for fewer than two sets."""
+    """True if the mean rises from every set of independent trials to the next; undecided for fewer than two sets."""
     sets = list(trials)
     if len(sets) < 2:
         return None

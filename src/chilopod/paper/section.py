@@ -21,7 +21,7 @@ Line = Row | OfTwin | OfPlanar
 
 @dataclass(frozen=True)
 class Context:
-    """What sections are computed from.
+    """Ground that sections are computed from.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class Section(Generic[T]):
 
 @dataclass
 class Found:
-    """What was found, by section: ``found[section]`` is its result, None if there is none.
+    """Results by section: ``found[section]`` is its result, None if there is none.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ class Found:
         return self.values.get(section)
 
     def __contains__(self, section: Section[Any]) -> bool:
-        """Whether it was computed, or failed."""
+        """True if it was computed, or failed."""
         return section in self.values or section in self.failures
 
     def add(self, section: Section[T], value: T) -> None:

@@ -9,7 +9,7 @@ T = TypeVar("T")
 
 
 class Size(Enum):
-    """Of a report."""
+    """Size of a report."""
 
     FULL = "as much as the paper"
     QUICK = "coarser sweeps, fewer module counts, springs and repeats; what does not depend on chance is as exact"
@@ -20,5 +20,5 @@ class Size(Enum):
         return {Size.FULL: full, Size.QUICK: quick, Size.TINY: tiny}[self]
 
     def cut(self, usual: T, tiny: T) -> T:
-        """What only a tiny report has less of."""
+        """Value for a report that is not tiny; a tiny one has less of it."""
         return self.of(usual, usual, tiny)

@@ -1,4 +1,4 @@
-"""What the paper says of its robot and what is asked of the twin besides, in the order of the table."""
+"""Statements of the paper on its robot, and what is asked of the twin besides, in the order of the table."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _FITTED, _PREDICTED, _CHECKED = Kind
 
 @dataclass(frozen=True)
 class VariantStatements:
-    """Of a variant: where curved walks set in, and how wide they are."""
+    """Statements on a variant: where curved walks set in, and how wide they are."""
 
     onset: Statement[Band]
     radius: Statement[Band]
@@ -27,7 +27,7 @@ class VariantStatements:
 
 @dataclass(frozen=True)
 class TaskStatements:
-    """Of a turning task: the spring of its circle, what becomes of it, and where the criteria are smallest."""
+    """Statements on a turning task: the spring of its circle, its outcome, and where the criteria are smallest."""
 
     k_hat: Statement[Band]
     outcomes: Statement[Said]
@@ -132,7 +132,7 @@ HOPF_SPRINGS = _predicted(
 NUMERICS: Statement[Band] = Statement(
     "numerics: finer steps, tight contact solver", Band("no counterpart", "less than 5 %", 0.0, 0.05), _CHECKED
 )
-"""Of the largest relative move."""
+"""Statement on the largest relative move."""
 
 PLANAR_LIMIT: Statement[Band] = Statement(
     "planar limit of the twin: where the straight walk is lost",

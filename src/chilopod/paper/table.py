@@ -106,7 +106,7 @@ class Row:
 
 
 class Kind(Enum):
-    """Whether the twin's constants were fitted to what is said; "checked" is what is about the twin itself."""
+    """Kind of a statement: fitted, predicted, or "checked", which is about the twin itself."""
 
     FITTED = "fitted"
     PREDICTED = "predicted"
@@ -134,7 +134,7 @@ class Statement(Generic[S]):
 
 @dataclass(frozen=True)
 class OfTwin:
-    """What the twin does.
+    """Result of the twin.
 
     Attributes
     ----------
@@ -156,7 +156,7 @@ class OfTwin:
 
 @dataclass(frozen=True)
 class OfPlanar:
-    """What the planar model does where the paper speaks of its robot; nobody says that it should do the same."""
+    """Result of the planar model where the paper speaks of its robot; nobody says that it should do the same."""
 
     statement: Statement[Said]
     result: Result
@@ -211,7 +211,7 @@ def of_twin(statement: Statement[Band], result: Result, reading: str = "") -> Of
 
 
 def robot_rows(found: Iterable[Row | OfTwin | OfPlanar], order: Iterable[Statement[Said]]) -> list[RobotRow]:
-    """What was found of statements, in their order; others come behind."""
+    """Rows on statements, in their order; others come behind."""
     rows, lines = [row for row in found if not isinstance(row, Row)], []
     for each in dict.fromkeys([*order, *(row.statement for row in rows)]):
         said, kind = each.said, each.kind.value

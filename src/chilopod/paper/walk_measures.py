@@ -1,4 +1,4 @@
-"""What series of walks from straight on come to, by the measures of the paper."""
+"""Measures of the paper on series of walks from straight on."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _RATE = 50.0  # Hz
 
 
 def by_spring(walks: Sequence[xr.Dataset], springs: Sequence[float]) -> xr.Dataset:
-    """What walks come to, over spring (N*mm/deg) and repeat; of each spring as many, one after the other."""
+    """Measures of walks, over spring (N*mm/deg) and repeat; of each spring as many, one after the other."""
     repeats = len(walks) // len(springs)
     rows = [xr.concat(walks[i : i + repeats], "repeat") for i in range(0, len(walks), repeats)]
     each = ("spring", np.asarray(springs, dtype=np.float64), {"units": PAPER_UNIT})
@@ -66,7 +66,7 @@ def shares(data: xr.Dataset) -> xr.Dataset:
 
 
 def counted(data: xr.Dataset, settled: bool = True) -> NDArray[np.bool_]:
-    """Which trials have an angle and a radius that count: curved ones that have settled (or not, as they say), at
+    """Mask of the trials with an angle and a radius that count: curved ones that have settled (or not, as they say), at
     springs at which most curve; shape (springs, repeats)."""
     most = is_curved(data).mean(axis=1) > 0.5
     return (in_settled_curve(data) if settled else is_curved(data)) & most[:, None]

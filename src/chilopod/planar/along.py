@@ -113,7 +113,7 @@ class FollowedModel(PlanarModel):
 
 @dataclass(frozen=True)
 class WalkMeans(ReadOnlyArrays):
-    """What periodic walks amount to over one period.
+    """Means of periodic walks over one period.
 
     Attributes
     ----------

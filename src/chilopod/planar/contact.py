@@ -1,4 +1,4 @@
-"""What the stance feet of a module do to it, boiled down to eight numbers.
+"""Force of the stance feet of a module, in eight numbers.
 
 A viscous foot pushes with minus its friction coefficient c times its velocity relative to the floor. Between two
 switching instants every stance foot moves straight back at the speed v of the gait: its place in the frame of its

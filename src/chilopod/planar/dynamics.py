@@ -39,7 +39,7 @@ ORIGIN, LEVEL, SLOPE, BEHIND, DECAY, TORQUE = range(SPRING)
 
 
 def _spring_torque(springs: Any, joint: int, angle: Any, t: Any) -> Any:
-    """What a spring, and a motor beside it, turn the rear module with at an angle (rad) and time t, N*m.
+    """Torque of a spring, and of a motor beside it, on the rear module at an angle (rad) and time t, N*m.
 
     ``springs`` is the stiffness of each, shape (N-1,); or, where they change, a description in lanes, shape (N-1, 6):
     TORQUE, and k = LEVEL + SLOPE s + BEHIND e^(-DECAY s), where s = t - ORIGIN.

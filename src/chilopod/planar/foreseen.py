@@ -1,4 +1,4 @@
-"""What a walk of the planar model will take, before it is begun: the steps of its integrator."""
+"""Cost of a walk of the planar model, foreseen before it is begun: the steps of its integrator."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from chilopod.errors import ParameterError
 from chilopod.robot import Robot
 
 MOST_STEPS = 2e9
-"""Of all modules together: an hour or so of one robot on one core."""
+"""Largest number of steps of all modules together: an hour or so of one robot on one core."""
 
 _REACH = 6.0
 """About the fastest rate times the longest step with which the integrator is stable."""
@@ -38,7 +38,7 @@ def check_steps(robot: Robot, seconds: float) -> None:
 
 
 def _rates(robot: Robot) -> dict[str, float]:
-    """What each property adds to a bound on the fastest motion, 1/s.
+    """Contribution of each property to a bound on the fastest motion, 1/s.
 
     The bounds are those of modules that nothing joins. Joints only take freedom away, and by Rayleigh's principle what
     is left is damped and sprung no more strongly.

@@ -79,12 +79,12 @@ class PlanarModel(ReadOnlyArrays):
 
     @cached_property
     def stiffness(self) -> Array:
-        """Of the yaw joints, N*m/rad, shape (N-1,)."""
+        """Stiffness of the yaw joints, N*m/rad, shape (N-1,)."""
         return read_only(np.array(self.robot.springs.stiffness))
 
     @cached_property
     def damping(self) -> Array:
-        """Of the yaw joints, N*m*s/rad, shape (N-1,)."""
+        """Damping of the yaw joints, N*m*s/rad, shape (N-1,)."""
         return read_only(np.array(self.robot.springs.damping))
 
     @cached_property
@@ -192,7 +192,7 @@ class PlanarModel(ReadOnlyArrays):
 
     @cached_property
     def scalars(self) -> Array:
-        """What the compiled right-hand side wants to know of a module: length (m), mass (kg), yaw inertia (kg*m^2) and
+        """Numbers of a module for the compiled right-hand side: length (m), mass (kg), yaw inertia (kg*m^2) and
         the speed of its feet (m/s), shape (1, 4)."""
         robot = self.robot
         sizes = [[robot.module_length, robot.module_mass, robot.module_yaw_inertia, robot.gait.speed]]
@@ -230,7 +230,7 @@ class PlanarModel(ReadOnlyArrays):
         return to_joint @ matrices, _ROWS_DIFFER * errors
 
     def can_flow_with(self, other: PlanarModel) -> bool:
-        """Whether :meth:`flow_many` may take both robots at once: they differ in springs at the most in what sets the
+        """True if :meth:`flow_many` may take both robots at once: they differ in springs at the most in what sets the
         shape."""
         here, there = self.robot, other.robot
         return self.modules == other.modules and (here.gait is there.gait or here.gait == there.gait)
@@ -286,8 +286,8 @@ class PlanarModel(ReadOnlyArrays):
 
     @cached_property
     def _linearised(self) -> tuple[Array, Array, Array, Array, float]:
-        """Of one period: the passive matrices, what springs and dampers take from A0, the fastest decay in every
-        interval, and the frequency of the springs."""
+        """Linear equations of one period: the passive matrices, what springs and dampers take from A0, the fastest
+        decay in every interval, and the frequency of the springs."""
         robot = self.robot
         n, intervals = self.modules, len(self.schedule.times) - 1
         if 3 * intervals * (n + 2) * (2 * n + 1) > _MOST_NUMBERS:

@@ -1,4 +1,4 @@
-"""What is written down of a walk: places, angles, rates and foot forces over time."""
+"""Record of a walk: places, angles, rates and foot forces over time."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def foot_forces(
 
 
 def _front_velocity(states: Array, heading: Array) -> Array:
-    """Of module 1 on the floor, m/s, shape (..., 2)."""
+    """Velocity of module 1 on the floor, m/s, shape (..., 2)."""
     ahead, left = directions(heading)
     velocity: Array = states[..., :1] * ahead + states[..., 1:2] * left
     return velocity

@@ -9,7 +9,7 @@ from chilopod.compiled import njit
 
 @njit
 def fit(rows: Any, pieces: Any, robots: Any, states: Any, step: Any, status: Any, record: Any) -> bool:
-    """Whether arguments of :func:`chilopod.planar.stretch.carry` have shapes that go together, and are not empty."""
+    """True if arguments of :func:`chilopod.planar.stretch.carry` have shapes that go together, and are not empty."""
     (count, joints), size = robots.lag.shape, pieces.widths.size
     return bool(
         0 < rows.size <= count

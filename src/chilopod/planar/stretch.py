@@ -25,7 +25,7 @@ from chilopod.planar.shapes import fit
 
 WALKING, DIVERGED, OUT_OF_RANGE, HALTED = range(4)
 MOST_BENT = 0.5 * np.pi
-"""Of a yaw joint, rad: beyond it modules run into each other."""
+"""Largest bend of a yaw joint, rad: beyond it modules run into each other."""
 
 _A_GROUP, _GROUPS = LANES, 4
 """Robots that a thread is given at a time at least, and how many times each thread is given some at most."""
@@ -70,7 +70,7 @@ class Pieces(NamedTuple):
 
 
 class Robots(NamedTuple):
-    """What robots are and what they are told.
+    """Robots and their commands.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class Robots(NamedTuple):
 
 
 class _Lanes(NamedTuple):
-    """What the right-hand side reads, in plain numbers whose last axis is the lane; see ``dynamics.py``."""
+    """Numbers that the right-hand side reads, whose last axis is the lane; see ``dynamics.py``."""
 
     x: Any
     scalars: Any
@@ -315,7 +315,7 @@ def _most_bent(x: Any, joints: int, lane: int) -> float:
 
 @njit
 def _describe(profile: Any, lag: Any, torque: Any, now: float, zero: float, springs: Any) -> None:
-    """What the right-hand side wants to know of the springs about ``now`` (s); its own time begins at ``zero``."""
+    """Springs about ``now`` (s) for the right-hand side; its own time begins at ``zero``."""
     for j in range(lag.size):
         ramping = now < profile[UNTIL, j]
         springs[j, ORIGIN] = (profile[SINCE, j] if ramping else profile[UNTIL, j]) - zero

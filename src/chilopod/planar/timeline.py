@@ -84,7 +84,7 @@ class Timeline:
         return cut, cut - switch, until - cut, which, np.array([-1])
 
     def is_at_cut(self, time: float) -> bool:
-        """Whether a time to which :meth:`whole_pieces` went is that of the last cut."""
+        """True if a time to which :meth:`whole_pieces` went is that of the last cut."""
         return time <= self.cut + self._moment
 
     def cut_at(self, time: float) -> None:

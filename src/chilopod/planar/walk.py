@@ -55,7 +55,7 @@ _STATUS = {
 
 
 def common(robot: Robot) -> tuple[Any, ...]:
-    """What robots of a batch share, see :class:`chilopod.engine.Engine`: gait and number of modules."""
+    """Properties that robots of a batch share, see :class:`chilopod.engine.Engine`: gait and number of modules."""
     return as_robot(robot).gait, robot.body.modules
 
 

@@ -12,7 +12,7 @@ from chilopod.robot.parts import Body, Legs, Twin
 
 
 def module_yaw_inertia(body: Body, legs: Legs, twin: Twin | None) -> float:
-    """Of one whole module with its legs about its centre, kg*m^2.
+    """Yaw inertia of one whole module with its legs about its centre, kg*m^2.
 
     The one given, else that of a uniform rod of the module's mass and length. A module may be so short that its legs
     and the width of its body alone have more than the rod; then it is the least that is possible.
@@ -31,12 +31,12 @@ def yaw_inertia_range(body: Body, legs: Legs, twin: Twin) -> tuple[float, float]
 
 
 def body_mass(body: Body, twin: Twin) -> float:
-    """What a module weighs without its legs, kg; a module has four links."""
+    """Mass of a module without its legs, kg; a module has four links."""
     return body.mass / body.modules - 4.0 * twin.link_mass
 
 
 def body_inertia(body: Body, legs: Legs, twin: Twin) -> tuple[float, float, float]:
-    """Of a module's body without its legs, about its long axis, about its transverse axis and in yaw, kg*m^2.
+    """Inertia of a module's body without its legs, about its long axis, about its transverse axis and in yaw, kg*m^2.
 
     Across, the body is a uniform box; along, its mass is spread so that body and legs together have the yaw inertia of
     :func:`module_yaw_inertia`. Such a body exists within :func:`yaw_inertia_range`.
@@ -49,7 +49,7 @@ def body_inertia(body: Body, legs: Legs, twin: Twin) -> tuple[float, float, floa
 
 
 def legs_yaw_inertia(legs: Legs, twin: Twin) -> float:
-    """What the four links of a module contribute about its centre, standing at mid-stroke, kg*m^2."""
+    """Yaw inertia of the four links of a module about its centre, standing at mid-stroke, kg*m^2."""
     upper, lower, height = twin.upper_link, twin.lower_link, twin.hip_height
     # How far the knee is ahead of the line from hip to foot; a leg that is too short hangs straight, and is refused
     # where it is built.
@@ -65,7 +65,7 @@ def legs_yaw_inertia(legs: Legs, twin: Twin) -> float:
 
 
 def link_inertia(twin: Twin, length: float) -> tuple[float, float]:
-    """Of a link across and about its own axis, kg*m^2: a uniform rod.
+    """Inertia of a link across and about its own axis, kg*m^2: a uniform rod.
 
     About its axis it is as thick as a foot, but never more than across: nothing is singular.
     """

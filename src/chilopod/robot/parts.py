@@ -105,7 +105,7 @@ class Legs(Description):
 
 
 class Twin(Description):
-    """What only the three-dimensional model reads.
+    """Constants that only the three-dimensional model reads.
 
     Attributes
     ----------

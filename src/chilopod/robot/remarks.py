@@ -1,4 +1,4 @@
-"""What is legal in a robot's description and yet worth knowing."""
+"""Remarks on a robot's description: legal and yet worth knowing."""
 
 from __future__ import annotations
 

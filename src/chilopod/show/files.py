@@ -16,7 +16,7 @@ from chilopod.tasks.identify import Identification
 
 
 def files_of(name: str, folder: str | Path) -> list[Path]:
-    """What is written of the figure of that name alone."""
+    """Files written of the figure of that name alone."""
     return [Path(folder) / f"{name}.{kind}" for kind in ("png", "svg", "csv", "nc")]
 
 

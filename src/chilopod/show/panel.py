@@ -1,4 +1,4 @@
-"""What every figure of the report consists of."""
+"""Panels, which every figure consists of."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ class Budget(Deadline):
 
     @property
     def spent(self) -> bool:
-        """Whether nothing is left."""
+        """True if nothing is left."""
         return self.left <= 0 or self.late
 
     def take(self, count: int = 1) -> None:

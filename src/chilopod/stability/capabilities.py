@@ -1,4 +1,4 @@
-"""What the analyses need to know of a periodic system, and what more they use where a system has it.
+"""Interfaces that the analyses need of a periodic system, and those that they use where a system has them.
 
 Every capability is a protocol: a system has it by having its methods. The analyses ask ``isinstance``, or, of
 protocols with one member, the functions at the end of this module. A member that is None counts as missing, so a class
@@ -165,7 +165,7 @@ class FlowsMany(KnowsOrbit, Protocol):
     cores."""
 
     def can_flow_with(self, other: Self, /) -> bool:
-        """Whether :meth:`flow_many` may take the other system along with this one."""
+        """True if :meth:`flow_many` may take the other system along with this one."""
         ...
 
     def flow_many(self, systems: Sequence[Self], t0: float, t1: float, /) -> tuple[Array, Array]:
@@ -179,7 +179,7 @@ class FlowsFrames(SystemLike, Protocol):
     """Knows how fast directions decay of which nothing is left within a step of its integration."""
 
     def is_stiff(self, x: Array, t0: float, t1: float, /) -> bool:
-        """Whether the derivative of the flow from state x at t0 to t1 has nothing to say of such directions."""
+        """True if the derivative of the flow from state x at t0 to t1 has nothing to say of such directions."""
         ...
 
     def flow_frame(self, x: Array, units: Array, frame: Array, t0: float, t1: float, /) -> Stretched:
@@ -188,7 +188,7 @@ class FlowsFrames(SystemLike, Protocol):
 
 
 def is_autonomous(system: SystemLike) -> TypeGuard[Autonomous]:
-    """Whether a system does not depend on time."""
+    """True if a system does not depend on time."""
     return system.period is None and isinstance(system, Autonomous)
 
 
@@ -196,27 +196,27 @@ def is_autonomous(system: SystemLike) -> TypeGuard[Autonomous]:
 
 
 def flows_with_error(system: SystemLike) -> TypeGuard[FlowsWithError]:
-    """Whether a system bounds the error of its flow."""
+    """True if a system bounds the error of its flow."""
     return getattr(system, "flow_with_error", None) is not None
 
 
 def expands_velocity(system: SystemLike) -> TypeGuard[ExpandsVelocity]:
-    """Whether a system knows its right-hand side with all derivatives."""
+    """True if a system knows its right-hand side with all derivatives."""
     return getattr(system, "velocity_series", None) is not None
 
 
 def is_stiff(system: SystemLike, x: Array, duration: float) -> TypeGuard[FlowsFrames]:
-    """Whether a return from state x at time 0 contracts some directions beyond what its derivative retains."""
+    """True if a return from state x at time 0 contracts some directions beyond what its derivative retains."""
     return getattr(system, "flow_frame", None) is not None and system.is_stiff(x, 0.0, duration)  # type: ignore[attr-defined]
 
 
 def flows_states(system: SystemLike) -> TypeGuard[FlowsStates]:
-    """Whether a system carries many states at once."""
+    """True if a system carries many states at once."""
     return getattr(system, "flow_states", None) is not None
 
 
 def flows_tangents(system: SystemLike) -> TypeGuard[FlowsTangents]:
-    """Whether a system carries directions instead of the full derivative."""
+    """True if a system carries directions instead of the full derivative."""
     return getattr(system, "flow_tangents", None) is not None
 
 

@@ -23,11 +23,11 @@ class Rule(NamedTuple):
     settled: float
 
     def met(self, off: float, best: float) -> bool:
-        """Whether a residual, after others of which the best is given, ends the corrections."""
+        """True if a residual, after others of which the best is given, ends the corrections."""
         return off <= self.round_off or self.stays(off, best)
 
     def stays(self, off: float, best: float) -> bool:
-        """Whether a residual is small and no longer falls."""
+        """True if a residual is small and no longer falls."""
         return off <= self.settled and off >= _FALLING * best
 
 

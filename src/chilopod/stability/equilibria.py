@@ -38,7 +38,7 @@ ComplexArray = NDArray[np.complex128]
 
 _EPSILON = float(np.finfo(float).eps)
 ROUNDING = 16.0 * _EPSILON
-"""Of the terms of a right-hand side: a few roundings in each."""
+"""Rounding error of a right-hand side, relative to its terms: a few roundings in each."""
 
 _ROUNDS = 60
 _HALVINGS = 12  # of a step of Newton's method
@@ -77,7 +77,7 @@ class Equilibrium(ReadOnlyArrays):
 
     @property
     def stable(self) -> bool | None:
-        """Whether all eigenvalues lie left of the imaginary axis: True or False by more than their errors, None where
+        """True if all eigenvalues lie left of the imaginary axis: True or False by more than their errors, None where
         these leave it undecided."""
         if (self.eigenvalues.real < -self.error_bounds).all():
             return True

@@ -59,7 +59,7 @@ _WORDS = (
     ("orbits", "equilibria"),
     ("orbit", "equilibrium"),
 )
-"""What is said of orbits and multipliers, in words of equilibria and eigenvalues."""
+"""Names of equilibria and eigenvalues for those of orbits and multipliers."""
 
 
 def locate_hopf(

@@ -39,7 +39,7 @@ def orbit_blocks(system: SystemLike, orbit: Orbit) -> tuple[Blocks, tuple[str, .
 
 
 def in_block(block: Block | None, matrices: Array) -> Array:
-    """What return maps, shape (k, n, n), are in a block, shape (k, m, m): every multiplier of the real type once
+    """Blocks of return maps, shape (k, m, m), from the maps, shape (k, n, n): every multiplier of the real type once
     instead of ``block.dimension`` times."""
     if block is None:
         return matrices
@@ -49,7 +49,7 @@ def in_block(block: Block | None, matrices: Array) -> Array:
 
 
 def crossings_in(block: Block | None, matrices: Matrices, search: Callable[[Matrices], Crossings]) -> Crossings:
-    """What a search finds in a block of return maps; its multiplicities are those in the whole."""
+    """Crossings that a search finds in a block of return maps; its multiplicities are those in the whole."""
     found = search(lambda values: _reduced(block, *matrices(values)))
     times = 1 if block is None or block.type is not Type.REAL else block.dimension
     crossings = tuple(

@@ -1,4 +1,4 @@
-"""What a bifurcation point is, and what is said of it."""
+"""Bifurcation points and their descriptions."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 class Kind(Labelled):
-    """What happens at a bifurcation point; each member's ``sentence`` says it in words."""
+    """Kind of a bifurcation point; each member's ``sentence`` describes it in words."""
 
     PITCHFORK = "pitchfork", "a symmetric orbit changes stability and a pair of mirrored orbits branches off"
     FOLD = "fold", "two orbits meet and vanish"
@@ -32,7 +32,7 @@ class Kind(Labelled):
 
 
 class Criticality(Labelled):
-    """Which way the new orbits go, or why that is not known; each member's ``sentence`` says it in words."""
+    """Direction of the new orbits, or why it is not known; each member's ``sentence`` describes it in words."""
 
     SUPERCRITICAL = (
         "supercritical",
@@ -48,7 +48,7 @@ class Criticality(Labelled):
 
     @property
     def known(self) -> bool:
-        """Whether it is the verdict of a coefficient."""
+        """True if it is the verdict of a coefficient."""
         return self not in (Criticality.NOT_DEFINED, Criticality.NOT_COMPUTED)
 
 
@@ -62,7 +62,7 @@ _NEGLIGIBLE = 0.3  # of the cubic term at the sampled amplitude: what the error 
 
 
 def kind_at_plus_one(form: NormalForm) -> Kind:
-    """What happens at a real multiplier +1 where the orbit goes on: transcritical with a quadratic term that is clearly
+    """Kind at a real multiplier +1 where the orbit goes on: transcritical with a quadratic term that is clearly
     there, pitchfork without one but with a cubic one, a branch point where the errors leave that open."""
     if form.status is not NormalFormStatus.FOUND:
         return Kind.BRANCH_POINT
@@ -151,7 +151,7 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
 
     @property
     def sentences(self) -> str:
-        """What happens here and which way the new orbits go, in words."""
+        """Sentences on what happens here and which way the new orbits go."""
         said = [f"{self.kind.sentence}."]
         if self.criticality.known:
             said.append(f"{self.criticality.label}: {self.criticality.sentence}.")

@@ -37,8 +37,8 @@ _FARTHEST = 0.8  # of a return: a crossing that much later is another one
 _CROSSING_ROUNDS = 30
 
 CUTS = (0.0, 0.0477, 0.382)
-"""Of an interval that is taken in parts: near the start as well, or the steps up to the cut would be the same, errors
-included."""
+"""Fractions of an interval that is taken in parts: near the start as well, or the steps up to the cut would be the
+same, errors included."""
 
 REPEATED = 10.0
 """Factor on the difference of two computations with steps of their own, for a bound on the error of one of them."""

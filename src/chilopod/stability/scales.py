@@ -16,7 +16,7 @@ _SWEEPS = 3
 
 
 def sizes(system: SystemLike, x: Array, duration: float) -> Array:
-    """What is large for every state, shape (n,): from the system, or from a state on the orbit and the flow there.
+    """Large size of every state, shape (n,): from the system, or from a state on the orbit and the flow there.
 
     A state has the size of its value, or of what the others, disturbed by their own sizes, make of it within a part of
     the return, whichever is larger: one that passes through zero just here, or rests there, is as large as its

@@ -1,5 +1,5 @@
-"""What to command: courses of targets, the radius a target asks for, the spring that gives it, the leg-yaw controller;
-and how well it went."""
+"""Steering: courses of targets, the radius that a target asks for, the spring that gives it, the leg-yaw controller,
+and measures of how well a walk went."""
 
 from chilopod.steering.actuated import ActuatedAxis
 from chilopod.steering.course import COURSES, Course, Goal, course_named, random_course

@@ -45,7 +45,7 @@ class ActuatedAxis:
 
     @classmethod
     def of(cls, robot: Robot, law: RadiusLaw) -> ActuatedAxis:
-        """That of a robot, which bends no tighter than its softest spring would bend it.
+        """Axis of a robot, which bends no tighter than its softest spring would bend it.
 
         Parameters
         ----------

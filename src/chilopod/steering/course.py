@@ -24,7 +24,7 @@ MOST_GOALS = 1000
 """More targets than this are a slip of the pen."""
 
 RANDOM_DISTANCES = (0.8, 2.0)
-"""Of the targets of a random course from where the robot is when their turn comes, least and largest, m."""
+"""Least and largest distance of the targets of a random course from where the robot is when their turn comes, m."""
 
 _LONGEST_PATIENCE = 1e4
 _FORM = 'a direction and a distance, such as "45 deg, 1.3 m", or a place on the floor, such as "1.2 m, 0.5 m"'

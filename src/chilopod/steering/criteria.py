@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 class Outcome(Labelled):
-    """What became of a turning task; each member's ``sentence`` says it in words."""
+    """Outcome of a turning task; each member's ``sentence`` describes it in words."""
 
     ARRIVED = "arrived", f"came within {ARRIVAL_RADIUS:g} m of the target"
     OUTSIDE = "bulged outside", "passed the target on the outside of the turn"

@@ -13,7 +13,7 @@ from chilopod.errors import ParameterError
 from chilopod.gait import Gait
 
 SIDES = ("left", "right")
-"""Of the legs of module 1: what their events are called."""
+"""Sides of the legs of module 1: the names of their events."""
 
 
 @dataclass(frozen=True)

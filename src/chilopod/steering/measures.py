@@ -1,4 +1,4 @@
-"""What walking a course came to, target by target: time, way, and what it cost to steer."""
+"""Measures of a walk along a course, target by target: time, way, and what it cost to steer."""
 
 from __future__ import annotations
 

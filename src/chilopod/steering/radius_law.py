@@ -1,4 +1,4 @@
-"""Which spring turns how tightly: the radius of the settled curved walk over one parameter, and its inverse."""
+"""Radius of the settled curved walk over one parameter, and its inverse."""
 
 from __future__ import annotations
 

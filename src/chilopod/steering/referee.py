@@ -27,7 +27,7 @@ LOOK = 0.1
 
 
 class Verdict(Labelled):
-    """What became of a target of a course; each member's ``sentence`` says it in words."""
+    """Outcome of a target of a course; each member's ``sentence`` describes it in words."""
 
     ARRIVED = "arrived", f"came within {ARRIVAL_RADIUS:g} m of it"
     LATE = "out of time", "did not get there in its time"
@@ -167,7 +167,7 @@ class CourseReferee:
         return self._number < self._counts
 
     def through(self, index: int | NDArray[np.intp], seen: Observation) -> Observation:
-        """What a scanner with this view sees at an event, of this number, one for all robots or one each."""
+        """Part of an observation that a scanner sees at the event of that number, one for all robots or one each."""
         hidden = np.abs(seen.bearing) > 0.5 * self._common.view
         hidden |= seen.distance > self._common.range
         if self._missed is not None:
@@ -247,11 +247,11 @@ _KEPT = {
     "leg_yaw": (("side",), "rad"),
     "stiffness": (("joint",), "N*m/rad"),
 }
-"""What a controller is shown, over what besides event and robot, and its unit."""
+"""Variables shown to a controller, over what besides event and robot, and their units."""
 
 
 def decisions(record: xr.Dataset, controller: Controller, gait: Gait) -> list[Command]:
-    """What a controller commands when it is shown again what the record says that it was shown.
+    """Commands of a controller when it is shown again what the record says that it was shown.
 
     Parameters
     ----------

@@ -124,7 +124,7 @@ class SpringLaw(ReadOnlyArrays):
         )
 
     def remarks(self, law: RadiusLaw) -> list[str]:
-        """What the actuator keeps from a robot that its radius law would allow."""
+        """Radii of its law that the robot's actuator keeps it from."""
         said = []
         softest, stiffest, pitchfork = (
             units.format(each, law.unit, digits=4) for each in (self.softest, self.stiffest, law.pitchfork)
@@ -168,14 +168,14 @@ class SpringLaw(ReadOnlyArrays):
         return np.where(straightens, self.stiffest, spring)
 
     def curvature(self, seen: Observation) -> Array:
-        """That is wanted, 1/m, left positive, shape (robots,)."""
+        """Curvature that is wanted, 1/m, left positive, shape (robots,)."""
         bearing = np.clip(seen.bearing, -0.5 * np.pi, 0.5 * np.pi)
         pursued = 2.0 * np.sin(bearing) / np.clip(seen.distance, ARRIVAL_RADIUS, self.ahead)
         sought = np.copysign(1.0 / self.tightest, seen.leg_yaw[:, 0])
         return np.where(np.isnan(pursued), sought, np.where(self._too_near(seen), 0.0, pursued))
 
     def _too_near(self, seen: Observation) -> NDArray[np.bool_]:
-        """Whether the tightest circle leads round the target and not to it."""
+        """True if the tightest circle leads round the target and not to it."""
         radius = self.tightest
         ahead, aside = seen.distance * np.cos(seen.bearing), np.abs(seen.distance * np.sin(seen.bearing))
         inside: NDArray[np.bool_] = np.hypot(ahead, aside - radius) < radius - ARRIVAL_RADIUS

@@ -93,7 +93,7 @@ class Driven(Short):
 
     @property
     def robot(self) -> Robot:
-        """That walked."""
+        """Robot that walked."""
         return self.driver.robot
 
     @property
@@ -103,7 +103,7 @@ class Driven(Short):
 
     @property
     def strategy(self) -> Strategy:
-        """How."""
+        """Strategy of the walk."""
         return self.driver.strategy
 
     @property
@@ -113,7 +113,7 @@ class Driven(Short):
 
     @cached_property
     def record(self) -> xr.Dataset:
-        """Of all walks together, NaN from where each ended."""
+        """Record of all walks together, NaN from where each ended."""
         longest = max(self.records, key=lambda each: each.sizes.get("time", 0))
         joined = xr.concat(
             self.records, dim="robot", data_vars="minimal", coords="minimal", compat="override", join="outer"

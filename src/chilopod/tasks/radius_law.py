@@ -26,7 +26,7 @@ CURVED = 0.25
 """rad: a walk is curved if its joints bend by more than this in all, to a radius of 4.5 m or less."""
 
 SETTLED = 0.05
-"""Of its bend: a curve has settled if it changed by less than this in the 10 s before its end."""
+"""Largest relative change of the bend of a settled curve in the 10 s before its end."""
 
 HELD = 16
 """Walks that must hold at a spring: of 20 none leaves the range then, as a rule."""
@@ -111,7 +111,7 @@ def that_holds(law: RadiusLaw, robot: Robot, engine: str = "planar") -> RadiusLa
 
 
 def end_of_walk(record: xr.Dataset, robot: Robot) -> xr.Dataset:
-    """What one trial's record comes to.
+    """Numbers at the end of one trial's record.
 
     Returns
     -------
@@ -149,11 +149,10 @@ def end_of_walk(record: xr.Dataset, robot: Robot) -> xr.Dataset:
 
 
 def is_curved(data: xr.Dataset) -> NDArray[np.bool_]:
-    """Which walks curve, by :func:`end_of_walk`; of the shape of ``data.direction``."""
+    """Mask of the walks that curve, by :func:`end_of_walk`; of the shape of ``data.direction``."""
     return np.isin(data.direction.values, ("left", "right"))
 
 
 def in_settled_curve(data: xr.Dataset) -> NDArray[np.bool_]:
-    """Which walks curve and have settled: those whose radius and angles are those of the robot, not of the time that
-    they were given."""
+    """Mask of the walks that curve and have settled: their radius and angles no longer depend on the duration."""
     return is_curved(data) & data.settled.values

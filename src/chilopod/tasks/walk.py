@@ -26,7 +26,7 @@ _MOST_BENT = 1.5  # rad; at a right angle modules run into each other
 
 @dataclass(frozen=True)
 class Ends(Short):
-    """What walks came to that differ in nothing but their seed.
+    """Ends of walks that differ in nothing but their seed.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Ends(Short):
 
     @property
     def seeded(self) -> bool:
-        """Whether the walks are disturbed."""
+        """True if the walks are disturbed."""
         return self.first.disturbance != NONE
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Whether what an engine gave is what was asked of it: before it is kept, for later nobody looks again.
+"""Check of an engine's record against what was asked of it: before it is kept, for later nobody looks again.
 
 The law is that of :meth:`chilopod.engine.Walk.to_dataset`.
 """
@@ -71,7 +71,7 @@ def check_finite(values: Mapping[str, Any], engine: str) -> None:
 
 
 def _outline(data: xr.Dataset, walk: Walk, first: Trial, robots: int) -> str:
-    """What is wrong with times, variables or shapes."""
+    """Fault of times, variables or shapes."""
     if not (walk.time == first.duration or (first.course and 0.0 <= walk.time < first.duration)):
         return f"it walked {walk.time:g} s instead of {first.duration:g} s"
     times, wanted, modules = data["time"].values, first.recording.samples(walk.time), first.robot.body.modules
@@ -96,7 +96,7 @@ def _outline(data: xr.Dataset, walk: Walk, first: Trial, robots: int) -> str:
 
 
 def _quantities(data: xr.Dataset, first: Trial, sizes: Mapping[str, int]) -> str:
-    """What is wrong with variables, in a record of these sizes."""
+    """Fault of variables, in a record of these sizes."""
     aimed, commands = first.target is not None, sizes["event"] > 0
     asked = {"": True, "target": aimed, "forces": first.forces, "poses": first.poses, "commands": commands}
     # Where all targets of a course are out of reach there never is one.
@@ -122,7 +122,7 @@ def _quantities(data: xr.Dataset, first: Trial, sizes: Mapping[str, int]) -> str
 
 
 def _attributes(data: xr.Dataset, first: Trial, walk: Walk) -> str:
-    """What is wrong with attributes of the whole."""
+    """Fault of attributes of the whole."""
     told = {"engine": engine_named(first.engine).traits.name, "robot": file_text(first.robot), "duration": walk.time}
     for name, value in told.items():
         if data.attrs.get(name) != value:
@@ -131,7 +131,7 @@ def _attributes(data: xr.Dataset, first: Trial, walk: Walk) -> str:
 
 
 def _content(data: xr.Dataset, walk: Walk, trials: Sequence[Trial], drawn: Sequence[Drawn]) -> str:
-    """What is wrong with numbers."""
+    """Fault of numbers."""
     first, status = trials[0], data["status"].values.tolist()
     if status != [each.label for each in walk.status]:
         return f"status is {status}, not that of the walk"

@@ -24,7 +24,7 @@ NOT_KEPT = "not kept"
 _CHANGES = "what its code can reach changes while it steers"
 _KNOWN: dict[str, str] = {}  # what was found of controllers, by all that makes them
 _MOST_BYTES = 256e6
-"""Of the records of a batch, about."""
+"""Largest size of the records of a batch, about."""
 
 
 def batches(trials: Sequence[Trial], on_cores: int | None = None) -> list[list[Trial]]:
@@ -155,7 +155,7 @@ def _doubts(trial: Trial) -> str:
 
 
 def _sight(trial: Trial) -> Hashable:
-    """What targets of a batch have in common."""
+    """Property that targets of a batch have in common."""
     course = trial.course
     if course is None:
         return trial.target is None

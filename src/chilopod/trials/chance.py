@@ -107,7 +107,7 @@ def _takes_seed(value: Any) -> bool:
 
 
 def _seedless(verb: str, value: object) -> bool:
-    """Whether what comes after something that takes a seed is none."""
+    """True if what comes after something that takes a seed is none."""
     return not verb.startswith(("LOAD_", "BUILD_")) or (verb == "LOAD_CONST" and value is None)
 
 

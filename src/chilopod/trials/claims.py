@@ -1,4 +1,4 @@
-"""Which trials of a folder are under way here, so that other processes walk others in the meantime."""
+"""Trials of a folder that are under way here, so that other processes walk others in the meantime."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import Self
 from chilopod.process import on_leave
 
 NAME = ".chilopod-claims"
-"""Of the file whose bytes are locked; there while somebody walks, and after one who was killed."""
+"""Name of the file whose bytes are locked; there while somebody walks, and after one who was killed."""
 
 _NOT, _WITH_OTHERS, _ALONE = "F_UNLCK", "F_RDLCK", "F_WRLCK"  # how a byte is locked
 _PRESENT = 0  # the byte that all who are here have locked, with the others
@@ -23,7 +23,7 @@ _TRIES, _PAUSE = 500, 2e-3  # s; whoever comes while the last one leaves tries a
 
 
 class Claims:
-    """What this process walks in a folder of trials.
+    """Trials that this process walks in a folder.
 
     A claim is a lock of the operating system's on one byte of an empty file in the folder; which byte follows from the
     trial's name. It ends with the process that has it, however that ends, so nobody has to find out who is still alive.
@@ -70,7 +70,7 @@ class Claims:
             os.close(handle)
 
     def take(self, name: str) -> bool:
-        """Whether a trial may be walked here: nobody else has it, and nobody else will be given it.
+        """True if a trial may be walked here: nobody else has it, and nobody else will be given it.
 
         Parameters
         ----------
@@ -88,7 +88,7 @@ class Claims:
                 _locked(self._handle, _NOT, _byte_of(name))
 
     def _entered(self) -> bool:
-        """Whether we are in; False if somebody is just leaving and takes the file along."""
+        """True if we are in; False if somebody is just leaving and takes the file along."""
         was_there = self._path.exists()
         handle = _opened(self._path, os.O_CREAT)
         try:
@@ -105,7 +105,7 @@ class Claims:
 
 
 def nobody_in(folder: Path) -> bool:
-    """Whether no process walks in a folder now, as far as can be told."""
+    """True if no process walks in a folder now, as far as can be told."""
     try:
         handle = _opened(folder / NAME)
     except FileNotFoundError:
@@ -130,7 +130,7 @@ def _opened(path: Path, more: int = 0) -> int:
 
 
 def _is(handle: int, path: Path) -> bool:
-    """Whether an open file still has that name."""
+    """True if an open file still has that name."""
     try:
         return os.path.samestat(os.fstat(handle), path.stat(follow_symlinks=False))
     except FileNotFoundError:

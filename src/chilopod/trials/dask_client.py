@@ -70,7 +70,7 @@ def connected(where: str | int, threads: int | None, stack: ExitStack) -> Any:
 
 
 def usable_cores() -> int:
-    """That this process may use."""
+    """Number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -183,7 +183,7 @@ def _stopped(cluster: Any, others: Sequence[BaseProcess]) -> None:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """What dask and what it stands on would log is said in one line, by us."""
+    """Silence of dask and what it stands on: what they would log is said in one line, by us."""
     loggers = [logging.getLogger(name) for name in _LOGGERS]
     levels = [logger.level for logger in loggers]
     for logger in loggers:

@@ -1,4 +1,4 @@
-"""What a trial is made of, as plain data: what its identity is derived from."""
+"""Contents of a trial, as plain data: its identity is derived from them."""
 
 from __future__ import annotations
 
@@ -132,12 +132,12 @@ def classes_in(value: object) -> Iterator[type]:
 
 
 def is_ours(kind: type) -> bool:
-    """Whether chilopod brings a class."""
+    """True if chilopod brings a class."""
     return kind.__module__.partition(".")[0] == "chilopod"
 
 
 def is_findable(kind: type) -> bool:
-    """Whether another process can find a class: what its module has by its name, not in a notebook or a script."""
+    """True if another process can find a class: what its module has by its name, not in a notebook or a script."""
     found: Any = sys.modules.get(kind.__module__)
     for part in kind.__qualname__.split("."):
         found = getattr(found, part, None)

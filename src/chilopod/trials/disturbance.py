@@ -1,4 +1,4 @@
-"""What differs from trial to trial."""
+"""Differences from trial to trial."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _DEVIATIONS = ("joint_angle", "heading", "friction", "bearing")
 
 @dataclass(frozen=True)
 class Disturbance:
-    """What differs from trial to trial: standard deviations of independent normal deviates.
+    """Differences from trial to trial: standard deviations of independent normal deviates.
 
     The same for every study and engine. None of it is printed in the paper. Of joints at 0.5, 1, 2 deg and feet at 2,
     4, 8 % the middle is the smallest spread with which the twin does what the robot did at k1 = 28 N*mm/deg: most walks
@@ -69,7 +69,7 @@ NONE = Disturbance(0.0, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Drawn:
-    """What a seed makes of a disturbance, for one robot.
+    """Draw of a disturbance by a seed, for one robot.
 
     Attributes
     ----------

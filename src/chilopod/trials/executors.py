@@ -29,7 +29,7 @@ class Executor(Protocol):
 
     @property
     def words(self) -> str:
-        """Where, to be put behind "3 of 7 trials"; empty on this machine alone."""
+        """Name of the place, to be put behind "3 of 7 trials"; empty on this machine alone."""
         ...
 
     def cut(self, batches: Sequence[list[Trial]]) -> Iterable[list[Trial]]:

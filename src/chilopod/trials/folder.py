@@ -1,4 +1,4 @@
-"""What is in a folder of trials, by its names and the headers of its files; no robot is built and nothing walks."""
+"""Contents of a folder of trials, by its names and the headers of its files; no robot is built and nothing walks."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def contents(folder: Path) -> Contents:
 
 
 def kept(paths: Sequence[Path], progress: Progress = silent) -> tuple[list[Kept], list[tuple[Path, str]]]:
-    """What the headers of files say, and for each of the others what is wrong with it.
+    """Headers of the files that can be read, and for each of the others what is wrong with it.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What happens on a worker of a cluster: one batch at a time, bytes in, bytes out.
+"""Work of a worker of a cluster: one batch at a time, bytes in, bytes out.
 
 Nothing here imports more than it must before it is called: the scheduler, which walks nothing, reads this file too.
 """
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from chilopod.trials.trial import Trial
 
 PACKAGES = ("chilopod", "numpy", "numba")
-"""That have to be the same on all machines."""
+"""Packages that have to be the same on all machines."""
 
 TWIN_PACKAGE = "mujoco-core"
-"""That has to be where there are trials of the twin."""
+"""Package that has to be where there are trials of the twin."""
 
 _SOURCES = "source code of chilopod"
 _DIGITS = 12  # of a digest, in an error
@@ -35,7 +35,7 @@ _PR_SET_PDEATHSIG = 1  # of prctl(2)
 
 
 def versions(packages: Sequence[str] = (*PACKAGES, TWIN_PACKAGE)) -> dict[str, str]:
-    """Of what makes a record what it is, in this process."""
+    """Versions of what makes a record what it is, in this process."""
     found = {_SOURCES: digest()[:_DIGITS]}
     for package in packages:
         try:

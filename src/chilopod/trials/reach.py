@@ -92,7 +92,7 @@ class Reach:
 
     @property
     def digest(self) -> str:
-        """Of all that was seen so far."""
+        """Digest of all that was seen so far."""
         return self._hash.hexdigest()[:16]
 
     def see(self, value: object, path: str) -> None:
@@ -143,7 +143,7 @@ class Reach:
         self._hash.update(repr(words).encode())
 
     def _parts(self, value: Any, kind: type, path: str) -> Parts:
-        """What an object consists of, each with what leads there."""
+        """Parts of an object, each with what leads there."""
         if kind is FunctionType:
             return self._function(value, path)
         if isinstance(value, ModuleType):
@@ -159,7 +159,7 @@ class Reach:
         return _KINDS[kind](value) if kind in _KINDS else self._instance(value, kind, path)
 
     def _instance(self, value: Any, kind: type, path: str) -> Parts:
-        """What pickle would keep, of classes that hide nothing from it."""
+        """State that pickle would keep, of classes that hide nothing from it."""
         unknown = UnknownKindError(f"{path}: an object of type {kind.__qualname__}")
         for each in filter(lambda each: self._is_own(each.__module__), kind.__mro__):
             for how in vars(each).keys() & _HIDING:
@@ -358,7 +358,7 @@ def _module_named(name: str, space: Mapping[str, Any]) -> ModuleType | None:
 
 @lru_cache(maxsize=256)
 def _compiled(content: bytes) -> CodeType | None:
-    """What a text says, in whatever words; None if it is no Python."""
+    """Code of a text; None if it is no Python."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:

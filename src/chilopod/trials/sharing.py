@@ -21,7 +21,7 @@ _PATIENCE = 120.0  # s in which they have to be done with one trial; one that is
 
 
 def alone(share: Iterable[list[Trial]], executor: Executor) -> Iterator[tuple[Walked, int]]:
-    """What :func:`shared` gives, where nothing is kept."""
+    """Walks in the form of :func:`shared`, where nothing is kept."""
     for walked in _walked(share, executor):
         for _, record in walked:
             record.attrs.pop(NOT_KEPT, None)
@@ -79,7 +79,7 @@ def _walked(
 
 
 class _Part:
-    """What of a study is to be walked here, what other processes walk, and what they have brought meanwhile."""
+    """Part of a study that is walked here, what other processes walk, and what they have brought meanwhile."""
 
     def __init__(self, store: Store, claims: Claims, patient: bool) -> None:
         self._store, self._claims, self._patient = store, claims, patient

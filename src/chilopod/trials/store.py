@@ -50,7 +50,7 @@ class Store:
         self._tell, self._said = tell, set[str]()
 
     def has(self, trial: Trial) -> bool:
-        """Whether there is something that has the name of a trial's record."""
+        """True if there is something that has the name of a trial's record."""
         return os.path.lexists(self.folder / trial.file_name)
 
     def read(self, trial: Trial) -> xr.Dataset | None:

@@ -1,4 +1,4 @@
-"""What a walk came to: its mean shape at the end, how tightly it turned, and where the robot got to."""
+"""Summary of a walk: its mean shape at the end, how tightly it turned, and where the robot got to."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class WalkSummary:
 
     @property
     def failed(self) -> bool:
-        """Whether it ended early."""
+        """True if it ended early."""
         return self.status != Status.WALKED.label
 
     @property
@@ -83,7 +83,7 @@ def mean_joint_angles(record: xr.Dataset, seconds: float = AVERAGED, before: flo
 
 
 def straight(record: xr.Dataset) -> bool:
-    """Whether no joint bends ever, to the last bit: nothing told left from right, and a straight walk stays straight
+    """True if no joint bends ever, to the last bit: nothing told left from right, and a straight walk stays straight
     even where it is unstable."""
     return not record.joint_angle.values.any()
 

@@ -139,12 +139,12 @@ class Trial:
 
     @property
     def recording(self) -> Recording:
-        """What is written down."""
+        """Contents of the record."""
         return Recording(self.rate, self.forces, self.poses)
 
     @property
     def least_bytes(self) -> float:
-        """What its record takes, at least."""
+        """Least memory of its record."""
         if self.brief:
             return 0.0
         return self.recording.least_bytes(self.robot.body.modules, self.duration)
@@ -204,7 +204,7 @@ class Trial:
 
     @cached_property
     def file_name(self) -> str:
-        """Of its record."""
+        """Name of the file of its record."""
         engine = engine_named(self.engine).traits.name
         kind = "".join(each if each.isalnum() else "-" for each in engine)
         return f"{kind}-{digest_of(self.text)}.nc"
@@ -216,7 +216,7 @@ class Trial:
 
 
 def versions_of(engine: str) -> dict[str, Any]:
-    """Of what makes a record, as they stand in a trial's text."""
+    """Versions of what makes a record, as they stand in a trial's text."""
     return {
         # What else a version says of a checkout, the sources say better.
         "chilopod": chilopod.__version__.partition("+")[0],
@@ -226,5 +226,5 @@ def versions_of(engine: str) -> dict[str, Any]:
 
 
 def digest_of(text: str) -> str:
-    """Of a trial's text: what its file is called by."""
+    """Digest of a trial's text: the name of its file."""
     return hashlib.sha256(text.encode()).hexdigest()[:20]

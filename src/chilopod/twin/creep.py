@@ -26,7 +26,7 @@ _SUNK = 0.5  # of its height: a robot that is lower does not stand on its feet
 
 @dataclass(frozen=True)
 class Creep:
-    """What standing feet do under a push.
+    """Reaction of standing feet to a push.
 
     Attributes
     ----------

@@ -65,7 +65,7 @@ class Edited:
 
 
 def _content(code: CodeType, edit: Any) -> tuple[Any, ...]:
-    """What a function does, and the plain values of its module that it uses: trials with another edit are others."""
+    """Code of a function, and the plain values of its module that it uses: trials with another edit are others."""
     used = {name: edit.__globals__.get(name) for name in code.co_names}
     plain = {name: value for name, value in used.items() if isinstance(value, int | float | str | tuple)}
     inner = [_content(each, edit) if isinstance(each, CodeType) else repr(each) for each in code.co_consts]

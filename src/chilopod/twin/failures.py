@@ -24,7 +24,7 @@ def failures(
     yaw_positions: NDArray[np.intp],
     warned: NDArray[np.bool_],
 ) -> dict[int, tuple[int, Status]]:
-    """What went wrong with the robots of a batch in some steps.
+    """Failures of the robots of a batch in some steps.
 
     Parameters
     ----------

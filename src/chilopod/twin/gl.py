@@ -1,4 +1,4 @@
-"""Which OpenGL can draw the robot off-screen here, if any. Only films and stills need one, nothing else does.
+"""Choice of an OpenGL that can draw the robot off-screen here. Only films and stills need one, nothing else does.
 
 MuJoCo reads ``MUJOCO_GL`` once, when it is imported, and takes GLFW where it is not set: that needs a display. Here the
 class that makes a context is taken from the backend's own module instead, so it does not matter whether MuJoCo has been
@@ -49,7 +49,7 @@ context.free()
 
 @dataclass(frozen=True)
 class Found:
-    """What was found.
+    """Backend that was found.
 
     Attributes
     ----------
@@ -154,7 +154,7 @@ def _candidates(known: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _tried(name: str) -> tuple[str, str]:
-    """What the driver of a backend calls itself, and what is wrong with it, if anything."""
+    """Name that the driver of a backend gives itself, and what is wrong with it, if anything."""
     # Without the folder that Python was started in, where a file could be called as a module is.
     command = [sys.executable, "-P", "-c", _TRIAL, name]
     environment = {**os.environ, "MUJOCO_GL": name}

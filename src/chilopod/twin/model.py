@@ -222,7 +222,7 @@ def silence() -> Iterator[None]:
 
 @contextmanager
 def _in_our_words() -> Iterator[None]:
-    """What MuJoCo finds wrong with a robot is an error of one line, also where it would only warn of it."""
+    """Errors of MuJoCo in one line, also where it would only warn."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
@@ -261,7 +261,7 @@ def _check_bodies(robot: Robot, twin: Twin) -> None:
 
 
 def _add_box(body: mujoco.MjsBody, robot: Robot, twin: Twin) -> None:
-    """What a module weighs without its legs, so that both together have the module's yaw inertia."""
+    """Box with a module's mass without its legs, so that both together have the module's yaw inertia."""
     length, width, height = robot.module_length, twin.body_width, twin.body_height
     body.explicitinertial = True
     body.mass, body.ipos = body_mass(robot.body, twin), [0.0, 0.0, 0.0]
@@ -334,7 +334,7 @@ def _adjustable(robot: Robot) -> bool:
 
 
 def _add_spring_actuator(spec: mujoco.MjSpec, joint: int) -> None:
-    """What stiffens a spring: torque = -control * angle, so that the control adds to the joint's own stiffness."""
+    """Actuator that stiffens a spring: torque = -control * angle, which adds to the joint's own stiffness."""
     spec.add_actuator(
         name=f"spring{joint}",
         target=f"yaw{joint}",

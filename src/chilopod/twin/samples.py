@@ -1,4 +1,4 @@
-"""Which simulation steps the samples of a record are taken at."""
+"""Simulation steps that the samples of a record are taken at."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a batch of walks needs to begin: robots that go together, where they start, their floor and their targets."""
+"""Start of a batch of walks: robots that go together, where they start, their floor and their targets."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ traits = Traits(
 
 
 def common(robot: Robot) -> Robot:
-    """What robots of a batch share, see :class:`chilopod.engine.Engine`: all but the numbers of their springs."""
+    """Properties of a batch, see :class:`chilopod.engine.Engine`: all but the numbers of the springs."""
     twin_of(as_robot(robot))
     return without_springs(robot)
 

@@ -1,4 +1,4 @@
-"""What makes a step of some milliseconds as good as a small one: the servos' dampers by the trapezoidal rule.
+"""Integration in steps of some milliseconds as good as in small ones: the servos' dampers by the trapezoidal rule.
 
 A servo's damping over its joint's inertia is a rate of hundreds per second, too fast for an explicit step of 2 ms.
 MuJoCo's own implicit integrators take the damper at the end of the step, I (w' - w) = h (M - D w'), and so act as if
@@ -27,7 +27,7 @@ from chilopod.robot import Twin
 Array = NDArray[np.float64]
 
 _IMPEDANCE = np.array([0.9, 0.95])
-"""Of a contact at first touch and deep: MuJoCo's defaults."""
+"""Impedance of a contact at first touch and deep: MuJoCo's defaults."""
 
 _WIDTH, _MIDDLE, _POWER = 0.001, 0.5, 2.0  # of how impedance grows with depth: MuJoCo's defaults
 
@@ -58,6 +58,6 @@ def with_step(spec: mujoco.MjSpec, twin: Twin) -> None:
 
 
 def _mobility(spec: mujoco.MjSpec, feet: list[mujoco.MjsGeom]) -> Array:
-    """What MuJoCo takes for the inverse of the mass that each foot shows the floor, 1/kg."""
+    """Inverse of the mass that each foot shows the floor, as MuJoCo takes it, 1/kg."""
     model = spec.compile()
     return np.array([model.body_invweight0[model.geom_bodyid[model.geom(foot.name).id], 0] for foot in feet])

@@ -35,7 +35,7 @@ _MOST_KEPT = 5e7  # numbers, of these steps
 _TARGETS_AHEAD = 2048  # ticks for which servo targets are computed at a time
 _SAME_INSTANT = 1e-9  # ticks
 _STATE = ("time", "qpos", "qvel", "qacc_warmstart", "qfrc_applied")
-"""Of MuJoCo's state what is not the same in every walk or set before every step."""
+"""Fields of MuJoCo's state that differ between walks and are not set before every step."""
 
 
 @one_thread
@@ -117,7 +117,7 @@ class TwinWalk:
 
     @property
     def time(self) -> float:
-        """That was asked for, s."""
+        """Time that was asked for, s."""
         return self._time
 
     @property
@@ -318,7 +318,7 @@ class TwinWalk:
         return np.array([each is Status.WALKED for each in self._status])
 
     def _kept(self) -> dict[str, Samples]:
-        """What is recorded, by MuJoCo's name."""
+        """Recorded quantities, by MuJoCo's name."""
         kept = {"qpos": self._positions, "qvel": self._rates}
         return {**kept, "sensordata": self._forces} if self._plan.model.nsensordata else kept
 
@@ -368,7 +368,7 @@ class TwinWalk:
             self._put_poles()
 
     def _controls(self, tick: int) -> Array:
-        """Of all actuators before every step up to a tick, for the robots that walk, shape (robots, steps, nu)."""
+        """Controls of all actuators before every step up to a tick, for walking robots, shape (robots, steps, nu)."""
         plan, ticks, per_tick = self._plan, np.arange(self._tick, tick), self._plan.steps_per_control
         control = np.zeros((len(self._walking), len(ticks), plan.model.nu))
         # Both legs at the knees and hips, then the yaw of module 1's.
@@ -402,6 +402,6 @@ def state_size(plan: TwinModel, initial: ArrayLike | None) -> int:
 
 
 def _heading(turn: Array) -> Array:
-    """Of rotation matrices (..., 3, 3), rad."""
+    """Heading of rotation matrices (..., 3, 3), rad."""
     heading: Array = np.arctan2(turn[..., 1, 0], turn[..., 0, 0])
     return heading

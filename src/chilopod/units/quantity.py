@@ -22,7 +22,7 @@ _PLAIN_WORDS: Final = {"model_type": "must be a table"}
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """What a field may hold; used as ``Annotated[float, Quantity(...)]`` in a `Description`.
+    """Definition of the values that a field may hold; used as ``Annotated[float, Quantity(...)]`` in a `Description`.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class Quantity:
         return tuple(values)
 
     def write(self, value: float) -> Any:
-        """What stands for one value in a robot file: text with its unit, or a whole number."""
+        """Form of one value in a robot file: text with its unit, or a whole number."""
         return value if self.integer else format(value, self.display)
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
@@ -157,7 +157,7 @@ def quantities(model: type[Description]) -> dict[str, Quantity]:
 
 
 def is_list(value: object) -> TypeGuard[Collection[Any]]:
-    """Whether `value` stands for several values: a list, tuple or array, and neither text nor a table."""
+    """True if `value` stands for several values: a list, tuple or array, and neither text nor a table."""
     return isinstance(value, Collection) and not isinstance(value, str | bytes | Mapping)
 
 

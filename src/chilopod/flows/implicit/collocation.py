@@ -79,7 +79,7 @@ class Control(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What an integration fills in, in units of the states.
+    """Results that an integration fills in, in units of the states.
 
     Attributes
     ----------

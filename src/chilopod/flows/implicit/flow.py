@@ -42,7 +42,7 @@ _REASONS = {
 
 @dataclass(frozen=True)
 class Stretched(ReadOnlyArrays):
-    """What a flow makes of a frame.
+    """Frame carried by a flow.
 
     Attributes
     ----------
@@ -214,12 +214,12 @@ class ImplicitFlow(ReadOnlyArrays):
 
 
 def can_be_implicit(tape: Tape) -> bool:
-    """Whether a right-hand side has no events, and switches in time only."""
+    """True if a right-hand side has no events, and switches in time only."""
     return all(kind != ops.GUARD and tape.program[4, node] == 0 for kind, node in zip(*tape.switches[:2], strict=True))
 
 
 def _branches(tape: Tape, params: Array, times: Array) -> Array:
-    """Of switches that know only time, shape (switches, times)."""
+    """Branches of switches that know only time, shape (switches, times)."""
     if tape.switches.shape[1] == 0:
         return np.zeros((0, times.size))
     values = evaluate(tape, times, np.zeros((tape.dimension, 1)), params)[tape.switches[1]]

@@ -225,7 +225,7 @@ def stages(problem: Any, method: Any, x: Any, t: float, h: float, step: Any) -> 
 
 @fused_njit(error_model="numpy")
 def _defects(x: Any, h: float, method: Any, step: Any, derivative: Any) -> tuple[Any, Any]:
-    """What f at the start differs by from the polynomial through its values in the stages, filtered by the inverse of
+    """Defect of f at the start from the polynomial through its values in the stages, filtered by the inverse of
     1 - h gamma J, of the state and of the columns of the derivative, shape (n, 1 + columns); and the round-off in it.
     """
     start, gamma = method.start, method.gamma

@@ -79,7 +79,7 @@ class TooManySteps(AnalysisError):
 
 @dataclass(frozen=True)
 class Passage(ReadOnlyArrays):
-    """What a flow does over an interval.
+    """Result of a flow over an interval.
 
     Attributes
     ----------

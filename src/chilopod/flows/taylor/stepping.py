@@ -79,7 +79,7 @@ class Control(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What an integration fills in.
+    """Results that an integration fills in.
 
     Attributes
     ----------
@@ -271,8 +271,8 @@ def _chosen(
 
 @fused_njit(error_model="numpy", inline="always")
 def _spent(control: Any, steps: int, done: float, whole: float) -> int:
-    """Whether there is time for a step, and it is within the budget, at the end of the interval too, of which a part is
-    done: DONE if so."""
+    """DONE if there is time for a step within the budget, which has to last to the end of the interval, of which a part
+    is done."""
     if control.stop[0] != 0.0:
         return TIME_OVER
     check = control.patience

@@ -1,4 +1,4 @@
-"""Which branch a switch is on, and how a motion goes through a switch or an event."""
+"""Branches of switches, and motions that go through a switch or an event."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def settle(tape: Any, motion: Any, unit: float) -> int:
 
 @fused_njit(error_model="numpy")
 def is_timed(tape: Any, s: int) -> bool:
-    """Whether a switch is a guard that knows only time."""
+    """True if a switch is a guard that knows only time."""
     return bool(tape.switches[0, s] == GUARD and tape.program[4, tape.switches[1, s]] == 0)
 
 

@@ -175,7 +175,7 @@ _SAME_NAME = (
 
 
 def _instead() -> dict[int, Any]:
-    """What stands in for functions that take no traced numbers, by identity."""
+    """Stand-ins for functions that take no traced numbers, by identity."""
     pairs: list[tuple[Any, Any]] = [
         (np.array, _array),
         (np.asarray, lambda value, *a, **o: value if isinstance(value, TracedArray) else _array(value, *a, **o)),
@@ -229,7 +229,7 @@ _MODULES = {"numpy", "math", "numpy.linalg"}
 
 
 def stand_in(value: Any) -> Any:
-    """What takes the place of a module, function or class while tracing: mostly itself."""
+    """Stand-in of a module, function or class while tracing: mostly itself."""
     if getattr(value, "__name__", None) in _MODULES and isinstance(value, type(math)):
         return Module(value)
     return _INSTEAD.get(id(value), value)

@@ -29,7 +29,7 @@ GUARD = 23
 """As a kind of switch: the guard of an event."""
 
 CONSTANT, TIMED, MOVING = 0, 1, 2
-"""What a node depends on: parameters only, time too, or the state."""
+"""Dependence of a node: on parameters only, on time too, or on the state."""
 
 
 class Tape(NamedTuple):

@@ -158,7 +158,7 @@ class Traced:
 
     @property
     def shape(self) -> tuple[()]:
-        """That of a number."""
+        """Shape of a number."""
         return ()
 
     ndim = 0

@@ -1,4 +1,4 @@
-"""What the spring that is set on the way owes to each step of its law, and how much it stands."""
+"""Contribution of each step of the law to the spring that is set on the way, and what disturbances it stands."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ _ACTUATOR = ("springs.rate=20 N*mm/deg/s", "springs.lag=0.5 s")
 
 @dataclass(frozen=True, eq=False)
 class Robust:
-    """What the variable spring owes to its law, and what it stands.
+    """Contributions of the steps of the law, and success under disturbed conditions.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ class Condition:
 
 
 def planar_conditions(robot: Robot) -> list[Condition]:
-    """Of the planar model."""
+    """Conditions of the planar model."""
     friction, middle = robot.ground.friction, robot.body.modules // 2 - 1
     return [
         Condition(USUAL),
@@ -110,7 +110,7 @@ def planar_conditions(robot: Robot) -> list[Condition]:
 
 
 def whole_conditions(robot: Robot) -> list[Condition]:
-    """Of the whole robot."""
+    """Conditions of the whole robot."""
     friction = robot.twin.sliding_friction if robot.twin else 1.0
     return [
         Condition(USUAL, engine="twin"),

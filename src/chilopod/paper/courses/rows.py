@@ -1,4 +1,4 @@
-"""What courses come to, as lines of the table: measured, and nothing that the paper prints."""
+"""Lines of the table on courses: measured, and nothing that the paper prints."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def _remark(found: Summary) -> str:
 
 
 def said(found: Verdicts) -> str:
-    """What the intervals decide, in a sentence."""
+    """Decision of the intervals, in a sentence."""
     groups = {
         "reaches more targets than": found.fewer,
         "reaches as many, for all that can be told, as": found.as_many,
@@ -81,7 +81,7 @@ def said(found: Verdicts) -> str:
 
 
 def robust_rows(steps: xr.Dataset, conditions: xr.Dataset) -> list[Row]:
-    """What each step of the law brings, and what becomes of courses under conditions that it does not know."""
+    """Rows on each step of the law, and on courses under conditions that it does not know."""
     grown = "; ".join(
         f"{name} {percent(share_of_targets(each))}"
         for name, each in zip(steps.case.values, steps.arrived.transpose("case", "course", "goal"), strict=True)

@@ -13,7 +13,7 @@ from chilopod.paper.scatter import Answer
 Array = NDArray[np.float64]
 
 LEVEL = 0.95
-"""Of all intervals."""
+"""Level of all intervals."""
 
 _DRAWN = 2000
 
@@ -33,14 +33,14 @@ class Interval:
     high: float
 
     def above(self, other: Interval) -> Answer:
-        """Whether it lies above another, bounds and all; undecided where they overlap."""
+        """True if it lies above another, bounds and all; undecided where they overlap."""
         if self.low > other.high:
             return True
         return False if self.high < other.low else None
 
     @property
     def sign(self) -> Answer:
-        """Whether it is positive, bounds and all; undecided where zero lies between them."""
+        """True if it is positive, bounds and all; undecided where zero lies between them."""
         return self.above(Interval(0.0, 0.0, 0.0))
 
 

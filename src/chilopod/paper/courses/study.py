@@ -91,7 +91,7 @@ class Case:
 def driven(
     cases: Sequence[Case], seeds: Sequence[int], size: Size, folder: Path | None = None, progress: Progress = silent
 ) -> xr.Dataset:
-    """What became of every target of random courses.
+    """Outcome of every target of random courses.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What courses come to, strategy by strategy, and what of it the intervals decide."""
+"""Summaries of courses, strategy by strategy, and the decisions of their intervals."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Summary:
-    """What one strategy comes to.
+    """Summary of one strategy.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ def titled(name: str, spring: float) -> str:
 
 
 def summaries(data: xr.Dataset) -> dict[str, Summary]:
-    """Of all strategies, by name.
+    """Summaries of all strategies, by name.
 
     Parameters
     ----------
@@ -114,13 +114,13 @@ def _summary(one: xr.Dataset, variable: xr.Dataset) -> Summary:
 
 
 def share_of_targets(arrived: xr.DataArray) -> Interval:
-    """Of targets that were reached, over (course, goal)."""
+    """Share of targets that were reached, over (course, goal)."""
     reached = arrived.values > 0.5
     return wilson(int(reached.sum()), reached.size)
 
 
 def share_of_courses(arrived: xr.DataArray) -> Interval:
-    """Of courses whose targets were all reached, over (course, goal)."""
+    """Share of courses whose targets were all reached, over (course, goal)."""
     whole = (arrived.transpose("course", "goal").values > 0.5).all(axis=1)
     return wilson(int(whole.sum()), whole.size)
 
@@ -137,7 +137,7 @@ def _work(one: xr.Dataset) -> Array:
 
 @dataclass(frozen=True)
 class Verdicts:
-    """What the intervals decide, each by the names of strategies that the variable spring is held against.
+    """Decisions of the intervals, each by the names of strategies that the variable spring is held against.
 
     Attributes
     ----------
@@ -164,7 +164,7 @@ class Verdicts:
 
 
 def verdicts(found: dict[str, Summary]) -> Verdicts:
-    """What can be said of the variable spring beside the others."""
+    """Decisions on the variable spring beside the others."""
     ours, others = found[VARIABLE.name], [each for name, each in found.items() if name != VARIABLE.name]
     reach = _decided(others, lambda each: ours.targets.above(each.targets))
     spent = _decided(others, lambda each: each.spent.above(ours.spent))
@@ -175,6 +175,6 @@ def verdicts(found: dict[str, Summary]) -> Verdicts:
 
 
 def _decided(others: Sequence[Summary], asked: Callable[[Summary], Answer]) -> tuple[list[str], list[str], list[str]]:
-    """Of which others the answer is yes, open, and no."""
+    """Strategies for which the answer is yes, open, and no."""
     yes, open_, no = ([each.title for each in others if asked(each) is answer] for answer in (True, None, False))
     return yes, open_, no

@@ -1,4 +1,4 @@
-"""What the trials of curved walks show of the planar model: beside the paper's model, and beside its robot."""
+"""Rows on the trials of curved walks of the planar model: beside the paper's model, and beside its robot."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the trials of curved walks show: the paper's estimate of the pitchfork beside the point, and its variants.
+"""Trials of curved walks: the paper's estimate of the pitchfork beside the point, and its variants.
 
 Fig. "curved", "absolute" and "different" of the paper, with the branch that the trials settle on.
 """
@@ -132,7 +132,7 @@ def curved_study(
 
 
 def bent(trials: xr.Dataset) -> NDArray[np.bool_]:
-    """Which trials settled on a curved walk, shape (spring, repeat)."""
+    """Mask of the trials that settled on a curved walk, shape (spring, repeat)."""
     return np.isin(trials.direction.values, ("left", "right"))
 
 
@@ -217,7 +217,7 @@ def law_along_branch(branch: xr.Dataset, count: int = 25) -> xr.Dataset:
 
 
 def compared(variants: Mapping[str, xr.Dataset], branches: Mapping[str, xr.Dataset]) -> xr.Dataset:
-    """What each of the paper's variants changes (Fig. "different").
+    """Changes by each of the paper's variants (Fig. "different").
 
     Returns
     -------

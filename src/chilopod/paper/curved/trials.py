@@ -218,7 +218,7 @@ def _walking_time(robot: Robot, e_folds: float) -> float:
 
 
 def _outcome(record: xr.Dataset, robot: Robot) -> xr.Dataset:
-    """What one trial's record comes to."""
+    """Numbers of one trial's record."""
     walk = record.isel(robot=0)
     last = mean_joint_angles(walk).values
     before = mean_joint_angles(walk, BEFORE, before=AVERAGED).values

@@ -74,7 +74,7 @@ class Film:
 
 @dataclass(frozen=True)
 class Shown:
-    """What is drawn of a section."""
+    """Drawings of a section."""
 
     section: Section[Any]
     figures: Sequence[Drawn]
@@ -82,7 +82,7 @@ class Shown:
 
 
 class State(Enum):
-    """Whether a report is still being computed, is complete, or was stopped before it was."""
+    """State of a report: still computed, complete, or stopped before it was."""
 
     RUNNING = "running"
     DONE = "done"

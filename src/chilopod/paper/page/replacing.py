@@ -1,4 +1,4 @@
-"""Whether a report may be written into a folder: more than it has itself is only replaced if that was asked for."""
+"""Rules for writing a report into a folder: other files are only replaced if that was asked for."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a page tells first: what was found in a few sentences, and the numbers that matter."""
+"""Head of a page: the findings in a few sentences, and the numbers that matter."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _TOLD: Final = {
     statements.RADII[21.0]: "radius of its walk with a front spring of 21 N*mm/deg",
     statements.ARRIVAL: "earliest arrival at the target of task A",
 }
-"""What is told of the twin at the top of the page."""
+"""Statements on the twin that stand at the top of the page."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def _predictions(found: Found) -> list[Verdict]:
 
 
 def summary(results: Found) -> str:
-    """What was found, in a few plain sentences."""
+    """Findings, in a few plain sentences."""
     parts, mode, uniform, turning = [], results[MODE], results[UNIFORM], results[TURNING]
     modules = results.context.robot.body.modules
     parts.append(

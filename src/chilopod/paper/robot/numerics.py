@@ -1,4 +1,4 @@
-"""Whether what the twin finds hangs on numerics: the base series with finer steps and a tighter solver."""
+"""Dependence of the twin's results on numerics: the base series with finer steps and a tighter solver."""
 
 from __future__ import annotations
 

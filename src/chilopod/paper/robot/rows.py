@@ -82,7 +82,7 @@ def _radius(base: xr.Dataset, spring: float, statement: Statement[Band]) -> OfTw
 
 
 def _curved_angles(base: xr.Dataset) -> dict[float, NDArray[np.float64]]:
-    """Of joint 1 in all trials that curve, rad, by spring (N*mm/deg), the stiffest first."""
+    """Angles of joint 1 in all trials that curve, rad, by spring (N*mm/deg), the stiffest first."""
     ordered = base.sortby("spring", ascending=False)
     angles = np.where(in_settled_curve(ordered), np.abs(ordered.mean_angle.sel(joint=1).values), np.nan)
     pairs = zip(ordered.spring.values, angles, strict=True)
@@ -137,7 +137,7 @@ def variant_rows(base: xr.Dataset, data: xr.Dataset, name: str, reading: str = "
 
 
 def duration_rows(data: xr.Dataset) -> list[OfTwin]:
-    """Which quantities of the base series would be judged otherwise if its walks were shorter.
+    """Quantities of the base series that would be judged otherwise if its walks were shorter.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def duration_rows(data: xr.Dataset) -> list[OfTwin]:
 
 
 def _duration_row(data: xr.Dataset, statement: Statement[Said], values: str, answers: Sequence[Answer]) -> OfTwin:
-    """Whether a quantity is judged alike after every duration."""
+    """Row on a quantity that is judged after every duration."""
     times, last = [f"{each:g}" for each in data.duration.values], answers[-1]
     by = {within(key): [t for t, one in zip(times, answers, strict=True) if one is key] for key in (True, False, None)}
     judged = [
@@ -172,7 +172,7 @@ def _duration_row(data: xr.Dataset, statement: Statement[Said], values: str, ans
 
 
 def _most(share: xr.DataArray, springs: tuple[float, ...]) -> bool:
-    """Whether most walks at each of some springs are counted."""
+    """True if most walks at each of some springs are counted."""
     return bool((share.sel(spring=list(springs)) > 0.5).all())
 
 

@@ -38,7 +38,7 @@ COUNT = 6
 """Sets of constants that predict, the preset's among them."""
 
 LOWER = ", lower steps"
-"""Of a variant's name: its steps are as much lower as they are shorter."""
+"""Suffix of a variant's name: its steps are as much lower as they are shorter."""
 
 _DURATION = 60.0  # s
 _BENT = 0.8  # rad in all, that walks begin with

@@ -1,4 +1,4 @@
-"""What else the robot could be made of: changes to the twin's structure, each with its constants fitted anew.
+"""Other structures of the robot: changes to the twin, each with its constants fitted anew.
 
 A twin that meets the base series with one structure may do so with another, and predict something else. Here each of
 some structures is given to the preset, its constants are moved by least squares until it meets the base series again
@@ -38,10 +38,10 @@ from chilopod.tasks.identify.twin_series import DURATION, base_series, residuals
 Array = NDArray[np.float64]
 
 PHASE, UNIFORM = "module phase 180 deg", "all springs alike"
-"""Of the variants, and of the predictions."""
+"""Names of the variants, and of the predictions."""
 
 TOLERANCE = 0.05
-"""Of a printed onset, relative: half of what the report calls agreeing; what chi squared counts in."""
+"""Tolerance of a printed onset, relative: half of what the report calls agreeing; what chi squared counts in."""
 
 _STEP = 0.06  # of a constant's range, for differences: where walks change evenly
 _ROUNDS, _MET = 5, 0.7  # steps at most, and misfit at which that ends
@@ -129,7 +129,7 @@ class Structure:
 
     @property
     def engine(self) -> str:
-        """That walks it."""
+        """Engine that walks it."""
         return f"{__name__}:{self.edited}" if self.edited else "twin"
 
 
@@ -149,7 +149,7 @@ STRUCTURES = (
     Structure("slow commands", "every 10 ms instead of 2", ("twin.control_interval=0.01 s",)),
     Structure("slow scanner", "a scan in 0.5 s instead of 0.1", ("twin.scanner_period=0.5 s",)),
 )
-"""What is tried, the robot as it is first."""
+"""Structures that are tried, the robot as it is first."""
 
 
 def structures(

@@ -30,7 +30,7 @@ as long again lets a robot that is as fast arrive, or pass the target."""
 
 @dataclass(frozen=True)
 class RobotTurning:
-    """What the tasks show.
+    """Results of the tasks.
 
     Attributes
     ----------

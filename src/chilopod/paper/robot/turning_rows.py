@@ -61,7 +61,7 @@ def turning_rows(found: RobotTurning, walks: RobotWalks | None) -> list[OfTwin]:
 
 
 def _became(criteria: xr.Dataset, task: Task) -> bool:
-    """Whether that becomes of a task at the paper's own springs, or between two that miss to either side."""
+    """True if that becomes of a task at the paper's own springs, or between two that miss to either side."""
     outcomes, k_hat = springs_by_outcome(criteria), task.k_hat.value
     if not task.outcomes:
         return bool(outcomes[Outcome.OUTSIDE] and outcomes[Outcome.INSIDE]) and k_hat in outcomes[Outcome.ARRIVED]
@@ -70,6 +70,6 @@ def _became(criteria: xr.Dataset, task: Task) -> bool:
 
 
 def _needs_leg_yaw(walks: LegYaw) -> bool:
-    """Whether many fail without leg yaw, and none with it."""
+    """True if many fail without leg yaw, and none with it."""
     (few, without), (many, with_) = arrivals(walks.alone), arrivals(walks.helped)
     return few <= without // 2 and many == with_

@@ -58,7 +58,7 @@ _SEEDS = 10_000  # between springs
 
 @dataclass(frozen=True)
 class RobotWalks:
-    """What the walks show.
+    """Results of the walks.
 
     Attributes
     ----------
@@ -190,7 +190,7 @@ def walk_records(
 def walk_ends(
     records: Sequence[xr.Dataset], robot: Robot, springs: Sequence[float], duration: float | None = None
 ) -> xr.Dataset:
-    """What walks come to.
+    """Numbers that walks come to at their ends.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ def walk_ends(
 
 
 def by_duration(records: Sequence[xr.Dataset], robot: Robot, springs: Sequence[float]) -> xr.Dataset:
-    """What the same walks would come to if they had ended earlier.
+    """Numbers of the same walks, had they ended earlier.
 
     Parameters
     ----------

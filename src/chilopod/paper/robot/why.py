@@ -53,7 +53,7 @@ PLANAR = {
     "twin.link_mass": 0.01,
     "twin.timestep": 5e-4,
 }
-"""What the planar limit has instead of the twin's constants, SI."""
+"""Constants of the planar limit instead of the twin's, SI."""
 
 FINER = {
     **PLANAR,
@@ -68,7 +68,7 @@ FINER = {
 
 @dataclass(frozen=True)
 class Factor:
-    """What the planar model leaves out.
+    """Assumption of the planar model that the twin does not make.
 
     Attributes
     ----------
@@ -318,7 +318,7 @@ def ablation(
 
 
 def _shape(robot: Robot) -> Array:
-    """Of the bend that is started with."""
+    """Shape of the bend that is started with."""
     mode = np.array(printed.mode_shape(robot))
     return mode / np.linalg.norm(mode)
 

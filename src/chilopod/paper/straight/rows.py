@@ -1,4 +1,4 @@
-"""What the paper prints of its Floquet analysis, beside what is computed."""
+"""Rows on the Floquet analysis: the paper's numbers beside what is computed."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ def differences(pitchfork: TurningTask, hopf: TurningTask) -> dict[str, Differen
 
 
 def all_lower(pitchfork: TurningTask, hopf: TurningTask) -> Answer:
-    """Whether all three minima of the pitchfork are the lower ones: no if any is higher beyond doubt."""
+    """True if all three minima of the pitchfork are the lower ones: no if any is higher beyond doubt."""
     return every(each.lower for each in differences(pitchfork, hopf).values())
 
 

@@ -16,7 +16,7 @@ from chilopod.paper.turning.trials import CRITERIA
 Array = NDArray[np.float64]
 
 SCALES = {"distance": (1.0, "m"), "angle": (180.0 / math.pi, "deg"), "effort": (1.0, "rad²·s")}
-"""What they are shown in: factor and unit."""
+"""Units in which the criteria are shown: factor and unit."""
 
 
 def minima(criteria: xr.Dataset, instant: int = 0) -> xr.Dataset:
@@ -63,7 +63,7 @@ def minima(criteria: xr.Dataset, instant: int = 0) -> xr.Dataset:
 
 
 def around(low: xr.Dataset, said: Band) -> Answer:
-    """Whether a criterion is smallest where it is said to be: undecided if springs that are no worse lie within as well
+    """True if a criterion is smallest where it is said to be: undecided if springs that are no worse lie within as well
     as without.
 
     Parameters
@@ -80,7 +80,7 @@ def around(low: xr.Dataset, said: Band) -> Answer:
 
 
 def _vertex(springs: Array, mean: Array, lowest: int) -> float:
-    """Of the parabola in 1/k through three points, in k."""
+    """Vertex of the parabola in 1/k through three points, in k."""
     order = slice(lowest - 1, lowest + 2)
     if lowest in (0, len(springs) - 1) or np.isnan(mean[order]).any():
         return float(springs[lowest])

@@ -1,4 +1,4 @@
-"""What the turning tasks of the planar model come to: geometry that the paper prints, and beside its robot."""
+"""Rows on the turning tasks of the planar model: geometry that the paper prints, and beside its robot."""
 
 from __future__ import annotations
 

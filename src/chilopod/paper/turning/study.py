@@ -1,4 +1,4 @@
-"""What the turning tasks show: all of them together, and why the best spring is not the law's."""
+"""Turning tasks: all of them together, and why the best spring is not the law's."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ def turning(
 def settled_start(
     robot: Robot, laws: RadiusLaws, targets: Mapping[str, Target], folder: str | Path | None = None
 ) -> xr.Dataset:
-    """Whether the spring of the law leads to the target, if the walk need not find its curve first.
+    """Arrival with the spring of the law, if the walk need not find its curve first.
 
     One undisturbed trial without leg yaw each, at the spring of the law by the path of module 1: from "straight", from
     the settled walk "bent" already, and bent with the target seen not from where module 1 points but from where it

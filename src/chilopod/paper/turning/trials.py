@@ -42,12 +42,12 @@ RATE = 50.0
 """Samples per second of these trials."""
 
 _PATH_STEP = 2
-"""Of the records' samples, every so many are kept of a path that is drawn."""
+"""Step between the samples of a record that are kept of a path that is drawn."""
 
 
 @dataclass(frozen=True)
 class TurningTask:
-    """What became of a target with many springs.
+    """Outcome of walks to a target with many springs.
 
     Attributes
     ----------
@@ -231,7 +231,7 @@ def springs_by_outcome(criteria: xr.Dataset) -> dict[Outcome, list[float]]:
 
 
 def outcome_words(criteria: xr.Dataset, written: Callable[[list[float]], str]) -> str:
-    """What became of walks to a target, from stiff springs to soft ones."""
+    """Words for the outcomes of walks to a target, from stiff springs to soft ones."""
     found = springs_by_outcome(criteria)
     shown = (Outcome.OUTSIDE, Outcome.ARRIVED, Outcome.INSIDE, Outcome.FAILED)
     return "; ".join(f"{outcome.label} at {written(found[outcome])}" for outcome in shown if found[outcome])
@@ -272,7 +272,7 @@ def arrivals(walks: xr.Dataset) -> tuple[int, int]:
 
 
 def by_leg_yaw(data: xr.Dataset) -> list[LegYaw]:
-    """What :func:`without_leg_yaw` found, by spring."""
+    """Results of :func:`without_leg_yaw`, by spring."""
     found = []
     for case in np.flatnonzero(~data.leg_yaw.values):
         alone, helped = data.isel(case=int(case)), data.isel(case=int(case) + 1)
@@ -282,7 +282,7 @@ def by_leg_yaw(data: xr.Dataset) -> list[LegYaw]:
 
 
 def _last(data: xr.DataArray) -> Array:
-    """Of every robot, what it had before it ended."""
+    """Last value of every robot before it ended."""
     values = data.transpose("robot", "time").values
     return np.array([row[np.isfinite(row)][-1] for row in values])
 

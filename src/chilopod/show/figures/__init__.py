@@ -1,1 +1,1 @@
-"""What is drawn of each study."""
+"""Figures of results."""

@@ -62,7 +62,7 @@ def title(done: Driven) -> str:
 
 
 def _bearing(walk: xr.Dataset) -> NDArray[np.float64]:
-    """Of the target whose turn it is, deg; a line does not cross the picture where it jumps."""
+    """Bearing of the target whose turn it is, deg; a line does not cross the picture where it jumps."""
     place = walk.position.transpose("time", "axis")
     # One that was the target all the time has one place for all times.
     place, target = place.values, walk.target.broadcast_like(place).transpose("time", "axis").values
@@ -127,7 +127,7 @@ def _goals(axes: Axes, walk: xr.Dataset, *, named: bool) -> None:
 
 
 def _missed(walk: xr.Dataset) -> str:
-    """Which targets were not reached, and why, such as "3, 5 out of time"."""
+    """Targets that were not reached, and why, such as "3, 5 out of time"."""
     numbers: dict[str, list[str]] = {}
     for number, verdict in enumerate(walk.goal_verdict.values, 1):
         if verdict not in (_ARRIVED, ""):

@@ -31,12 +31,12 @@ class Aim:
     reached: float | None
 
     def is_reached(self, now: float) -> bool:
-        """Whether it has been, at a time (s)."""
+        """True if it has been, at a time (s)."""
         return self.reached is not None and now >= self.reached - 1e-9
 
 
 def aims_of(record: xr.Dataset) -> tuple[tuple[Aim, ...], ...]:
-    """Of every robot the targets in the order of their turns.
+    """Targets of every robot in the order of their turns.
 
     Parameters
     ----------
@@ -60,12 +60,12 @@ def aims_of(record: xr.Dataset) -> tuple[tuple[Aim, ...], ...]:
 
 
 def places_of(aims: Iterable[Iterable[Aim]]) -> NDArray[np.float64]:
-    """Of all targets of all robots, m, shape (P, 2)."""
+    """Places of all targets of all robots, m, shape (P, 2)."""
     return np.array([aim.place for each in aims for aim in each]).reshape(-1, 2)
 
 
 def _moved(record: xr.Dataset) -> tuple[Aim, ...]:
-    """Of one robot, whose target is over time."""
+    """Aims of one robot, whose target is over time."""
     time, places = record["time"].values, record["target"].isel(robot=0).transpose("time", "axis").values
     edges = [0, *(np.flatnonzero((np.diff(places, axis=0) != 0.0).any(axis=1)) + 1).tolist(), len(time)]
     aims = []

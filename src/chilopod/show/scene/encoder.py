@@ -18,7 +18,7 @@ ENCODER: Final = "libx264"
 
 
 def has_encoder() -> bool:
-    """Whether films can be encoded here."""
+    """True if films can be encoded here."""
     try:
         av.codec.Codec(ENCODER, "w")
     except (av.FFmpegError, av.codec.codec.UnknownCodecError):

@@ -295,7 +295,7 @@ class FilmPanel:
             artist.set_clip_path(axes.patch)
 
     def known(self, now: float) -> tuple[object, ...]:
-        """What :meth:`tell` shows depends on this alone: the outcome, and of each target that has begun its own."""
+        """Key of the content that :meth:`tell` shows: the outcome, and of each target that has begun its own."""
         begun = self.shown.begun(self.robot, now)
         return (bool(now >= self.outcome.time - 1e-9), *(aim.is_reached(now) for aim in begun))
 
@@ -316,7 +316,7 @@ class FilmPanel:
             ring.set_linestyle("-" if arrived else (0, (4, 3)))
 
     def placed(self, index: int) -> Sequence[Any]:
-        """What moves, where it is then."""
+        """Moving objects, placed at a time."""
         frames, robot = self.shown.frames, self.robot
         spine, centres, stands = frames.spine[index, robot], frames.centres[index, robot], frames.stands[index, robot]
         if np.isnan(spine).any():

@@ -124,7 +124,7 @@ def stills(
 
 
 class _Walks:
-    """What a record holds at the samples nearest to some times."""
+    """Samples of a record nearest to some times."""
 
     def __init__(self, record: xr.Dataset, titles: Mapping[Any, str] | Sequence[str], times: Array) -> None:
         if "pose" not in record:
@@ -143,7 +143,7 @@ class _Walks:
         self.last = np.maximum.accumulate(rows, axis=0)
 
     def view(self, size: tuple[int, int], robot: int | None = None, index: int = 0) -> View:
-        """Of everything, or of the surroundings of a robot at a time."""
+        """View of everything, or of the surroundings of a robot at a time."""
         frames, floor = self.shown.frames, self.shown.floor
         if robot is not None:
             around = slice(max(0, index - _CALM), index + _CALM + 1)
@@ -168,7 +168,7 @@ class _Walks:
         return framing(np.concatenate(solid), size[0] / size[1])
 
     def look(self, index: int, robot: int) -> Look:
-        """Of a robot at a time."""
+        """Look of a robot at a time."""
         shown, sample = self.shown, int(self.samples[index])
         last, now = int(self.last[sample, robot]), float(shown.frames.time[index])
         begun = shown.begun(robot, now)
@@ -233,7 +233,7 @@ class _Panel3D(FilmPanel):
         self.index = 0
 
     def placed(self, index: int) -> Sequence[Any]:
-        """What to draw at a time."""
+        """Objects to draw at a time."""
         self.index = index
         return (self,)
 

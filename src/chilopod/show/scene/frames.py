@@ -175,7 +175,7 @@ def _feet(robot: Robot, centres: Array, headings: Array, reach: Array, leg_yaw: 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a robot.
+    """Outcome of a robot's walk.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What is drawn of the three-dimensional robot: the shapes of its MuJoCo model, and its yaw joints, which have none."""
+"""Shapes of the three-dimensional robot: those of its MuJoCo model, and its yaw joints, which have none."""
 
 from __future__ import annotations
 

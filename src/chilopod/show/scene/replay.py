@@ -46,7 +46,7 @@ def replay(record: xr.Dataset, *, titles: Mapping[Any, str] | Sequence[str], hea
 
 
 def _data(shown: Scene) -> dict[str, Any]:
-    """What the script of the page reads; its arrays are little-endian, in base64."""
+    """Data that the script of the page reads; its arrays are little-endian, in base64."""
     frames = shown.frames
     robot, count, n = frames.robot, len(frames.time), frames.robot.body.modules
     # First the spine, then left and right foot of every module.

@@ -91,7 +91,7 @@ def _continued(poses: Array, quaternions: Sequence[int]) -> Array:
 
 
 def _data(shown: Scene, plan: TwinModel, poses: Array) -> dict[str, Any]:
-    """What the script of the page reads; coordinates are little-endian, in base64."""
+    """Data that the script of the page reads; coordinates are little-endian, in base64."""
     origin, step = _scale(shown, poses)
     steps = packed(poses, origin, step)
     pole = plan.model.geom("pole").size
@@ -139,7 +139,7 @@ def _bodies(model: mujoco.MjModel) -> list[dict[str, Any]]:
 
 
 def _shapes(plan: TwinModel) -> list[dict[str, Any]]:
-    """What is drawn of the model: on which body, where there, what it is and how large (half sizes, m)."""
+    """Shapes of the model: body, place, kind and size (half sizes, m) of each."""
     model, feet = plan.model, {int(geom) for geom in plan.feet.ravel()}
     front = int(model.body("module1").id)
     shapes = []

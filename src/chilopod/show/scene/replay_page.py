@@ -1,4 +1,4 @@
-"""What all replays have in common: one HTML page with a panel per robot, and controls to play it."""
+"""Page that all replays have in common: HTML with a panel per robot, and controls to play it."""
 
 from __future__ import annotations
 

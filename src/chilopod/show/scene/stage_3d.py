@@ -81,7 +81,7 @@ def framing(points: ArrayLike, aspect: float) -> View:
 
 @dataclass(frozen=True)
 class Look:
-    """What a picture shows of a robot.
+    """Appearance of a robot in a picture.
 
     Attributes
     ----------

@@ -104,7 +104,7 @@ class Branch(Result):
 
     @property
     def scale(self) -> float:
-        """Of the parameter along the curve: tangents have it in this unit."""
+        """Scale of the parameter along the curve: tangents have it in this unit."""
         return float(self.units[-1])
 
     @property
@@ -352,7 +352,7 @@ def _anchored(
 
 
 def _outward(point: BranchPoint, between: tuple[float, float]) -> bool:
-    """Whether a curve leaves the interval where it is."""
+    """True if a curve leaves the interval where it is."""
     ahead = float(point.tangent[-1])
     return bool((point.value <= between[0] and ahead < 0.0) or (point.value >= between[1] and ahead > 0.0))
 
@@ -416,7 +416,7 @@ def _followed(
 
 
 def _before(point: BranchPoint, closed: Step, step: Step) -> bool:
-    """Whether a special point within a step comes before the place where the curve closes."""
+    """True if a special point within a step comes before the place where the curve closes."""
     start = step.start.last
     assert start.units is not None
     moved = np.append(point.orbit - start.orbit, point.value - start.value) / start.units

@@ -56,7 +56,7 @@ class BranchPoint(ReadOnlyArrays):
 
     @property
     def stable(self) -> bool | None:
-        """Whether all multipliers lie inside the unit circle: True or False by more than the error bound, None where it
+        """True if all multipliers lie inside the unit circle: True or False by more than the error bound, None where it
         leaves that undecided, as at most special points."""
         return stable_within(self.multipliers, self.error_bound)
 

@@ -1,4 +1,4 @@
-"""Whether a curve of periodic orbits has come back to where it started."""
+"""Closing of a curve of periodic orbits where it comes back to its start."""
 
 from __future__ import annotations
 

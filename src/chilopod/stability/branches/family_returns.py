@@ -80,7 +80,7 @@ class FamilyReturns:
         self._dimension = 0
 
     def system(self, value: float) -> SystemLike:
-        """What is studied: over the full period, or as many as the orbits take."""
+        """System under study: over the full period, or as many as the orbits take."""
         return self._systems(value)[1]
 
     def _systems(self, value: float) -> tuple[SystemLike, SystemLike]:
@@ -155,7 +155,7 @@ class FamilyReturns:
         return float(np.abs((turned(system, passing)[0] - image.state) / self.units(x.size)[:-1]).max())
 
     def _flows_each(self, system: SystemLike) -> TypeGuard[FlowsEach]:
-        """Whether a system flows each; asked once for each class, for the answer takes longer than some flows."""
+        """True if a system flows each; asked once for each class, for the answer takes longer than some flows."""
         kind = type(system)
         if kind not in self._each:
             self._each[kind] = isinstance(system, FlowsEach)

@@ -1,4 +1,4 @@
-"""What happens within a step along a curve of periodic orbits.
+"""Events within a step along a curve of periodic orbits.
 
 The return map is looked at in the ends of a step and at nine places in between. Where polynomials of degree eight
 through what vanishes at an event fit, and stay clear of zero or pass it once, nothing else happens; elsewhere the step
@@ -57,7 +57,7 @@ Bracket = tuple[Event, float, float]
 
 @dataclass(frozen=True)
 class Found:
-    """What happens within a step: the special points in order, and a sentence for each thing that could not be made
+    """Events within a step: the special points in order, and a sentence for each thing that could not be made
     out."""
 
     points: tuple[BranchPoint, ...] = ()
@@ -74,7 +74,7 @@ class Within:
 
     @functools.cached_property
     def blocks(self) -> Blocks:
-        """Of the return map along the step, as the orbits' spatial symmetries make them."""
+        """Blocks of the return map along the step, as the orbits' spatial symmetries make them."""
         return blocks_along(self.curve, self.step)
 
     def at(self, place: float) -> Step:
@@ -133,7 +133,7 @@ def inspect(curve: Curve, step: Step, closely: bool) -> Found:
 
 
 def _confirmed(within: Within, place: Place) -> bool:
-    """Whether what passes at a place is on the other side behind it, by more than the errors of the multipliers.
+    """True if what passes at a place is on the other side behind it, by more than the errors of the multipliers.
 
     Where two meet at +1 or -1 and leave along the circle, as without damping, either of them is on any side: that one
     passed is told by the product of their distances. Beside a point where branches meet a multiplier is critical within
@@ -212,7 +212,7 @@ def _places(within: Within, brackets: list[Bracket] | None, turned: bool) -> tup
 
 
 def _placed(within: Within, crossing: Crossing, block: Block | None) -> Place:
-    """What happens where multipliers cross."""
+    """Place where multipliers cross."""
     if crossing.event is not Event.PLUS:
         return Place(crossing, block)
     before, after = within.sides(crossing.value)
@@ -234,7 +234,7 @@ def _fold(within: Within, a: float, b: float) -> Place:
 
 
 def _branches_meet(step: Step) -> bool:
-    """Whether the curve is not the only one through the end of a step."""
+    """True if the curve is not the only one through the end of a step."""
     return bool(np.linalg.svd(step.matrix[:-1], compute_uv=False)[-1] <= _BRANCHING)
 
 
@@ -289,7 +289,7 @@ def _root(within: Within, event: Event, a: float, b: float) -> Crossing | None:
 
 
 def _start_jacobian(within: Within) -> Array:
-    """Of the return map at the start of a step."""
+    """Derivative of the return map at the start of a step."""
     matrix = within.step.start.matrix[:-1, :-1]
     sizes = within.curve.units(len(matrix))[:-1]
     jacobian: Array = (matrix + np.eye(len(matrix))) * sizes[:, None] / sizes
@@ -297,7 +297,7 @@ def _start_jacobian(within: Within) -> Array:
 
 
 def _tests(nu: ComplexArray) -> Array:
-    """What changes its sign at each of the events, shape (places, 3), from multipliers, shape (places, n)."""
+    """Test functions, which change sign at the events, shape (places, 3), from multipliers, shape (places, n)."""
     with np.errstate(all="ignore"):
         return np.stack([factors(nu, event).prod(axis=1).real for event in _EVENTS], axis=1)
 
@@ -331,7 +331,7 @@ def _brackets_from_places(within: Within) -> list[Bracket] | None:
 
 
 def _jacobian_at(within: Within, place: float) -> Array:
-    """Of the return map at a place within a step, on the cubic through its ends where that is close enough."""
+    """Derivative of the return map within a step, on the cubic through its ends where that is close enough."""
     curve, step = within.curve, within.step
     if place == step.size:
         return step.image.jacobian

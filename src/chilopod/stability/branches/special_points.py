@@ -1,4 +1,4 @@
-"""What is known of a special point on a branch: what happens there, and how sure its place is."""
+"""Descriptions of special points on a branch: what happens there, and how sure its place is."""
 
 from __future__ import annotations
 

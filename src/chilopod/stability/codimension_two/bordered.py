@@ -224,7 +224,7 @@ class Equations:
         )
 
     def spot(self, place: Place, frame: Frame, before: Array | None) -> Spot:
-        """What there is to know of a point on the curve, in a frame of its own; its tangent goes the same way as the
+        """Description of a point on the curve, in a frame of its own; its tangent goes the same way as the
         one ``before``."""
         system = self.system(place.values)
         section = frame.section
@@ -385,5 +385,5 @@ def _orthonormal(columns: Array) -> Array:
 
 
 def knows_orbit(system: SystemLike) -> bool:
-    """Whether a system knows its orbit."""
+    """True if a system knows its orbit."""
     return isinstance(system, KnowsOrbit) and system.orbit is not None

@@ -19,7 +19,7 @@ ComplexArray = NDArray[np.complex128]
 
 
 class CodimensionTwo(Labelled):
-    """What happens at a point of codimension two; each member's ``sentence`` says it in words."""
+    """Kind of a point of codimension two; each member's ``sentence`` describes it in words."""
 
     CUSP = "cusp", "two curves of folds meet and vanish: beyond it one orbit is left of three"
     DEGENERATE_PITCHFORK = (
@@ -116,7 +116,7 @@ DEGENERATE = {
     Kind.PERIOD_DOUBLING: CodimensionTwo.GENERALISED_PERIOD_DOUBLING,
     Kind.NEIMARK_SACKER: CodimensionTwo.CHENCINER,
 }
-"""What it is where the coefficient of a curve's normal form vanishes."""
+"""Kind of the point where the coefficient of a curve's normal form vanishes."""
 
 _TOGETHER = {
     frozenset({Kind.FOLD, Kind.PERIOD_DOUBLING}): CodimensionTwo.FOLD_FLIP,
@@ -131,5 +131,5 @@ _TOGETHER = {
 
 
 def together(one: Kind, other: Kind) -> CodimensionTwo:
-    """What it is where two bifurcations happen at once."""
+    """Kind of the point where two bifurcations happen at once."""
     return _TOGETHER.get(frozenset({one, other}), CodimensionTwo.SEVERAL_CRITICAL)

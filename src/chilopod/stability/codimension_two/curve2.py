@@ -1,4 +1,4 @@
-"""What a curve of bifurcation points in two parameters consists of, and why it ends."""
+"""Points of a curve of bifurcation points in two parameters, and why it ends."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class Curve2(Result):
 
     @property
     def values(self) -> Array:
-        """Of both parameters at all points, shape (points, 2)."""
+        """Values of both parameters at all points, shape (points, 2)."""
         return np.array([point.values for point in self.points])
 
     def _lines(self) -> list[str]:

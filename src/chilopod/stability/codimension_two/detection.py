@@ -105,7 +105,7 @@ class Critical(ReadOnlyArrays):
 
 
 def critical(target: int, at: Evaluated, frame: Frame) -> Critical:
-    """Which multipliers are critical at a place of a curve, and which are not."""
+    """Multipliers at a place of a curve, the critical ones apart."""
     spec = spectrum(at.image)
     if target:
         own = [int(np.abs(spec.values - target).argmin())]
@@ -133,7 +133,7 @@ def _without(spec: Spectrum, own: list[int]) -> NDArray[np.intp]:
 
 
 class Detector:
-    """What is looked for along a curve.
+    """Test function that is watched along a curve.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ class Detector:
         )
 
     def sampled(self, own: Critical, at: Evaluated, frame: Frame) -> tuple[ReturnedStates, CriticalOrbit]:
-        """What a normal form at a place is computed from."""
+        """Samples at a place that a normal form is computed from."""
         system, image = self._equations.system(at.place.values), at.image
         orbit = CriticalOrbit(at.place.state, image.jacobian, own.multiplier, own.mode, own.left, image.returns)
         return lambda states: returned_states(system, states, frame.section), orbit
@@ -320,7 +320,7 @@ class Detector:
         return replace(found, next_coefficient=value, next_coefficient_error=error) if np.isfinite(error) else found
 
     def _named(self, signal: Signal, spot: Spot, own: Critical) -> CodimensionTwo | None:
-        """What a zero of a test function is; None where it means nothing."""
+        """Kind of the point at a zero of a test function; None where it means nothing."""
         target = self._equations.target
         if signal is Signal.COEFFICIENT:
             return DEGENERATE.get(self._kind)

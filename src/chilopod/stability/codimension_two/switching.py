@@ -93,7 +93,7 @@ def switch2(
 
 @dataclass(frozen=True)
 class _Unfolding:
-    """What happens beside a degenerate point on a curve.
+    """Unfolding of a degenerate point on a curve.
 
     Attributes
     ----------

@@ -335,7 +335,7 @@ class _Critical:
         return new
 
     def _closes(self, last: Spot, new: Spot, home: Spot) -> bool:
-        """Whether the start of the curve lies within the step from one spot to the next."""
+        """True if the start of the curve lies within the step from one spot to the next."""
         frame = last.frame
         # The same orbit may be met at another instant where the system does not depend on time.
         seen = slice(frame.parameters.start if frame.section is not None else 0, None)

@@ -46,7 +46,7 @@ class Sample(ReadOnlyArrays):
         return nearest.real if nearest.imag == 0.0 else np.nan
 
     def passes(self, other: Sample) -> bool:
-        """Whether the multiplier nearest +1 is on its other side in another sample."""
+        """True if the multiplier nearest +1 is on its other side in another sample."""
         return self.beside_plus_one * other.beside_plus_one < 0.0
 
 

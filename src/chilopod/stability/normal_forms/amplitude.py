@@ -45,7 +45,7 @@ _BETTER = 0.3  # of the error, to go on for
 
 
 class NormalFormStatus(Labelled):
-    """What became of a normal form; each member's ``sentence`` says it in words."""
+    """Status of a normal form; each member's ``sentence`` describes it in words."""
 
     FOUND = "found", "the coefficients hold within their errors"
     LINEAR = "linear", "no nonlinear term was seen along the mode, however large the amplitude"

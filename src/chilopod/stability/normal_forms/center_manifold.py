@@ -67,7 +67,7 @@ class CriticalOrbit(ReadOnlyArrays):
 
     @property
     def real(self) -> bool:
-        """Whether the multiplier is."""
+        """True if the multiplier is."""
         return self.multiplier.imag == 0.0
 
 

@@ -58,7 +58,7 @@ class Series(ReadOnlyArrays):
 
     @property
     def falling(self) -> NDArray[np.bool_]:
-        """Whether the coefficients still fall at their end, shape (entries,): noise would not."""
+        """True if the coefficients still fall at their end, shape (entries,): noise would not."""
         before: Array = np.abs(self.coefficients[-2 * _TAIL : -_TAIL]).max(axis=0)
         return np.asarray(before > _FALL * self.roughness)
 

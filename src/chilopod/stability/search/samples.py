@@ -339,7 +339,7 @@ class Samples:
         return bool((np.abs(middle.orbit - last.orbit - 0.5 * change) <= _HALFWAY * size).all())
 
     def _goes_through(self, left: Sample, right: Sample) -> bool:
-        """Whether one orbit has a multiplier that passes +1 between two samples: then samples come together there.
+        """True if one orbit has a multiplier that passes +1 between two samples: then samples come together there.
 
         Two orbits that pass each other at a distance have multipliers on either side, and none comes together.
         """

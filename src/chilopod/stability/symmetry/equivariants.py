@@ -1,4 +1,4 @@
-"""What can happen where a multiplier becomes critical in a block of a symmetry group.
+"""Bifurcations where a multiplier becomes critical in a block of a symmetry group.
 
 The block says which multipliers are critical together, which terms the normal form has, and at +1 and -1 along which
 lines new orbits branch off: those fixed by an axial isotropy subgroup (equivariant branching lemma; Golubitsky, Stewart
@@ -35,7 +35,7 @@ _MOST_ENTRIES = 2**23
 
 
 class SymmetricKind(Labelled):
-    """What happens in a block; each member's ``sentence`` says it in words."""
+    """Kind of a bifurcation in a block; each member's ``sentence`` describes it in words."""
 
     SYMMETRY_KEPT = (
         "symmetry kept",
@@ -90,7 +90,7 @@ class AxialBranch(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class SymmetricCrossing:
-    """What happens where multipliers in a block cross the unit circle.
+    """Crossing of the unit circle by multipliers in a block.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ class SymmetricCrossing:
 
 
 def symmetric_crossing(block: Block, critical: Event, returns: int = 1) -> SymmetricCrossing:
-    """What happens where an eigenvalue of a block's reduced matrix, simple there, crosses the unit circle.
+    """Crossing of the unit circle by an eigenvalue of a block's reduced matrix, simple there.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ to about 1e-12."""
 
 
 class Type(enum.Enum):
-    """What commutes with an irreducible real representation: real or complex numbers."""
+    """Type of an irreducible real representation: it commutes with real or complex numbers."""
 
     REAL = "real"
     COMPLEX = "complex"
@@ -85,11 +85,11 @@ class Block(ReadOnlyArrays):
 
     @property
     def trivial(self) -> bool:
-        """Whether every element acts as the identity: what happens in this block breaks no symmetry."""
+        """True if every element acts as the identity: what happens in this block breaks no symmetry."""
         return bool(self.kernel.all())
 
     def reduced(self, matrices: ArrayLike) -> Array | ComplexArray:
-        """What is left of matrices that commute with the group.
+        """Reduced form of matrices that commute with the group.
 
         Parameters
         ----------
@@ -276,7 +276,7 @@ def _rank(block: Block) -> tuple[bool, int, int, tuple[float, ...]]:
 
 
 def _verified(group: Group, blocks: Sequence[Block]) -> bool:
-    """Whether the bases are what they should be: together one basis, in which generators and commutants have their
+    """True if the bases are what they should be: together one basis, in which generators and commutants have their
     forms."""
     basis = np.hstack([group.to_orthogonal @ block.basis for block in blocks])
     n = group.dimension

@@ -41,12 +41,12 @@ def symmetric_states(system: SystemLike, state: Array, size: Array, near: float 
 
 @functools.lru_cache(maxsize=8)
 def _elements(generators: bytes, n: int) -> Array:
-    """Of the group that some matrices generate, shape (order, n, n)."""
+    """Elements of the group that some matrices generate, shape (order, n, n)."""
     return finite_group(np.frombuffer(generators).reshape(-1, n, n)).elements
 
 
 def reverses(system: SystemLike, mode: NDArray[np.complex128], size: Array) -> bool:
-    """Whether a spatial symmetry of a system turns a mode, shape (n,), into its negative; ``size`` is of the states."""
+    """True if a spatial symmetry of a system turns a mode, shape (n,), into its negative; ``size`` is of the states."""
     own = np.abs(mode / size).max()
     return any(
         bool((np.abs(matrix @ mode + mode) / size).max() <= _LOOSE * own) for matrix in spatial_symmetries(system)

@@ -1,4 +1,4 @@
-"""What constants are fitted to: what a robot's walks came to, the paper's or one's own."""
+"""Data that constants are fitted to: results of a robot's walks, the paper's or one's own."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class CriticalMode:
-    """What is known of the pitchfork in k1 of a robot: the data that the constants are fitted to.
+    """Pitchfork in k1 of a robot: the data that the constants are fitted to.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class CriticalMode:
 
 @dataclass(frozen=True)
 class BaseSeries:
-    """What is known of a robot's walks with several first springs: the data that the constants are fitted to.
+    """Walks of a robot with several first springs: the data that the constants are fitted to.
 
     All springs are in N*mm/deg.
 
@@ -68,12 +68,12 @@ class BaseSeries:
 
     @property
     def springs(self) -> tuple[float, ...]:
-        """Of all walks that an evaluation runs, rising."""
+        """Springs of all walks that an evaluation runs, rising."""
         return tuple(sorted({*self.curved, *self.straight, *self.radii, *self.speeds}))
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What each of the :func:`residuals` is of."""
+        """Name of each of the :func:`residuals`."""
         return (
             *(f"radius at {spring:g}" for spring in self.radii),
             *(f"speed at {spring:g}" for spring in self.speeds),

@@ -8,7 +8,7 @@ from typing import Any
 
 
 def known_fits() -> list[dict[str, Any]]:
-    """What ``twin_fits.json`` holds, best first: ``constants`` (SI, by path), ``bends_rad``, ``residuals`` of each."""
+    """Fits in ``twin_fits.json``, best first: ``constants`` (SI, by path), ``bends_rad``, ``residuals`` of each."""
     found: list[dict[str, Any]] = json.loads(
         files("chilopod.tasks.identify").joinpath("twin_fits.json").read_text(encoding="utf-8")
     )["fits"]

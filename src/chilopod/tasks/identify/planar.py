@@ -41,7 +41,7 @@ _NO_PITCHFORK = 100.0
 
 @dataclass(frozen=True)
 class Identification(Short):
-    """What the data say about the constants.
+    """Result of an identification of the planar constants.
 
     Attributes
     ----------
@@ -231,7 +231,7 @@ def _profile(
 
 
 def _predictions(robot: Robot, variants: Mapping[str, Sequence[str]]) -> dict[str, float | str]:
-    """What a set of constants says about numbers that were not fitted."""
+    """Predictions of a set of constants for numbers that were not fitted."""
 
     def critical(setting: Sequence[str]) -> float:
         try:

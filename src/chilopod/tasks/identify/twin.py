@@ -88,7 +88,7 @@ class Fit:
 
     @property
     def objective(self) -> float:
-        """What the search makes small: sum of the squared residuals, and of the constants' distances from the middle of
+        """Objective of the search: sum of the squared residuals, and of the constants' distances from the middle of
         their ranges over a quarter of them."""
         return float(np.sum(self.residuals**2) + np.sum(((parts_of(self.constants) - 0.5) / _PRIOR) ** 2))
 
@@ -106,7 +106,7 @@ class Fit:
 
 @dataclass(frozen=True)
 class TwinIdentification(Short):
-    """What a search found.
+    """Result of a search for the constants of the twin.
 
     Attributes
     ----------
@@ -337,7 +337,7 @@ def known() -> list[Fit]:
 
 
 def confirmed(robot: Robot, data: BaseSeries) -> bool:
-    """Whether walks from straight on end where evaluations begin near: at the stiffest spring that curves most of them
+    """True if walks from straight on end where evaluations begin near: at the stiffest spring that curves most of them
     in a curve, to both sides, and at the softest that does not most of them straight."""
     curves, stays = max(data.curved), min(data.straight)
     asked = [

@@ -36,7 +36,7 @@ _PER_CYCLE = 10  # samples
 
 @dataclass(frozen=True)
 class Series:
-    """What the walks of a series come to.
+    """Measures of the walks of a series.
 
     Attributes
     ----------

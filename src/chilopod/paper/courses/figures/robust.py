@@ -61,7 +61,7 @@ def whole(conditions: xr.Dataset) -> Panel:
 
 
 def _said(data: xr.Dataset) -> str:
-    """What the intervals decide of every condition."""
+    """Decisions of the intervals on every condition."""
     ours = data.sel(strategy=VARIABLE.name)
     usual = share_of_targets(ours.sel(condition=USUAL).arrived)
     worse, better = [], []

@@ -1,4 +1,4 @@
-"""What of the whole robot's walks hangs on how long they last."""
+"""Dependence of the whole robot's results on the duration of its walks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What else the robot could be made of, and what each such robot predicts."""
+"""Other structures of the robot, and what each of them predicts."""
 
 from __future__ import annotations
 

@@ -125,7 +125,7 @@ def different(found: RobotWalks) -> Panel:
 
 
 def _variants(found: RobotWalks) -> dict[str, tuple[str, xr.Dataset]]:
-    """Of every variant and reading of it, by what they are called here: the paper's name, and the trials."""
+    """Variants and their readings by the names of this module: the paper's name, and the trials."""
     named: dict[str, tuple[str, xr.Dataset]] = {}
     for name, data in found.variants.items():
         named[name] = (name, data)

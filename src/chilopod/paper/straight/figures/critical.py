@@ -20,7 +20,7 @@ _SERIES = (("planar model, computed", style.BLUE, "o", "full"), ("robot, paper",
 
 
 def variants(data: xr.Dataset) -> Panel:
-    """Of the paper's variants."""
+    """Panel of the paper's variants."""
     model, robot = data.critical_k1.values, data.robot_printed.values
     names = [typeset(str(name)) for name in data.variant.values[1:]]
     changes = 100.0 * (data.critical_k1.values / model[0] - 1.0), 100.0 * (robot / robot[0] - 1.0)
@@ -59,7 +59,7 @@ def variants(data: xr.Dataset) -> Panel:
 
 
 def modules(data: xr.Dataset, robot: Robot) -> Panel:
-    """Of longer and shorter robots."""
+    """Panel of longer and shorter robots."""
     counts, values, says = data.modules.values, data.critical_k1.values, data.says.values
     found = ~np.isnan(values)
     sub = [int(count) for count, word in zip(counts, says, strict=True) if word == "subcritical"]

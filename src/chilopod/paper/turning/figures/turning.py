@@ -78,7 +78,7 @@ def turning(found: Turning) -> Panel:
 
 
 def became(task: TurningTask) -> str:
-    """What became of most walks with each spring that is shown."""
+    """Outcome of most walks with each spring that is shown."""
     by_outcome = springs_by_outcome(task.criteria).items()
     shown = [float(each) for each in task.paths.shown.values]
     return listing(f"most {what.label} with {spring(k, 2)}" for k in shown for what, those in by_outcome if k in those)
