@@ -55,10 +55,16 @@ def live(running):
         raise running.failure
 
 
-@pytest.fixture
-def opened(chromium, live):
-    with visit(chromium, live) as page:
+@pytest.fixture(scope="module")
+def page(chromium, running):
+    with visit(chromium, running) as page:
         yield page
+
+
+@pytest.fixture
+def opened(page, live):
+    """One page for all tests, as a user would have it."""
+    return page
 
 
 @contextmanager
@@ -92,6 +98,26 @@ def read(page, words):
 
 def walked(page):
     return int(re.search(r"(\d+) s, seed", page.locator("body").inner_text())[1])
+
+
+def test_two_browsers_a_reload_and_a_close(chromium, live):
+    """The first test, since it stands while nobody looks: the other tests leave their page open."""
+    with visit(chromium, live) as one, visit(chromium, live) as other:
+        read(one, READY)
+        type_into(one, "first spring", "30")
+        read(other, "its first spring, 30 N")
+        before = walked(other)
+        other.reload()
+        read(other, "its first spring, 30 N")
+        assert walked(other) >= before
+    time.sleep(1.0)
+    stood, frames = live.seen.time, live.frames
+    time.sleep(1.0)
+    assert live.seen.time == stood  # while nobody looks
+    assert live.frames == frames
+    with visit(chromium, live) as again:
+        read(again, "its first spring, 30 N")
+        assert walked(again) >= int(stood)
 
 
 def test_a_spring_below_the_pitchfork_bends_it_to_the_radius_of_the_branch(opened):
@@ -151,7 +177,9 @@ def test_keys_do_what_controls_do(opened, live):
     refused = live.gate.refused
     opened.locator("body").press("h")
     read(opened, "first spring softer, stiffer")
-    opened.keyboard.press("Escape")
+    opened.locator("body").press("h")
+    opened.get_by_text("first spring softer, stiffer").wait_for(state="hidden")
+    opened.get_by_text("first spring softer, stiffer").wait_for(state="hidden")
     opened.locator("body").press("z")
     read(opened, r"its first spring, 37\.3 N")
     opened.locator("body").press("Space")
@@ -170,25 +198,6 @@ def test_nonsense_in_a_field_is_refused_in_a_line(opened):
     type_into(opened, "seed", "-4")
     time.sleep(1.0)
     read(opened, READY)
-
-
-def test_two_browsers_a_reload_and_a_close(chromium, live):
-    with visit(chromium, live) as one, visit(chromium, live) as other:
-        read(one, READY)
-        type_into(one, "first spring", "30")
-        read(other, "its first spring, 30 N")
-        before = walked(other)
-        other.reload()
-        read(other, "its first spring, 30 N")
-        assert walked(other) >= before
-    time.sleep(1.0)
-    stood, frames = live.seen.time, live.frames
-    time.sleep(1.0)
-    assert live.seen.time == stood  # while nobody looks
-    assert live.frames == frames
-    with visit(chromium, live) as again:
-        read(again, "its first spring, 30 N")
-        assert walked(again) >= int(stood)
 
 
 def test_who_does_not_read_holds_up_nobody(opened, live):

@@ -251,12 +251,13 @@ class Controls:
         self._strategy.value = names[(names.index(self._strategy.value) + 1) % len(names)]
 
     async def _help(self, event: viser.CommandEvent) -> None:
-        """Show the keys to whoever asked; nobody says that an earlier window was closed by Escape."""
+        """Show the keys to the browser that asked, or hide them; Escape does not reach viser's windows."""
         if event.client is None:
             return
         before = self._helped.pop(event.client, None)
         if before is not None and not before.closed:
             before.close()
+            return
         gui = event.client.gui
         with gui.add_modal("Keys") as modal:
             gui.add_markdown(HELP)
