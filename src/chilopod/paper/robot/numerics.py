@@ -42,7 +42,7 @@ def twin_numerics(robot: Robot, size: Size = Size.FULL, progress: Progress = sil
     """
     radii, speeds, onsets = [], [], []
     cases = CASES if size is Size.FULL else dict(list(CASES.items())[:2])
-    springs, duration = size.cut((SPRINGS, DURATION), (SPRINGS[::2], 18.0))
+    springs, duration = size.cut((SPRINGS, DURATION), (SPRINGS[::2], 10.0))
     for index, (name, (step, tolerance)) in enumerate(cases.items()):
         progress(index / len(cases), name)
         finer = robot.with_value("twin.timestep", step)

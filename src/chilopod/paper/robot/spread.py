@@ -116,7 +116,7 @@ def predictions(
         if variant.gait.stride != robot.gait.stride:
             variants[f"{name}{LOWER}"] = lower_steps(robot, variant)
     springs, uniform_springs = size.cut((SPRINGS, UNIFORM_SPRINGS), (SPRINGS[1::4], UNIFORM_SPRINGS[::3]))
-    longest, swinging = size.cut((_DURATION, UNIFORM_DURATION), (16.0, 12.0))
+    longest, swinging = size.cut((_DURATION, UNIFORM_DURATION), (10.0, 8.0))
     series = {}
     for name, variant in variants.items():
         duration = longest * robot.gait.stride / variant.gait.stride

@@ -179,7 +179,7 @@ def structures(
     by the nearer of its two readings.
     """
     data = base_series_data()
-    tried, rounds, duration = size.cut((STRUCTURES, _ROUNDS, DURATION), (STRUCTURES[:1], 0, 18.0))
+    tried, rounds, duration = size.cut((STRUCTURES, _ROUNDS, DURATION), (STRUCTURES[:1], 0, 10.0))
     law = _law(robot, data, part(progress, 0.0, 0.1)) if rounds else np.empty(0)
     rows: list[Mapping[str, Any]] = []
     for index, each in enumerate(tried):

@@ -113,7 +113,7 @@ def robot_walks(
     repeats, fewer, fewest = size.of((REPEATS, VARIANT_REPEATS, UNIFORM_REPEATS), (2, 1, 1), (1, 1, 1))
     springs = size.of(VARIANT_SPRINGS, VARIANT_SPRINGS[1::2], VARIANT_SPRINGS[1::4])
     uniform_springs = size.of(UNIFORM_SPRINGS, UNIFORM_SPRINGS[:4], UNIFORM_SPRINGS[:4:2])
-    duration, swinging = size.cut((DURATION, UNIFORM_DURATION), (21.0, 12.0))
+    duration, swinging = size.cut((DURATION, UNIFORM_DURATION), (12.0, 8.0))
     told = part(progress, 0.0, 0.31, "as built")
     records = walk_records(robot, SPRINGS, repeats, duration=duration, folder=folder, progress=told)
     base, durations = walk_ends(records, robot, SPRINGS), by_duration(records, robot, SPRINGS)

@@ -211,7 +211,7 @@ def onset(robot: Robot, folder: str | Path | None = None, size: Size = Size.FULL
     If not full, without the second fit.
     """
     springs = size.of(SPRINGS, SPRINGS[::2], SPRINGS[::3])
-    duration = size.cut(_WALK, 3.0)
+    duration = size.cut(_WALK, 2.5)
     bends = _bends(robot, springs, duration, folder)
     if bends[-1] > 0.0:
         return float("inf")
