@@ -9,7 +9,18 @@ import xarray as xr
 from chilopod import load_robot
 from chilopod.engine import Command, Event
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.steering import ON_COURSES, VARIABLE, LegYawController, Verdict, course_named, decisions
+from chilopod.gym.policies import BASELINES
+from chilopod.steering import (
+    ON_COURSES,
+    ON_THE_WAY,
+    STRATEGIES,
+    VARIABLE,
+    LegYawController,
+    Strategy,
+    Verdict,
+    course_named,
+    decisions,
+)
 from chilopod.tasks import Driver, drive, driver
 from chilopod.tasks.course import patience_of, trial_of
 from chilopod.trials import run
@@ -123,7 +134,7 @@ def test_the_law_uses_the_actuator_that_there_is(ready, monkeypatch):
             "no pitchfork.*narrower.* or the strategy leg-yaw",
         ),
         (["legs.half_width=0.3 m"], "actuated", None, AnalysisError, "no pitchfork"),
-        ([], "pitchfork", None, ParameterError, "say which"),
+        ([], "pitchfork", None, ParameterError, "strategy pitchfork needs one stiffness"),
         ([], "variable", 0.3, ParameterError, "no spring to choose"),
     ],
 )
@@ -149,6 +160,38 @@ def test_a_driver_walks_in_its_own_engine_only():
     assert (refused.value.field, refused.value.value, refused.value.allowed) == ("engine", "planar", "twin")
     assert trial_of(ready, NEAR).engine == "twin"
     assert driver(ROBOT, ON_COURSES["leg-yaw"]).engine == "planar"
+
+
+@dataclass(frozen=True)
+class Once(Strategy):
+    """Strategy of a user: the spring of the tightest circle, and legs that yaw half as far."""
+
+    needs_law = True
+
+    def fitted(self, robot, spring=None):
+        return robot.with_value("springs.stiffness[1]", 0.8 * robot.springs.stiffness[1]), ("a softer second spring",)
+
+    def controller(self, robot, law):
+        return LegYawController(limit=0.5 * LegYawController().limit), (f"circles of {law.tightest:.1f} m",)
+
+
+def test_a_strategy_of_ones_own_is_a_class(ready):
+    mine = driver(ROBOT, Once("mine", "softer behind"), law=ready.law)
+    assert mine.remarks == ("a softer second spring", f"circles of {ready.law.tightest:.1f} m")
+    (record,) = drive(mine, NEAR).records
+    assert 0.0 < np.abs(record.leg_yaw).max() <= 0.5 * LegYawController().limit
+    with pytest.raises(ParameterError, match="strategy mine needs the robot's radius law"):
+        mine.strategy.prepare(ROBOT)
+    own = mine.strategy.prepare(ROBOT, controller=LegYawController())
+    assert own.controller == LegYawController()
+    assert own.robot.springs.stiffness[1] < ROBOT.springs.stiffness[1]
+
+
+def test_who_knows_which_strategies():
+    assert list(STRATEGIES) == ["pitchfork", "hopf", "leg-yaw", "open-loop"]
+    assert list(ON_COURSES) == ["variable", "pitchfork", "hopf", "leg-yaw", "actuated"]
+    assert list(ON_THE_WAY) == ["variable", "leg-yaw", "actuated"]
+    assert list(BASELINES) == ["variable", "leg-yaw"]
 
 
 def test_leg_yaw_needs_no_pitchfork():

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 
 def _strategies() -> list[str]:
-    from chilopod.live.state import STRATEGIES_HERE
+    from chilopod.steering import ON_THE_WAY
 
-    return [each.name for each in STRATEGIES_HERE]
+    return list(ON_THE_WAY)
 
 
 def live(

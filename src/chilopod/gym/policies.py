@@ -9,17 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.engine import Controller, event_times
-from chilopod.errors import ParameterError, nearest_name
 from chilopod.gym.episodes import Episodes
-from chilopod.steering import ON_COURSES, VARIABLE, steered
-from chilopod.tasks.course import driver
+from chilopod.steering import ON_THE_WAY, strategy_named
+from chilopod.tasks.radius_law import radius_law
 
 Row = NDArray[np.float32]
 
 Policy = Callable[[Row], Row]
 """From the observation of a robot, or one a robot, to its action."""
 
-BASELINES = ("leg-yaw", VARIABLE.name)
+BASELINES = {name: each for name, each in ON_THE_WAY.items() if not each.needs_torque}
 """Strategies that steer with what actions set."""
 
 
@@ -79,18 +78,8 @@ def baseline(name: str, episodes: Episodes, engine: str = "planar") -> Steered:
     AnalysisError
         If the robot has no radius law, and the strategy stands on it.
     """
-    if name not in BASELINES:
-        raise ParameterError(
-            "there is no such baseline",
-            field="baseline",
-            value=name,
-            allowed=", ".join(BASELINES),
-            nearest=nearest_name(name, BASELINES),
-        )
-    strategy = ON_COURSES[name]
-    if strategy is VARIABLE:
-        controller = driver(episodes.robot, strategy, engine=engine).controller
-    else:
-        _, controller = steered(episodes.robot, strategy, None)
+    strategy = strategy_named(name, BASELINES)
+    law = radius_law(episodes.robot, engine) if strategy.needs_law else None
+    controller = strategy.prepare(episodes.robot, law).controller
     assert controller is not None  # both steer
     return Steered(controller, episodes)

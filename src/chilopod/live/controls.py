@@ -15,7 +15,8 @@ from chilopod import units
 from chilopod.analysis.parameters import PAPER_UNIT, stiffness
 from chilopod.live import wishes
 from chilopod.live.session import Session
-from chilopod.live.state import FRICTIONS, SPEEDS, STRATEGIES_HERE, STRIDES, Seen, Settings
+from chilopod.live.state import FRICTIONS, SPEEDS, STRIDES, Seen, Settings
+from chilopod.steering import ON_THE_WAY
 from chilopod.steering.target import FARTHEST
 
 _SOFTEST, _STIFFEST = 0.05, 1.5  # of the stiffest spring of the file
@@ -163,7 +164,7 @@ class Controls:
         with gui.add_folder("Target", expand_by_default=False):
             self._strategy: Any = gui.add_dropdown(
                 "strategy",
-                [each.name for each in STRATEGIES_HERE],
+                list(ON_THE_WAY),
                 initial_value=self._settings.strategy,
                 hint="How it goes there.",
             )

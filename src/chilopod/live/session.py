@@ -17,21 +17,27 @@ from chilopod.errors import ChilopodError, ParameterError
 from chilopod.live import wishes
 from chilopod.live.state import (
     FRICTIONS,
-    LEG_YAW,
     SPEEDS,
     STRIDES,
     Seen,
     Settings,
     as_finite,
     as_seed,
-    as_strategy,
     as_within,
 )
 from chilopod.record import Recording
 from chilopod.robot import Robot
-from chilopod.steering import ARRIVAL_RADIUS, VARIABLE, ActuatedAxis, LegYawController, RadiusLaw, SpringLaw
+from chilopod.steering import (
+    ARRIVAL_RADIUS,
+    LEG_YAW,
+    ON_THE_WAY,
+    VARIABLE,
+    ActuatedAxis,
+    RadiusLaw,
+    SpringLaw,
+    strategy_named,
+)
 from chilopod.steering.target import FARTHEST
-from chilopod.tasks.course import driver
 from chilopod.trials import Disturbance
 
 Array = NDArray[np.float64]
@@ -69,7 +75,7 @@ class Session:
     seed
         Seed of start and nudges.
     strategy
-        Name of one of :data:`STRATEGIES_HERE`.
+        Name of one of :data:`chilopod.steering.ON_THE_WAY`.
 
     Raises
     ------
@@ -84,7 +90,14 @@ class Session:
         self._file = robot.override("springs.adjustable", True)
         self._engine.common(self._file)
         self._settings = Settings(
-            self._file, 1.0, robot.gait.stride, as_strategy(strategy).name, _SPEED, False, as_seed(seed), False
+            self._file,
+            1.0,
+            robot.gait.stride,
+            strategy_named(strategy, ON_THE_WAY).name,
+            _SPEED,
+            False,
+            as_seed(seed),
+            False,
         )
         self.law: RadiusLaw | None = None
         self._records: list[xr.Dataset] = []
@@ -309,7 +322,7 @@ class Session:
             case wishes.Target(place):
                 self._aim(place)
             case wishes.Steering(strategy):
-                self._settings = replace(self._settings, strategy=as_strategy(strategy).name)
+                self._settings = replace(self._settings, strategy=strategy_named(strategy, ON_THE_WAY).name)
                 if self._target is not None:
                     self._aim(self._target)
             case wishes.Pull(joint, torque, time):
@@ -360,17 +373,11 @@ class Session:
             return
         x, y = (as_finite("target", each) for each in place)
         as_within("target", math.hypot(x, y), (0.0, FARTHEST), "m from where the walk began")
-        strategy = as_strategy(self._settings.strategy)
-        controller: Controller | None = LegYawController()
-        steering = LEG_YAW.name
-        if strategy is not LEG_YAW:
-            if self.law is None:
-                self._said.append(
-                    f"how tightly it turns is not known (yet), so leg yaw alone steers, not {strategy.name}"
-                )
-            else:
-                controller = driver(self._settings.robot, strategy, engine=self._engine_name, law=self.law).controller
-                steering = strategy.name
+        strategy = ON_THE_WAY[self._settings.strategy]
+        if strategy.needs_law and self.law is None:
+            self._said.append(f"how tightly it turns is not known (yet), so leg yaw alone steers, not {strategy.name}")
+            strategy = LEG_YAW
+        controller, steering = strategy.prepare(self._settings.robot, self.law).controller, strategy.name
         if self._target is not None:
             self._let_go()
         self._target, self._controller, self._steering = (x, y), controller, steering

@@ -12,14 +12,8 @@ from chilopod.engine import Status
 from chilopod.errors import ParameterError
 from chilopod.live.wishes import LARGEST_SEED
 from chilopod.robot import Robot
-from chilopod.steering import ACTUATED, STRATEGIES, VARIABLE, Strategy, strategy_named
 
 Array = NDArray[np.float64]
-
-LEG_YAW = STRATEGIES["leg-yaw"]
-
-STRATEGIES_HERE = (VARIABLE, LEG_YAW, ACTUATED)
-"""How a target is walked to. (The others are leg-yaw with a spring that is chosen before: here by hand.)"""
 
 SPEEDS = (1.0, 20.0)
 """Slowest and fastest, times real time."""
@@ -110,17 +104,6 @@ class Settings:
     paused: bool
     seed: int
     recording: bool
-
-
-def as_strategy(name: str) -> Strategy:
-    """One of :data:`STRATEGIES_HERE`.
-
-    Raises
-    ------
-    ParameterError
-        If there is none of this name.
-    """
-    return strategy_named(name, {each.name: each for each in STRATEGIES_HERE})
 
 
 def as_seed(seed: object) -> int:

@@ -10,14 +10,24 @@ from chilopod.steering.radius_law import RadiusLaw
 from chilopod.steering.referee import CourseReferee, Judged, Verdict, decisions
 from chilopod.steering.shortest import shortest_path
 from chilopod.steering.spring_law import SpringLaw
-from chilopod.steering.strategies import ACTUATED, ON_COURSES, STRATEGIES, VARIABLE, Strategy, steered, strategy_named
+from chilopod.steering.strategies import (
+    LEG_YAW,
+    ON_COURSES,
+    ON_THE_WAY,
+    STRATEGIES,
+    VARIABLE,
+    Prepared,
+    Strategy,
+    strategy_named,
+)
 from chilopod.steering.target import ARRIVAL_RADIUS, Target
 
 __all__ = [
-    "ACTUATED",
     "ARRIVAL_RADIUS",
     "COURSES",
+    "LEG_YAW",
     "ON_COURSES",
+    "ON_THE_WAY",
     "STRATEGIES",
     "VARIABLE",
     "ActuatedAxis",
@@ -28,6 +38,7 @@ __all__ = [
     "Judged",
     "LegYawController",
     "Outcome",
+    "Prepared",
     "RadiusLaw",
     "SpringLaw",
     "Strategy",
@@ -41,6 +52,5 @@ __all__ = [
     "of_course",
     "random_course",
     "shortest_path",
-    "steered",
     "strategy_named",
 ]

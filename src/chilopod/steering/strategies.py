@@ -1,69 +1,189 @@
-"""The strategies that are compared: which springs, and whether the legs of module 1 help."""
+"""Strategies: the ways to make a robot turn. A new one is a class with :meth:`Strategy.prepare` and a line of _ALL."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import ClassVar, Final, NamedTuple
 
+from chilopod.engine import Controller
 from chilopod.errors import ParameterError, nearest_name
 from chilopod.robot import Robot
+from chilopod.steering.actuated import ActuatedAxis
 from chilopod.steering.leg_yaw import LegYawController
+from chilopod.steering.radius_law import RadiusLaw
+from chilopod.steering.spring_law import SpringLaw
+
+
+class Prepared(NamedTuple):
+    """Robot that is ready to walk with a strategy.
+
+    Attributes
+    ----------
+    robot
+        Robot with the strategy's springs and actuators.
+    controller
+        Controller of the walk; None without one.
+    remarks
+        Remarks on both, a sentence each.
+    """
+
+    robot: Robot
+    controller: Controller | None
+    remarks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Strategy:
-    """How a robot is made to turn.
+    """Way to make a robot turn: here with springs that stay as they are during the walk.
 
     Attributes
     ----------
     name
-        As it is typed.
+        Name as it is typed.
     sentence
         Description of the strategy in a sentence.
     springs
-        The parameter it chooses: the dotted path of one spring or of all; None leaves the springs alone.
+        Dotted path of the spring, or of all springs, that is chosen before the walk; None if there is none to choose.
     leg_yaw
         True if the legs of module 1 yaw towards the target.
     """
 
     name: str
     sentence: str
-    springs: str | None
-    leg_yaw: bool
+    springs: str | None = None
+    leg_yaw: bool = True
+
+    needs_law: ClassVar[bool] = False
+    """True if the controller needs the robot's radius law."""
+
+    needs_torque: ClassVar[bool] = False
+    """True if the controller commands torques of the joints."""
+
+    def check(self, spring: float | None) -> None:
+        """Refuse a spring that the strategy does not choose, and the lack of one that it does.
+
+        Raises
+        ------
+        ParameterError
+            If the spring does not go with the strategy.
+        """
+        if self.springs is not None and spring is None:
+            raise ParameterError(f"strategy {self.name} needs one stiffness", field="k1", allowed="a stiffness")
+        if self.springs is None and spring is not None:
+            raise ParameterError(f"strategy {self.name} has no spring to choose", field="k1", value=spring)
+
+    def fitted(self, robot: Robot, spring: float | None = None) -> tuple[Robot, tuple[str, ...]]:
+        """Robot with the strategy's springs and actuators, and remarks on it."""
+        self.check(spring)
+        return (robot if self.springs is None or spring is None else robot.with_value(self.springs, spring)), ()
+
+    def controller(self, robot: Robot, law: RadiusLaw | None) -> tuple[Controller | None, tuple[str, ...]]:
+        """Controller of a robot that was :meth:`fitted`, and remarks on it."""
+        return LegYawController() if self.leg_yaw else None, ()
+
+    def prepare(
+        self,
+        robot: Robot,
+        law: RadiusLaw | None = None,
+        spring: float | None = None,
+        controller: Controller | None = None,
+    ) -> Prepared:
+        """Make a robot ready to walk.
+
+        Parameters
+        ----------
+        robot
+            The robot.
+        law
+            Radius law of the robot, for strategies with ``needs_law``.
+        spring
+            Stiffness for strategies with ``springs``, N*m/rad.
+        controller
+            Controller in place of the strategy's, which then needs no law.
+
+        Raises
+        ------
+        ParameterError
+            If spring, law or actuators do not go with the strategy.
+        """
+        walker, remarks = self.fitted(robot, spring)
+        if controller is not None:
+            return Prepared(walker, controller, remarks)
+        if self.needs_law and law is None:
+            raise ParameterError(f"strategy {self.name} needs the robot's radius law", field="law", value=None)
+        own, more = self.controller(walker, law)
+        return Prepared(walker, own, (*remarks, *more))
 
 
-STRATEGIES: Mapping[str, Strategy] = {
-    each.name: each
-    for each in (
-        Strategy(
-            "pitchfork", "a soft first spring bends the walk, leg yaw chooses the side", "springs.stiffness[0]", True
-        ),
-        Strategy(
-            "hopf", "springs all alike and soft make the walk undulate, leg yaw turns it", "springs.stiffness", True
-        ),
-        Strategy("leg-yaw", "the springs stay as they are, leg yaw alone turns the robot", None, True),
-        Strategy(
-            "open-loop", "a soft first spring bends the walk, to whichever side it falls", "springs.stiffness[0]", False
-        ),
-    )
-}
-"""For one turn, by name."""
+@dataclass(frozen=True)
+class SpringOnTheWay(Strategy):
+    """Strategy that sets the first spring during the walk, by the circle to the target."""
 
-VARIABLE: Final = Strategy(
-    "variable",
-    "the first spring is set anew in every gait cycle, leg yaw chooses the side",
-    "springs.stiffness[0]",
-    True,
+    needs_law = True
+
+    def fitted(self, robot: Robot, spring: float | None = None) -> tuple[Robot, tuple[str, ...]]:
+        """Robot with an actuator at its first spring; an ideal one if the robot file names none."""
+        self.check(spring)
+        adjustable = robot.springs.adjustable
+        if adjustable is None:
+            said = "the robot file names no actuator: the first spring is taken to change as fast as it is told to"
+            return robot.override("springs.adjustable[0]", True), (said,)
+        if not adjustable[0]:
+            raise ParameterError(
+                f"the first spring has no actuator, and the strategy {self.name} sets it on the way",
+                field="springs.adjustable[0]",
+                value=False,
+                allowed="true",
+            )
+        return robot, ()
+
+    def controller(self, robot: Robot, law: RadiusLaw | None) -> tuple[Controller | None, tuple[str, ...]]:
+        """Law of the first spring."""
+        assert law is not None
+        own = SpringLaw.of(robot, law)
+        return own, tuple(own.remarks(law))
+
+
+@dataclass(frozen=True)
+class TorqueOnTheWay(Strategy):
+    """Strategy that bends the axis into the circle to the target by torques at all joints."""
+
+    needs_law = True
+    needs_torque = True
+
+    def controller(self, robot: Robot, law: RadiusLaw | None) -> tuple[Controller | None, tuple[str, ...]]:
+        """Driven axis."""
+        assert law is not None
+        return ActuatedAxis.of(robot, law), ()
+
+
+VARIABLE: Final = SpringOnTheWay(
+    "variable", "the first spring is set anew in every gait cycle, leg yaw chooses the side"
 )
-ACTUATED: Final = Strategy(
-    "actuated", "torques at all joints bend the body axis into the circle to the target, with leg yaw", None, True
+LEG_YAW: Final = Strategy("leg-yaw", "the springs stay as they are, leg yaw alone turns the robot")
+ACTUATED: Final = TorqueOnTheWay(
+    "actuated", "torques at all joints bend the body axis into the circle to the target, with leg yaw"
+)
+_ALL = (
+    VARIABLE,
+    Strategy("pitchfork", "a soft first spring bends the walk, leg yaw chooses the side", "springs.stiffness[0]"),
+    Strategy("hopf", "springs all alike and soft make the walk undulate, leg yaw turns it", "springs.stiffness"),
+    LEG_YAW,
+    Strategy(
+        "open-loop", "a soft first spring bends the walk, to whichever side it falls", "springs.stiffness[0]", False
+    ),
+    ACTUATED,
 )
 
-ON_COURSES: Mapping[str, Strategy] = {
-    each.name: each for each in (VARIABLE, STRATEGIES["pitchfork"], STRATEGIES["hopf"], STRATEGIES["leg-yaw"], ACTUATED)
-}
-"""For courses, by name."""
+STRATEGIES: Mapping[str, Strategy] = {each.name: each for each in _ALL if not each.needs_law}
+"""Strategies for one turn, by name."""
+
+ON_COURSES: Mapping[str, Strategy] = {each.name: each for each in _ALL if each.leg_yaw}
+"""Strategies for courses, by name."""
+
+ON_THE_WAY: Mapping[str, Strategy] = {each.name: each for each in ON_COURSES.values() if each.springs is None}
+"""Strategies for courses without a spring to choose before the walk, by name."""
 
 
 def strategy_named(name: str, among: Mapping[str, Strategy] = STRATEGIES) -> Strategy:
@@ -83,10 +203,3 @@ def strategy_named(name: str, among: Mapping[str, Strategy] = STRATEGIES) -> Str
             nearest=nearest_name(name, among),
         )
     return among[name]
-
-
-def steered(robot: Robot, strategy: Strategy, stiffness: float | None) -> tuple[Robot, LegYawController | None]:
-    """The robot with the strategy's spring (N*m/rad; None leaves it), and its controller."""
-    if strategy.springs is not None and stiffness is not None:
-        robot = robot.with_value(strategy.springs, stiffness)
-    return robot, LegYawController() if strategy.leg_yaw else None

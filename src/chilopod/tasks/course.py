@@ -19,16 +19,11 @@ from chilopod.notebook import block, table, words
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import (
-    ACTUATED,
-    VARIABLE,
-    ActuatedAxis,
     Course,
     RadiusLaw,
-    SpringLaw,
     Strategy,
     Verdict,
     random_course,
-    steered,
 )
 from chilopod.tasks.radius_law import radius_law
 from chilopod.tasks.shown import paths
@@ -244,36 +239,19 @@ def driver(
     AnalysisError
         If the strategy stands on the pitchfork and the robot has none.
     """
-    chooses = strategy.springs is not None and strategy is not VARIABLE
-    if chooses and spring is None:
-        raise ParameterError(
-            f"the strategy {strategy.name} walks with one spring: say which", field="k1", allowed="a stiffness"
-        )
-    if spring is not None and not chooses:
-        raise ParameterError(f"the strategy {strategy.name} has no spring to choose", field="k1", value=spring)
-    remarks: list[str] = []
-    walker = _with_actuator(robot, remarks) if strategy is VARIABLE else robot
+    strategy.fitted(robot, spring)  # refuses before the law takes its time
+    unknown: tuple[str, ...] = ()
     try:
         law = law or radius_law(robot, engine, folder, progress)
     except AnalysisError as error:
-        if strategy in (VARIABLE, ACTUATED) and controller is None:
+        if strategy.needs_law and controller is None:
             raise AnalysisError(
                 f"the strategy {strategy.name} stands on how tightly the first spring turns the robot: {error.problem}",
                 allowed="a robot that bends (narrower, softer behind, with a longer stride), or the strategy leg-yaw",
             ) from error
-        remarks.append(
-            f"how tightly the robot turns is not known, so shortest paths are straight lines: {error.problem}"
-        )
-    if controller is not None:
-        walker, _ = steered(walker, strategy, spring)
-    elif strategy is VARIABLE and law is not None:
-        controller = own = SpringLaw.of(walker, law)
-        remarks += own.remarks(law)
-    elif strategy is ACTUATED and law is not None:
-        controller = ActuatedAxis.of(walker, law)
-    else:
-        walker, controller = steered(walker, strategy, spring)
-    return Driver(walker, strategy, controller, law, engine, tuple(remarks))
+        unknown = (f"how tightly the robot turns is not known, so shortest paths are straight lines: {error.problem}",)
+    ready = strategy.prepare(robot, law, spring, controller)
+    return Driver(ready.robot, strategy, ready.controller, law, engine, (*unknown, *ready.remarks))
 
 
 def drive(
@@ -357,18 +335,3 @@ def patience_of(engine: str) -> float:
 def random_courses(seeds: Sequence[int], engine: str = "planar") -> list[Course]:
     """Random courses of five targets, see :func:`chilopod.steering.random_course`, with the engine's patience."""
     return [random_course(seed, patience_of(engine)) for seed in seeds]
-
-
-def _with_actuator(robot: Robot, remarks: list[str]) -> Robot:
-    adjustable = robot.springs.adjustable
-    if adjustable is None:
-        remarks.append("the robot file names no actuator: the first spring is taken to change as fast as it is told to")
-        return robot.override("springs.adjustable[0]", True)
-    if not adjustable[0]:
-        raise ParameterError(
-            "the first spring has no actuator, and the strategy variable sets it on the way",
-            field="springs.adjustable[0]",
-            value=False,
-            allowed="true",
-        )
-    return robot

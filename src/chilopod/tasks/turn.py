@@ -21,7 +21,7 @@ from chilopod.notebook import block, table, words
 from chilopod.progress import Progress, silent
 from chilopod.record import LONGEST, in_range
 from chilopod.robot import Robot
-from chilopod.steering import Criteria, Strategy, Target, earliest_arrival, evaluate, steered
+from chilopod.steering import Criteria, Strategy, Target, earliest_arrival, evaluate
 from chilopod.tasks.radius_law import radius_law
 from chilopod.tasks.shown import paths
 from chilopod.tasks.walk import check_repeats, foot_creep, repeated
@@ -211,8 +211,7 @@ def turn(
         progress(0.4, "trials with many springs")
         stiffness = best_spring(robot, target, strategy, between, time, engine, controller, folder)
     progress(0.9, "walk")
-    walker, chosen = steered(robot, strategy, stiffness)
-    steering = controller or chosen
+    walker, steering, _ = strategy.prepare(robot, None, stiffness, controller)
     trial = Trial(walker, time, target=target, controller=steering, engine=engine, poses=traits.poses)
     record = together(run(repeated(trial, seed, repeats), folder))
     when = earliest_arrival(record)
@@ -240,8 +239,8 @@ def best_spring(
             values = np.linspace(values[max(best - 1, 0)], values[min(best + 1, tried - 1)], tried)
         trials = []
         for value in values:
-            walker, chosen = steered(robot, strategy, float(value))
-            trials.append(Trial(walker, duration, 0, (), target, controller or chosen, NONE, rate=20.0, engine=engine))
+            walker, steering, _ = strategy.prepare(robot, None, float(value), controller)
+            trials.append(Trial(walker, duration, 0, (), target, steering, NONE, rate=20.0, engine=engine))
         record = together(run(trials, folder))
         nearest = evaluate(record, duration).nearest
         # Of springs that do equally well the stiffest.

@@ -12,6 +12,7 @@ from chilopod.paper.curved import rows as curved_rows
 from chilopod.paper.curved import study as curved_findings
 from chilopod.paper.curved.trials import curved_trials, off_branch, on_branch
 from chilopod.paper.printed import variant_robots
+from chilopod.paper.section import Context
 from chilopod.paper.size import Size
 from chilopod.paper.table import OfPlanar, Row
 from chilopod.planar import PlanarModel
@@ -138,7 +139,7 @@ def test_variants_are_the_papers():
 
 def test_a_small_study_says_what_it_found(kept):
     seen = []
-    study = curved_findings.curved_study(ROBOT, kept, Size.TINY, progress=lambda done, words: seen.append(done))
+    study = curved_findings.curved_study(Context(size=Size.TINY, folder=kept), lambda done, words: seen.append(done))
     assert seen == sorted(seen)
     assert seen[-1] == 1.0
     found = curved_rows.rows(study)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from chilopod import load_robot
 from chilopod.netcdf import netcdf
 from chilopod.paper.curved.figures import trials as curved_trials
 from chilopod.paper.curved.figures import variants as curved_variants
 from chilopod.paper.curved.study import curved_study
+from chilopod.paper.section import Context
 from chilopod.paper.size import Size
 from chilopod.show import style
 from chilopod.show.tables import csv
@@ -22,7 +22,7 @@ PANELS = {
 
 @pytest.fixture(scope="module")
 def study(kept):
-    return curved_study(load_robot("aoi2022-planar"), kept, Size.TINY)
+    return curved_study(Context(size=Size.TINY, folder=kept))
 
 
 @pytest.mark.parametrize("name", PANELS)

@@ -13,6 +13,7 @@ import xarray as xr
 
 from chilopod.errors import ParameterError
 from chilopod.paper import statements
+from chilopod.paper.section import Context
 from chilopod.paper.size import Size
 from chilopod.paper.table import OfPlanar, Row, Verdict
 from chilopod.paper.turning.minima import minima
@@ -29,7 +30,7 @@ TASK_A = Target.parse("45 deg, 1.3 m")
 
 @pytest.fixture(scope="module")
 def found(kept):
-    return turning(ROBOT, kept, Size.TINY)
+    return turning(Context(size=Size.TINY, folder=kept))
 
 
 def test_stiff_springs_bulge_outside_soft_ones_turn_inside_and_those_between_arrive(found):

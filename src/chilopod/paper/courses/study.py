@@ -20,7 +20,7 @@ from chilopod.paper.section import Context
 from chilopod.paper.size import Size
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
-from chilopod.steering import ACTUATED, ON_COURSES, VARIABLE, ActuatedAxis, Course, Goal, Verdict, steered
+from chilopod.steering import ON_COURSES, VARIABLE, Course, Goal, Verdict
 from chilopod.tasks.course import Driver, driver, random_courses, steering_cost, trial_of
 from chilopod.trials import Disturbance, Trial
 
@@ -210,10 +210,8 @@ def prepared(context: Context, engine: str = "planar") -> Driver:
 def without_setting(robot: Robot, variable: Driver, strategy: str, spring: float | None = None) -> Driver:
     """A strategy that sets no spring on the way, with its spring (N*mm/deg) if it has one."""
     law, plan = variable.law, ON_COURSES[strategy]
-    if plan is ACTUATED and law is not None:
-        return Driver(robot, plan, ActuatedAxis.of(robot, law), law, variable.engine)
-    walker, controller = steered(robot, plan, None if spring is None else stiffness(spring))
-    return Driver(walker, plan, controller, law, variable.engine)
+    ready = plan.prepare(robot, law, None if spring is None else stiffness(spring))
+    return Driver(ready.robot, plan, ready.controller, law, variable.engine)
 
 
 def _best(strategy: str, tried: Sequence[tuple[str, float]], shares: Array) -> float:

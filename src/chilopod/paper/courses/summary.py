@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from chilopod.paper.courses.statistics import Interval, bootstrap_mean, bootstrap_ratio, wilson
 from chilopod.paper.scatter import Answer
-from chilopod.steering import ACTUATED, ON_COURSES, VARIABLE
+from chilopod.steering import ON_COURSES, VARIABLE
 
 Array = NDArray[np.float64]
 
@@ -74,7 +74,7 @@ def titled(name: str, spring: float) -> str:
     """Title of a strategy: its name, or the spring (N*mm/deg) that it walks with. On courses the best spring of a
     strategy may lie on either side of the bifurcation that it is named for."""
     strategy = ON_COURSES[name]
-    if strategy is VARIABLE or strategy.springs is None or np.isnan(spring):
+    if strategy.springs is None or np.isnan(spring):
         return name
     return f"{'first spring' if strategy.springs.endswith(']') else 'all springs'} {spring:g}"
 
@@ -170,7 +170,7 @@ def verdicts(found: dict[str, Summary]) -> Verdicts:
     spent = _decided(others, lambda each: each.spent.above(ours.spent))
     time = _decided(others, lambda each: each.later.sign)
     work = _decided(others, lambda each: each.more_work.sign)
-    costlier = [each.title for each in others if each.name == ACTUATED.name and each.title in work[0]]
+    costlier = [each.title for each in others if ON_COURSES[each.name].needs_torque and each.title in work[0]]
     return Verdicts(*reach, *spent, *time, costlier)
 
 

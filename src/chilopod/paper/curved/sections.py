@@ -21,7 +21,7 @@ CURVED: Section[CurvedStudy] = Section(
     "curved",
     CHAPTER,
     "walks from straight on, trial by trial",
-    lambda context, found, report: curved_study(context.robot, context.folder, context.size, report),
+    lambda context, found, report: curved_study(context, report),
     lambda study, found: rows(study),
     lambda study, found: [trials.walks(study), trials.joints(study), trials.onset(study), variants.panel(study)],
 )

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -26,6 +25,7 @@ from chilopod.paper.curved.trials import (
     variant_trials,
 )
 from chilopod.paper.scatter import Difference, spread_difference
+from chilopod.paper.section import Context
 from chilopod.paper.size import Size
 from chilopod.paper.walk_measures import example_walks
 from chilopod.progress import Progress, part, silent
@@ -85,27 +85,19 @@ class CurvedStudy:
         return fitted(self.trials)
 
 
-def curved_study(
-    robot: Robot,
-    folder: str | Path | None = None,
-    size: Size = Size.FULL,
-    progress: Progress = silent,
-) -> CurvedStudy:
+def curved_study(context: Context, progress: Progress = silent) -> CurvedStudy:
     """Run the trials of the paper's curved walks and compare them with the exact branches.
 
     Parameters
     ----------
-    robot
-        The paper's, as the springs of the trials are spread about its critical one.
-    folder
-        Folder of the trials.
-    size
-        If not full, three trials at every spring and two of the variants, in place of the paper's 10 and 5; if tiny, at
-        fewer springs.
+    context
+        Robot of the planar model, the paper's, as the springs of the trials are spread about its critical one; folder
+        and size. If not full, three trials at every spring and two of the variants, in place of the paper's 10 and 5;
+        if tiny, at fewer springs.
     progress
         Called as the work goes on.
     """
-
+    robot, folder, size = context.robot, context.folder, context.size
     repeats, variant_repeats = (10, 5) if size is Size.FULL else (3, 2)
     springs, agreement_springs = size.cut((SPRINGS, AGREEMENT_SPRINGS), (TINY_SPRINGS, AGREEMENT_SPRINGS[:1]))
     trials = curved_trials(robot, springs, repeats, folder=folder, progress=part(progress, 0.0, 0.3))

@@ -8,11 +8,11 @@ import xarray as xr
 from chilopod.analysis.square_root import square_root_fit
 from chilopod.errors import AnalysisError
 from chilopod.paper.fit_data import base_series_data
+from chilopod.paper.section import Context
 from chilopod.paper.size import Size
 from chilopod.paper.statements import NUMERICS
 from chilopod.paper.table import OfTwin, Result, of_twin
 from chilopod.progress import Progress, silent
-from chilopod.robot import Robot
 from chilopod.tasks.identify.twin_series import DURATION, base_series
 from chilopod.twin.walk import TOLERANCE
 
@@ -23,23 +23,20 @@ CASES = {"2 ms": (2e-3, TOLERANCE), "1 ms": (1e-3, TOLERANCE), "0.5 ms": (5e-4, 
 """Step (s) and tolerance of the contact solver, the first what all studies have."""
 
 
-def twin_numerics(robot: Robot, size: Size = Size.FULL, progress: Progress = silent) -> xr.Dataset:
+def twin_numerics(context: Context, progress: Progress = silent) -> xr.Dataset:
     """Onset, radii and speeds with finer steps and a tighter solver.
 
     Parameters
     ----------
-    robot
-        With a twin.
-    size
-        If not full, the first two cases only.
-    progress
-        Called as the work goes on.
+    context, progress
+        As for :func:`chilopod.paper.robot.walks.robot_walks`; if not full, the first two cases only.
 
     Returns
     -------
     Dataset over case and spring: ``axis_radius`` (m) and ``speed`` of module 1 (m/s); over case: ``onset`` by the
     paper's method (N*mm/deg).
     """
+    robot, size = context.whole, context.size
     radii, speeds, onsets = [], [], []
     cases = CASES if size is Size.FULL else dict(list(CASES.items())[:2])
     springs, duration = size.cut((SPRINGS, DURATION), (SPRINGS[::2], 10.0))

@@ -20,11 +20,12 @@ from chilopod.paper.equal_distance import radius_ratio
 from chilopod.paper.fit_data import base_series_data
 from chilopod.paper.robot.turning import TASK_DURATION
 from chilopod.paper.robot.walks import UNIFORM_DURATION, lower_steps, undulations, walk_ends
+from chilopod.paper.section import Context
 from chilopod.paper.size import Size
 from chilopod.paper.walk_measures import onset_with_error
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
-from chilopod.steering import ARRIVAL_RADIUS, steered, strategy_named
+from chilopod.steering import ARRIVAL_RADIUS, strategy_named
 from chilopod.tasks.identify.twin import known, unlike
 from chilopod.tasks.identify.twin_constants import FREE, with_constants
 from chilopod.trials import NONE, Trial
@@ -44,19 +45,13 @@ _DURATION = 60.0  # s
 _BENT = 0.8  # rad in all, that walks begin with
 
 
-def twin_spread(
-    robot: Robot, folder: str | Path | None = None, size: Size = Size.FULL, progress: Progress = silent
-) -> xr.Dataset:
+def twin_spread(context: Context, progress: Progress = silent) -> xr.Dataset:
     """Predictions by several sets of constants.
 
     Parameters
     ----------
-    robot
-        For what is not fitted.
-    folder, progress
-        As for :func:`chilopod.paper.robot.walks.robot_walks`.
-    size
-        If not full, two sets, or one.
+    context, progress
+        As for :func:`chilopod.paper.robot.walks.robot_walks`; if not full, two sets, or one.
 
     Returns
     -------
@@ -65,6 +60,7 @@ def twin_spread(
     built, at an equal distance from each one's own onset), ``uniform`` (N*mm/deg), and over task ``best``, the spring
     that comes nearest to the target (N*mm/deg), and ``arrives``, whether that arrives.
     """
+    robot, folder, size = context.whole, context.folder, context.size
     fits = unlike(known(), size.of(COUNT, 2, 1))
     rows: list[dict[str, Any]] = []
     for index, fit in enumerate(fits):
@@ -145,7 +141,7 @@ def nearest_springs(
     for letter, task in printed.TASKS.items():
         walks = []
         for k in springs:
-            walker, controller = steered(robot, plan, stiffness(k))
+            walker, controller, _ = plan.prepare(robot, None, stiffness(k))
             walks.append(
                 Trial(walker, duration, 0, (), task.target, controller, disturbance=NONE, rate=20.0, engine="twin")
             )

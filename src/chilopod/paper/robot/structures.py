@@ -25,6 +25,7 @@ from chilopod.paper.fit_data import base_series_data
 from chilopod.paper.printed import CRITERION_NAMES
 from chilopod.paper.robot.spread import LOWER, predictions, printed_number
 from chilopod.paper.robot.turning import TASK_DURATION
+from chilopod.paper.section import Context
 from chilopod.paper.size import Size
 from chilopod.paper.turning.minima import minima
 from chilopod.paper.turning.trials import turning_task
@@ -152,22 +153,13 @@ STRUCTURES = (
 """Structures that are tried, the robot as it is first."""
 
 
-def structures(
-    robot: Robot,
-    folder: str | Path | None = None,
-    size: Size = Size.FULL,
-    progress: Progress = silent,
-) -> xr.Dataset:
+def structures(context: Context, progress: Progress = silent) -> xr.Dataset:
     """Predictions by other structures, with their constants fitted anew.
 
     Parameters
     ----------
-    robot
-        With constants that meet the base series.
-    folder, progress
-        As for :func:`chilopod.paper.robot.walks.robot_walks`.
-    size
-        If tiny, one structure, whose constants are not fitted.
+    context, progress
+        As for :func:`chilopod.paper.robot.walks.robot_walks`; if tiny, one structure, whose constants are not fitted.
 
     Returns
     -------
@@ -178,6 +170,7 @@ def structures(
     ``chi_squared``, the sum of squares of the predictions' distances from the paper's over 5 %, for the shorter stride
     by the nearer of its two readings.
     """
+    robot, folder, size = context.whole, context.folder, context.size
     data = base_series_data()
     tried, rounds, duration = size.cut((STRUCTURES, _ROUNDS, DURATION), (STRUCTURES[:1], 0, 10.0))
     law = _law(robot, data, part(progress, 0.0, 0.1)) if rounds else np.empty(0)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 import xarray as xr
 
 from chilopod.paper import printed
-from chilopod.paper.size import Size
+from chilopod.paper.section import Context
 from chilopod.paper.turning.trials import DURATION, TurningTask, turning_task, without_leg_yaw
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
@@ -50,21 +49,16 @@ class RobotTurning:
     without: xr.Dataset
 
 
-def robot_turning(
-    robot: Robot, folder: str | Path | None = None, size: Size = Size.FULL, progress: Progress = silent
-) -> RobotTurning:
+def robot_turning(context: Context, progress: Progress = silent) -> RobotTurning:
     """All turning tasks of the paper.
 
     Parameters
     ----------
-    robot
-        With a twin.
-    folder, progress
-        As for :func:`chilopod.paper.robot.walks.robot_walks`.
-    size
-        If not full, two repeats instead of five, and fewer springs.
+    context, progress
+        As for :func:`chilopod.paper.robot.walks.robot_walks`; if not full, two repeats instead of five, and fewer
+        springs.
     """
-
+    robot, folder, size = context.whole, context.folder, context.size
     repeats, springs, duration = size.of(
         (printed.REPEATS, SPRINGS, TASK_DURATION), (2, SPRINGS[1::2], TASK_DURATION), (2, SHOWN, 6.0)
     )

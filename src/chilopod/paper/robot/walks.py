@@ -20,7 +20,7 @@ from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT, stiffness
 from chilopod.analysis.square_root import SquareRootFit, square_root_fit
 from chilopod.errors import AnalysisError
 from chilopod.paper import printed
-from chilopod.paper.size import Size
+from chilopod.paper.section import Context
 from chilopod.paper.walk_measures import by_spring, example_walks, onset, onset_with_error, radius_at, shares
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
@@ -93,23 +93,18 @@ class RobotWalks:
         return onset(self.base)
 
 
-def robot_walks(
-    robot: Robot, folder: str | Path | None = None, size: Size = Size.FULL, progress: Progress = silent
-) -> RobotWalks:
+def robot_walks(context: Context, progress: Progress = silent) -> RobotWalks:
     """All walks of the paper.
 
     Parameters
     ----------
-    robot
-        With a twin.
-    folder
-        Folder of the trials.
-    size
-        If not full, two repeats of the base series, one of the variants and of uniform springs, with fewer springs.
+    context
+        Whole robot, folder, size. If not full, two repeats of the base series, one of the variants and of uniform
+        springs, with fewer springs.
     progress
         Called as the work goes on.
     """
-
+    robot, folder, size = context.whole, context.folder, context.size
     repeats, fewer, fewest = size.of((REPEATS, VARIANT_REPEATS, UNIFORM_REPEATS), (2, 1, 1), (1, 1, 1))
     springs = size.of(VARIANT_SPRINGS, VARIANT_SPRINGS[1::2], VARIANT_SPRINGS[1::4])
     uniform_springs = size.of(UNIFORM_SPRINGS, UNIFORM_SPRINGS[:4], UNIFORM_SPRINGS[:4:2])

@@ -27,6 +27,7 @@ from chilopod.analysis.square_root import square_root_fit
 from chilopod.analysis.straight_walk import pitchfork
 from chilopod.errors import AnalysisError
 from chilopod.paper import printed
+from chilopod.paper.section import Context
 from chilopod.paper.size import Size
 from chilopod.paper.statements import PLANAR_LIMIT
 from chilopod.paper.table import OfPlanar, OfTwin, Result, of_twin
@@ -264,21 +265,14 @@ def limit_point(
     return sign_change(found.spring.values, found.growth.values)
 
 
-def ablation(
-    robot: Robot, planar: Robot, folder: str | Path | None = None, size: Size = Size.FULL, progress: Progress = silent
-) -> xr.Dataset:
+def ablation(context: Context, progress: Progress = silent) -> xr.Dataset:
     """The point with factors switched on and off.
 
     Parameters
     ----------
-    robot
-        With a twin.
-    planar
-        Planar model from which the planar limit takes feet and friction.
-    folder, progress
-        As for :func:`chilopod.paper.robot.walks.robot_walks`.
-    size
-        If not full, only the path from the planar limit to the twin, by fewer springs.
+    context, progress
+        As for :func:`chilopod.paper.robot.walks.robot_walks`; the planar limit takes feet and friction from the robot
+        of the planar model. If not full, only the path from the planar limit to the twin, by fewer springs.
 
     Returns
     -------
@@ -288,6 +282,7 @@ def ablation(
     planar limit by :func:`limit_point` and of the planar model; ``grip``, the twin's creep
     coefficient, and ``viscous``, the planar model's (N*s/m).
     """
+    robot, planar, folder, size = context.whole, context.robot, context.folder, context.size
     names = [factor.name for factor in FACTORS]
     wanted: dict[str, list[list[str]]] = {"path": [names[: i + 1] for i in range(len(names))]}
     if size is Size.FULL:

@@ -27,7 +27,7 @@ TURNING: Section[Turning] = Section(
     "turning",
     CHAPTER,
     "turning to targets",
-    lambda context, found, report: turning(context.robot, context.folder, context.size, report),
+    lambda context, found, report: turning(context, report),
     lambda tasks, found: rows(tasks),
     lambda tasks, found: figures.panels(tasks),
 )

@@ -12,10 +12,11 @@ import numpy as np
 import xarray as xr
 
 from chilopod import trials
-from chilopod.analysis.parameters import ALL, PAPER_UNIT, stiffness
+from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT, stiffness
 from chilopod.analysis.radius_law import RadiusLaws, radius_laws
 from chilopod.analysis.straight_walk import first_loss
 from chilopod.paper import printed
+from chilopod.paper.section import Context
 from chilopod.paper.size import Size
 from chilopod.paper.turning.trials import (
     DURATION,
@@ -29,7 +30,7 @@ from chilopod.paper.turning.trials import (
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.stability import Kind
-from chilopod.steering import STRATEGIES, Target, earliest_arrival, evaluate, steered
+from chilopod.steering import STRATEGIES, LegYawController, Target, earliest_arrival, evaluate
 from chilopod.trials import NONE, Disturbance, Trial
 
 ROUGH = 3.0
@@ -83,22 +84,17 @@ class Turning:
     farther: xr.Dataset
 
 
-def turning(
-    robot: Robot, folder: str | Path | None = None, size: Size = Size.FULL, progress: Progress = silent
-) -> Turning:
+def turning(context: Context, progress: Progress = silent) -> Turning:
     """All turning studies of a robot.
 
     Parameters
     ----------
-    robot
-        The paper's numbers are those of ``aoi2022-planar``.
-    folder
-        Folder of the trials; without one nothing is kept.
-    size
-        If not full, fewer springs and fewer, nearer targets.
+    context
+        Robot of the planar model, folder, size. If not full, fewer springs and fewer, nearer targets.
     progress
         Called with the part done (0 to 1) and a few words.
     """
+    robot, folder, size = context.robot, context.folder, context.size
     quick = size is not Size.FULL
     springs = QUICK_SPRINGS if quick else SPRINGS
     laws = radius_laws(robot)
@@ -159,7 +155,7 @@ def settled_start(
     for target in targets.values():
         _, spring = laws.k_hat(target.radius)
         bent = laws.joint_angles(spring)
-        walker, _ = steered(robot, STRATEGIES["open-loop"], stiffness(spring))
+        walker = robot.with_value(K1, stiffness(spring))
         model = Trial(walker, DURATION, target=target, disturbance=NONE, rate=RATE)
         walks = [model, replace(model, joint_angles=bent)]
         records = trials.run(walks, folder)
@@ -206,17 +202,17 @@ def farther_targets(
     ``k_hat`` by the law (N*mm/deg).
     """
     rows: dict[str, list[Any]] = {name: [] for name in ("nearest", "effort", "effort_part", "earliest", "k_hat")}
+    limit = LegYawController().limit
     for away in distances:
         target = Target(bearing, away)
         asked = []
         for spring in springs:
-            walker, controller = steered(robot, STRATEGIES["pitchfork"], stiffness(float(spring)))
+            walker, controller, _ = STRATEGIES["pitchfork"].prepare(robot, None, stiffness(float(spring)))
             duration = DURATION * away / distances[0]
             asked.append(Trial(walker, duration, target=target, controller=controller, disturbance=NONE, rate=RATE))
         record = trials.together(trials.run(asked, folder))
         earliest = earliest_arrival(record)
         result = evaluate(record, earliest)
-        limit = controller.limit if controller else 0.0
         rows["nearest"].append(result.nearest)
         rows["effort"].append(result.effort)
         rows["effort_part"].append(result.effort / (2.0 * limit**2 * earliest))

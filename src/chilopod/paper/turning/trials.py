@@ -19,7 +19,7 @@ from chilopod.analysis.parameters import PAPER_UNIT, stiffness
 from chilopod.paper import printed
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
-from chilopod.steering import STRATEGIES, Outcome, Target, earliest_arrival, evaluate, steered
+from chilopod.steering import STRATEGIES, Outcome, Target, earliest_arrival, evaluate
 from chilopod.steering.criteria import efforts
 from chilopod.steering.strategies import strategy_named
 from chilopod.trials import Disturbance, Trial
@@ -129,7 +129,7 @@ def turning_task(
     plan = strategy_named(strategy)
     asked = []
     for spring in springs:
-        walker, controller = steered(robot, plan, stiffness(float(spring)))
+        walker, controller, _ = plan.prepare(robot, None, stiffness(float(spring)))
         walk = Trial(
             walker,
             duration,
@@ -315,7 +315,7 @@ def without_leg_yaw(
     cases, most = [], printed.WITHOUT_LEG_YAW
     for index, ((name, spring), leg_yaw) in enumerate((item, with_) for item in springs.items() for with_ in (0, 1)):
         strategy = "pitchfork" if leg_yaw else "open-loop"
-        walker, controller = steered(robot, STRATEGIES[strategy], stiffness(spring))
+        walker, controller, _ = STRATEGIES[strategy].prepare(robot, None, stiffness(spring))
         asked = [
             Trial(walker, duration, seed, target=target, controller=controller, rate=RATE, engine=engine)
             for seed in range(printed.REPEATS if leg_yaw else most)
