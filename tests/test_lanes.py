@@ -95,8 +95,15 @@ def test_a_wish_not_to_compile_is_refused_in_one_line():
     assert done.stderr.count("\n") == 1
 
 
-@pytest.mark.parametrize(("name", "value"), [("", "zzz"), ("", "tbb"), ("", "safe"), ("_PRIORITY", "zzz")])
-@pytest.mark.parametrize("command", ["['walk', 'aoi2022-planar', '--duration', '0.1 s']", "['doctor', '--json']"])
+@pytest.mark.parametrize(
+    ("command", "name", "value"),
+    [
+        ("['walk', 'aoi2022-planar', '--duration', '0.1 s']", "", "tbb"),
+        ("['walk', 'aoi2022-planar', '--duration', '0.1 s']", "_PRIORITY", "zzz"),
+        ("['doctor', '--json']", "", "safe"),
+        ("['doctor', '--json']", "_PRIORITY", "zzz"),
+    ],
+)
 def test_threads_that_cannot_be_had_are_one_line(command, name, value):
     if value in ("tbb", "safe") and find_library("tbb"):
         pytest.skip("they can be had")

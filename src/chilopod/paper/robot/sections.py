@@ -48,7 +48,7 @@ FILMS: Section[list[Movie]] = Section(
     CHAPTER,
     "the paper's two movies in 3-D",
     lambda context, found, report: robot_movies(
-        context.whole, _FILMED, _TRIED, context.folder, report, shorter=context.size.cut(1.0, 0.02)
+        context.whole, _FILMED, _TRIED, context.folder, report, shorter=context.size.cut(1.0, 0.013)
     ),
     films=lambda films: films,
 )
