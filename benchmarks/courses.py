@@ -27,7 +27,7 @@ from chilopod.cores import cores
 from chilopod.engine import engine_named, steer
 from chilopod.robot import load_robot
 from chilopod.steering import VARIABLE
-from chilopod.tasks.course import Driver, driver, random_courses, trial_of
+from chilopod.tasks.course import Driver, driver, random_courses
 from chilopod.trials import Trial, batches, walked
 
 from _timing import duration, machine, table, write_section
@@ -37,10 +37,9 @@ ROUNDS = 2
 
 
 def courses(ready: Driver, count: int) -> list[Trial]:
-    assert ready.law is not None
     seeds = range(1000, 1000 + count)
     return [
-        trial_of(ready, replace(course, tightest=ready.law.tightest), seed, brief=True)
+        ready.trial(course, seed, brief=True)
         for seed, course in zip(seeds, random_courses(seeds, ready.engine), strict=True)
     ]
 

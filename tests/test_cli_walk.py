@@ -17,6 +17,7 @@ from chilopod.steering import ARRIVAL_RADIUS, STRATEGIES
 
 ROBOT = "aoi2022-planar"
 SOFT = ["--set", "springs.stiffness[0]=9 N*mm/deg"]
+TURN = ["turn", "--target", "45 deg, 1.3 m"]
 
 
 def printed(capsys, *arguments):
@@ -307,7 +308,7 @@ def test_a_controller_of_ones_own_turns_in_place_of_the_strategys(capsys, own, t
         ("toy", ["is no class"]),
     ],
 )
-@pytest.mark.parametrize("command", [["walk"], ["turn", "--target", "45 deg, 1.3 m", "--k1", "10 N*mm/deg"]])
+@pytest.mark.parametrize("command", [["walk"], [*TURN, "--k1", "10 N*mm/deg"], ["course", "--targets", "0 deg, 1 m"]])
 def test_controllers_that_are_none_are_refused_in_one_line(capsys, own, command, name, words):
     message = refused(capsys, command[0], ROBOT, *command[1:], "--controller", f"{own}:{name}")
     assert all(word in message for word in words), message

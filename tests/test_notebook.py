@@ -13,8 +13,9 @@ from chilopod.analysis import pitchfork, straight_walk
 from chilopod.notebook import block, folded, picture, table, words
 from chilopod.stability import PeriodicSystem, begin, follow, follow2, from_rhs, locate
 from chilopod.steering import Target, course_named, strategy_named
-from chilopod.tasks import Driver, drive, ends, planned, turn, walk
+from chilopod.tasks import Driver, drive, ends, turn, walk
 from chilopod.tasks.shown import draw_paths
+from chilopod.trials import Trial
 
 ROBOT = load_robot("aoi2022-planar")
 SVG = "{http://www.w3.org/2000/svg}"
@@ -147,7 +148,7 @@ def test_walks():
     assert [line.get_xydata().tolist() for line in axes.lines] == walks.record.position.transpose(
         "robot", "time", "axis"
     ).values.tolist()
-    assert "straight" in said(ends(planned(ROBOT, 1.0))._repr_html_())
+    assert "straight" in said(ends(Trial(ROBOT, 1.0).repeated())._repr_html_())
 
 
 def test_turn():

@@ -5,8 +5,8 @@ import pytest
 
 from chilopod import load_robot
 from chilopod.errors import ParameterError
-from chilopod.tasks import ends, foot_creep, planned, walk
-from chilopod.tasks.walk import repeated
+from chilopod.tasks import ends, walk
+from chilopod.tasks.runs import Runs
 from chilopod.trials import NONE, Disturbance, Trial, run
 
 ROBOT = load_robot("aoi2022-planar").with_value("springs.stiffness[0]", 0.5)
@@ -15,7 +15,7 @@ ROBOT = load_robot("aoi2022-planar").with_value("springs.stiffness[0]", 0.5)
 def test_seeds_count_up_and_walk_as_trials_do():
     done = walk(ROBOT, 3.0, seed=4, repeats=2, joint_angles=[0.02])
     assert [trial.seed for trial in done.trials] == [4, 5]
-    assert done.seeded
+    assert done.seeds == [4, 5]
     assert not done.straight
     assert done.foot_creep is None
     (record,) = run([Trial(ROBOT, 3.0, 5, (0.02,) * 5)])
@@ -26,7 +26,7 @@ def test_seeds_count_up_and_walk_as_trials_do():
 
 
 def test_what_walks_came_to_needs_no_record(monkeypatch):
-    trials = planned(ROBOT, 2.0, seed=4, repeats=3)
+    trials = Trial(ROBOT, 2.0).repeated(seed=4, repeats=3)
     came = []
     found = ends(trials, told=lambda index, record: came.append((index, record.attrs["trial"])))
     assert sorted(came) == [(index, trial.text) for index, trial in enumerate(trials)]
@@ -47,23 +47,24 @@ def test_what_walks_came_to_needs_no_record(monkeypatch):
 def test_without_a_seed_it_stays_straight():
     done = walk(ROBOT, 3.0)
     assert done.straight
-    assert not done.seeded
+    assert done.seeds == [None]
     assert np.isinf(done.summaries[0].axis_radius)
 
 
 def test_disturbances_only_with_a_seed():
-    one = Trial(ROBOT, 3.0)
-    assert [trial.disturbance for trial in repeated(one, None, 1)] == [NONE]
-    assert [trial.disturbance for trial in repeated(one, 0, 2)] == [Disturbance()] * 2
+    one, other = Trial(ROBOT, 3.0), Trial(ROBOT, 3.0, disturbance=Disturbance(missed=0.5))
+    assert [trial.disturbance for trial in one.repeated()] == [NONE]
+    assert [trial.disturbance for trial in one.repeated(0, 2)] == [Disturbance()] * 2
+    assert [trial.disturbance for trial in other.repeated(0, 2)] == [other.disturbance] * 2
 
 
 def test_feet_of_the_twin_creep():
-    assert foot_creep(load_robot("aoi2022"), "twin") > 1000.0
+    assert Runs((Trial(load_robot("aoi2022"), 1.0, engine="twin"),)).foot_creep > 1000.0
 
 
 def test_a_twin_that_cannot_stand_has_no_creep():
     limp = load_robot("aoi2022").set_from_text(["twin.servo_stiffness=1e-12 N*m/rad"])
-    assert foot_creep(limp, "twin") is None
+    assert Runs((Trial(limp, 1.0, engine="twin"),)).foot_creep is None
 
 
 @pytest.mark.parametrize(

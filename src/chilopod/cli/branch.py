@@ -8,17 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from chilopod.cli.options import (
-    ForceOption,
-    JsonOption,
     OutOption,
     ParameterOption,
-    RobotArg,
-    SetOption,
+    RobotOptions,
     deliver,
     free,
     interval,
     print_json,
-    read_robot,
+    with_options,
 )
 from chilopod.cli.progress import progress_bar
 
@@ -28,8 +25,9 @@ if TYPE_CHECKING:
 _BETWEEN = ("7.5 N*mm/deg", "20 N*mm/deg")
 
 
+@with_options
 def branch(
-    robot: RobotArg,
+    options: RobotOptions,
     parameter: ParameterOption = "springs.stiffness[0]",
     between: Annotated[
         tuple[str, str] | None,
@@ -53,14 +51,11 @@ def branch(
     left: Annotated[
         bool, typer.Option("--left", help="Follow the left turn; it is the mirror image of the right.")
     ] = False,
-    overrides: SetOption = None,
-    as_json: JsonOption = False,
     out: OutOption = None,
     resume: Annotated[
         Path | None,
         typer.Option(metavar="FOLDER", help="Go on with the branch saved there; without --out it grows in its place."),
     ] = None,
-    force: ForceOption = False,
 ) -> None:
     """Follow the curved walks from the pitchfork at which the straight walk gives way: how tightly they turn, how
     fast and stable they are, folds and what else happens on the way.
@@ -73,7 +68,7 @@ def branch(
     With --out, draws the branch (unstable parts dashed, those out of range dotted) and writes it as netCDF and CSV;
     --resume goes on with it.
     """
-    described = read_robot(robot, overrides)
+    described = options.described
     chosen = between or (None if resume else _BETWEEN)
     limits = interval(described, parameter, chosen) if chosen else None
     from chilopod.analysis.branch import as_json as plain
@@ -82,7 +77,7 @@ def branch(
     saved = None if resume is None else read_walks(resume / "branch.nc")
     folder = out or resume
     # A branch that goes on where it is saved holds all it held before.
-    replace = force or (folder is not None and resume is not None and folder.resolve() == resume.resolve())
+    replace = options.force or (folder is not None and resume is not None and folder.resolve() == resume.resolve())
     if folder:
         from chilopod.show import files_of
 
@@ -104,7 +99,7 @@ def branch(
 
         return write_branch(data, folder, replace=replace) if folder else []
 
-    deliver(write, lambda: print_json(plain(data)) if as_json else _print(data))
+    deliver(write, lambda: print_json(plain(data)) if options.as_json else _print(data))
 
 
 def _print(data: xr.Dataset) -> None:

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from chilopod.cli.options import (
-    OutOption,
-    WalkOptions,
-    print_table,
-    reading,
-    with_walk_options,
-)
+from chilopod.cli.options import OutOption, WalkOptions, print_table, reading, with_options
 
 if TYPE_CHECKING:
+    from chilopod.progress import Progress
     from chilopod.tasks import Driven
 
 
@@ -31,7 +26,7 @@ def _strategies() -> list[str]:
     return list(ON_COURSES)
 
 
-@with_walk_options
+@with_options
 def course(
     options: WalkOptions,
     targets: Annotated[
@@ -89,38 +84,25 @@ def course(
     spring = None if k1 is None else options.spring(chosen.springs, k1)
     with reading("patience"):
         seconds = None if patience is None else units.parse(patience, "s")
-    from chilopod.tasks.course import check_drive, drive, driver, patience_of
 
-    own = options.own
-    goals = course_named(targets, patience_of(options.engine) if seconds is None else seconds)
-    check_drive(described, goals, **options.repeated)
-    options.free_files_of("course", out)
+    def walked(told: Callable[[str], Progress]) -> Driven:
+        from chilopod.tasks.course import Driver, drive, driver, patience_of
+        from chilopod.trials import check_fits
 
-    with options.walking("course") as show:
-        ready = driver(
-            described,
-            chosen,
-            spring,
-            engine=options.engine,
-            controller=own,
-            folder=options.trials,
-            progress=lambda part, words: show("radius law", part, words),
-        )
-        done = drive(
-            ready,
-            goals,
-            **options.repeated,
-            folder=options.trials,
-            progress=lambda part, words: show("course", part, words),
-        )
+        goals = course_named(targets, patience_of(options.engine) if seconds is None else seconds)
+        how = options.steering
+        # What cannot be driven is refused before the radius law takes its time.
+        check_fits(Driver(described, chosen, law=None, **how).trial(goals).repeated(options.seed, options.repeats))
+        ready = driver(described, chosen, spring, **how, folder=options.trials, progress=told("radius law"))
+        return drive(ready, goals, **options.runs(told("course")))
 
-    options.deliver(done, options.files_written("course", done, out), lambda: _print(done))
+    options.walk_into(out, "course", walked, _print)
 
 
 def _print(done: Driven) -> None:
     told = done.as_json()
     walks, goals = told["walks"], len(done.course.goals)
-    typer.echo(f"{done.robot.name}, {done.engine}, {done.strategy.name}: {done.strategy.sentence}")
+    typer.echo(f"{done.who}, {done.strategy.name}: {done.strategy.sentence}")
     typer.echo(f"  {goals} target{'s' * (goals > 1)}, {done.course.patience:g} s for each")
     for remark in done.driver.remarks:
         typer.echo(f"  {remark}")

@@ -6,10 +6,10 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import MISSING, dataclass, fields
-from functools import cached_property
+from functools import cached_property, partial
 from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar, get_type_hints
 
 import typer
 from typer.core import TyperCommand
@@ -19,10 +19,12 @@ from chilopod.cli.progress import progress_bar
 from chilopod.errors import ChilopodError
 
 if TYPE_CHECKING:
-    from chilopod.engine import Controller
+    from chilopod import tasks
+    from chilopod.progress import Progress
     from chilopod.robot import Robot
-    from chilopod.tasks import Driven, Ends, Turn
+    from chilopod.tasks.runs import Runs
 
+Found = TypeVar("Found", bound="Runs")
 STAYS_STRAIGHT = "nothing disturbed it, so nothing bends it, even where the straight walk is unstable"
 
 
@@ -170,13 +172,20 @@ def new_app(help_text: str, *, completion: bool = False) -> typer.Typer:
         True if it has the options that make a shell complete its commands; only the outermost can.
     """
     # Help without rich: importing it costs a third of what --help may take. Tracebacks are the business of `main`.
-    return _App(
+    app = _App(
         help=help_text,
         rich_markup_mode=None,
         pretty_exceptions_enable=False,
         add_completion=completion,
         no_args_is_help=False,
     )
+
+    @app.callback(invoke_without_command=True)
+    def group(ctx: typer.Context) -> None:
+        if ctx.invoked_subcommand is None:
+            typer.echo(ctx.get_help())
+
+    return app
 
 
 @contextmanager
@@ -205,16 +214,10 @@ def read_robot(robot: str, overrides: Sequence[str] | None) -> Robot:
 
 
 @dataclass(frozen=True)
-class WalkOptions:
-    """Argument and options that walk, turn and course share, as they were typed."""
+class RobotOptions:
+    """Argument and options of commands that compute something of a robot, as they were typed."""
 
     robot: RobotArg
-    seed: SeedOption = None
-    repeats: RepeatsOption = 1
-    engine: EngineOption = "planar"
-    controller: ControllerOption = None
-    trials: TrialsOption = None
-    cluster: ClusterOption = None
     overrides: SetOption = None
     as_json: JsonOption = False
     force: ForceOption = False
@@ -224,21 +227,39 @@ class WalkOptions:
         """Robot with the numbers that ``--set`` changed."""
         return read_robot(self.robot, self.overrides)
 
-    @cached_property
-    def own(self) -> Controller | None:
-        """Controller of ``--controller``, if any."""
-        return own_controller(self.controller)
+    def free_in(self, folder: Path | None, name: str) -> list[Path]:
+        """The file of this name in the folder, if there is one, which can be written; see :func:`free`."""
+        files = [folder / name] if folder else []
+        free(files, self.force)
+        return files
+
+    def deliver_json(self, files: Sequence[Path], result: dict[str, Any], show: Callable[[], None]) -> None:
+        """Write a result into these files as JSON, and print it."""
+        from chilopod.output import write_all
+
+        texts = [(file, json_text(result) + "\n") for file in files]
+        deliver(lambda: write_all(texts, replace=self.force), lambda: print_json(result) if self.as_json else show())
+
+
+@dataclass(frozen=True)
+class WalkOptions(RobotOptions):
+    """Argument and options that walk, turn and course share, as they were typed."""
+
+    seed: SeedOption = None
+    repeats: RepeatsOption = 1
+    engine: EngineOption = "planar"
+    controller: ControllerOption = None
+    trials: TrialsOption = None
+    cluster: ClusterOption = None
 
     @property
-    def repeated(self) -> dict[str, Any]:
-        """Arguments of every task that say which walks, and where."""
-        return {"seed": self.seed, "repeats": self.repeats, "engine": self.engine}
+    def steering(self) -> dict[str, Any]:
+        """Engine and controller, arguments of every task and of a trial."""
+        return {"engine": self.engine, "controller": own_controller(self.controller)}
 
-    @contextmanager
-    def walking(self, what: str) -> Iterator[Callable[[str, float, str], None]]:
-        """Show progress, find the user's modules, and walk on the cluster that was named, in this block."""
-        with progress_bar(what) as show, own_code(show), walking_on(self.cluster):
-            yield show
+    def runs(self, progress: Progress) -> tasks.RunOptions:
+        """Options of every task, which tells how far it is."""
+        return {"seed": self.seed, "repeats": self.repeats, "folder": self.trials, "progress": progress}
 
     def spring(self, path: str | None, k1: str) -> float:
         """Stiffness of ``--k1`` for the springs that a strategy softens, N*m/rad."""
@@ -246,27 +267,37 @@ class WalkOptions:
             path = path or "springs.stiffness"
             return self.described.override(path, k1).get(path)
 
-    def free_files_of(self, what: str, out: Path | None) -> None:
-        """Make sure that the files of a ``turn`` or a ``course`` can be written into the folder, if there is one."""
+    @contextmanager
+    def walking(self, what: str) -> Iterator[Callable[[str], Progress]]:
+        """Find the user's modules, walk on the cluster that was named, and show progress under titles, in this
+        block."""
+        with progress_bar(what) as show, own_code(show), walking_on(self.cluster):
+            yield lambda title: partial(show, title)
+
+    def walk_into(
+        self,
+        out: Path | None,
+        what: str,
+        walk: Callable[[Callable[[str], Progress]], Found],
+        show: Callable[[Found], None],
+    ) -> None:
+        """Walk a ``turn`` or a ``course``, write its files into the folder, if there is one, and print it."""
         if out:
             from chilopod.show.walked import files_of_walks
 
             free(files_of_walks(what, out), self.force)
-
-    def files_written(self, what: str, done: Turn | Driven, out: Path | None) -> Callable[[], Iterable[Path]]:
-        """Function that writes them."""
+        with self.walking(what) as told:
+            done = walk(told)
 
         def write() -> Iterable[Path]:
             from chilopod.show.walked import write_walks
 
             return write_walks(what, done, out, replace=self.force) if out else ()
 
-        return write
+        self.deliver(write, done, show)
 
-    def deliver(
-        self, done: Turn | Driven | Ends, write: Callable[[], Iterable[Path]], show: Callable[[], None]
-    ) -> None:
-        """Write the files of a result, and print it, as JSON where that was asked for; see :func:`deliver`."""
+    def deliver(self, write: Callable[[], Iterable[Path]], done: Found, show: Callable[[Found], None]) -> None:
+        """Write the files of walks, and print what they came to, as JSON where that was asked for."""
 
         def printed() -> None:
             with progress_bar("creep of the feet"):  # may take as long as the walk
@@ -274,33 +305,36 @@ class WalkOptions:
             if self.as_json:
                 print_json(done.as_json())
                 return
-            show()
+            show(done)
             if creeps is not None:
                 typer.echo(f"  standing feet creep like viscous ones of {creeps:.0f} N*s/m")
 
         deliver(write, printed)
 
 
-def with_walk_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Let typer see the fields of :class:`WalkOptions`, which come as the first argument, beside a command's own."""
-    hints = get_type_hints(WalkOptions, include_extras=True)
-    shared = [
+def with_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Let typer see the fields of the options that come as a command's first argument, beside those of its own."""
+    first, *own = (
+        each.replace(kind=Parameter.KEYWORD_ONLY) for each in signature(command, eval_str=True).parameters.values()
+    )
+    hints = get_type_hints(first.annotation, include_extras=True)
+    robot, *shared = (
         Parameter(
             each.name,
             Parameter.KEYWORD_ONLY,
             default=Parameter.empty if each.default is MISSING else each.default,
             annotation=hints[each.name],
         )
-        for each in fields(WalkOptions)
-    ]
-    _, *own = (
-        each.replace(kind=Parameter.KEYWORD_ONLY) for each in signature(command, eval_str=True).parameters.values()
+        for each in fields(first.annotation)
     )
+    common = {each.name for each in fields(RobotOptions)}
 
     def run(**given: Any) -> None:
-        command(WalkOptions(**{each.name: given.pop(each.name) for each in shared}), **given)
+        options = {each.name: given.pop(each.name) for each in (robot, *shared)}
+        command(first.annotation(**options), **given)
 
-    seen = [shared[0], *own, *shared[1:]]
+    # What all commands have comes last.
+    seen = [robot, *own, *sorted(shared, key=lambda each: each.name in common)]
     run.__doc__, run.__annotations__ = command.__doc__, {each.name: each.annotation for each in seen}
     vars(run)["__signature__"] = Signature(seen)
     return run

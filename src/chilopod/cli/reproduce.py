@@ -34,12 +34,6 @@ PRESET, WHOLE = "aoi2022-planar", "aoi2022"
 identify_app = new_app("Find constants of a model from measured or printed numbers.")
 
 
-@identify_app.callback(invoke_without_command=True)
-def _group(ctx: typer.Context) -> None:
-    if ctx.invoked_subcommand is None:
-        typer.echo(ctx.get_help())
-
-
 def reproduce(
     ctx: typer.Context,
     only: Annotated[

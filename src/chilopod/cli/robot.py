@@ -23,12 +23,6 @@ _PLANAR, _WHOLE = "aoi2022-planar", "aoi2022"
 app = new_app("Make, show, check and export robot files.")
 
 
-@app.callback(invoke_without_command=True)
-def _group(ctx: typer.Context) -> None:
-    if ctx.invoked_subcommand is None:
-        typer.echo(ctx.get_help())
-
-
 @app.command()
 def new(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="The robot file to write, such as my.toml.")],

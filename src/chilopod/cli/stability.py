@@ -4,26 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chilopod.cli.options import (
-    BetweenOption,
-    ForceOption,
-    JsonOption,
-    OutOption,
-    ParameterOption,
-    RobotArg,
-    SetOption,
-    deliver,
-    free,
-    interval,
-    json_text,
-    print_json,
-    read_robot,
-)
+from chilopod.cli.options import BetweenOption, OutOption, ParameterOption, RobotOptions, interval, with_options
 from chilopod.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -31,37 +16,21 @@ if TYPE_CHECKING:
     from chilopod.robot import Robot
 
 
-def stability(
-    robot: RobotArg,
-    overrides: SetOption = None,
-    as_json: JsonOption = False,
-    out: OutOption = None,
-    force: ForceOption = False,
-) -> None:
+@with_options
+def stability(options: RobotOptions, out: OutOption = None) -> None:
     """Is the straight walk stable in the planar model? Its Floquet multipliers, exponents and modes.
 
     A small disturbance is a sum of modes. A mode grows with its exponent, and by its multiplier from one period T of
     the gait to the next: the walk is stable if every |multiplier| is below 1, every exponent's real part below 0.
     Exponents are the principal logarithms of the multipliers over T: their imaginary parts lie in (-pi/T, pi/T].
     """
-    described = read_robot(robot, overrides)
-    files = [out / "stability.json"] if out else []
-    free(files, force)
+    described = options.described
+    files = options.free_in(out, "stability.json")
     from chilopod.analysis import straight_walk
 
     with progress_bar("stability"):
         found = straight_walk(described)
-    result = found.as_json()
-    deliver(
-        lambda: _write(files, result, force),
-        lambda: print_json(result) if as_json else _print_stability(described, found),
-    )
-
-
-def _write(files: list[Path], result: dict[str, Any], force: bool) -> list[Path]:
-    from chilopod.output import write_all
-
-    return write_all(((file, json_text(result) + "\n") for file in files), replace=force)
+    options.deliver_json(files, found.as_json(), lambda: _print_stability(described, found))
 
 
 def _print_stability(described: Robot, found: StraightWalk) -> None:
@@ -73,17 +42,15 @@ def _print_stability(described: Robot, found: StraightWalk) -> None:
     typer.echo(f"  multipliers are within {found.exponents.multipliers.error_bound:.1e}{nearer}")
 
 
+@with_options
 def bifurcation(
-    robot: RobotArg,
+    options: RobotOptions,
     parameter: ParameterOption,
     between: BetweenOption,
-    overrides: SetOption = None,
     seconds: Annotated[
         float, typer.Option(metavar="S", min=0.0, help="Time for the search, s; then it ends with what it has.")
     ] = 60.0,
-    as_json: JsonOption = False,
     out: OutOption = None,
-    force: ForceOption = False,
 ) -> None:
     """Where does the straight walk give way as one number of the robot varies, and how?
 
@@ -91,25 +58,21 @@ def bifurcation(
     kind, its error bound, the mode that grows, and whether what replaces the straight walk sets in gently
     (supercritical) or by a jump (subcritical).
     """
-    described = read_robot(robot, overrides)
-    low, high = interval(described, parameter, between)
-    files = [out / "bifurcation.json"] if out else []
-    free(files, force)
+    described = options.described
+    limits = interval(described, parameter, between)
+    files = options.free_in(out, "bifurcation.json")
     from chilopod.analysis import bifurcations
 
     with progress_bar("bifurcation"):
         points = bifurcations(
             described,
             parameter,
-            (low, high),
+            limits,
             remark=lambda text: typer.echo(f"note: {text}", err=True),
             seconds=seconds,
         )
     result = {"robot": described.name, "points": [point.as_json() for point in points]}
-    deliver(
-        lambda: _write(files, result, force),
-        lambda: print_json(result) if as_json else _print_bifurcations(described, parameter, (low, high), points),
-    )
+    options.deliver_json(files, result, lambda: _print_bifurcations(described, parameter, limits, points))
 
 
 def _print_bifurcations(

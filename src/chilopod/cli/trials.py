@@ -29,12 +29,6 @@ FolderArg = Annotated[
 ]
 
 
-@app.callback(invoke_without_command=True)
-def _group(ctx: typer.Context) -> None:
-    if ctx.invoked_subcommand is None:
-        typer.echo(ctx.get_help())
-
-
 @app.command("list")
 def listed(folder: FolderArg, as_json: JsonOption = False) -> None:
     """Say which trials are kept in a folder: of which robots, how long, with which seeds.

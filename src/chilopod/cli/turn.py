@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chilopod.cli.options import (
-    STAYS_STRAIGHT,
-    OutOption,
-    StrategyOption,
-    WalkOptions,
-    reading,
-    with_walk_options,
-)
+from chilopod.cli.options import STAYS_STRAIGHT, OutOption, StrategyOption, WalkOptions, reading, with_options
 
 if TYPE_CHECKING:
+    from chilopod.progress import Progress
     from chilopod.tasks import Turn
 
 
-@with_walk_options
+@with_options
 def turn(
     options: WalkOptions,
     target: Annotated[
@@ -66,33 +61,24 @@ def turn(
     spring = k1 if k1 in ("auto", "law") else options.spring(chosen.springs, k1)
     with reading("duration"):
         seconds = None if duration is None else units.parse(duration, "s")
-    options.free_files_of("turn", out)
-    from chilopod.tasks import turn as walk_there
 
-    with options.walking("turn") as show:
-        done = walk_there(
-            described,
-            goal,
-            chosen,
-            spring,
-            duration=seconds,
-            **options.repeated,
-            controller=options.own,
-            folder=options.trials,
-            progress=lambda part, words: show("turn", part, words),
-        )
+    def walked(told: Callable[[str], Progress]) -> Turn:
+        from chilopod.tasks import turn as walk_there
 
-    options.deliver(done, options.files_written("turn", done, out), lambda: _print(done, options.seed))
+        how = {"duration": seconds, **options.steering}
+        return walk_there(described, goal, chosen, spring, **how, **options.runs(told("turn")))
+
+    options.walk_into(out, "turn", walked, _print)
 
 
-def _print(done: Turn, seed: int | None) -> None:
+def _print(done: Turn) -> None:
     from chilopod import units
 
     def shown(value: float) -> str:
         return units.format(value, "N*mm/deg", digits=4)
 
     found = done.criteria
-    typer.echo(f"{done.robot.name}, {done.engine}, {done.strategy.name}: {done.strategy.sentence}")
+    typer.echo(f"{done.who}, {done.strategy.name}: {done.strategy.sentence}")
     typer.echo(f"  target {done.target}: a circle of {done.target.radius:.3f} m")
     if done.by_law is not None:
         typer.echo(f"  spring by the settled radius (the paper's k1-hat): {shown(done.by_law)}")
@@ -103,10 +89,9 @@ def _print(done: Turn, seed: int | None) -> None:
     )
     typer.echo("  seed    outcome         arrival (s)  nearest (m)  left (m)  angle (deg)  effort (rad2 s)")
     for i, outcome in enumerate(found.outcome):
-        label = "-" if seed is None else str(seed + i)
         arrival = f"{found.arrival[i]:.2f}" if math.isfinite(found.arrival[i]) else "never"
         typer.echo(
-            f"  {label:<6}  {outcome.label:<14}  {arrival:<11}  {found.nearest[i]:<11.4f}  "
+            f"  {done.labels[i]:<6}  {outcome.label:<14}  {arrival:<11}  {found.nearest[i]:<11.4f}  "
             f"{found.distance[i]:<8.3f}  {math.degrees(found.angle[i]):<11.2f}  {found.effort[i]:.4f}"
         )
     if done.straight:

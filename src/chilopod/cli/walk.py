@@ -6,17 +6,11 @@ import math
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chilopod.cli.options import (
-    STAYS_STRAIGHT,
-    WalkOptions,
-    free,
-    reading,
-    with_walk_options,
-)
+from chilopod.cli.options import STAYS_STRAIGHT, WalkOptions, free, reading, with_options
 
 if TYPE_CHECKING:
     from chilopod.record_file import RecordFile
@@ -26,7 +20,7 @@ if TYPE_CHECKING:
 _MUCH = 1e9  # bytes
 
 
-@with_walk_options
+@with_options
 def walk(
     options: WalkOptions,
     duration: Annotated[str, typer.Option(metavar="TIME", help='How long, such as "60 s" or "2 min".')] = "60 s",
@@ -58,21 +52,19 @@ def walk(
         angles = joint_angles(initial_joints)
     free([out] if out else [], options.force)
     from chilopod.record import RATE
-    from chilopod.tasks import ends, planned
+    from chilopod.tasks import ends
+    from chilopod.trials import Trial
 
     with ExitStack() as stack:
-        with options.walking("walk") as show:
-            rate = RATE if rate is None else rate
-            how: dict[str, Any] = {"joint_angles": angles, "rate": rate, "forces": forces, "controller": options.own}
-            walks = planned(described, seconds, **how, **options.repeated)
-            file = stack.enter_context(_record_file(out, walks)) if out else None
-            done = ends(
-                walks,
-                options.trials,
-                lambda part, words: show("walk", part, words),
-                file.add if file else lambda index, record: None,
+        with options.walking("walk") as told:
+            one = Trial(
+                described, seconds, 0, angles, rate=RATE if rate is None else rate, forces=forces, **options.steering
             )
-        options.deliver(done, lambda: file.write(replace=options.force) if file else [], lambda: _print(done))
+            trials = one.repeated(options.seed, options.repeats)
+            file = stack.enter_context(_record_file(out, trials)) if out else None
+            add = file.add if file else lambda index, record: None
+            done = ends(trials, options.trials, told("walk"), add)
+        options.deliver(lambda: file.write(replace=options.force) if file else [], done, _print)
 
 
 def _record_file(path: Path, walks: Sequence[Trial]) -> RecordFile:
@@ -88,11 +80,9 @@ def _record_file(path: Path, walks: Sequence[Trial]) -> RecordFile:
 
 
 def _print(done: Ends) -> None:
-    first, count = done.first, len(done.trials)
-    typer.echo(f"{first.robot.name}, {first.engine}: {count} walk{'s' if count > 1 else ''} of {first.duration:g} s")
+    typer.echo(done.title)
     typer.echo("  seed    x (m)     y (m)     radius (m)  joint angles, mean of the last 5 s (deg)")
-    for trial, end in zip(done.trials, done.summaries, strict=True):
-        label = str(trial.seed) if done.seeded else "-"
+    for label, end in zip(done.labels, done.summaries, strict=True):
         if end.failed:
             typer.echo(f"  {label:<6}  {end.sentence}")
             continue

@@ -8,8 +8,9 @@ if TYPE_CHECKING:
     from chilopod.tasks.course import Driven, Driver, drive, driver
     from chilopod.tasks.identify import identify_planar, identify_twin
     from chilopod.tasks.radius_law import radius_law
-    from chilopod.tasks.turn import Turn, best_spring, turn
-    from chilopod.tasks.walk import Ends, Walks, ends, foot_creep, planned, walk
+    from chilopod.tasks.runs import RunOptions
+    from chilopod.tasks.turn import Turn, turn
+    from chilopod.tasks.walk import Ends, Walks, ends, walk
 else:
     __getattr__, __dir__ = exports(
         __name__,
@@ -17,8 +18,9 @@ else:
             "course": ("Driven", "Driver", "drive", "driver"),
             "identify": ("identify_planar", "identify_twin"),
             "radius_law": ("radius_law",),
-            "turn": ("Turn", "best_spring", "turn"),
-            "walk": ("Ends", "Walks", "ends", "foot_creep", "planned", "walk"),
+            "runs": ("RunOptions",),
+            "turn": ("Turn", "turn"),
+            "walk": ("Ends", "Walks", "ends", "walk"),
         },
     )
 
@@ -26,16 +28,14 @@ __all__ = [
     "Driven",
     "Driver",
     "Ends",
+    "RunOptions",
     "Turn",
     "Walks",
-    "best_spring",
     "drive",
     "driver",
     "ends",
-    "foot_creep",
     "identify_planar",
     "identify_twin",
-    "planned",
     "radius_law",
     "turn",
     "walk",

@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack, cast
 
 import numpy as np
 import xarray as xr
 
 from chilopod.engine import Controller, engine_named
-from chilopod.engine.named import check_controller, path_of
-from chilopod.errors import AnalysisError, ParameterError
+from chilopod.errors import AnalysisError
 from chilopod.frozen import Short
 from chilopod.notebook import block, table, words
 from chilopod.progress import Progress, silent
@@ -26,15 +25,25 @@ from chilopod.steering import (
     random_course,
 )
 from chilopod.tasks.radius_law import radius_law
+from chilopod.tasks.runs import RunOptions, Runs, runs
 from chilopod.tasks.shown import paths
-from chilopod.tasks.walk import check_repeats, foot_creep, repeated
-from chilopod.trials import NONE, Trial, check_fits, run
+from chilopod.trials import Trial, finite
 
 GRAVITY = 9.81
 """m/s^2"""
 
 _RATE = 20.0  # Hz, of records: looks of the referee fall on samples
 _PATIENCE = 25.0  # s for a target, of an engine whose walks are as fast as the straight walk without slip
+_OF_GOALS = {
+    "begin": "begin_s",
+    "end": "end_s",
+    "nearest": "nearest_m",
+    "path": "path_m",
+    "shortest": "shortest_m",
+    "effort": "leg_yaw_effort_rad2_s",
+    "spring_work": "spring_work_J",
+    "drive_work": "drive_work_J",
+}
 
 
 @dataclass(frozen=True)
@@ -46,7 +55,7 @@ class Driver(Short):
     robot
         With the springs of the strategy, and the actuator that it needs.
     strategy
-        As given to :func:`drive`.
+        As given to :func:`driver`.
     controller
         Controller of the walk; None without steering.
     law
@@ -64,37 +73,35 @@ class Driver(Short):
     engine: str
     remarks: tuple[str, ...] = ()
 
+    def trial(self, course: Course, seed: int = 0, *, poses: bool = False, brief: bool = False) -> Trial:
+        """The trial of a course, with the disturbance that all studies have, and with any radius of the tightest
+        circle: that of the robot takes its place where it is known."""
+        goals = course if self.law is None else replace(course, tightest=self.law.tightest)
+        told = self.robot, course.duration, seed, (), goals, self.controller
+        return Trial(*told, rate=_RATE, engine=self.engine, poses=poses, brief=brief)
+
 
 @dataclass(frozen=True)
-class Driven(Short):
+class Driven(Runs):
     """Walks along a course, and what became of its targets.
 
     Attributes
     ----------
-    driver
-        Driver of the walks.
-    course
-        As given to :func:`drive`.
     trials
         With all that makes each walk.
+    driver
+        Driver of the walks.
     records
         Records of every walk, up to where it ended, see :func:`chilopod.steering.of_course`.
     """
 
     driver: Driver
-    course: Course
-    trials: tuple[Trial, ...]
     records: tuple[xr.Dataset, ...]
 
     @property
-    def robot(self) -> Robot:
-        """Robot that walked."""
-        return self.driver.robot
-
-    @property
-    def engine(self) -> str:
-        """Name of the engine."""
-        return self.driver.engine
+    def course(self) -> Course:
+        """The course with the radius of the robot's tightest circle."""
+        return cast(Course, self.first.target)
 
     @property
     def strategy(self) -> Strategy:
@@ -115,79 +122,58 @@ class Driven(Short):
         ).assign_coords(robot=np.arange(len(self.records)))
         return joined.assign(within=longest.within) if "within" in longest else joined
 
-    @cached_property
-    def foot_creep(self) -> float | None:
-        """See :func:`chilopod.tasks.walk.foot_creep`."""
-        return foot_creep(self.robot, self.engine)
-
-    def as_json(self) -> dict[str, Any]:
-        """Plain numbers; null for what there is not."""
-        first = self.trials[0]
+    def _found(self) -> dict[str, Any]:
+        walks = zip(self.trials, self.seeds, self.records, strict=True)
         return {
-            "robot": self.robot.name,
-            "engine": self.engine,
             "strategy": self.strategy.name,
-            "controller": None if first.controller is None else path_of(type(first.controller)),
             "patience_s": self.course.patience,
             "tightest_radius_m": self.course.tightest,
             "pitchfork_N_m_rad": self.pitchfork,
             "remarks": list(self.driver.remarks),
-            "walks": [_walk_json(*each) for each in zip(self.trials, self.records, strict=True)],
-            "foot_creep_N_s_m": self.foot_creep,
+            "walks": [{"seed": seed, **_walk_json(trial.robot, record)} for trial, seed, record in walks],
         }
 
     def _repr_html_(self) -> str:
         goals = self.record.sizes["goal"]
         rows = []
-        for trial, record in zip(self.trials, self.records, strict=True):
+        for label, record in zip(self.labels, self.records, strict=True):
             ends = record.goal_end.values
             rows.append(
                 (
-                    "-" if trial.disturbance == NONE else trial.seed,
+                    label,
                     f"{int((record.goal_verdict == Verdict.ARRIVED.label).sum())} of {goals}",
                     f"{np.nanmax(ends):.1f}" if np.isfinite(ends).any() else "-",
                 )
             )
         return block(
-            f"{self.robot.name}, {self.engine}: a course of {goals} targets by {self.strategy.name}",
+            f"{self.who}: a course of {goals} targets by {self.strategy.name}",
             paths(self.record),
             *(words(remark) for remark in self.driver.remarks),
             table(("seed", "targets reached", "after (s)"), rows),
         )
 
 
-def _walk_json(trial: Trial, record: xr.Dataset) -> dict[str, Any]:
-    def plain(value: float) -> float | None:
-        return float(value) if np.isfinite(value) else None
-
+def _walk_json(robot: Robot, record: xr.Dataset) -> dict[str, Any]:
     sentences = {verdict.label: verdict.sentence for verdict in Verdict}
     goals = []
-    for goal in record.isel(robot=0).transpose("goal", ...).goal.values:
+    for goal in record.goal.values:
         found = record.isel(robot=0).sel(goal=goal)
         verdict = str(found.goal_verdict.item())
         goals.append(
             {
                 "verdict": verdict,
                 "sentence": sentences[verdict],
-                "place_m": [plain(each) for each in found.goal_place.values],
-                "begin_s": plain(found.goal_begin.item()),
-                "end_s": plain(found.goal_end.item()),
-                "nearest_m": plain(found.goal_nearest.item()),
-                "path_m": plain(found.goal_path.item()),
-                "shortest_m": plain(found.goal_shortest.item()),
-                "leg_yaw_effort_rad2_s": plain(found.goal_effort.item()),
-                "spring_work_J": plain(found.goal_spring_work.item()),
-                "drive_work_J": plain(found.goal_drive_work.item()),
+                "place_m": [finite(each) for each in found.goal_place.values],
+                **{told: finite(found[f"goal_{name}"].item()) for name, told in _OF_GOALS.items()},
             }
         )
     return {
-        "seed": None if trial.disturbance == NONE else trial.seed,
         "status": str(record.status.values[0]),
         "arrived": int((record.goal_verdict == Verdict.ARRIVED.label).sum()),
-        "time_s": plain(float(np.nanmax(record.goal_end.values))),
+        "time_s": finite(float(np.nanmax(record.goal_end.values))),
         "spring_work_J": float(record.goal_spring_work.sum()),
         "drive_work_J": float(record.goal_drive_work.sum()),
-        "steering_cost_of_transport": plain(steering_cost(trial.robot, record)),
+        "steering_cost_of_transport": finite(steering_cost(robot, record)),
         "targets": goals,
     }
 
@@ -254,16 +240,7 @@ def driver(
     return Driver(ready.robot, strategy, ready.controller, law, engine, (*unknown, *ready.remarks))
 
 
-def drive(
-    driver: Driver,
-    course: Course,
-    *,
-    seed: int | None = None,
-    repeats: int = 1,
-    engine: str | None = None,
-    folder: str | Path | None = None,
-    progress: Progress = silent,
-) -> Driven:
+def drive(driver: Driver, course: Course, **options: Unpack[RunOptions]) -> Driven:
     """Let a robot walk a course.
 
     Parameters
@@ -271,60 +248,18 @@ def drive(
     driver
         The robot and what steers it.
     course
-        With any radius of the tightest circle: that of the robot takes its place where it is known.
-    seed, repeats, folder, progress
-        As for :func:`chilopod.tasks.walk`.
-    engine
-        Name of the driver's engine, which is also the default.
+        With any radius of the tightest circle, see :meth:`Driver.trial`.
+    **options
+        See :class:`chilopod.tasks.RunOptions`.
 
     Raises
     ------
     ParameterError
         If memory cannot hold the records, or something is out of range.
     """
-    if engine not in (None, driver.engine):
-        raise ParameterError(
-            "the driver was made ready for another engine", field="engine", value=engine, allowed=driver.engine
-        )
-    engine = driver.engine
-    check_drive(driver.robot, course, seed=seed, repeats=repeats, engine=engine)
-    if driver.controller is not None:
-        check_controller(driver.controller)
-    if driver.law is not None:
-        course = replace(course, tightest=driver.law.tightest)
-    trials = repeated(trial_of(driver, course, poses=engine_named(engine).traits.poses), seed, repeats)
-    records = run(trials, folder, progress)
-    return Driven(driver, course, trials, tuple(records))
-
-
-def check_drive(
-    robot: Robot, course: Course, *, seed: int | None = None, repeats: int = 1, engine: str = "planar"
-) -> None:
-    """Refuse what :func:`drive` would refuse of a robot, before :func:`driver` takes its time.
-
-    Raises
-    ------
-    ParameterError
-        If the engine does not know such a robot, several walks are all alike, or memory cannot hold their records.
-    """
-    check_repeats(seed, repeats)
-    one = Trial(robot, course.duration, target=course, rate=_RATE, engine=engine)
-    check_fits([one] * repeats)
-
-
-def trial_of(driver: Driver, course: Course, seed: int = 0, *, poses: bool = False, brief: bool = False) -> Trial:
-    """The trial of a course, with the disturbance that all studies have."""
-    return Trial(
-        driver.robot,
-        course.duration,
-        seed,
-        target=course,
-        controller=driver.controller,
-        rate=_RATE,
-        engine=driver.engine,
-        poses=poses,
-        brief=brief,
-    )
+    trial = driver.trial(course, poses=engine_named(driver.engine).traits.poses)
+    trials, records = runs(trial, **options)
+    return Driven(trials, driver, tuple(records))
 
 
 def patience_of(engine: str) -> float:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack, cast
 
 import numpy as np
 import xarray as xr
@@ -14,18 +13,15 @@ from numpy.typing import NDArray
 from chilopod import units
 from chilopod.analysis.parameters import K1
 from chilopod.engine import Controller, engine_named
-from chilopod.engine.named import check_controller, path_of
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.frozen import Short
 from chilopod.notebook import block, table, words
-from chilopod.progress import Progress, silent
-from chilopod.record import LONGEST, in_range
+from chilopod.progress import part, silent
 from chilopod.robot import Robot
 from chilopod.steering import Criteria, Strategy, Target, earliest_arrival, evaluate
 from chilopod.tasks.radius_law import radius_law
+from chilopod.tasks.runs import RunOptions, Runs, runs
 from chilopod.tasks.shown import paths
-from chilopod.tasks.walk import check_repeats, foot_creep, repeated
-from chilopod.trials import NONE, Trial, check_fits, run, straight, together
+from chilopod.trials import NONE, Trial, check_fits, finite, run, straight, together
 
 Array = NDArray[np.float64]
 
@@ -36,17 +32,15 @@ _AS_NEAR = 1e-9  # m
 
 
 @dataclass(frozen=True)
-class Turn(Short):
+class Turn(Runs):
     """A turning task and how it went.
 
     Attributes
     ----------
-    robot
-        With the spring it walked with.
-    target, strategy, engine
+    trials
+        With all that makes each walk: the robot has the spring that it walked with.
+    strategy
         As given to :func:`turn`.
-    controller
-        Controller of the walks, the strategy's or one's own; None without steering.
     by_law
         The spring whose settled walk has the radius of the circle to the target, the paper's k1-hat, N*m/rad; None
         where there is no such spring or none was asked for.
@@ -58,55 +52,42 @@ class Turn(Short):
         At the earliest arrival of any repeat, or at the end if none arrives.
     """
 
-    robot: Robot
-    target: Target
     strategy: Strategy
-    engine: str
-    controller: Controller | None
     by_law: float | None
     stiffness: float | None
     record: xr.Dataset
     criteria: Criteria
 
     @property
+    def target(self) -> Target:
+        """As given to :func:`turn`."""
+        return cast(Target, self.first.target)
+
+    @property
     def straight(self) -> bool:
         """See :func:`chilopod.trials.straight`."""
         return straight(self.record)
 
-    @cached_property
-    def foot_creep(self) -> float | None:
-        """See :func:`chilopod.tasks.walk.foot_creep`."""
-        return foot_creep(self.robot, self.engine)
-
-    def as_json(self) -> dict[str, Any]:
-        """Plain numbers; null for what there is not."""
-
-        def plain(value: float | None) -> float | None:
-            return float(value) if value is not None and np.isfinite(value) else None
-
+    def _found(self) -> dict[str, Any]:
         found = self.criteria
         return {
-            "robot": self.robot.name,
             "strategy": self.strategy.name,
-            "engine": self.engine,
-            "controller": None if self.controller is None else path_of(type(self.controller)),
             "target": {"bearing_rad": self.target.bearing, "distance_m": self.target.distance},
-            "circle_radius_m": plain(self.target.radius),
-            "spring_by_law_N_m_rad": plain(self.by_law),
-            "spring_N_m_rad": plain(self.stiffness),
+            "circle_radius_m": finite(self.target.radius),
+            "spring_by_law_N_m_rad": finite(self.by_law),
+            "spring_N_m_rad": finite(self.stiffness),
             "evaluation_time_s": found.time,
             "walks": [
                 {
                     "outcome": outcome.label,
-                    "arrival_s": plain(found.arrival[i]),
-                    "nearest_m": plain(found.nearest[i]),
-                    "epsilon1_m": plain(found.distance[i]),
-                    "epsilon2_rad": plain(found.angle[i]),
-                    "epsilon3_rad2_s": plain(found.effort[i]),
+                    "arrival_s": finite(found.arrival[i]),
+                    "nearest_m": finite(found.nearest[i]),
+                    "epsilon1_m": finite(found.distance[i]),
+                    "epsilon2_rad": finite(found.angle[i]),
+                    "epsilon3_rad2_s": finite(found.effort[i]),
                 }
                 for i, outcome in enumerate(found.outcome)
             ],
-            "foot_creep_N_s_m": self.foot_creep,
         }
 
     def _repr_html_(self) -> str:
@@ -120,7 +101,7 @@ class Turn(Short):
             for outcome, arrival, nearest in zip(found.outcome, found.arrival, found.nearest, strict=True)
         ]
         return block(
-            f"{self.robot.name}, {self.engine}: turn to {self.target} by {self.strategy.name}",
+            f"{self.who}: turn to {self.target} by {self.strategy.name}",
             paths(self.record),
             words(said),
             table(("outcome", "arrival (s)", "nearest (m)"), rows),
@@ -134,12 +115,9 @@ def turn(
     spring: float | str = "auto",
     *,
     duration: float | None = None,
-    seed: int | None = None,
-    repeats: int = 1,
     engine: str = "planar",
     controller: Controller | None = None,
-    folder: str | Path | None = None,
-    progress: Progress = silent,
+    **options: Unpack[RunOptions],
 ) -> Turn:
     """Walk to a target.
 
@@ -158,15 +136,13 @@ def turn(
     duration
         s; by default what the circle takes at the speed of the straight walk without slip, times the engine's haste,
         see :class:`chilopod.engine.Traits`; at least 5 s.
-    seed, repeats, progress
-        As for :func:`chilopod.tasks.walk`.
     engine
-        One of :data:`chilopod.engine.ENGINES`, or one's own as ``package.module:object``. The radius law of the planar
-        model is that of its exact branch, any other's that of trials.
+        As for :class:`chilopod.trials.Trial`. The radius law of the planar model is that of its exact branch, any
+        other's that of trials.
     controller
-        In place of the strategy's: a frozen dataclass, see :class:`chilopod.trials.Trial`.
-    folder
-        Folder of all trials, of the radius law and of the search too; without one nothing is kept.
+        Controller in place of the strategy's, see :class:`chilopod.trials.Trial`.
+    **options
+        See :class:`chilopod.tasks.RunOptions`; the folder has the trials of the radius law and of the search too.
 
     Raises
     ------
@@ -182,21 +158,14 @@ def turn(
             value=spring,
             allowed="auto",
         )
-    check_repeats(seed, repeats)
     traits = engine_named(engine).traits
-    engine_named(engine).common(robot)
-    if controller is not None:
-        check_controller(controller)
     time = duration if duration is not None else _time_for(robot, target, traits.haste)
-    in_range("duration", time, LONGEST, "s")
-    check_fits(repeated(Trial(robot, time, target=target, engine=engine), seed, repeats))
+    trial = Trial(robot, time, target=target, controller=controller, engine=engine, poses=traits.poses)
+    check_fits(trial.repeated(options.get("seed"), options.get("repeats", 1)))
+    folder, progress = options.get("folder"), options.get("progress", silent)
     law = None
     if isinstance(spring, str) and strategy.springs == K1:
-
-        def shown(done: float, words: str) -> None:
-            progress(0.4 * done, f"radius law, {words}")
-
-        law = radius_law(robot, engine, folder, shown)
+        law = radius_law(robot, engine, folder, part(progress, 0.0, 0.4, "radius law"))
     by_law = law.value(target.radius) if law else None
     if strategy.springs is None:
         stiffness = None
@@ -209,40 +178,32 @@ def turn(
     else:
         between = (float(law.values[0]), 1.5 * law.pitchfork) if law else _around(robot)
         progress(0.4, "trials with many springs")
-        stiffness = best_spring(robot, target, strategy, between, time, engine, controller, folder)
-    progress(0.9, "walk")
-    walker, steering, _ = strategy.prepare(robot, None, stiffness, controller)
-    trial = Trial(walker, time, target=target, controller=steering, engine=engine, poses=traits.poses)
-    record = together(run(repeated(trial, seed, repeats), folder))
+        stiffness = _best_spring(trial, strategy, between, folder)
+    options["progress"] = part(progress, 0.9, 1.0, "walk")
+    trials, records = runs(_with_spring(trial, strategy, stiffness), **options)
+    record = together(records)
     when = earliest_arrival(record)
     criteria = evaluate(record, when if np.isfinite(when) else float(record.time[-1]))
-    return Turn(walker, target, strategy, engine, steering, by_law, stiffness, record, criteria)
+    return Turn(trials, strategy, by_law, stiffness, record, criteria)
 
 
-def best_spring(
-    robot: Robot,
-    target: Target,
-    strategy: Strategy,
-    between: tuple[float, float],
-    duration: float,
-    engine: str = "planar",
-    controller: Controller | None = None,
-    folder: str | Path | None = None,
-) -> float:
+def _with_spring(trial: Trial, strategy: Strategy, stiffness: float | None) -> Trial:
+    walker, controller, _ = strategy.prepare(trial.robot, None, stiffness, trial.controller)
+    return replace(trial, robot=walker, controller=controller)
+
+
+def _best_spring(trial: Trial, strategy: Strategy, between: tuple[float, float], folder: str | Path | None) -> float:
     """The spring of a strategy that comes nearest to the target, by undisturbed trials on ever finer grids, N*m/rad."""
     low, high = between
-    tried = engine_named(engine).traits.a_round
+    tried = engine_named(trial.engine).traits.a_round
+    trial = replace(trial, disturbance=NONE, rate=20.0, poses=False)
     values = np.geomspace(low, high, tried)
     best = 0
     for round_ in range(_ROUNDS):
         if round_:
             values = np.linspace(values[max(best - 1, 0)], values[min(best + 1, tried - 1)], tried)
-        trials = []
-        for value in values:
-            walker, steering, _ = strategy.prepare(robot, None, float(value), controller)
-            trials.append(Trial(walker, duration, 0, (), target, steering, NONE, rate=20.0, engine=engine))
-        record = together(run(trials, folder))
-        nearest = evaluate(record, duration).nearest
+        record = together(run([_with_spring(trial, strategy, float(value)) for value in values], folder))
+        nearest = evaluate(record, trial.duration).nearest
         # Of springs that do equally well the stiffest.
         best = int(np.flatnonzero(nearest <= np.nanmin(nearest) + _AS_NEAR)[-1])
     return float(values[best])

@@ -3,29 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypedDict, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 import xarray as xr
 
-from chilopod.engine import Controller, HasFootCreep, engine_named
-from chilopod.engine.named import path_of
-from chilopod.errors import ParameterError
-from chilopod.frozen import Short
+from chilopod.engine import Controller
 from chilopod.notebook import block, table
 from chilopod.progress import Progress, silent
+from chilopod.record import RATE
 from chilopod.robot import Robot
+from chilopod.tasks.runs import RunOptions, Runs, runs
 from chilopod.tasks.shown import paths
-from chilopod.trials import NONE, Disturbance, Trial, WalkSummary, as_now, run, run_each, straight, summaries, together
-
-_MOST_BENT = 1.5  # rad; at a right angle modules run into each other
+from chilopod.trials import Trial, WalkSummary, as_now, run_each, straight, summaries, together
 
 
 @dataclass(frozen=True)
-class Ends(Short):
+class Ends(Runs):
     """Ends of walks that differ in nothing but their seed.
 
     Attributes
@@ -38,59 +34,37 @@ class Ends(Short):
         True if none of them ever bent, see :func:`chilopod.trials.straight`.
     """
 
-    trials: tuple[Trial, ...]
     summaries: Sequence[WalkSummary]
     straight: bool
 
     @property
-    def first(self) -> Trial:
-        """All but the seed is the same in the others."""
-        return self.trials[0]
+    def title(self) -> str:
+        """Robot, engine, how many walks and how long, in words."""
+        count = len(self.trials)
+        return f"{self.who}: {count} walk{'s' if count > 1 else ''} of {self.first.duration:g} s"
 
-    @property
-    def seeded(self) -> bool:
-        """True if the walks are disturbed."""
-        return self.first.disturbance != NONE
-
-    @cached_property
-    def foot_creep(self) -> float | None:
-        """See :func:`foot_creep`."""
-        return foot_creep(self.first.robot, self.first.engine)
-
-    def as_json(self) -> dict[str, Any]:
-        """Plain numbers; null for what there is not."""
-        first = self.first
+    def _found(self) -> dict[str, Any]:
+        ends = zip(self.trials, self.summaries, strict=True)
         return {
-            "robot": first.robot.name,
-            "engine": first.engine,
-            "controller": None if first.controller is None else path_of(type(first.controller)),
-            "duration_s": first.duration,
-            "seeded": self.seeded,
-            "walks": [
-                {"seed": trial.seed, **end.as_json()} for trial, end in zip(self.trials, self.summaries, strict=True)
-            ],
-            "foot_creep_N_s_m": self.foot_creep,
+            "duration_s": self.first.duration,
+            "seeded": self.seeds[0] is not None,
+            "walks": [{"seed": trial.seed, **end.as_json()} for trial, end in ends],
         }
 
     def _repr_html_(self) -> str:
-        return block(self._heading, self._table)
-
-    @property
-    def _heading(self) -> str:
-        first, count = self.first, len(self.trials)
-        return f"{first.robot.name}, {first.engine}: {count} walk{'s' if count > 1 else ''} of {first.duration:g} s"
+        return block(self.title, self._table)
 
     @property
     def _table(self) -> str:
         rows = [
             (
-                trial.seed if self.seeded else "-",
+                label,
                 end.sentence,
                 f"{end.x:.3f}",
                 f"{end.y:.3f}",
                 f"{end.axis_radius:.4g}" if np.isfinite(end.axis_radius) else "straight",
             )
-            for trial, end in zip(self.trials, self.summaries, strict=True)
+            for label, end in zip(self.labels, self.summaries, strict=True)
         ]
         return table(("seed", "", "x (m)", "y (m)", "radius (m)"), rows)
 
@@ -110,86 +84,43 @@ class Walks(Ends):
     record: xr.Dataset
 
     def _repr_html_(self) -> str:
-        return block(self._heading, paths(self.record), self._table)
-
-
-class Plan(TypedDict, total=False):
-    """Arguments of :func:`walk` and :func:`planned`, all of which may be left out."""
-
-    seed: int | None
-    repeats: int
-    joint_angles: Sequence[float]
-    rate: float
-    forces: bool
-    engine: str
-    controller: Controller | None
+        return block(self.title, paths(self.record), self._table)
 
 
 def walk(
     robot: Robot,
     duration: float,
     *,
-    folder: str | Path | None = None,
-    progress: Progress = silent,
-    **plan: Unpack[Plan],
+    joint_angles: Sequence[float] = (),
+    rate: float = RATE,
+    forces: bool = False,
+    engine: str = "planar",
+    controller: Controller | None = None,
+    **options: Unpack[RunOptions],
 ) -> Walks:
     """Let a robot walk, once or many times.
 
     Parameters
     ----------
-    robot
-        The robot.
-    duration
-        s.
-    folder
-        Folder where the trials are kept; without one nothing is kept.
-    progress
-        Called with the part done (0 to 1) and a few words.
-    **plan
-        ``seed`` of the first walk's disturbances, the others count up from it; None (default) for no disturbance at
-        all. ``repeats``, the number of walks, by default 1. ``joint_angles`` at the start, before disturbance, rad: one
-        a joint, front to rear, one for all, or none for straight. ``rate``, samples per second, by default 100.
-        ``forces``: whether the record has the force on every foot. ``engine``: one of
-        :data:`chilopod.engine.ENGINES`, by default planar, or one's own as ``package.module:object``. ``controller``
-        that steers, a frozen dataclass, see :class:`chilopod.trials.Trial`.
+    robot, duration, joint_angles, rate, forces, engine, controller
+        As for :class:`chilopod.trials.Trial`.
+    **options
+        See :class:`chilopod.tasks.RunOptions`.
 
     Raises
     ------
     ParameterError
         If something is out of range, or memory cannot hold the record: :func:`ends` needs none.
     """
-    trials = planned(robot, duration, **plan)
-    record = together(run(trials, folder, progress))
+    bends = tuple(joint_angles)
+    one = Trial(robot, duration, 0, bends, controller=controller, rate=rate, forces=forces, engine=engine)
+    trials, records = runs(one, **options)
+    record = together(records)
     return Walks(trials, summaries(robot, record), straight(record), record)
 
 
-def planned(robot: Robot, duration: float, **plan: Unpack[Plan]) -> tuple[Trial, ...]:
-    """The trials of :func:`walk`, whose arguments these are.
-
-    Raises
-    ------
-    ParameterError
-        If something is out of range.
-    """
-    rest: dict[str, Any] = {**plan}
-    angles, joints = tuple(rest.pop("joint_angles", ())), robot.body.modules - 1
-    seed, repeats = rest.pop("seed", None), rest.pop("repeats", 1)
-    if len(angles) == 1:
-        angles *= joints
-    if len(angles) not in (0, joints):
-        raise ParameterError(
-            f"are {len(angles)} angles", field="joint_angles", value=angles, allowed=f"{joints}, or one for all"
-        )
-    if not all(abs(angle) <= _MOST_BENT for angle in angles):
-        raise ParameterError(
-            "are bent too far", field="joint_angles", value=angles, allowed=f"{_MOST_BENT} rad (85 deg) to either side"
-        )
-    check_repeats(seed, repeats)
-    return repeated(Trial(robot, duration, joint_angles=angles, **rest), seed, repeats)
-
-
 def ends(
-    trials: tuple[Trial, ...],
+    trials: Sequence[Trial],
     folder: str | Path | None = None,
     progress: Progress = silent,
     told: Callable[[int, xr.Dataset], None] = lambda index, record: None,
@@ -199,9 +130,9 @@ def ends(
     Parameters
     ----------
     trials
-        From :func:`planned`.
+        From :meth:`chilopod.trials.Trial.repeated`.
     folder, progress
-        As for :func:`walk`.
+        As for :class:`chilopod.tasks.RunOptions`.
     told
         Called with the number of a walk and its record as soon as that is there.
     """
@@ -215,33 +146,3 @@ def ends(
         unbent = unbent and straight(record)
         told(index, record)
     return Ends(trials, [found[index] for index in range(len(trials))], unbent)
-
-
-def check_repeats(seed: int | None, repeats: int) -> None:
-    """Make sure that there are walks, and that several differ.
-
-    Raises
-    ------
-    ParameterError
-        If not.
-    """
-    if repeats < 1:
-        raise ParameterError("must be positive", field="repeats", value=repeats)
-    if repeats > 1 and seed is None:
-        raise ParameterError("are all alike without a seed", field="repeats", value=repeats, allowed="1, or a seed")
-
-
-def repeated(trial: Trial, seed: int | None, repeats: int) -> tuple[Trial, ...]:
-    """A trial so many times, disturbed with seeds that count up; once and undisturbed where the seed is None."""
-    spread = NONE if seed is None else Disturbance()
-    return tuple(replace(trial, seed=(seed or 0) + i, disturbance=spread) for i in range(repeats))
-
-
-def foot_creep(robot: Robot, engine: str) -> float | None:
-    """How firmly an engine's floor holds standing feet: the coefficient of viscous friction across the way that lets
-    them creep as much, N*s/m; None where they do not creep, or the robot does not stand."""
-    walks = engine_named(engine)
-    if not isinstance(walks, HasFootCreep):
-        return None
-    found = walks.foot_creep(robot).across
-    return found if np.isfinite(found) else None

@@ -60,17 +60,18 @@ class WalkSummary:
 
     def as_json(self) -> dict[str, Any]:
         """Plain numbers; null for what a failed walk does not have, and for an infinite radius."""
-
-        def plain(value: float) -> float | None:
-            return float(value) if np.isfinite(value) else None
-
         return {
             "status": self.status,
-            "x_m": plain(self.x),
-            "y_m": plain(self.y),
-            "axis_radius_m": plain(self.axis_radius),
-            "mean_joint_angles_rad": [plain(angle) for angle in self.joint_angles],
+            "x_m": finite(self.x),
+            "y_m": finite(self.y),
+            "axis_radius_m": finite(self.axis_radius),
+            "mean_joint_angles_rad": [finite(angle) for angle in self.joint_angles],
         }
+
+
+def finite(value: float | None) -> float | None:
+    """A number for JSON; None for what is not finite."""
+    return float(value) if value is not None and np.isfinite(value) else None
 
 
 def mean_joint_angles(record: xr.Dataset, seconds: float = AVERAGED, before: float = 0.0) -> xr.DataArray:

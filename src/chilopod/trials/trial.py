@@ -20,10 +20,11 @@ from chilopod.robot import Robot
 from chilopod.sources import digest
 from chilopod.steering import Course, Target
 from chilopod.trials.description import classes_in, code_of, is_findable, is_ours, plain, robot_text, sources_of
-from chilopod.trials.disturbance import Disturbance
+from chilopod.trials.disturbance import NONE, Disturbance
 from chilopod.trials.reach import UnknownKindError
 
 _DIGITS = 16
+_MOST_BENT = 1.5  # rad; at a right angle modules run into each other
 _ABOVE = ("analysis", "cli", "gym", "live", "paper", "show", "stability", "tasks")
 """Subpackages that no walk is made with: who edits these finds trials that were kept before."""
 
@@ -41,7 +42,7 @@ class Trial:
     seed
         Seed of its disturbances.
     joint_angles
-        At the start, before disturbance, rad, (N-1,); empty for straight.
+        At the start, before disturbance, rad: one a joint, front to rear, one for all, or none for straight.
     target
         Target of the robot, if any: one target, or a course of them, which ends the walk.
     controller
@@ -93,16 +94,22 @@ class Trial:
             if not isinstance(getattr(self, name), kind):
                 raise ParameterError("is none", field=name, value=getattr(self, name), allowed=allowed)
         angles, joints = as_array("joint_angles", self.joint_angles), self.robot.body.modules - 1
-        if angles.shape not in ((0,), (joints,)) or not np.isfinite(angles).all():
+        if angles.shape not in ((0,), (1,), (joints,)):
             raise ParameterError(
-                "are none", field="joint_angles", value=self.joint_angles, allowed=f"{joints}, or none"
+                f"are {angles.size} angles",
+                field="joint_angles",
+                value=self.joint_angles,
+                allowed=f"{joints}, or one for all",
             )
+        if not (np.abs(angles) <= _MOST_BENT).all():
+            bounds = f"{_MOST_BENT} rad (85 deg) to either side"
+            raise ParameterError("are bent too far", field="joint_angles", value=self.joint_angles, allowed=bounds)
         seeds = as_seeds([self.seed], "seed")
         # Equal trials have one text, whatever kinds of numbers they were given.
         told = {
             "duration": as_number("duration", self.duration),
             "seed": seeds[0] if seeds else 0,
-            "joint_angles": tuple(angles.tolist()),
+            "joint_angles": tuple(np.broadcast_to(angles, joints if angles.size else 0).tolist()),
             "rate": as_number("rate", self.rate),
             "forces": bool(self.forces),
             "poses": bool(self.poses),
@@ -167,6 +174,21 @@ class Trial:
         except UnknownKindError as error:
             can = "numbers, text, arrays, lists, dictionaries, enums, functions, classes and modules can"
             return f"of this process {id(self.controller):x}", f"{error}, which cannot be described; {can}", ""
+
+    def repeated(self, seed: int | None = None, repeats: int = 1) -> tuple[Trial, ...]:
+        """The same trial so many times, with seeds that count up; undisturbed where the seed is None.
+
+        Raises
+        ------
+        ParameterError
+            If there would be no walks, or several that are all alike.
+        """
+        if repeats < 1:
+            raise ParameterError("must be positive", field="repeats", value=repeats)
+        if repeats > 1 and seed is None:
+            raise ParameterError("are all alike without a seed", field="repeats", value=repeats, allowed="1, or a seed")
+        spread = NONE if seed is None else self.disturbance
+        return tuple(replace(self, seed=(seed or 0) + i, disturbance=spread) for i in range(repeats))
 
     def as_now(self) -> Trial:
         """The same trial, with code and fields of its controller as they are now."""

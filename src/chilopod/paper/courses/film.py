@@ -46,6 +46,6 @@ def film(
     fixed = without_setting(robot, variable, "pitchfork", best)
     first = drive(variable, course, seed=_SEED, folder=folder, progress=part(progress, 0.0, 0.5))
     second = drive(fixed, course, seed=_SEED, folder=folder, progress=part(progress, 0.5, 1.0))
-    both = Driven(variable, course, first.trials + second.trials, first.records + second.records)
+    both = Driven(first.trials + second.trials, variable, first.records + second.records)
     titles = "k1 set on the way", f"k1 = {best:g} {PAPER_UNIT.replace('*', '·')}"
     return Movie("courses-movie", f"One target after another: {NAMED}", titles, both.record, _SPEED, size=_SIZE)

@@ -21,7 +21,7 @@ from chilopod.paper.size import Size
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.steering import ON_COURSES, VARIABLE, Course, Goal, Verdict
-from chilopod.tasks.course import Driver, driver, random_courses, steering_cost, trial_of
+from chilopod.tasks.course import Driver, driver, random_courses, steering_cost
 from chilopod.trials import Disturbance, Trial
 
 Array = NDArray[np.float64]
@@ -82,10 +82,7 @@ class Case:
 
     def on(self, course: Course, seed: int) -> Trial:
         """Its trial of a course."""
-        law = self.driver.law
-        here = course if law is None else replace(course, tightest=law.tightest)
-        walk = trial_of(self.driver, here, seed, brief=True)
-        return replace(walk, disturbance=self.disturbance)
+        return replace(self.driver.trial(course, seed, brief=True), disturbance=self.disturbance)
 
 
 def driven(
