@@ -53,13 +53,6 @@ class RadiusLaws(Short):
 def radius_laws(robot: Robot, progress: Progress = silent) -> RadiusLaws:
     """The laws from the branch of curved walks, from the pitchfork down to where a joint bends by a right angle.
 
-    Parameters
-    ----------
-    robot
-        The robot.
-    progress
-        Called with the part done (0 to 1) and a few words.
-
     Raises
     ------
     AnalysisError

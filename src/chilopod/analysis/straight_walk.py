@@ -34,10 +34,8 @@ class StraightWalk(ReadOnlyArrays):
 
     Attributes
     ----------
-    robot
-        The robot.
-    exponents
-        Exponents, modes and multipliers of the reduced system, 2N+1 of each.
+    robot, exponents
+        Robot; exponents, modes and multipliers of its reduced system, 2N+1 of each.
     joint_components
         Joint angles of every mode, shape (2N+1, N-1), see :func:`joint_components`.
     """
@@ -98,14 +96,12 @@ class WalkBifurcation(ReadOnlyArrays):
 
     Attributes
     ----------
-    point
-        Kind and place of the point, in SI units (see :class:`chilopod.stability.BifurcationPoint`).
-    parameter, unit
-        Dotted path of the parameter and the unit it is shown in.
-    joint_components
-        Joint angles of the critical mode, shape (N-1,), see :func:`joint_components`.
-    coefficient
-        Cubic coefficient per period (1/rad^2) for an amplitude measured along ``joint_components``.
+    point, parameter, unit
+        Kind and place of the point, in SI units (see :class:`chilopod.stability.BifurcationPoint`); dotted path of the
+        parameter and the unit it is shown in.
+    joint_components, coefficient
+        Joint angles of the critical mode, shape (N-1,), see :func:`joint_components`; cubic coefficient per period
+        (1/rad^2) for an amplitude measured along them.
     """
 
     point: stability.BifurcationPoint
@@ -220,10 +216,8 @@ def bifurcations(
 
     Parameters
     ----------
-    robot
-        The robot; what it has for ``parameter`` does not matter.
-    parameter
-        Dotted path, such as ``springs.stiffness[0]``; ``springs.stiffness`` moves all springs together.
+    robot, parameter
+        Robot, and dotted path, such as ``springs.stiffness[0]``; ``springs.stiffness`` moves all springs together.
     between
         The interval in SI units, rising.
     normal_form

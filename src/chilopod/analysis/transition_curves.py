@@ -35,7 +35,7 @@ class TransitionCurve(Short):
     Attributes
     ----------
     curve
-        In SI units, see :class:`chilopod.stability.Curve2`.
+        Curve in SI units.
     parameters, units
         Dotted paths of the two parameters, and the units they are shown in.
     """
@@ -136,22 +136,16 @@ def transition_curve(
 
     Parameters
     ----------
-    robot
-        The robot; what it has for the two parameters does not matter.
-    parameters
-        Their dotted paths, such as ``springs.stiffness[0]`` and ``legs.forward_offset``.
+    robot, parameters
+        Robot, and dotted paths of two parameters, such as ``springs.stiffness[0]`` and ``legs.forward_offset``.
     between
         Both intervals in SI units: the first is searched for a point to start from, and the curve is followed in both.
-    kind
-        Kind of the bifurcation.
-    second
-        Value of the second parameter (SI) at which the first is searched.
-    points
-        At most so many, in each direction.
-    longest
-        Largest step, in units of ``between``.
+    kind, second
+        Kind of the bifurcation; value of the second parameter (SI) at which the first is searched.
+    points, longest
+        At most so many points in each direction; largest step, in units of ``between``.
     progress
-        Told how many points there are.
+        Called with how many points there are.
 
     Raises
     ------

@@ -37,12 +37,10 @@ class Actions:
 
     Attributes
     ----------
-    robot
-        With an actuator for each of the springs.
-    joints
-        Joints of these springs, counted from 0.
+    robot, joints
+        Robot with an actuator for each of the springs, and their joints, counted from 0.
     softest, stiffest
-        Softest and stiffest of these springs, N*m/rad.
+        Ends of the range of each spring, N*m/rad.
     legs
         Leg controller that defines yaw limit and swing.
     """
@@ -55,15 +53,10 @@ class Actions:
 
     @classmethod
     def of(cls, robot: Robot, springs: Literal["first", "all"] = "first") -> Actions:
-        """The actions of a robot.
+        """The actions of a robot, on its first spring or on all that can be adjusted.
 
-        Parameters
-        ----------
-        robot
-            A robot without any actuator is given them.
-        springs
-            The first, or all that can be adjusted. Where the robot file gives no range, it goes from a seventh of the
-            stiffest spring of the axis to that.
+        A robot without any actuator is given them. Where the robot file gives no range, it goes from a seventh of the
+        stiffest spring of the axis to that.
 
         Raises
         ------
@@ -85,11 +78,8 @@ class Actions:
         stiffest = tuple(own.stiffest[joint] if own.stiffest else most for joint in joints)
         for low, high in zip(softest, stiffest, strict=True):
             if not low < high:
-                raise ParameterError(
-                    "leave a spring no range",
-                    field="springs.softest, springs.stiffest",
-                    value=f"{low:g}, {high:g} N*m/rad",
-                )
+                given, names = f"{low:g}, {high:g} N*m/rad", "springs.softest, springs.stiffest"
+                raise ParameterError("leave a spring no range", field=names, value=given)
         return cls(robot, joints, softest, stiffest)
 
     @property
@@ -139,15 +129,8 @@ class Actions:
         return np.clip(2.0 * (np.log(stiffness) - low) / (high - low) - 1.0, -1.0, 1.0)
 
     def commands(self, actions: Array, leg_yaw: Array) -> list[tuple[float, Command]]:
-        """Commands of a gait cycle by actions: parts of the cycle and the commands that come then.
-
-        Parameters
-        ----------
-        actions
-            As :meth:`checked`.
-        leg_yaw
-            As it is, rad, shape (robots, 2).
-        """
+        """Commands of a gait cycle by :meth:`checked` actions and the present leg yaw, rad, shape (robots, 2): parts of
+        the cycle, and the commands that come then."""
         stiffness = np.tile(self.robot.springs.stiffness, (len(actions), 1))
         stiffness[:, self.joints] = self.stiffness(actions)
         wanted, yaw = self.legs.limit * actions[:, len(self.joints) :], leg_yaw.copy()

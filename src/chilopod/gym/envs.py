@@ -36,21 +36,19 @@ def _without_pictures(env: Any) -> dict[str, Any]:
     return {name: None if name in ("_picture", "_pictures") else each for name, each in env.__dict__.items()}
 
 
-class CourseVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
-    """Robots that walk random courses, all in one walk of an engine; an episode is five targets.
+class RobotVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
+    """Robots with one task, all in one walk of an engine.
 
     Parameters
     ----------
     num_envs
         Number of robots.
-    robot
-        A preset, a robot file, or a robot; by default the paper's.
-    engine
-        ``planar``, ``twin``, or one's own as ``package.module:object``.
+    robot, engine
+        A preset, a robot file, or a robot, by default the paper's; and an engine's name.
     render_mode
         ``rgb_array`` or None.
     named
-        As of :class:`chilopod.gym.Episodes`: springs, targets, patience, disturbance, rewards.
+        As of :class:`chilopod.gym.Episodes`: task, springs, patience, disturbance, and what the task has.
 
     Raises
     ------
@@ -59,7 +57,6 @@ class CourseVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
     """
 
     metadata = {"render_modes": [*_RENDER_MODES], "render_fps": _FPS, "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
-    targets = 5
 
     def __init__(
         self,
@@ -70,7 +67,7 @@ class CourseVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
         render_mode: str | None = None,
         **named: Any,
     ) -> None:
-        self.episodes = _episodes(num_envs, robot, engine, render_mode, {"targets": self.targets, **named})
+        self.episodes = _episodes(num_envs, robot, engine, render_mode, named)
         self.num_envs, self.render_mode = num_envs, render_mode
         self.single_observation_space, self.single_action_space = _spaces(self.episodes)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -121,17 +118,10 @@ class CourseVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
         return tuple(picture.drawn() for picture in self._pictures)
 
 
-class TurnVectorEnv(CourseVectorEnv):
-    """As :class:`CourseVectorEnv`, with one target in an episode."""
-
-    targets = 1
-
-
-class CourseEnv(gymnasium.Env[Row, Row]):
-    """One robot of :class:`CourseVectorEnv`, whose parameters these are."""
+class RobotEnv(gymnasium.Env[Row, Row]):
+    """One robot of :class:`RobotVectorEnv`, whose parameters these are."""
 
     metadata = {"render_modes": [*_RENDER_MODES], "render_fps": _FPS}  # noqa: RUF012
-    targets = 5
 
     def __init__(
         self,
@@ -142,7 +132,7 @@ class CourseEnv(gymnasium.Env[Row, Row]):
         **named: Any,
     ) -> None:
         self.render_mode = render_mode
-        self.episodes = _episodes(1, robot, engine, render_mode, {"targets": self.targets, **named})
+        self.episodes = _episodes(1, robot, engine, render_mode, named)
         self.observation_space, self.action_space = _spaces(self.episodes)
         self._over = False
         self._picture: Picture | None = None
@@ -174,12 +164,6 @@ class CourseEnv(gymnasium.Env[Row, Row]):
 
             self._picture = Picture(self.episodes, 0)
         return self._picture.drawn()
-
-
-class TurnEnv(CourseEnv):
-    """As :class:`CourseEnv`, with one target in an episode."""
-
-    targets = 1
 
 
 def _episodes(

@@ -1,4 +1,4 @@
-"""Episodes of a batch of robots, step by step: the tasks behind the environments, without Gymnasium.
+"""Episodes of a batch of robots, step by step, without Gymnasium.
 
 A step is a gait cycle. Robots whose episode is over stand still for the next step and begin another at its end, while
 the others walk on: Gymnasium's autoreset mode ``NEXT_STEP``.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -16,15 +16,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod import memory
 from chilopod.engine import Observation, Walk, engine_named
-from chilopod.engine.arguments import as_number
 from chilopod.errors import ParameterError
 from chilopod.flows.arguments import checked_count
 from chilopod.gym.actions import Actions
 from chilopod.gym.sight import Sight
+from chilopod.gym.tasks import Look, Task, task_of
 from chilopod.record import LONGEST
 from chilopod.robot import Robot
-from chilopod.steering import CourseReferee, Judged, Verdict, random_course
-from chilopod.steering.course import MOST_GOALS, RANDOM_DISTANCES
+from chilopod.steering import CourseReferee, Judged, Verdict
 from chilopod.tasks.course import patience_of
 from chilopod.trials import Disturbance, Drawn, draw
 
@@ -37,36 +36,6 @@ _SEEDS = 1 << 31  # of episodes that nobody gave one, less than this
 
 
 @dataclass(frozen=True)
-class Rewards:
-    """Reward of a step.
-
-    A robot that fails is charged as if it walked straight away from its targets until their time is over, with the
-    penalty for failing on top: walking on to the end of the time is then never worse, whatever the robot does with it.
-
-    Attributes
-    ----------
-    progress
-        For every metre that the target has come nearer.
-    arrival
-        For arriving at a target.
-    cycle
-        For every gait cycle.
-    failure
-        For a robot that falls, or bends a joint too far, besides that charge.
-    """
-
-    progress: float = 1.0
-    arrival: float = 1.0
-    cycle: float = -0.01
-    failure: float = -1.0
-
-    def __post_init__(self) -> None:
-        for each in fields(self):
-            if not np.isfinite(as_number(each.name, getattr(self, each.name))):
-                raise ParameterError("must be finite", field=each.name, value=getattr(self, each.name))
-
-
-@dataclass(frozen=True)
 class Step:
     """Result of a step, for every robot of a batch; the arrays are the caller's to keep.
 
@@ -75,11 +44,9 @@ class Step:
     observation
         See :class:`chilopod.gym.Sight`.
     reward
-        See :class:`Rewards`; 0 for a robot whose episode has just begun.
-    terminated
-        True if the robot has arrived at its last target, or does not walk any more.
-    truncated
-        True if its time for the last target is over.
+        See :meth:`chilopod.gym.Task.reward`; 0 for a robot whose episode has just begun.
+    terminated, truncated
+        See :meth:`chilopod.gym.Task.ending`.
     info
         ``time`` of the episode (s), ``distance`` of the target (m), ``pose`` of module 1 (m, m, rad), ``verdict`` on
         the target of which the robot is done with this step, or "", and ``arrived``: how many targets so far.
@@ -94,17 +61,8 @@ class Step:
 
 @dataclass(frozen=True)
 class Moment:
-    """Where robots of a batch are at the end of a step: what a picture shows.
-
-    Attributes
-    ----------
-    pose
-        x, y and heading of module 1, m and rad, shape (robots, 3).
-    joint_angles, leg_yaw
-        rad, shapes (robots, N-1) and (robots, 2).
-    aims
-        Places of the targets, m, shape (robots, 2).
-    """
+    """Poses of a batch at the end of a step, for pictures: x, y and heading of module 1 (m, m, rad), joint angles and
+    leg yaw (rad), and the places of the targets (m), each of shape (robots, ...)."""
 
     pose: Array
     joint_angles: Array
@@ -113,7 +71,7 @@ class Moment:
 
 
 class Episodes:
-    """Robots that walk to random targets, each in an episode of its own.
+    """Robots that walk to targets, each in an episode of its own.
 
     Parameters
     ----------
@@ -121,23 +79,25 @@ class Episodes:
         All are alike.
     count
         Number of episodes at once.
+    task
+        Task, or its name among :data:`chilopod.gym.tasks.TASKS`.
     engine
         One of :data:`chilopod.engine.ENGINES`, or one's own as ``package.module:object``.
     springs
         Springs that actions set, see :class:`chilopod.gym.Actions`.
-    targets
-        Targets of an episode, one after the other, see :func:`chilopod.steering.random_course`.
     patience
         For each target, s; by default the engine's, see :func:`chilopod.tasks.course.patience_of`.
     disturbance
         Disturbance of the start and of bearings, as in trials.
-    rewards
-        Rewards of steps.
     remember
         True to keep :attr:`moments`.
+    chosen
+        Attributes of the task that are to be others, such as ``targets`` or ``rewards``.
 
     Attributes
     ----------
+    task
+        Task of the episodes.
     actions, sight
         Meaning of actions and of observations.
     moments
@@ -154,27 +114,26 @@ class Episodes:
         robot: Robot,
         count: int = 1,
         *,
+        task: str | Task = "Turn",
         engine: str = "planar",
         springs: Literal["first", "all"] = "first",
-        targets: int = 1,
         patience: float | None = None,
         disturbance: Disturbance = Disturbance(),  # noqa: B008  (frozen)
-        rewards: Rewards = Rewards(),
         remember: bool = False,
+        **chosen: Any,
     ) -> None:
-        self._targets = checked_count("targets", targets, MOST_GOALS)
+        self.task = task_of(task, chosen)
         self._count = checked_count("num_envs", count, _MOST)
-        for name, given, wanted in (("disturbance", disturbance, Disturbance), ("rewards", rewards, Rewards)):
-            if not isinstance(given, wanted):
-                raise ParameterError(f"must be a {wanted.__name__}", field=name, value=given)
+        if not isinstance(disturbance, Disturbance):
+            raise ParameterError("must be a Disturbance", field="disturbance", value=disturbance)
         self._name, self._engine = engine, engine_named(engine)
         self._engine.common(robot)
         self.actions = Actions.of(robot, springs)
         self._patience = patience_of(engine) if patience is None else patience
-        self._disturbance, self.rewards = disturbance, rewards
-        common = random_course(0, self._patience, self._targets)
+        self._disturbance = disturbance
+        common = self.task.course(0, self._patience)
         self.sight = Sight(self.actions, common.range)
-        gait, least = robot.gait, RANDOM_DISTANCES[1] / robot.gait.speed
+        gait, least = robot.gait, self.task.farthest / robot.gait.speed
         if self._patience < least:
             raise ParameterError(
                 "is too short for the farthest target",
@@ -183,7 +142,7 @@ class Episodes:
                 allowed=f"{least:g} s or more",
             )
         self._period = gait.period
-        self._looks = int(np.ceil(common.duration / gait.period)) + self._targets + 1
+        self._looks = int(np.ceil(common.duration / gait.period)) + len(common.goals) + 1
         needed = _A_LOOK * self._looks * self._count
         if needed > memory.available():
             raise ParameterError(
@@ -227,8 +186,7 @@ class Episodes:
         generators
             One a robot, of the seeds of its episodes from now on.
         seeds
-            Seeds of its first one: that is the course and the disturbance that trials draw from this seed; None: drawn
-            too.
+            Seed of its first one, of which trials draw the same disturbance; None: drawn too.
         """
         self._generators = list(generators)
         return self._begin(seeds)
@@ -303,7 +261,7 @@ class Episodes:
             "friction": np.stack([each.friction for each in drawn]),
             "seeds": [each.scan_seed for each in drawn] if noisy else None,
         }
-        return drawn, [random_course(seed, self._patience, self._targets) for seed in chosen], conditions
+        return drawn, [self.task.course(seed, self._patience) for seed in chosen], conditions
 
     def _look(self, walk: Walk, fresh: Marks) -> Step:
         """Judge, put up the next targets, and see; at the end of a step."""
@@ -320,10 +278,10 @@ class Episodes:
                 bearing=np.where(others, again.bearing, seen.bearing),
                 distance=np.where(others, again.distance, seen.distance),
             )
-        reward = self._reward(judged, fresh, self._away - away, left)
+        look = Look(judged, busy, self._away - away, left, self._period, self.robot.gait.speed)
+        reward = np.where(fresh, 0.0, self.task.reward(look))
         self._away = np.where(others, _distance(aims, pose), away)
-        terminated = judged.gone | (judged.arrived & ~busy)
-        truncated = (judged.late | judged.unseen) & ~busy
+        terminated, truncated = self.task.ending(look)
         if (self._cycle + 1) * self._period > LONGEST:
             truncated |= busy  # no walk is longer; the next step begins another
         self._arrived += judged.arrived
@@ -340,15 +298,6 @@ class Episodes:
             "arrived": self._arrived.copy(),
         }
         return Step(self.sight.row(self._through(seen)), reward, terminated, truncated, info)
-
-    def _reward(self, judged: Judged, fresh: Marks, nearer: Array, left: Array) -> Array:
-        worth = self.rewards
-        # At worst a robot that walks on gains as little as this in the time that is left.
-        least = min(worth.cycle, 0.0) / self._period - abs(worth.progress) * self.robot.gait.speed
-        reward = worth.progress * np.nan_to_num(nearer) + worth.arrival * judged.arrived
-        reward += worth.cycle + np.where(judged.gone, worth.failure + least * left, 0.0)
-        reward[fresh] = 0.0
-        return np.asarray(reward)
 
     def _through(self, seen: Observation) -> Observation:
         """Observation that gets through to the robots, with noise and the view that scanners have."""

@@ -26,15 +26,7 @@ _FONT, _MARGIN = 14.0, 0.3  # pixels; m
 
 
 class Picture:
-    """Pictures of one robot while its episodes go on.
-
-    Parameters
-    ----------
-    episodes
-        Episodes that are drawn.
-    robot
-        Number of the robot.
-    """
+    """Pictures of the robot of a number while its episodes go on."""
 
     def __init__(self, episodes: Episodes, robot: int) -> None:
         self._episodes, self._robot = episodes, robot

@@ -32,10 +32,8 @@ class Steered:
 
     Attributes
     ----------
-    controller
-        Controller that steers by springs and leg yaw.
-    episodes
-        Episodes that define actions and observations.
+    controller, episodes
+        Controller that steers by springs and leg yaw, and what defines actions and observations.
     """
 
     controller: Controller
@@ -64,10 +62,8 @@ def baseline(name: str, episodes: Episodes, engine: str = "planar") -> Steered:
 
     Parameters
     ----------
-    name
-        ``leg-yaw``: the paper's controller, the springs as they are; ``variable``: the first spring is set besides.
-    episodes
-        Episodes of the robots that are steered.
+    name, episodes
+        ``leg-yaw``: the paper's controller, the springs as they are; or ``variable``: the first spring is set besides.
     engine
         Engine of the radius law of ``variable``, see :func:`chilopod.tasks.radius_law`.
 

@@ -25,12 +25,11 @@ class RadiusLaw(ReadOnlyArrays):
 
     Attributes
     ----------
-    values
-        Values of the parameter, rising, SI units, shape (points,); the last one is the pitchfork.
-    radii
-        m, shape (points,), infinite at the pitchfork.
+    values, radii
+        Values of the parameter, rising, SI units, the last one the pitchfork, and radii, m, infinite there, shape
+        (points,).
     unit
-        For messages: the unit that values are written in.
+        Unit of the values in messages.
     """
 
     values: Array
@@ -48,11 +47,9 @@ class RadiusLaw(ReadOnlyArrays):
 
         Parameters
         ----------
-        values, radii, stable
+        values, radii, stable, unit
             Along the branch, from the pitchfork on (itself included): the parameter in SI units, the radius in m, and
-            whether the walk is stable, shape (points,).
-        unit
-            Unit of the values.
+            whether the walk is stable, shape (points,); unit of the values in messages.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Who sees to it that a course is walked: puts up one target after another, and says what became of each."""
+"""Referee of courses: it puts up one target after another, and says what became of each."""
 
 from __future__ import annotations
 
@@ -38,16 +38,14 @@ class Verdict(Labelled):
 
 @dataclass(frozen=True)
 class Judged:
-    """Whom a look of :class:`CourseReferee` found to be done with a target, marks of shape (robots,).
+    """Marks of the robots, shape (robots,), that a look of :class:`CourseReferee` found to be done with a target.
 
     Attributes
     ----------
-    arrived
-        There.
+    arrived, gone
+        There; no longer walking, and so done with all targets.
     late, unseen
-        Out of time; and have never had it in view.
-    gone
-        No longer walking, and so done with all targets.
+        Out of time; the same, and the target was never in view.
     begins
         With none before.
     """
@@ -73,10 +71,8 @@ class CourseReferee:
 
     Parameters
     ----------
-    courses
-        One a robot; how long they have for a target, and what they see, is the same in all.
-    gait
-        Gait of the robots.
+    courses, gait
+        One course a robot, alike in patience and view; gait of the robots.
     missed
         True if a target is missed by the scanner, by event, shape (robots, at least as many as events); None: never.
     keep
@@ -181,15 +177,7 @@ class CourseReferee:
         return replace(found, **{name: getattr(found, name).copy() for name in _KEPT})
 
     def add_to(self, data: xr.Dataset, walk: Walk) -> None:
-        """Add to the record of the walk what became of every target, and what the controller was shown.
-
-        Parameters
-        ----------
-        data
-            From :meth:`chilopod.engine.Walk.to_dataset`; changed in place.
-        walk
-            As it ended.
-        """
+        """Add to the record of a walk that has ended what became of every target and what the controller was shown."""
         busy = self.busy
         stopped = busy & np.array([each is not Status.WALKED for each in walk.status])
         self._judge(stopped, walk.time, Verdict.STOPPED)
@@ -251,15 +239,7 @@ _KEPT = {
 
 
 def decisions(record: xr.Dataset, controller: Controller, gait: Gait) -> list[Command]:
-    """Commands of a controller when it is shown again what the record says that it was shown.
-
-    Parameters
-    ----------
-    record
-        Record of a course.
-    controller, gait
-        Controller that steered, and gait of the robots.
-    """
+    """Commands of a controller when it is shown again what the record of a course says that it was shown."""
     shown = {name: record[f"seen_{name}"].transpose("event", "robot", ...).values for name in _KEPT}
     until = float(record.event[-1]) + gait.period
     asked = zip(event_times(controller, gait, until), range(record.sizes["event"]), strict=False)

@@ -28,11 +28,9 @@ def shortest_path(place: Array, radius: float, arrival: float = ARRIVAL_RADIUS) 
     Parameters
     ----------
     place
-        Ahead and to the left, m, shape (..., 2).
-    radius
-        Radius of the tightest circle, m; 0 for what turns on the spot.
-    arrival
-        Distance that counts as arrived, m; 0 for the place itself.
+        Distances ahead and to the left, m, shape (..., 2).
+    radius, arrival
+        Radius of the tightest circle, m, 0 for what turns on the spot; distance that counts as arrived, m.
 
     Returns
     -------

@@ -15,8 +15,7 @@ from chilopod.notebook import block, table
 from chilopod.progress import Progress, silent
 from chilopod.record import RATE
 from chilopod.robot import Robot
-from chilopod.tasks.runs import RunOptions, Runs, runs
-from chilopod.tasks.shown import paths
+from chilopod.tasks.runs import RunOptions, Runs, paths, runs
 from chilopod.trials import Trial, WalkSummary, as_now, run_each, straight, summaries, together
 
 
@@ -26,10 +25,8 @@ class Ends(Runs):
 
     Attributes
     ----------
-    trials
-        With all that makes each of them.
-    summaries
-        The end of every walk.
+    trials, summaries
+        All that makes each walk, and the end of each.
     straight
         True if none of them ever bent, see :func:`chilopod.trials.straight`.
     """
@@ -56,30 +53,16 @@ class Ends(Runs):
 
     @property
     def _table(self) -> str:
-        rows = [
-            (
-                label,
-                end.sentence,
-                f"{end.x:.3f}",
-                f"{end.y:.3f}",
-                f"{end.axis_radius:.4g}" if np.isfinite(end.axis_radius) else "straight",
-            )
-            for label, end in zip(self.labels, self.summaries, strict=True)
-        ]
+        rows = []
+        for label, end in zip(self.labels, self.summaries, strict=True):
+            radius = f"{end.axis_radius:.4g}" if np.isfinite(end.axis_radius) else "straight"
+            rows.append((label, end.sentence, f"{end.x:.3f}", f"{end.y:.3f}", radius))
         return table(("seed", "", "x (m)", "y (m)", "radius (m)"), rows)
 
 
 @dataclass(frozen=True)
 class Walks(Ends):
-    """Walks that differ in nothing but their seed, and what they came to.
-
-    Attributes
-    ----------
-    trials, summaries, straight
-        As for :class:`Ends`.
-    record
-        Record of all walks.
-    """
+    """The same with the record of all walks."""
 
     record: xr.Dataset
 
@@ -129,10 +112,8 @@ def ends(
 
     Parameters
     ----------
-    trials
-        From :meth:`chilopod.trials.Trial.repeated`.
-    folder, progress
-        As for :class:`chilopod.tasks.RunOptions`.
+    trials, folder, progress
+        From :meth:`chilopod.trials.Trial.repeated`; the rest as for :class:`chilopod.tasks.RunOptions`.
     told
         Called with the number of a walk and its record as soon as that is there.
     """

@@ -28,31 +28,14 @@ _MOST_BYTES = 256e6
 
 
 def batches(trials: Sequence[Trial], on_cores: int | None = None) -> list[list[Trial]]:
-    """Trials in groups that can walk together and take a few seconds, within so much memory.
-
-    Parameters
-    ----------
-    trials
-        In any order.
-    on_cores
-        Number of cores that a batch has for itself; by default all there are.
-    """
+    """Trials, in any order, in groups that can walk together and take a few seconds, within so much memory, on so many
+    cores each, by default all."""
     groups: dict[tuple[Any, ...], list[Trial]] = {}
     for trial in trials:
-        alike = (
-            trial.engine,
-            engine_named(trial.engine).common(trial.robot),
-            trial.robot.gait,
-            trial.robot.body.modules,
-            trial.duration,
-            trial.recording,
-            _sight(trial),
-            json.dumps(trial.steering, sort_keys=True),
-            trial.code,
-            # Whether its sensors are noisy is said once for a batch.
-            trial.disturbance.bearing > 0.0,
-            trial.brief,
-        )
+        walks = trial.engine, engine_named(trial.engine).common(trial.robot), trial.robot.gait, trial.robot.body.modules
+        asked = trial.duration, trial.recording, trial.brief, _sight(trial)
+        noisy = trial.disturbance.bearing > 0.0  # said once for a batch
+        alike = walks, asked, noisy, json.dumps(trial.steering, sort_keys=True), trial.code
         groups.setdefault(alike, []).append(trial)
     split = []
     for group in groups.values():
@@ -63,16 +46,8 @@ def batches(trials: Sequence[Trial], on_cores: int | None = None) -> list[list[T
 
 
 def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
-    """Walk trials of one batch.
-
-    Parameters
-    ----------
-    trials
-        Trials of one of :func:`batches`.
-
-    Returns
-    -------
-    The record of each, with one ``robot``, and robot file and trial in the attributes.
+    """Walk the trials of one of :func:`batches`; the record of each has one ``robot``, and robot file and trial in the
+    attributes.
 
     Raises
     ------
@@ -147,19 +122,15 @@ def _doubts(trial: Trial) -> str:
         # An engine may give anything.
         if not getattr(one, "identical", lambda _: True)(other):
             _KNOWN[who] = "it steers otherwise when it sees the same again (a clock, np.random, a count?)"
-        elif trial.as_now().code != trial.code:
-            _KNOWN[who] = _CHANGES
         else:
-            _KNOWN[who] = ""
+            _KNOWN[who] = _CHANGES if trial.as_now().code != trial.code else ""
     return _KNOWN[who]
 
 
 def _sight(trial: Trial) -> Hashable:
     """Property that targets of a batch have in common."""
     course = trial.course
-    if course is None:
-        return trial.target is None
-    return course.patience, course.view, course.range, course.tightest
+    return (course.patience, course.view, course.range, course.tightest) if course else trial.target is None
 
 
 def _apart(data: xr.Dataset, trials: Sequence[Trial]) -> list[xr.Dataset]:
@@ -181,7 +152,6 @@ def _apart(data: xr.Dataset, trials: Sequence[Trial]) -> list[xr.Dataset]:
 
 def _bytes_of(trial: Trial) -> float:
     """About what a trial's record takes while it walks."""
-    modules = trial.robot.body.modules
     # A module's joint, legs and servos at every sample, as the engine has them and as they are recorded.
-    numbers = 20 * modules + (6 * modules if trial.forces else 0) + (8 * modules if trial.poses else 0)
+    numbers = (20 + 6 * trial.forces + 8 * trial.poses) * trial.robot.body.modules
     return 8.0 * numbers * (trial.duration * trial.rate + 1.0)

@@ -29,14 +29,12 @@ class Disturbance:
 
     Attributes
     ----------
-    joint_angle
-        Joint angle of every yaw joint at the start, rad.
-    heading
-        Heading of module 1 at the start, rad.
+    joint_angle, heading
+        Deviation of every yaw joint, and of the heading of module 1, at the start, rad.
     friction
-        Friction of the logarithm of every foot's friction coefficient.
+        Deviation of the logarithm of every foot's friction coefficient.
     bearing
-        Bearing of every measured bearing, rad. The twin's scanner has noise of its own instead, if this is not zero.
+        Deviation of every measured bearing, rad. The twin's scanner has noise of its own instead, if this is not zero.
     missed
         Part of its looks at which the scanner misses the target, on a course.
     slick
@@ -73,10 +71,8 @@ class Drawn:
 
     Attributes
     ----------
-    joint_angles
-        At the start, rad, shape (N-1,).
-    heading
-        At the start, rad.
+    joint_angles, heading
+        Joint angles, shape (N-1,), and heading at the start, rad.
     friction
         Factors on the friction coefficients of feet, shape (N, 2).
     bearing
@@ -98,20 +94,16 @@ class Drawn:
 def draw(
     disturbance: Disturbance, seed: int, modules: int, looks: int, joint_angles: Sequence[float] | None = None
 ) -> Drawn:
-    """Draw what differs; each kind has its own stream of numbers.
+    """Draw a disturbance for a robot of so many modules, each kind from its own stream of numbers.
 
     Parameters
     ----------
-    disturbance
-        Size of the disturbance.
-    seed
-        0 or more.
-    modules
-        Modules of the robot.
+    disturbance, seed, modules
+        Size of the disturbance, seed of 0 or more, and modules of the robot.
     looks
         Largest number of looks at its target.
     joint_angles
-        About which those at the start are, rad; by default straight.
+        Mean joint angles at the start, rad; by default straight.
     """
     streams = np.random.SeedSequence(seed).spawn(6)
     joints, heading, friction, bearing = (np.random.default_rng(each) for each in streams[:4])

@@ -107,8 +107,7 @@ def current() -> Executor:
 def using(executor: Executor) -> Iterator[None]:
     """Let everything that runs trials in this block, studies and tasks included, run them there.
 
-    It holds for this thread and for tasks of asyncio made in the block, not for threads started in it: these have
-    to say it again.
+    It holds for this thread and for tasks of asyncio made in the block, not for threads started in it.
     """
     token = _CURRENT.set(executor)
     try:

@@ -46,13 +46,7 @@ def versions(packages: Sequence[str] = (*PACKAGES, TWIN_PACKAGE)) -> dict[str, s
 
 
 def check_versions(expected: Mapping[str, str], found: Mapping[str, str], place: str) -> None:
-    """Make sure that a worker has the versions that the client has.
-
-    Raises
-    ------
-    ClusterError
-        If one is another; says which.
-    """
+    """Refuse a worker that has other versions than the client, by a ClusterError that says which."""
     for name, wanted in expected.items():
         there = found.get(name, "none")
         if there != wanted:

@@ -71,18 +71,9 @@ class UnknownKindError(Exception):
 
 
 class Reach:
-    """A digest of everything that can be reached from the objects that it is shown, in order.
-
-    Parameters
-    ----------
-    own
-        Top-level package that is one's own even where it is installed.
-
-    Attributes
-    ----------
-    chance
-        First thing seen that answers otherwise every time, see :mod:`chilopod.trials.chance`; empty if nothing.
-    """
+    """A digest of everything that can be reached from the objects that it is shown, in order; ``own`` is a top-level
+    package that is one's own even where it is installed. ``chance`` is the first thing seen that answers otherwise
+    every time, see :mod:`chilopod.trials.chance`; empty if nothing."""
 
     def __init__(self, own: str = "") -> None:
         self._own, self.chance = own, ""
@@ -96,13 +87,7 @@ class Reach:
         return self._hash.hexdigest()[:16]
 
     def see(self, value: object, path: str) -> None:
-        """Add an object, reached as ``path`` says, and all that can be reached from it.
-
-        Raises
-        ------
-        UnknownKindError
-            If there is something of a kind that nobody can describe.
-        """
+        """Add an object, reached as ``path`` says, and all that can be reached from it, or raise UnknownKindError."""
         try:
             self._see(value, path)
         except UnknownKindError:
@@ -176,9 +161,6 @@ class Reach:
             yield "", part
         if isinstance(value, np.ndarray):  # pickle leaves out what a subclass adds
             yield ".__dict__", getattr(value, "__dict__", None)
-
-    # -- code
-    # ---------------------------------------------------------------------------------------------------------------
 
     def _function(self, function: FunctionType, path: str) -> Parts:
         if function.__globals__.get("__name__") == "functools" and hasattr(function, "registry"):
@@ -263,9 +245,6 @@ class Reach:
                     inner = vars(module).get(part) or _module_named(name + "." * bool(each.argval) + part, space)
                     found |= {part: inner} if isinstance(inner, ModuleType) else {}
         return found
-
-    # -- code of others
-    # ---------------------------------------------------------------------------------------------------------------
 
     def _named(self, value: Any) -> str:
         """Name and version of what a package of others has under its own name; empty for all else."""

@@ -31,13 +31,8 @@ class Store:
     checksum over all of its bytes. Many processes may use one folder at the same time: they share the work, see
     :class:`chilopod.trials.claims.Claims`, and whoever walks the same trial writes the same file.
 
-    Parameters
-    ----------
-    folder
-        Made with the first record where there is none.
-    tell
-        Given a line about every file that is not what it should be; by default the logger of this module, which prints
-        it on stderr if nobody has told it otherwise.
+    The folder is made with the first record where there is none. ``tell`` is given a line about every file that is not
+    what it should be; by default it is the logger of this module, which prints on stderr.
 
     Raises
     ------
@@ -56,8 +51,7 @@ class Store:
     def read(self, trial: Trial) -> xr.Dataset | None:
         """The record of a trial; None if there is none.
 
-        A file that is damaged, was edited, or holds another trial counts as none. It is moved aside: its name gets the
-        ending ``.aside``.
+        A file that is damaged, was edited, or holds another trial counts as none and gets the ending ``.aside``.
 
         Raises
         ------
@@ -85,20 +79,16 @@ class Store:
             If it is another trial's record, or the file cannot be written.
         """
         if record.attrs.get("trial") != trial.text:
-            raise OutputError(
-                "is that of another trial, or was walked by other code",
-                field="record",
-                allowed=f"a record for {trial.file_name}",
-            )
+            problem = "is that of another trial, or was walked by other code"
+            raise OutputError(problem, field="record", allowed=f"a record for {trial.file_name}")
         if NOT_KEPT in record.attrs:
             words = trial.not_kept(record.attrs.pop(NOT_KEPT))
             if words not in self._said:
                 self._tell(words)
             self._said.add(words)
             return
-        content = content_of(record)
         # Whoever deletes the folder while trials walk loses what was in it, not the walks to come: it is made again.
-        write_atomic(self.folder / trial.file_name, content, durable=True, temporary=_UNFINISHED)
+        write_atomic(self.folder / trial.file_name, content_of(record), durable=True, temporary=_UNFINISHED)
 
     @contextmanager
     def claims(self) -> Iterator[Claims]:
@@ -112,8 +102,7 @@ class Store:
             sync_folder(self.folder)
 
     def _move_aside(self, path: Path, why: str) -> None:
-        aside = path.with_name(f"{path.name}.aside")
-        count = 1
+        aside, count = path.with_name(f"{path.name}.aside"), 1
         while os.path.lexists(aside):
             count += 1
             aside = path.with_name(f"{path.name}.aside{count}")

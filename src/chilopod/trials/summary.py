@@ -29,12 +29,11 @@ class WalkSummary:
     ----------
     status
         A label of :class:`chilopod.engine.Status`.
-    joint_angles
-        Means over the last :data:`AVERAGED` s, rad, shape (N-1,); NaN if the walk failed.
-    axis_radius
-        Radius by these, see :meth:`chilopod.robot.Robot.axis_radius`, m: infinite if the walk is straight.
+    joint_angles, axis_radius
+        Means over the last :data:`AVERAGED` s, rad, shape (N-1,), NaN if the walk failed; and radius by these, see
+        :meth:`chilopod.robot.Robot.axis_radius`, m, infinite if the walk is straight.
     x, y
-        X and y of the centre of module 1 at the end, m.
+        Place of the centre of module 1 at the end, m.
     """
 
     status: str

@@ -17,14 +17,12 @@ class CriticalMode:
 
     Attributes
     ----------
-    k1
-        Critical spring, N*mm/deg.
+    k1, between
+        Critical spring, and the interval in which it is located, N*mm/deg.
     components
         Joint angles of the critical mode, front to rear, of unit norm and positive sum, shape (N-1,).
     k1_tolerance, component_tolerance
         Tolerance of each of them.
-    between
-        Interval in which the point is located, N*mm/deg.
     """
 
     k1: float

@@ -15,19 +15,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Constant:
-    """One that is fitted, and where it is looked for.
-
-    Attributes
-    ----------
-    path
-        In the robot's description.
-    low, high
-        Ends of the range, SI; of its ratio to `per` if that is given.
-    logarithmic
-        True if it is its logarithm that is searched evenly.
-    per
-        Path of another constant, before it among :data:`FREE`.
-    """
+    """One that is fitted: its path in the robot's description and the ends of its range, SI, evenly searched by its
+    logarithm if ``logarithmic``; both of its ratio to another constant, before it among :data:`FREE`, if ``per`` is
+    given."""
 
     path: str
     low: float

@@ -36,13 +36,12 @@ _PER_CYCLE = 10  # samples
 
 @dataclass(frozen=True)
 class Series:
-    """Measures of the walks of a series.
+    """Measures of the walks of a series, NaN where a walk failed.
 
     Attributes
     ----------
     before, bends
-        Mean joint angles over 4.8 s, 12 s before the end and at the end, rad, shape (springs, joints); NaN where a walk
-        failed.
+        Mean joint angles over 4.8 s, 12 s before the end and at the end, rad, shape (springs, joints).
     speeds
         Speeds of module 1 along its way, gait cycle by gait cycle, over the last 4.8 s, m/s, shape (springs,).
     """
@@ -66,18 +65,14 @@ def base_series(
 
     Parameters
     ----------
-    robot
-        Its first spring does not matter.
-    data
-        The series.
+    robot, data
+        Robot, whose first spring does not matter, and the series.
     springs
         Values of k1, N*mm/deg, if not those of the series.
-    tolerance
-        Tolerance of the contact solver.
+    tolerance, duration
+        Tolerance of the contact solver; s.
     engine
         The twin, or one that is edited, see :class:`chilopod.twin.Edited`.
-    duration
-        s.
     """
     walks: Any = engine_named(engine)  # with arguments that only the twin knows
     robots = [robot.with_value(K1, stiffness(spring)) for spring in springs or data.springs]
@@ -105,22 +100,11 @@ def _series(walk: Walk, robot: Robot) -> Series:
 
 
 def residuals(robot: Robot, found: Series, data: BaseSeries) -> Array:
-    """Computed less the data.
+    """Residuals of a series: computed less the data, one number for each of ``data.names``.
 
-    Parameters
-    ----------
-    robot
-        For its size.
-    found
-        From :func:`base_series`.
-    data
-        The series.
-
-    Returns
-    -------
-    One for each of ``data.names``: radii, speeds and onset (each over the tolerance of it); bend where the robot is
-    straight beyond 0.1 rad in all (over 0.05 rad); what it lacks at the stiffest spring that curves of 0.3 rad (the
-    same); motion between the averages beyond 0.1 rad (over 0.1 rad).
+    These are radii, speeds and onset (each over the tolerance of it); bend where the robot is straight beyond 0.1 rad
+    in all (over 0.05 rad); what it lacks at the stiffest spring that curves of 0.3 rad (the same); motion between the
+    averages beyond 0.1 rad (over 0.1 rad).
     """
     springs = data.springs
     summed = np.abs(found.bends).sum(-1)
