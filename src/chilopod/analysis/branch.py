@@ -100,11 +100,8 @@ def curved_walks(
     """
     forks = [each for each in bifurcations(robot, parameter, between) if each.point.kind is Kind.PITCHFORK]
     if not forks:
-        raise AnalysisError(
-            "the straight walk has no pitchfork in this interval",
-            field=parameter,
-            value=interval_text(robot, parameter, between),
-        )
+        searched = interval_text(robot, parameter, between)
+        raise AnalysisError("the straight walk has no pitchfork in this interval", field=parameter, value=searched)
     fork = forks[-1]
     make = _followed(robot, parameter)
     # The positive side of the mode is that of positive joint angles.

@@ -110,12 +110,9 @@ class Actions:
         inside = np.abs(array) <= 1.0 + _ROUNDING
         if not inside.all():
             robot, number = (int(each) for each in np.argwhere(~inside)[0])
-            raise ParameterError(
-                f"the {self.names[number]} is out of range",
-                field=f"action[{number}]" if robots == 1 else f"action[{robot}, {number}]",
-                value=float(array[robot, number]),
-                allowed="-1 to 1",
-            )
+            problem, value = f"the {self.names[number]} is out of range", float(array[robot, number])
+            where = f"action[{number}]" if robots == 1 else f"action[{robot}, {number}]"
+            raise ParameterError(problem, field=where, value=value, allowed="-1 to 1")
         return np.clip(array, -1.0, 1.0)
 
     def stiffness(self, actions: Array) -> Array:

@@ -80,15 +80,8 @@ class RobotVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Row, dict[str, Any]]:
-        """Begin an episode with every robot.
-
-        Parameters
-        ----------
-        seed
-            Seed of robot 0, to which that of robot i adds i, or one each; None: as the generators go on.
-        options
-            Not used.
-        """
+        """Begin an episode with every robot: ``seed`` is that of robot 0, to which that of robot i adds i, or one each;
+        None: as the generators go on."""
         seeds = _seeds(seed, self.num_envs)
         super().reset(seed=None if np.ndim(seed) else seeds[0])  # type: ignore[arg-type]
         if self._generators is None:

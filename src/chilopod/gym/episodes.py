@@ -25,7 +25,7 @@ from chilopod.record import LONGEST
 from chilopod.robot import Robot
 from chilopod.steering import CourseReferee, Judged, Verdict
 from chilopod.tasks.course import patience_of
-from chilopod.trials import Disturbance, Drawn, draw
+from chilopod.trials import Disturbance, Drawn, conditions, draw
 
 Array = NDArray[np.float64]
 Marks = NDArray[np.bool_]
@@ -75,14 +75,11 @@ class Episodes:
 
     Parameters
     ----------
-    robot
-        All are alike.
-    count
-        Number of episodes at once.
-    task
-        Task, or its name among :data:`chilopod.gym.tasks.TASKS`.
-    engine
-        One of :data:`chilopod.engine.ENGINES`, or one's own as ``package.module:object``.
+    robot, count, engine
+        Robot, number of episodes at once, and name of the engine.
+    task, chosen
+        Task, or its name among :data:`chilopod.gym.tasks.TASKS`; attributes of it that are to be others, such as
+        ``targets`` or ``rewards``.
     springs
         Springs that actions set, see :class:`chilopod.gym.Actions`.
     patience
@@ -91,13 +88,9 @@ class Episodes:
         Disturbance of the start and of bearings, as in trials.
     remember
         True to keep :attr:`moments`.
-    chosen
-        Attributes of the task that are to be others, such as ``targets`` or ``rewards``.
 
     Attributes
     ----------
-    task
-        Task of the episodes.
     actions, sight
         Meaning of actions and of observations.
     moments
@@ -135,12 +128,8 @@ class Episodes:
         self.sight = Sight(self.actions, common.range)
         gait, least = robot.gait, self.task.farthest / robot.gait.speed
         if self._patience < least:
-            raise ParameterError(
-                "is too short for the farthest target",
-                field="patience",
-                value=f"{self._patience:g} s",
-                allowed=f"{least:g} s or more",
-            )
+            problem, allowed = "is too short for the farthest target", f"{least:g} s or more"
+            raise ParameterError(problem, field="patience", value=f"{self._patience:g} s", allowed=allowed)
         self._period = gait.period
         self._looks = int(np.ceil(common.duration / gait.period)) + len(common.goals) + 1
         needed = _A_LOOK * self._looks * self._count
@@ -179,26 +168,14 @@ class Episodes:
         return int(self._cycle - self._since[robot])
 
     def begin(self, generators: Sequence[np.random.Generator], seeds: Sequence[int | None]) -> Step:
-        """Begin an episode with every robot, in a new walk.
-
-        Parameters
-        ----------
-        generators
-            One a robot, of the seeds of its episodes from now on.
-        seeds
-            Seed of its first one, of which trials draw the same disturbance; None: drawn too.
-        """
+        """Begin an episode with every robot, in a new walk, with the disturbance that trials draw from its seed. Where
+        that is None it is drawn from the robot's generator, as those of later episodes are."""
         self._generators = list(generators)
         return self._begin(seeds)
 
     def step(self, actions: ArrayLike) -> Step:
-        """Walk for a gait cycle.
-
-        Parameters
-        ----------
-        actions
-            Shape (robots, numbers of an action), see :class:`chilopod.gym.Actions`; those of robots whose episode was
-            over are not used.
+        """Walk for a gait cycle by actions of shape (robots, numbers of an action), see :class:`chilopod.gym.Actions`;
+        those of robots whose episode was over are not used.
 
         Raises
         ------
@@ -223,8 +200,8 @@ class Episodes:
     # ---------------------------------------------------------------------------------------------------------------
 
     def _begin(self, seeds: Sequence[int | None]) -> Step:
-        drawn, courses, conditions = self._drawn(np.arange(self._count), seeds)
-        self._walk = self._engine.start(self.robot, record=None, **conditions)
+        drawn, courses, start = self._drawn(np.arange(self._count), seeds)
+        self._walk = self._engine.start(self.robot, record=None, **start)
         missed = np.stack([each.missed for each in drawn])
         self._missing = bool(self._disturbance.missed)
         self._referee = CourseReferee(courses, self.robot.gait, missed if self._missing else None, keep=False)
@@ -237,8 +214,8 @@ class Episodes:
 
     def _restart(self, walk: Walk, which: Marks) -> None:
         ids = np.flatnonzero(which)
-        drawn, courses, conditions = self._drawn(ids, [None] * len(ids))
-        walk.restart(which, **conditions)
+        drawn, courses, start = self._drawn(ids, [None] * len(ids))
+        walk.restart(which, **start)
         missed = np.stack([each.missed for each in drawn])
         self._referee.restart(which, courses, missed if self._missing else None)
         self._errors[ids] = np.stack([each.bearing for each in drawn])
@@ -254,14 +231,8 @@ class Episodes:
         ]
         modules = self.robot.body.modules
         drawn = [draw(self._disturbance, seed, modules, self._looks) for seed in chosen]
-        angles, headings = np.stack([each.joint_angles for each in drawn]), np.array([each.heading for each in drawn])
-        noisy = self._engine.traits.noisy and self._disturbance.bearing > 0.0
-        conditions = {
-            "initial": self._engine.initial_states(self.robot, angles, headings),
-            "friction": np.stack([each.friction for each in drawn]),
-            "seeds": [each.scan_seed for each in drawn] if noisy else None,
-        }
-        return drawn, [self.task.course(seed, self._patience) for seed in chosen], conditions
+        start = conditions(self._engine, self.robot, drawn, self._disturbance.bearing > 0.0)
+        return drawn, [self.task.course(seed, self._patience) for seed in chosen], start
 
     def _look(self, walk: Walk, fresh: Marks) -> Step:
         """Judge, put up the next targets, and see; at the end of a step."""

@@ -62,10 +62,8 @@ class RadiusLaw(ReadOnlyArrays):
         good = stable[1:] & (np.diff(values) < 0.0) & (np.diff(curvature) > 0.0)
         count = 1 + (len(good) if good.all() else int(np.argmin(good)))
         if count < 3:
-            raise AnalysisError(
-                "the curved walks beside the pitchfork are unstable or do not tighten: there is no radius law",
-                field="branch",
-            )
+            problem = "the curved walks beside the pitchfork are unstable or do not tighten: there is no radius law"
+            raise AnalysisError(problem, field="branch")
         bent = np.concatenate([[np.inf], radii[1:count]])
         return cls(values[:count][::-1], bent[::-1], unit)
 
@@ -105,12 +103,8 @@ class RadiusLaw(ReadOnlyArrays):
         """
         if not radius >= self.tightest:
             softest = units.format(float(self.values[0]), self.unit, digits=4)
-            raise AnalysisError(
-                "no spring turns so tightly",
-                field="radius",
-                value=f"{radius:.4g} m",
-                allowed=f"{self.tightest:.4g} m (at {softest}) and more",
-            )
+            allowed = f"{self.tightest:.4g} m (at {softest}) and more"
+            raise AnalysisError("no spring turns so tightly", field="radius", value=f"{radius:.4g} m", allowed=allowed)
         if np.isinf(radius):
             return self.pitchfork
         wanted = 1.0 / radius**2

@@ -128,15 +128,8 @@ class CourseReferee:
         return judged
 
     def restart(self, which: NDArray[np.bool_], courses: Sequence[Course], missed: NDArray[np.bool_] | None) -> None:
-        """Begin anew with robots that have been put on the floor anew.
-
-        Parameters
-        ----------
-        which
-            Shape (robots,).
-        courses, missed
-            One for each of them, as at the start; no more targets than the longest course at the start.
-        """
+        """Begin anew with robots that have been put on the floor anew, by a mask of shape (robots,), each with a
+        course, no longer than the longest at the start, and with what its scanner misses."""
         for robot, course in zip(np.flatnonzero(which).tolist(), courses, strict=True):
             self._courses[robot], self._counts[robot] = course, len(course.goals)
         if self._missed is not None and missed is not None:

@@ -97,9 +97,8 @@ class Driven(Runs):
     def record(self) -> xr.Dataset:
         """Record of all walks together, NaN from where each ended."""
         longest = max(self.records, key=lambda each: each.sizes.get("time", 0))
-        joined = xr.concat(
-            self.records, dim="robot", data_vars="minimal", coords="minimal", compat="override", join="outer"
-        ).assign_coords(robot=np.arange(len(self.records)))
+        how: Any = {"data_vars": "minimal", "coords": "minimal", "compat": "override", "join": "outer"}
+        joined = xr.concat(self.records, "robot", **how).assign_coords(robot=np.arange(len(self.records)))
         return joined.assign(within=longest.within) if "within" in longest else joined
 
     def _found(self) -> dict[str, Any]:
@@ -137,15 +136,9 @@ def _walk_json(robot: Robot, record: xr.Dataset) -> dict[str, Any]:
     goals = []
     for goal in record.goal.values:
         found = record.isel(robot=0).sel(goal=goal)
-        verdict = str(found.goal_verdict.item())
-        goals.append(
-            {
-                "verdict": verdict,
-                "sentence": sentences[verdict],
-                "place_m": [finite(each) for each in found.goal_place.values],
-                **{told: finite(found[f"goal_{name}"].item()) for name, told in _OF_GOALS.items()},
-            }
-        )
+        verdict, place = str(found.goal_verdict.item()), [finite(each) for each in found.goal_place.values]
+        told = {told: finite(found[f"goal_{name}"].item()) for name, told in _OF_GOALS.items()}
+        goals.append({"verdict": verdict, "sentence": sentences[verdict], "place_m": place, **told})
     return {
         "status": str(record.status.values[0]),
         "arrived": _arrived(record),

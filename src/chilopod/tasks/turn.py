@@ -28,6 +28,13 @@ _SOFTEST = 1.0 / 20.0  # of the stiffest spring: where a strategy without a radi
 _ROUNDS = 2
 _LEAST = 5.0  # s
 _AS_NEAR = 1e-9  # m
+_TOLD = {
+    "arrival": "arrival_s",
+    "nearest": "nearest_m",
+    "distance": "epsilon1_m",
+    "angle": "epsilon2_rad",
+    "effort": "epsilon3_rad2_s",
+}
 
 
 @dataclass(frozen=True)
@@ -73,14 +80,7 @@ class Turn(Runs):
             "spring_N_m_rad": finite(self.stiffness),
             "evaluation_time_s": found.time,
             "walks": [
-                {
-                    "outcome": outcome.label,
-                    "arrival_s": finite(found.arrival[i]),
-                    "nearest_m": finite(found.nearest[i]),
-                    "epsilon1_m": finite(found.distance[i]),
-                    "epsilon2_rad": finite(found.angle[i]),
-                    "epsilon3_rad2_s": finite(found.effort[i]),
-                }
+                {"outcome": outcome.label, **{told: finite(getattr(found, name)[i]) for name, told in _TOLD.items()}}
                 for i, outcome in enumerate(found.outcome)
             ],
         }

@@ -109,14 +109,8 @@ def ends(
     told: Callable[[int, xr.Dataset], None] = lambda index, record: None,
 ) -> Ends:
     """Let robots walk and keep only what they came to: memory holds a batch of records, however many walks there are.
-
-    Parameters
-    ----------
-    trials, folder, progress
-        From :meth:`chilopod.trials.Trial.repeated`; the rest as for :class:`chilopod.tasks.RunOptions`.
-    told
-        Called with the number of a walk and its record as soon as that is there.
-    """
+    ``told`` is called with the number of a walk and its record as soon as that is there; for the rest see
+    :meth:`chilopod.trials.Trial.repeated` and :class:`chilopod.tasks.RunOptions`."""
     trials = tuple(as_now(trials))
     number = {trial.file_name: index for index, trial in enumerate(trials)}
     found: dict[int, WalkSummary] = {}

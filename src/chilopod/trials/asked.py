@@ -25,34 +25,22 @@ _MAY_LACK = ("foot_load", "command_stiffness", "command_torque", "seen_bearing",
 
 
 def check_asked(data: Any, walk: Walk, trials: Sequence[Trial], drawn: Sequence[Drawn]) -> xr.Dataset:
-    """The record that an engine gave of a batch, if it is that of these trials and of what was drawn for them.
-
-    Raises
-    ------
-    AnalysisError
-        If it is not, naming the engine and what is wrong.
-    """
-    wrong = "its record is no xarray.Dataset"
-    if isinstance(data, xr.Dataset):
-        try:
-            wrong = _outline(data, walk, trials[0], len(trials)) or _content(data, walk, trials, drawn)
-        except (LookupError, TypeError, ValueError, AttributeError) as error:
-            wrong = f"its record cannot be understood ({in_words(error)})"
+    """The record that an engine gave of a batch, if it is that of these trials and of what was drawn for them; else an
+    AnalysisError names the engine and what is wrong."""
+    if not isinstance(data, xr.Dataset):
+        raise _refused("its record is no xarray.Dataset", trials[0].engine)
+    try:
+        wrong = _outline(data, walk, trials[0], len(trials)) or _content(data, walk, trials, drawn)
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        wrong = f"its record cannot be understood ({in_words(error)})"
     if wrong:
         raise _refused(wrong, trials[0].engine)
-    asked: xr.Dataset = data
-    return asked
+    return data
 
 
 def check_finite(values: Mapping[str, Any], engine: str) -> None:
-    """Refuse the variables of a robot's record, by name, shape (times, 1, ...), unless a robot that walks is somewhere,
-    and one that failed or was halted no more from some sample on.
-
-    Raises
-    ------
-    AnalysisError
-        Naming the engine that gave them.
-    """
+    """Refuse the variables of a robot's record, by name, shape (times, 1, ...), by an AnalysisError unless a robot that
+    walks is somewhere, and one that failed or was halted no more from some sample on."""
     label, there = str(values["status"][0]), np.isfinite(values["heading"][:, 0])
     count = len(there) if label == Status.WALKED.label else np.count_nonzero(there)
     for name in MOTION:

@@ -15,7 +15,7 @@ from chilopod.errors import AnalysisError
 from chilopod.steering import CourseReferee, Target, of_course
 from chilopod.trials.asked import check_asked, check_finite
 from chilopod.trials.description import classes_in, file_text, is_ours, plain
-from chilopod.trials.disturbance import Drawn, draw
+from chilopod.trials.disturbance import Drawn, conditions, draw
 from chilopod.trials.trial import Trial
 
 NOT_KEPT = "not kept"
@@ -46,14 +46,8 @@ def batches(trials: Sequence[Trial], on_cores: int | None = None) -> list[list[T
 
 
 def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
-    """Walk the trials of one of :func:`batches`; the record of each has one ``robot``, and robot file and trial in the
-    attributes.
-
-    Raises
-    ------
-    ParameterError, AnalysisError
-        If an argument is out of range, or the controller fails.
-    """
+    """Records of the trials of one of :func:`batches`, each with one ``robot``, and robot file and trial in the
+    attributes. What goes wrong in them is a ParameterError or AnalysisError."""
     first = trials[0]
     # Who steers otherwise when asked the same again is found out before.
     doubts = first.code[1] or first.code[2] or _doubts(first)
@@ -67,10 +61,9 @@ def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
     if referee is not None:
         referee.add_to(data, walk)
     records = _apart(data.assign_attrs({NOT_KEPT: doubts} if doubts else {}), trials)
-    return [
-        of_course(record, trial.robot, trial.brief) if referee else record
-        for record, trial in zip(records, trials, strict=True)
-    ]
+    if referee is None:
+        return records
+    return [of_course(record, trial.robot, trial.brief) for record, trial in zip(records, trials, strict=True)]
 
 
 def _steered(trials: Sequence[Trial], until: float) -> tuple[Walk, list[Drawn], CourseReferee | None]:
@@ -81,22 +74,17 @@ def _steered(trials: Sequence[Trial], until: float) -> tuple[Walk, list[Drawn], 
     courses = [each.course for each in trials if each.course]
     asked = sum(1 for _ in event_times(first.controller, first.robot.gait, first.duration)) if first.controller else 0
     drawn = [draw(each.disturbance, each.seed, each.robot.body.modules, asked, each.joint_angles) for each in trials]
-    own_noise, noisy = engine.traits.noisy, first.target is not None and first.disturbance.bearing > 0.0
     walk = engine.start(
         [trial.robot for trial in trials],
-        initial=engine.initial_states(
-            first.robot, np.stack([each.joint_angles for each in drawn]), np.array([each.heading for each in drawn])
-        ),
-        friction=np.stack([each.friction for each in drawn]),
         target=np.stack(targets) if targets else None,
-        seeds=[each.scan_seed for each in drawn] if noisy and own_noise else None,
         record=first.recording,
         expected=first.duration,
+        **conditions(engine, first.robot, drawn, first.target is not None and first.disturbance.bearing > 0.0),
     )
     if len(walk.robots) != len(trials):
         problem = f"start gave a walk of {len(walk.robots)} robots instead of {len(trials)}"
         raise AnalysisError(problem, field=f"engine {first.engine}")
-    noise = None if own_noise or not asked else np.stack([each.bearing for each in drawn])
+    noise = None if engine.traits.noisy or not asked else np.stack([each.bearing for each in drawn])
     missed = np.stack([each.missed for each in drawn])
     referee = CourseReferee(courses, first.robot.gait, missed if missed.any() else None) if courses else None
     steer(walk, until, first.controller, bearing_noise=noise, referee=referee)

@@ -26,11 +26,10 @@ class Claims:
     """Trials that this process walks in a folder.
 
     A claim is a lock of the operating system's on one byte of an empty file in the folder; which byte follows from the
-    trial's name. It ends with the process that has it, however that ends, so nobody has to find out who is still alive.
-    On file systems of several machines it holds for all of them, where these have locks. Where there are no such locks
-    (they are Linux's, of open files) everybody is given every claim: then work is doubled, and nothing else, for who
-    walks the same trial writes the same file. ``sweep`` is called at the end if nobody else is there: what is in the
-    folder now and is no whole file was left over by somebody who was killed.
+    trial's name. It ends with the process that has it, however that ends. Where there are no such locks (they are
+    Linux's, of open files) everybody is given every claim: then work is doubled, and nothing else. ``sweep`` is called
+    at the end if nobody else is there: what is in the folder now and is no whole file was left over by somebody who was
+    killed.
     """
 
     def __init__(self, folder: Path, sweep: Callable[[], object]) -> None:

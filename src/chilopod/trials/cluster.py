@@ -124,11 +124,9 @@ class Cluster:
 
         Raises
         ------
-        ClusterError
-            If the cluster goes away or has no worker for a minute, or workers have other versions; or, when all else
-            is done, for batches that kill their workers.
-        ParameterError
-            If a controller's class cannot be imported on a worker.
+        ClusterError, ParameterError
+            If the cluster goes away or has no worker for a minute, or workers have other versions; when all else is
+            done, for batches that kill their workers; if a controller's class cannot be imported on a worker.
         """
         suspects: list[tuple[int, Sequence[Trial]]] = []
         yield from self._walk(enumerate(batches), suspects)
@@ -216,9 +214,8 @@ class Cluster:
 
     def _in_words(self, error: BaseException) -> ClusterError:
         """An error of dask's own."""
-        kinds = (OSError, TimeoutError, asyncio.CancelledError)
-        gone = self._client.status != "running" or isinstance(error, kinds) or "Cancelled" in type(error).__name__
-        if gone:
+        gone = isinstance(error, (OSError, TimeoutError, asyncio.CancelledError)) or "Cancelled" in type(error).__name__
+        if gone or self._client.status != "running":
             return self._error("the scheduler went away; what is kept in a folder goes on from here")
         return self._error(one_line(f"{type(error).__name__}: {error}"))
 
@@ -270,35 +267,21 @@ def _there(address: str, distributed: Any, stack: ExitStack) -> Any:
             knocking.submit(asyncio.run, asked()).result()
     except Exception as error:  # OSError, ValueError of an address, whatever comes of bytes that are not dask's
         reason = "does not answer" if isinstance(error, OSError) else f"is none ({type(error).__name__}: {error})"
-        raise ClusterError(
-            one_line(reason), field="cluster", value=address, allowed="the address of a dask scheduler"
-        ) from None
+        allowed = "the address of a dask scheduler"
+        raise ClusterError(one_line(reason), field="cluster", value=address, allowed=allowed) from None
     client = distributed.Client(address, timeout=_CONNECT, set_as_default=False)
     stack.callback(_closed, client)
     try:
         if not client.nthreads():
             raise ClusterError("has no workers", field="cluster", value=address)
-        _check(client, address)
+        for place, there in client.run(versions, PACKAGES).items():
+            check_versions(versions(PACKAGES), there, f"{address}, {place}")
     except ClusterError:
         raise
     except Exception as error:  # what a scheduler answers that is no scheduler, or goes away now
         problem = f"cannot be used: {type(error).__name__}: {error}"
         raise ClusterError(one_line(problem), field="cluster", value=address) from error
     return client
-
-
-def _check(client: Any, address: str) -> None:
-    """Make sure that all workers have the versions that are here."""
-    python = "{}.{}".format(*sys.version_info)
-    # First what dask tells of itself, for which the worker needs nothing of ours.
-    for place, told in client.get_versions(packages=PACKAGES)["workers"].items():
-        # Older versions of dask read __version__, which names the checkout too; the digest below says more.
-        there = {name: (found or "none").partition("+")[0] for name, found in told["packages"].items()}
-        there["python"] = ".".join(there["python"].split(".")[:2])
-        here = {"python": python, **versions(PACKAGES)}
-        check_versions({name: here[name] for name in ("python", *PACKAGES)}, there, f"{address}, {place}")
-    for place, there in client.run(versions, PACKAGES).items():
-        check_versions(versions(PACKAGES), there, f"{address}, {place}")
 
 
 def _own(workers: int, threads: int, distributed: Any, stack: ExitStack) -> Any:
@@ -329,11 +312,8 @@ def _own(workers: int, threads: int, distributed: Any, stack: ExitStack) -> Any:
     try:
         client.wait_for_workers(workers, timeout=_START)
     except TimeoutError:
-        raise ClusterError(
-            "worker processes do not start; a script has to make its cluster under `if __name__ == '__main__':`",
-            field="cluster",
-            value=workers,
-        ) from None
+        problem = "worker processes do not start; a script has to make its cluster under `if __name__ == '__main__':`"
+        raise ClusterError(problem, field="cluster", value=workers) from None
     return client
 
 

@@ -28,14 +28,8 @@ class Header:
 
 
 def content_of(record: xr.Dataset) -> bytes:
-    """A record as it stands in its file.
-
-    Raises
-    ------
-    OutputError
-        If it holds anything but floating-point numbers, integers of 32 bits, truth values and text, or a dimension of
-        length 0.
-    """
+    """A record as it stands in its file. Anything but floating-point numbers, integers of 32 bits, truth values and
+    text, and a dimension of length 0, is an OutputError."""
     if not all(record.sizes.values()):
         sizes = {str(name): size for name, size in record.sizes.items()}
         raise OutputError("has a dimension of length 0 and cannot be kept", field="record", value=sizes)
@@ -82,13 +76,8 @@ def _describe(target: Any, field: str, attributes: Mapping[Any, Any]) -> None:
 
 
 def read_record(path: Path) -> xr.Dataset:
-    """A record as it was walked: of the same types, and with nothing about the file.
-
-    Raises
-    ------
-    FileNotFoundError, UnsoundError, OutputError
-        As for :func:`chilopod.netcdf.unsealed`.
-    """
+    """A record as it was walked: of the same types, and with nothing about the file; or an error of
+    :func:`chilopod.netcdf.unsealed`."""
     try:
         record = xr.load_dataset(io.BytesIO(unsealed(path)), engine="scipy").drop_encoding()
     except UnsoundError:
@@ -104,13 +93,8 @@ def read_record(path: Path) -> xr.Dataset:
 
 
 def read_header(path: Path, *, whole: bool = False) -> Header:
-    """Header of a record's file, all of which is held against its seal if ``whole``; otherwise its length alone is.
-
-    Raises
-    ------
-    FileNotFoundError, UnsoundError, OutputError
-        As for :func:`chilopod.netcdf.unsealed`.
-    """
+    """Header of a record's file, all of which is held against its seal if ``whole``, otherwise its length alone; or an
+    error of :func:`chilopod.netcdf.unsealed`."""
     if whole:
         unsealed(path)
     with sealed_file(path) as file:

@@ -41,20 +41,9 @@ class Contents(NamedTuple):
 
 
 class Kept(NamedTuple):
-    """A trial that is kept, as its file's header says.
-
-    Attributes
-    ----------
-    path, size
-        Path and size of the file, bytes.
-    robot
-        Name of the robot.
-    told
-        The trial's text, see :attr:`chilopod.trials.Trial.text`.
-    found
-        True if this version of chilopod and of the engine takes it for what it would walk; of an engine of one's own
-        its version is not looked at.
-    """
+    """A trial that is kept, as its file's header says: path and size of the file (bytes), name of the robot, and
+    :attr:`chilopod.trials.Trial.text`. It is ``found`` if this version of chilopod and of the engine takes it for what
+    it would walk; of an engine of one's own its version is not looked at."""
 
     path: Path
     size: int
@@ -64,13 +53,7 @@ class Kept(NamedTuple):
 
 
 def contents(folder: Path) -> Contents:
-    """The names in a folder, in order.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such folder, or it cannot be read.
-    """
+    """The names in a folder, in order; a ParameterError if there is no such folder, or it cannot be read."""
     found: tuple[list[Path], ...] = ([], [], [], [])
     try:
         with os.scandir(folder) as entries:
@@ -101,16 +84,8 @@ def checked(paths: Sequence[Path], progress: Progress = silent) -> tuple[list[Ke
 def clean(folder: Path, *, old: bool = False, dry: bool = False) -> tuple[list[Path], Wrong]:
     """Remove what is no trial's record and was written by chilopod: what was set aside, or left over by who was killed.
 
-    With ``old`` the records of other versions go too; with ``dry`` nothing goes.
-
-    Returns
-    -------
-    What was (or would be) removed, and what is left for a reason.
-
-    Raises
-    ------
-    ParameterError, OutputError
-        If there is no such folder, or a file cannot be removed.
+    With ``old`` the records of other versions go too; with ``dry`` nothing goes. What was (or would be) removed is
+    returned, and what is left for a reason. What cannot be removed is an OutputError.
     """
     found = contents(folder)
     remove = list(found.aside)
@@ -131,20 +106,9 @@ def clean(folder: Path, *, old: bool = False, dry: bool = False) -> tuple[list[P
 
 @dataclass(frozen=True)
 class Group:
-    """Trials of robots of one name that differ in nothing but the robots' numbers, their seeds, and where the
-    targets of a course are.
-
-    Attributes
-    ----------
-    robot, engine, controller
-        By name; no controller is None.
-    duration, target
-        s; bearing, rad, and distance, m; of a course how many targets it has; None where there is none.
-    found
-        See :class:`Kept`.
-    robots, seeds, count, size
-        Number of robots, seeds of those that are disturbed, number of trials, and size of all files, bytes.
-    """
+    """Trials of robots of one name that differ in nothing but the robots' numbers, their seeds, and where the targets
+    of a course are: what they share, number of robots, seeds of those that are disturbed, number of trials, and size of
+    all files, bytes. The target is bearing, rad, and distance, m, or how many a course has."""
 
     robot: str
     engine: str

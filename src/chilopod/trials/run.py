@@ -139,8 +139,7 @@ class _Study:
     def _shared(self, missing: Sequence[Trial], store: Store) -> Iterator[tuple[Trial, xr.Dataset]]:
         with store.claims() as claims:
             left, moved, patient = list(missing), time.monotonic(), True
-            brought: list[Trial] = []  # by other processes meanwhile
-            elsewhere: list[Trial] = []
+            brought, elsewhere = list[Trial](), list[Trial]()  # by other processes meanwhile; still with them
 
             def free(batch: list[Trial]) -> list[Trial]:
                 """Those of a batch that are to be walked here; they are claimed."""
@@ -203,8 +202,6 @@ class _Study:
             walked = list(zip(begun[index], records, strict=True))
             for trial, record in walked:
                 if record.attrs.get("trial") != trial.text:
-                    raise AnalysisError(
-                        "gave the record of another trial, or one that other code walked",
-                        field=type(self._executor).__name__,
-                    )
+                    problem = "gave the record of another trial, or one that other code walked"
+                    raise AnalysisError(problem, field=type(self._executor).__name__)
             yield walked

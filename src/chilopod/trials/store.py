@@ -28,11 +28,9 @@ class Store:
     """A folder that keeps the records of trials, each in a netCDF-3 file of its own.
 
     Every file is there whole or not at all, has a name derived from all that makes its trial, holds that as text, and a
-    checksum over all of its bytes. Many processes may use one folder at the same time: they share the work, see
-    :class:`chilopod.trials.claims.Claims`, and whoever walks the same trial writes the same file.
-
-    The folder is made with the first record where there is none. ``tell`` is given a line about every file that is not
-    what it should be; by default it is the logger of this module, which prints on stderr.
+    checksum over all of its bytes. Many processes may use one folder at the same time: they share the work, and whoever
+    walks the same trial writes the same file. The folder is made with the first record where there is none. ``tell`` is
+    given a line about every file that is not what it should be; by default it is the logger of this module.
 
     Raises
     ------
@@ -51,12 +49,8 @@ class Store:
     def read(self, trial: Trial) -> xr.Dataset | None:
         """The record of a trial; None if there is none.
 
-        A file that is damaged, was edited, or holds another trial counts as none and gets the ending ``.aside``.
-
-        Raises
-        ------
-        OutputError
-            If such a file cannot be moved, or this process has no memory to read it.
+        A file that is damaged, was edited, or holds another trial counts as none and gets the ending ``.aside``. What
+        cannot be moved, or read for want of memory, is an OutputError.
         """
         path = self.folder / trial.file_name
         try:
@@ -71,13 +65,8 @@ class Store:
             return None
 
     def write(self, trial: Trial, record: xr.Dataset) -> None:
-        """Keep a record, for good once :meth:`sync` has been called; unless it says that it is not to be kept.
-
-        Raises
-        ------
-        OutputError
-            If it is another trial's record, or the file cannot be written.
-        """
+        """Keep a record, for good once :meth:`sync` has been called; unless it says that it is not to be kept. Another
+        trial's record, and a file that cannot be written, is an OutputError."""
         if record.attrs.get("trial") != trial.text:
             problem = "is that of another trial, or was walked by other code"
             raise OutputError(problem, field="record", allowed=f"a record for {trial.file_name}")
@@ -116,7 +105,5 @@ class Store:
 
     def _sweep(self) -> None:
         """Remove what somebody who was killed did not finish."""
-        with os.scandir(self.folder) as entries:
-            for entry in entries:
-                if entry.name.startswith(_UNFINISHED):
-                    os.unlink(entry)
+        for path in self.folder.glob(f"{_UNFINISHED}*"):
+            path.unlink()

@@ -65,10 +65,8 @@ def base_series(
 
     Parameters
     ----------
-    robot, data
-        Robot, whose first spring does not matter, and the series.
-    springs
-        Values of k1, N*mm/deg, if not those of the series.
+    robot, data, springs
+        Robot, the series, and values of k1, N*mm/deg, if not those of the series.
     tolerance, duration
         Tolerance of the contact solver; s.
     engine
