@@ -33,11 +33,22 @@ _FPS = 10  # pictures of a film, each a gait cycle
 
 def _without_pictures(env: Any) -> dict[str, Any]:
     """State of an environment for copies; pictures are drawn from the episodes anew."""
-    return {name: None if name in ("_picture", "_pictures") else each for name, each in env.__dict__.items()}
+    return {**env.__dict__, "_pictures": None}
+
+
+def _drawn(env: Any) -> list[Pixels] | None:
+    """Pictures of all robots; None without a render mode."""
+    if env.render_mode is None:
+        return None
+    if env._pictures is None:
+        from chilopod.gym.picture import Picture
+
+        env._pictures = [Picture(env.episodes, robot) for robot in range(env.episodes.count)]
+    return [picture.drawn() for picture in env._pictures]
 
 
 class RobotVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
-    """Robots with one task, all in one walk of an engine.
+    """Robots with one task, all in one walk of an engine. What cannot be is a ParameterError.
 
     Parameters
     ----------
@@ -49,11 +60,6 @@ class RobotVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
         ``rgb_array`` or None.
     named
         As of :class:`chilopod.gym.Episodes`: task, springs, patience, disturbance, and what the task has.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such robot, engine, task or render mode.
     """
 
     metadata = {"render_modes": [*_RENDER_MODES], "render_fps": _FPS, "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
@@ -102,13 +108,8 @@ class RobotVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
 
     def render(self) -> tuple[Pixels, ...] | None:
         """A picture of every robot, from above; None without a render mode."""
-        if self.render_mode is None:
-            return None
-        if self._pictures is None:
-            from chilopod.gym.picture import Picture
-
-            self._pictures = [Picture(self.episodes, robot) for robot in range(self.num_envs)]
-        return tuple(picture.drawn() for picture in self._pictures)
+        drawn = _drawn(self)
+        return None if drawn is None else tuple(drawn)
 
 
 class RobotEnv(gymnasium.Env[Row, Row]):
@@ -128,7 +129,7 @@ class RobotEnv(gymnasium.Env[Row, Row]):
         self.episodes = _episodes(1, robot, engine, render_mode, named)
         self.observation_space, self.action_space = _spaces(self.episodes)
         self._over = False
-        self._picture: Picture | None = None
+        self._pictures: list[Picture] | None = None
 
     __getstate__ = _without_pictures
 
@@ -150,22 +151,16 @@ class RobotEnv(gymnasium.Env[Row, Row]):
 
     def render(self) -> Pixels | None:
         """A picture of the robot, from above; None without a render mode."""
-        if self.render_mode is None:
-            return None
-        if self._picture is None:
-            from chilopod.gym.picture import Picture
-
-            self._picture = Picture(self.episodes, 0)
-        return self._picture.drawn()
+        drawn = _drawn(self)
+        return None if drawn is None else drawn[0]
 
 
 def _episodes(
     count: int, robot: str | Path | Robot | None, engine: str, render_mode: str | None, named: dict[str, Any]
 ) -> Episodes:
     if render_mode not in (None, *_RENDER_MODES):
-        raise ParameterError(
-            "there is no such render mode", field="render_mode", value=render_mode, allowed=", ".join(_RENDER_MODES)
-        )
+        allowed = ", ".join(_RENDER_MODES)
+        raise ParameterError("there is no such render mode", field="render_mode", value=render_mode, allowed=allowed)
     engine_named(engine)
     if robot is None:
         robot = _PRESETS.get(engine, _PRESETS["planar"])

@@ -20,15 +20,12 @@ from chilopod.errors import ParameterError
 from chilopod.flows.arguments import checked_count
 from chilopod.gym.actions import Actions
 from chilopod.gym.sight import Sight
-from chilopod.gym.tasks import Look, Task, task_of
-from chilopod.record import LONGEST
+from chilopod.gym.tasks import Look, Marks, Task, task_of
+from chilopod.record import LONGEST, Array
 from chilopod.robot import Robot
 from chilopod.steering import CourseReferee, Judged, Verdict
 from chilopod.tasks.course import patience_of
-from chilopod.trials import Disturbance, Drawn, conditions, draw
-
-Array = NDArray[np.float64]
-Marks = NDArray[np.bool_]
+from chilopod.trials.disturbance import Disturbance, Drawn, conditions, draw
 
 _MOST = 1 << 20  # robots
 _A_LOOK = 2.0 * (8.0 + 1.0)  # bytes that a look's error and whether it misses take, drawn and in one array
@@ -41,12 +38,9 @@ class Step:
 
     Attributes
     ----------
-    observation
-        See :class:`chilopod.gym.Sight`.
-    reward
-        See :meth:`chilopod.gym.Task.reward`; 0 for a robot whose episode has just begun.
-    terminated, truncated
-        See :meth:`chilopod.gym.Task.ending`.
+    observation, reward, terminated, truncated
+        See :class:`chilopod.gym.Sight` and :class:`chilopod.gym.Task`; the reward of a robot whose episode has just
+        begun is 0.
     info
         ``time`` of the episode (s), ``distance`` of the target (m), ``pose`` of module 1 (m, m, rad), ``verdict`` on
         the target of which the robot is done with this step, or "", and ``arrived``: how many targets so far.
@@ -71,7 +65,7 @@ class Moment:
 
 
 class Episodes:
-    """Robots that walk to targets, each in an episode of its own.
+    """Robots that walk to targets, each in an episode of its own. What cannot be is a ParameterError.
 
     Parameters
     ----------
@@ -91,15 +85,10 @@ class Episodes:
 
     Attributes
     ----------
-    actions, sight
-        Meaning of actions and of observations.
+    actions, sight, period
+        Meaning of actions and of observations, and length of a step, s.
     moments
         Moments of the steps so far, as many as the longest episode has.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such robot, engine or task.
     """
 
     def __init__(
@@ -116,7 +105,7 @@ class Episodes:
         **chosen: Any,
     ) -> None:
         self.task = task_of(task, chosen)
-        self._count = checked_count("num_envs", count, _MOST)
+        self.count = checked_count("num_envs", count, _MOST)
         if not isinstance(disturbance, Disturbance):
             raise ParameterError("must be a Disturbance", field="disturbance", value=disturbance)
         self._name, self._engine = engine, engine_named(engine)
@@ -130,16 +119,13 @@ class Episodes:
         if self._patience < least:
             problem, allowed = "is too short for the farthest target", f"{least:g} s or more"
             raise ParameterError(problem, field="patience", value=f"{self._patience:g} s", allowed=allowed)
-        self._period = gait.period
+        self.period = gait.period
         self._looks = int(np.ceil(common.duration / gait.period)) + len(common.goals) + 1
-        needed = _A_LOOK * self._looks * self._count
+        needed = _A_LOOK * self._looks * self.count
         if needed > memory.available():
-            raise ParameterError(
-                f"would take {memory.in_words(needed)} of memory",
-                field="num_envs * targets * patience",
-                value=f"{self._count} * {common.duration:g} s",
-                allowed=f"less, {memory.in_words(memory.available())} are free",
-            )
+            problem, asked = f"would take {memory.in_words(needed)} of memory", f"{self.count} * {common.duration:g} s"
+            allowed = f"less, {memory.in_words(memory.available())} are free"
+            raise ParameterError(problem, field="num_envs * targets * patience", value=asked, allowed=allowed)
         self.moments: deque[Moment] | None = deque(maxlen=self._looks) if remember else None
         self._walk: Walk | None = None
         self._generators: list[np.random.Generator] = []
@@ -158,11 +144,6 @@ class Episodes:
         """Robot that walks, with the actuators that actions need."""
         return self.actions.robot
 
-    @property
-    def period(self) -> float:
-        """Length of a step, s."""
-        return self._period
-
     def steps(self, robot: int) -> int:
         """Number of steps that the present episode of a robot has had so far."""
         return int(self._cycle - self._since[robot])
@@ -175,42 +156,34 @@ class Episodes:
 
     def step(self, actions: ArrayLike) -> Step:
         """Walk for a gait cycle by actions of shape (robots, numbers of an action), see :class:`chilopod.gym.Actions`;
-        those of robots whose episode was over are not used.
-
-        Raises
-        ------
-        ParameterError
-            If there is no episode yet, or an action is none; nothing has changed then.
-        """
+        those of robots whose episode was over are not used. Before the first episode, or where an action is none, that
+        is a ParameterError and nothing has changed."""
         if self._walk is None:
             raise ParameterError("there is no episode yet", field="step", allowed="reset() first")
-        told, waiting, walk = self.actions.checked(actions, self._count), self._ended, self._walk
+        told, waiting, walk = self.actions.checked(actions, self.count), self._ended, self._walk
         if waiting.all():
-            return self._begin([None] * self._count)
+            return self._begin([None] * self.count)
         for phase, command in self.actions.commands(told, self._leg_yaw):
-            walk.advance((self._cycle + phase) * self._period)
+            walk.advance((self._cycle + phase) * self.period)
             walk.command(command)
         self._cycle += 1
-        walk.advance(self._cycle * self._period)
+        walk.advance(self._cycle * self.period)
         if waiting.any():
             self._restart(walk, waiting)
         return self._look(walk, waiting)
 
-    # -- inside
-    # ---------------------------------------------------------------------------------------------------------------
-
     def _begin(self, seeds: Sequence[int | None]) -> Step:
-        drawn, courses, start = self._drawn(np.arange(self._count), seeds)
+        drawn, courses, start = self._drawn(np.arange(self.count), seeds)
         self._walk = self._engine.start(self.robot, record=None, **start)
         missed = np.stack([each.missed for each in drawn])
         self._missing = bool(self._disturbance.missed)
         self._referee = CourseReferee(courses, self.robot.gait, missed if self._missing else None, keep=False)
         self._errors = np.stack([each.bearing for each in drawn])
-        self._cycle, self._since = 0, np.zeros(self._count, dtype=np.intp)
-        self._away, self._arrived = np.full(self._count, np.nan), np.zeros(self._count, dtype=np.intp)
+        self._cycle, self._since = 0, np.zeros(self.count, dtype=np.intp)
+        self._away, self._arrived = np.full(self.count, np.nan), np.zeros(self.count, dtype=np.intp)
         if self.moments is not None:
             self.moments.clear()
-        return self._look(self._walk, np.ones(self._count, dtype=np.bool_))
+        return self._look(self._walk, np.ones(self.count, dtype=np.bool_))
 
     def _restart(self, walk: Walk, which: Marks) -> None:
         ids = np.flatnonzero(which)
@@ -249,11 +222,11 @@ class Episodes:
                 bearing=np.where(others, again.bearing, seen.bearing),
                 distance=np.where(others, again.distance, seen.distance),
             )
-        look = Look(judged, busy, self._away - away, left, self._period, self.robot.gait.speed)
+        look = Look(judged, busy, self._away - away, left, self.period, self.robot.gait.speed)
         reward = np.where(fresh, 0.0, self.task.reward(look))
         self._away = np.where(others, _distance(aims, pose), away)
         terminated, truncated = self.task.ending(look)
-        if (self._cycle + 1) * self._period > LONGEST:
+        if (self._cycle + 1) * self.period > LONGEST:
             truncated |= busy  # no walk is longer; the next step begins another
         self._arrived += judged.arrived
         self._ended, self._leg_yaw = terminated | truncated, seen.leg_yaw
@@ -262,7 +235,7 @@ class Episodes:
         if self.moments is not None:
             self.moments.append(Moment(pose, seen.joint_angles, seen.leg_yaw, aims))
         info = {
-            "time": (self._cycle - self._since) * self._period,
+            "time": (self._cycle - self._since) * self.period,
             "distance": self._away.copy(),
             "pose": pose,
             "verdict": _verdicts(judged),
@@ -274,7 +247,7 @@ class Episodes:
         """Observation that gets through to the robots, with noise and the view that scanners have."""
         look = self._cycle - self._since
         if not self._engine.traits.noisy:
-            bearing = seen.bearing + self._errors[np.arange(self._count), look]
+            bearing = seen.bearing + self._errors[np.arange(self.count), look]
             seen = replace(seen, bearing=(bearing + np.pi) % (2.0 * np.pi) - np.pi)
         return self._referee.through(look, seen)
 

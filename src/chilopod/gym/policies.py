@@ -24,16 +24,11 @@ BASELINES = {name: each for name, each in ON_THE_WAY.items() if not each.needs_t
 
 @dataclass(frozen=True)
 class Steered:
-    """A controller as a policy.
+    """A controller that steers by springs and leg yaw as a policy, for episodes.
 
     At every step it is asked at all its events at once, with what is seen at the beginning of the gait cycle. In a walk
     it is asked at each event when it comes: it then sees what a policy saw up to a cycle before. Springs that the
     controller does not set stay as stiff as in the robot file, as far as actions go.
-
-    Attributes
-    ----------
-    controller, episodes
-        Controller that steers by springs and leg yaw, and what defines actions and observations.
     """
 
     controller: Controller
@@ -69,10 +64,8 @@ def baseline(name: str, episodes: Episodes, engine: str = "planar") -> Steered:
 
     Raises
     ------
-    ParameterError
-        If there is none of this name.
-    AnalysisError
-        If the robot has no radius law, and the strategy stands on it.
+    ParameterError, AnalysisError
+        If there is none of this name, or the robot has no radius law, and the strategy stands on it.
     """
     strategy = strategy_named(name, BASELINES)
     law = radius_law(episodes.robot, engine) if strategy.needs_law else None

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from chilopod.engine.arguments import as_number
 from chilopod.errors import ParameterError, nearest_name
 from chilopod.flows.arguments import checked_count
+from chilopod.record import Array
 from chilopod.steering import Course, Goal, Judged, Target, random_course
 from chilopod.steering.course import MOST_GOALS, RANDOM_DISTANCES
 
-Array = NDArray[np.float64]
 Marks = NDArray[np.bool_]
 
 
@@ -23,12 +23,8 @@ Marks = NDArray[np.bool_]
 class Rewards:
     """Weights of the reward of a step, see :meth:`Task.reward`.
 
-    Attributes
-    ----------
-    progress, arrival, cycle
-        For every metre that the target has come nearer, for arriving at a target, and for every gait cycle.
-    failure
-        For a robot that falls, or bends a joint too far, besides what the time that was left is charged.
+    Weighed are every metre that the target has come nearer, arriving at a target, every gait cycle, and the failure of
+    a robot that falls, or bends a joint too far, besides what the time that was left is charged.
     """
 
     progress: float = 1.0
@@ -50,10 +46,9 @@ class Look:
     ----------
     judged, busy
         Marks of the robots that are done with a target, and of those that have another one.
-    nearer, left
-        Distance by which the target has come nearer, m, NaN where there is none; time left for all targets, s.
-    period, speed
-        Length of a step, s; speed of the straight walk without slip, m/s.
+    nearer, left, period, speed
+        Distance by which the target has come nearer, m, NaN where there is none; time left for all targets and length
+        of a step, s; speed of the straight walk without slip, m/s.
     """
 
     judged: Judged
@@ -76,8 +71,8 @@ class Task:
 
     @property
     def farthest(self) -> float:
-        """Largest distance of a target when its turn comes, m."""
-        raise NotImplementedError
+        """Largest distance of a target when its turn comes, m; by default that of random courses."""
+        return RANDOM_DISTANCES[1]
 
     def course(self, seed: int, patience: float) -> Course:
         """Targets of the episode of a seed, each with so much time, s; as many for every seed."""
@@ -112,11 +107,6 @@ class RandomTargets(Task):
     def __post_init__(self) -> None:
         super().__post_init__()
         checked_count("targets", self.targets, MOST_GOALS)
-
-    @property
-    def farthest(self) -> float:
-        """As random courses have it."""
-        return RANDOM_DISTANCES[1]
 
     def course(self, seed: int, patience: float) -> Course:
         """The course ``random:SEED``."""
@@ -155,13 +145,8 @@ TASKS: Final[Mapping[str, Task]] = {
 
 
 def task_of(task: str | Task, chosen: Mapping[str, Any]) -> Task:
-    """A task, or the one of this name, with some of its attributes chosen otherwise.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such task, or it has no such attribute.
-    """
+    """A task, or the one of this name, with some of its attributes chosen otherwise; a ParameterError if there is no
+    such task, or it has no such attribute."""
     found = TASKS.get(task) if isinstance(task, str) else task
     if not isinstance(found, Task):
         nearest, allowed = nearest_name(str(task), TASKS), f"{', '.join(TASKS)}, or a chilopod.gym.Task"

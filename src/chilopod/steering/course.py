@@ -8,17 +8,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod import units
 from chilopod.engine.arguments import as_number
 from chilopod.errors import ParameterError, UnitError, nearest_name
 from chilopod.kinematics import directions
-from chilopod.record import in_range
+from chilopod.record import Array, in_range
 from chilopod.steering.target import ARRIVAL_RADIUS, FARTHEST
 from chilopod.text_file import read_text
-
-Array = NDArray[np.float64]
 
 MOST_GOALS = 1000
 """More targets than this are a slip of the pen."""

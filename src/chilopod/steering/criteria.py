@@ -6,13 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.labels import Labelled
+from chilopod.record import Array
 from chilopod.steering.target import ARRIVAL_RADIUS
-
-Array = NDArray[np.float64]
 
 
 class Outcome(Labelled):

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from chilopod.record import Array
 from chilopod.robot import Robot
-
-Array = NDArray[np.float64]
 
 _OVER = ("robot", "goal")
 _READ = ("position", "leg_yaw", "joint_angle", "stiffness", "command_torque", "seen_joint_angles")

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from chilopod.engine import Command, Controller, Observation, Status, Walk, event_times
 from chilopod.gait import Gait
 from chilopod.labels import Labelled
-from chilopod.record import bearing_and_distance
+from chilopod.record import Array, bearing_and_distance
 from chilopod.steering.course import Course
 from chilopod.steering.shortest import shortest_path
 from chilopod.steering.target import ARRIVAL_RADIUS
@@ -20,7 +20,6 @@ from chilopod.steering.target import ARRIVAL_RADIUS
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
 
 LOOK = 0.1
 """s between two looks at where the robots are: the paper's robot goes 6 mm meanwhile."""
@@ -40,14 +39,8 @@ class Verdict(Labelled):
 class Judged:
     """Marks of the robots, shape (robots,), that a look of :class:`CourseReferee` found to be done with a target.
 
-    Attributes
-    ----------
-    arrived, gone
-        There; no longer walking, and so done with all targets.
-    late, unseen
-        Out of time; the same, and the target was never in view.
-    begins
-        With none before.
+    They have ``arrived``, are out of time (``late``, ``unseen`` if the target was never in view), or walk no more and
+    are done with all targets (``gone``). Others have had no target yet (``begins``).
     """
 
     arrived: NDArray[np.bool_]

@@ -43,9 +43,8 @@ def shortest_path(place: Array, radius: float, arrival: float = ARRIVAL_RADIUS) 
     """
     for name, value in (("turning radius", radius), ("arrival radius", arrival)):
         if not 0.0 <= value <= FARTHEST:
-            raise ParameterError(
-                "is out of range", field=name, value=f"{value:g} m", allowed=f"from 0, at most {FARTHEST:g} m"
-            )
+            allowed = f"from 0, at most {FARTHEST:g} m"
+            raise ParameterError("is out of range", field=name, value=f"{value:g} m", allowed=allowed)
     place = np.asarray(place, dtype=np.float64)
     x, y = place[..., 0].ravel(), np.abs(place[..., 1]).ravel()
     length = np.full(x.shape, np.nan)

@@ -16,15 +16,8 @@ from chilopod.steering.spring_law import SpringLaw
 
 
 class Prepared(NamedTuple):
-    """Robot that is ready to walk with a strategy.
-
-    Attributes
-    ----------
-    robot, controller
-        Robot with the strategy's springs and actuators; controller of the walk, None without one.
-    remarks
-        Remarks on both, a sentence each.
-    """
+    """Robot with a strategy's springs and actuators, controller of its walk, None without one, and remarks on both, a
+    sentence each."""
 
     robot: Robot
     controller: Controller | None

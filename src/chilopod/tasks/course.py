@@ -47,10 +47,9 @@ class Driver(Short):
     ----------
     robot, strategy, controller
         Robot with the springs and the actuator of the strategy; strategy; controller, None without steering.
-    law
-        The robot's radius law; None where it has none and the strategy needs none.
-    engine
-        Name of the engine that the law belongs to and that walks.
+    law, engine
+        The robot's radius law, None where it has none and needs none; name of the engine that it belongs to and that
+        walks.
     remarks
         Remarks on the result, a sentence each.
     """
@@ -184,10 +183,9 @@ def driver(
 
     Raises
     ------
-    ParameterError
-        If the strategy wants a spring and has none, or has one and wants none; if the spring has no actuator.
-    AnalysisError
-        If the strategy stands on the pitchfork and the robot has none.
+    ParameterError, AnalysisError
+        If the strategy wants a spring and has none, or has one and wants none; if the spring has no actuator; if the
+        strategy stands on the pitchfork and the robot has none.
     """
     strategy.fitted(robot, spring)  # refuses before the law takes its time
     unknown: tuple[str, ...] = ()
@@ -205,13 +203,7 @@ def driver(
 
 def drive(driver: Driver, course: Course, **options: Unpack[RunOptions]) -> Driven:
     """Let a robot walk a course, with any radius of the tightest circle, see :meth:`Driver.trial`, and with
-    :class:`chilopod.tasks.RunOptions`.
-
-    Raises
-    ------
-    ParameterError
-        If memory cannot hold the records, or something is out of range.
-    """
+    :class:`chilopod.tasks.RunOptions`. What is out of range, or too much for memory, is a ParameterError."""
     trial = driver.trial(course, poses=engine_named(driver.engine).traits.poses)
     trials, records = runs(trial, **options)
     return Driven(trials, driver, tuple(records))

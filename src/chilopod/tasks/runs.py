@@ -33,10 +33,8 @@ class RunOptions(TypedDict, total=False):
     seed, repeats
         Seed of the first walk's disturbances, the others count up from it, None (default) for no disturbance at all;
         and number of walks, by default 1.
-    folder
-        Folder where all trials are kept; without one nothing is kept.
-    progress
-        Called with the part done (0 to 1) and a few words.
+    folder, progress
+        Folder where all trials are kept, if any; called with the part done (0 to 1) and a few words.
     """
 
     seed: int | None

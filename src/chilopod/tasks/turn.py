@@ -8,7 +8,6 @@ from typing import Any, Unpack, cast
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from chilopod import units
 from chilopod.analysis.parameters import K1
@@ -21,8 +20,6 @@ from chilopod.steering import Criteria, Strategy, Target, earliest_arrival, eval
 from chilopod.tasks.radius_law import radius_law
 from chilopod.tasks.runs import RunOptions, Runs, paths, runs
 from chilopod.trials import NONE, Trial, check_fits, finite, run, straight, together
-
-Array = NDArray[np.float64]
 
 _SOFTEST = 1.0 / 20.0  # of the stiffest spring: where a strategy without a radius law starts to look
 _ROUNDS = 2

@@ -21,15 +21,8 @@ from chilopod.trials import Trial, WalkSummary, as_now, run_each, straight, summ
 
 @dataclass(frozen=True)
 class Ends(Runs):
-    """Ends of walks that differ in nothing but their seed.
-
-    Attributes
-    ----------
-    trials, summaries
-        All that makes each walk, and the end of each.
-    straight
-        True if none of them ever bent, see :func:`chilopod.trials.straight`.
-    """
+    """Ends of walks that differ in nothing but their seed: all that makes each, the end of each, and whether they are
+    ``straight``: none of them ever bent, see :func:`chilopod.trials.straight`."""
 
     summaries: Sequence[WalkSummary]
     straight: bool

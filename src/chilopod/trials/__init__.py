@@ -12,7 +12,7 @@ from chilopod.lazy import exports
 if TYPE_CHECKING:
     from chilopod.trials.batch import batches, walked
     from chilopod.trials.cluster import Cluster
-    from chilopod.trials.disturbance import NONE, Disturbance, Drawn, conditions, draw
+    from chilopod.trials.disturbance import NONE, Disturbance, Drawn, draw
     from chilopod.trials.executors import Executor, Here, using
     from chilopod.trials.run import as_now, check_fits, run, run_each, together
     from chilopod.trials.store import Store
@@ -24,7 +24,7 @@ else:
         {
             "batch": ("batches", "walked"),
             "cluster": ("Cluster",),
-            "disturbance": ("NONE", "Disturbance", "Drawn", "conditions", "draw"),
+            "disturbance": ("NONE", "Disturbance", "Drawn", "draw"),
             "executors": ("Executor", "Here", "using"),
             "run": ("as_now", "check_fits", "run", "run_each", "together"),
             "store": ("Store",),
@@ -47,7 +47,6 @@ __all__ = [
     "as_now",
     "batches",
     "check_fits",
-    "conditions",
     "draw",
     "finite",
     "mean_joint_angles",

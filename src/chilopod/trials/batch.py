@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Hashable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -33,7 +33,9 @@ def batches(trials: Sequence[Trial], on_cores: int | None = None) -> list[list[T
     groups: dict[tuple[Any, ...], list[Trial]] = {}
     for trial in trials:
         walks = trial.engine, engine_named(trial.engine).common(trial.robot), trial.robot.gait, trial.robot.body.modules
-        asked = trial.duration, trial.recording, trial.brief, _sight(trial)
+        course = trial.course
+        sight = (course.patience, course.view, course.range, course.tightest) if course else trial.target is None
+        asked = trial.duration, trial.recording, trial.brief, sight
         noisy = trial.disturbance.bearing > 0.0  # said once for a batch
         alike = walks, asked, noisy, json.dumps(trial.steering, sort_keys=True), trial.code
         groups.setdefault(alike, []).append(trial)
@@ -113,12 +115,6 @@ def _doubts(trial: Trial) -> str:
         else:
             _KNOWN[who] = _CHANGES if trial.as_now().code != trial.code else ""
     return _KNOWN[who]
-
-
-def _sight(trial: Trial) -> Hashable:
-    """Property that targets of a batch have in common."""
-    course = trial.course
-    return (course.patience, course.view, course.range, course.tightest) if course else trial.target is None
 
 
 def _apart(data: xr.Dataset, trials: Sequence[Trial]) -> list[xr.Dataset]:

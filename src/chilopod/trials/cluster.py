@@ -16,7 +16,7 @@ import tempfile
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, suppress
 from itertools import islice
 from multiprocessing import resource_tracker
 from multiprocessing.process import BaseProcess
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
     from chilopod.trials.trial import Trial
 
+_Answers = queue.SimpleQueue[tuple[int, bytes | BaseException]]
 _SHARES = 8  # batches that a worker gets of a study, at least, so that all are done at about the same time
 _AHEAD = 2  # batches a worker has, with that which it walks
 _LOOK = 1.0  # s between two looks at a cluster from which nothing comes
@@ -71,10 +72,9 @@ class Cluster:
 
     Raises
     ------
-    ExtraError, ParameterError
-        If dask is not installed, or there cannot be so many workers.
-    ClusterError
-        If it is not there, has no workers, or has another Python, chilopod, numpy or numba.
+    ExtraError, ParameterError, ClusterError
+        If dask is not installed; there cannot be so many workers; it is not there, has no workers, or has another
+        Python, chilopod, numpy or numba.
     """
 
     def __init__(self, where: str | int, threads: int | None = None) -> None:
@@ -120,14 +120,9 @@ class Cluster:
                 yield from self._pace.pieces(batch[i : i + size], threads)
 
     def walk(self, batches: Iterable[Sequence[Trial]]) -> Iterator[tuple[int, list[xr.Dataset]]]:
-        """The number of a batch and its records, as they come; a batch is taken when it is sent.
-
-        Raises
-        ------
-        ClusterError, ParameterError
-            If the cluster goes away or has no worker for a minute, or workers have other versions; when all else is
-            done, for batches that kill their workers; if a controller's class cannot be imported on a worker.
-        """
+        """The number of a batch and its records, as they come; a batch is taken when it is sent. A cluster that goes
+        away or has no worker for a minute, workers of other versions and, when all else is done, batches that kill
+        their workers are a ClusterError; a controller that workers cannot import is a ParameterError."""
         suspects: list[tuple[int, Sequence[Trial]]] = []
         yield from self._walk(enumerate(batches), suspects)
         # Dask blames all that a killed worker was given. What is killed alone, too, kills.
@@ -144,7 +139,7 @@ class Cluster:
         """Batches with their numbers; those that were given up go into ``killed``."""
         from distributed import KilledWorker
 
-        arrived: queue.SimpleQueue[tuple[int, bytes | BaseException]] = queue.SimpleQueue()
+        arrived: _Answers = queue.SimpleQueue()
         under_way: dict[int, tuple[Sequence[Trial], Any]] = {}
         waiting = iter(batches)
         try:
@@ -169,9 +164,7 @@ class Cluster:
             for _, future in under_way.values():
                 future.release()
 
-    def _sent(
-        self, index: int, batch: Sequence[Trial], arrived: queue.SimpleQueue[tuple[int, bytes | BaseException]]
-    ) -> Any:
+    def _sent(self, index: int, batch: Sequence[Trial], arrived: _Answers) -> Any:
         """Give a batch to the cluster, and see to it that its answer is fetched as soon as it is there; its future."""
         client, job = self._client, packed(batch)
         try:
@@ -191,7 +184,7 @@ class Cluster:
         asyncio.run_coroutine_threadsafe(fetch(), client.loop.asyncio_loop)
         return future
 
-    def _next(self, arrived: queue.SimpleQueue[tuple[int, bytes | BaseException]]) -> tuple[int, bytes | BaseException]:
+    def _next(self, arrived: _Answers) -> tuple[int, bytes | BaseException]:
         """The next answer, from a cluster that is there."""
         self._seen = time.monotonic()
         while True:
@@ -238,7 +231,10 @@ def _connected(where: str | int, threads: int | None, stack: ExitStack) -> Any:
     import dask
     import distributed
 
-    stack.enter_context(_quiet())
+    for name in _LOGGERS:  # what they would log is said in one line, by us
+        logger = logging.getLogger(name)
+        stack.callback(logger.setLevel, logger.level)
+        logger.setLevel(logging.CRITICAL + 1)
     stack.enter_context(dask.config.set(_SETTINGS))
     if isinstance(where, int):
         needs("cryptography", extra="cluster")
@@ -291,7 +287,9 @@ def _own(workers: int, threads: int, distributed: Any, stack: ExitStack) -> Any:
     if sys.platform != "win32":
         resource_tracker.ensure_running()
     others = multiprocessing.active_children()
-    with _without_interrupts():
+    masks = hasattr(signal, "pthread_sigmask")
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if masks else set()
+    try:
         cluster = distributed.LocalCluster(
             n_workers=0,
             threads_per_worker=threads,
@@ -305,6 +303,9 @@ def _own(workers: int, threads: int, distributed: Any, stack: ExitStack) -> Any:
             env=dict.fromkeys(("NUMBA_NUM_THREADS", *_BLAS), str(threads)),
             preload=["chilopod.trials.on_worker"],
         )
+    finally:
+        if masks:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
     stack.callback(_stopped, cluster, others)
     client = distributed.Client(cluster, timeout=_START, set_as_default=False, direct_to_workers=True)
     stack.callback(_closed, client)
@@ -339,29 +340,3 @@ def _stopped(cluster: Any, others: Sequence[BaseProcess]) -> None:
     # When Python ends dask would try again for ten seconds, and tell of processes whose end it has not noticed.
     cluster.shutdown_on_close = False
     logging.getLogger("distributed.process").setLevel(logging.CRITICAL + 1)
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """Silence of dask and what it stands on: what they would log is said in one line, by us."""
-    loggers = [logging.getLogger(name) for name in _LOGGERS]
-    levels = [logger.level for logger in loggers]
-    for logger in loggers:
-        logger.setLevel(logging.CRITICAL + 1)
-    try:
-        yield
-    finally:
-        for logger, level in zip(loggers, levels, strict=True):
-            logger.setLevel(level)
-
-
-@contextmanager
-def _without_interrupts() -> Iterator[None]:
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)

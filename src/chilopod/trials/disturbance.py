@@ -74,14 +74,12 @@ class Drawn:
 
     Attributes
     ----------
-    joint_angles, heading
-        Joint angles, shape (N-1,), and heading at the start, rad.
-    friction
-        Factors on the friction coefficients of feet, shape (N, 2).
-    bearing, missed
-        Errors of the measured bearings, rad, and whether the scanner misses the target, shape (looks,).
-    scan_seed
-        Seed of the noise of a scanner that has its own.
+    joint_angles, heading, friction
+        Joint angles, shape (N-1,), and heading at the start, rad; factors on the friction coefficients of feet, shape
+        (N, 2).
+    bearing, missed, scan_seed
+        Errors of the measured bearings, rad, and whether the scanner misses the target, shape (looks,); seed of the
+        noise of a scanner that has its own.
     """
 
     joint_angles: Array

@@ -54,21 +54,21 @@ class Kept(NamedTuple):
 
 def contents(folder: Path) -> Contents:
     """The names in a folder, in order; a ParameterError if there is no such folder, or it cannot be read."""
-    found: tuple[list[Path], ...] = ([], [], [], [])
+    trials, aside, unfinished, foreign = list[Path](), list[Path](), list[Path](), list[Path]()
     try:
         with os.scandir(folder) as entries:
             for entry in entries:
-                file = entry.is_file(follow_symlinks=False)
-                marks = (
-                    _TRIAL.fullmatch(entry.name),
-                    file and _ASIDE.fullmatch(entry.name),
-                    file and entry.name.startswith(_UNFINISHED),
-                    True,
-                )
-                next(paths for paths, mark in zip(found, marks, strict=True) if mark).append(folder / entry.name)
+                file, paths = entry.is_file(follow_symlinks=False), foreign
+                if _TRIAL.fullmatch(entry.name):
+                    paths = trials
+                elif file and _ASIDE.fullmatch(entry.name):
+                    paths = aside
+                elif file and entry.name.startswith(_UNFINISHED):
+                    paths = unfinished
+                paths.append(folder / entry.name)
     except OSError as error:
         raise ParameterError(f"is no folder of trials ({error.strerror})", field="folder", value=str(folder)) from None
-    return Contents(*(tuple(sorted(each)) for each in found))
+    return Contents(*(tuple(sorted(each)) for each in (trials, aside, unfinished, foreign)))
 
 
 def kept(paths: Sequence[Path], progress: Progress = silent) -> tuple[list[Kept], Wrong]:

@@ -136,7 +136,7 @@ class Reach:
         if isinstance(value, type):
             return self._class(value)
         if kind is np.ndarray and not value.dtype.hasobject:
-            return _array_parts(value)
+            return iter([(".dtype", str(value.dtype.descr)), (".shape", value.shape), ("[...]", value.tobytes())])
         if isinstance(value, enum.Enum):
             return _attributes("_name_", "_value_", "__class__")(value)
         if isinstance(getattr(value, "py_func", None), FunctionType):  # as numba keeps it
@@ -266,10 +266,6 @@ class Reach:
 
     def _is_own(self, module: str) -> bool:
         return module.partition(".")[0] == self._own or not _brought_by(module)
-
-
-def _array_parts(array: Any) -> Parts:
-    return iter([(".dtype", str(array.dtype.descr)), (".shape", array.shape), ("[...]", array.tobytes())])
 
 
 def _dict_parts(values: Mapping[Any, object]) -> Parts:

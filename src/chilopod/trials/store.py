@@ -32,10 +32,7 @@ class Store:
     walks the same trial writes the same file. The folder is made with the first record where there is none. ``tell`` is
     given a line about every file that is not what it should be; by default it is the logger of this module.
 
-    Raises
-    ------
-    OutputError
-        If files cannot be written into the folder.
+    A folder into which files cannot be written is an OutputError.
     """
 
     def __init__(self, folder: str | Path, tell: Callable[[str], object] = _logger.warning) -> None:

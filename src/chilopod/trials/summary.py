@@ -8,17 +8,13 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from chilopod.engine import Status
+from chilopod.record import Array
 from chilopod.robot import Robot
-
-Array = NDArray[np.float64]
 
 AVERAGED = 5.0
 """s at the end of a walk over which the paper averages joint angles."""
-
-_SENTENCES = {status.label: status.sentence for status in Status}
 
 
 @dataclass(frozen=True)
@@ -50,7 +46,7 @@ class WalkSummary:
     @property
     def sentence(self) -> str:
         """The status in words."""
-        return _SENTENCES[self.status]
+        return next(each.sentence for each in Status if each.label == self.status)
 
     @property
     def joint_angles_deg(self) -> list[float]:

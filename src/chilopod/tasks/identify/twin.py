@@ -22,7 +22,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from cmaes import CMA
-from numpy.typing import NDArray
 
 from chilopod import units
 from chilopod.analysis.parameters import K1, stiffness
@@ -31,6 +30,7 @@ from chilopod.errors import ChilopodError
 from chilopod.frozen import Short
 from chilopod.output import check_folder, write_atomic
 from chilopod.progress import Progress, part, silent
+from chilopod.record import Array
 from chilopod.robot import Robot
 from chilopod.tasks.identify.data import BaseSeries
 from chilopod.tasks.identify.twin_constants import FREE, parts_of, values_at, with_constants
@@ -38,8 +38,6 @@ from chilopod.tasks.identify.twin_series import DURATION, Series, base_series, r
 from chilopod.tasks.radius_law import DURATION as LONG
 from chilopod.tasks.radius_law import end_of_walk
 from chilopod.trials import Trial, run
-
-Array = NDArray[np.float64]
 
 VERSION = 3
 """Goes up whenever the same constants would give other bends; evaluations of other versions are left alone."""
@@ -90,15 +88,8 @@ class Fit:
 
 @dataclass(frozen=True)
 class TwinIdentification(Short):
-    """Result of a search for the constants of the twin.
-
-    Attributes
-    ----------
-    given, data
-        Robot with what is not fitted, and the data that were.
-    fits
-        All evaluations; first the best of those that walk into the curve from straight on, then by their objective.
-    """
+    """Result of a search for the constants of the twin: robot with what is not fitted, data, and all evaluations, first
+    the best of those that walk into the curve from straight on, then by their objective."""
 
     given: Robot
     data: BaseSeries
@@ -117,10 +108,8 @@ class TwinIdentification(Short):
     def ranges(self) -> dict[str, tuple[float, float]]:
         """From the smallest to the largest value of each constant among the good fits, SI."""
         values = np.array([fit.constants for fit in self.good or self.fits[:1]])
-        return {
-            each.path: (float(low), float(high))
-            for each, low, high in zip(FREE, values.min(axis=0), values.max(axis=0), strict=True)
-        }
+        ends = zip(values.min(axis=0).tolist(), values.max(axis=0).tolist(), strict=True)
+        return {each.path: span for each, span in zip(FREE, ends, strict=True)}
 
     def as_json(self) -> dict[str, Any]:
         """Constants with the ranges of the good fits, and the best fits, as plain numbers and text."""
@@ -185,10 +174,9 @@ def search(
     ----------
     robot, data
         Robot with the constants that are not fitted, and data of its walks.
-    starts, generations
-        Number of starts, spread over the ranges of the constants, and of generations of ten evaluations from each.
-    seed
-        Seed of starts and evolution.
+    starts, generations, seed
+        Number of starts, spread over the ranges of the constants, and of generations of ten evaluations from each; seed
+        of both.
     folder
         Folder of the evaluations; a stopped search is resumed, because it asks for the same ones.
     progress
