@@ -54,8 +54,9 @@ class Actions:
     def of(cls, robot: Robot, springs: Literal["first", "all"] = "first") -> Actions:
         """The actions of a robot, on its first spring or on all that can be adjusted.
 
-        A robot without any actuator is given them; a spring that has none, or no range, is a ParameterError. Where the
-        robot file gives no range, it goes from a seventh of the stiffest spring of the axis to that.
+        A robot without any actuator is given them. Where the robot file gives no range, it goes from a seventh of the
+        stiffest spring of the axis to that. Raises ParameterError if a spring has no actuator, or that leaves it no
+        range.
         """
         if springs not in SPRINGS:
             raise ParameterError("are no springs", field="springs", value=springs, allowed=" or ".join(SPRINGS))
@@ -91,8 +92,8 @@ class Actions:
         return tuple(sorted((each.phase, each.window, SIDES.index(each.name)) for each in events))
 
     def checked(self, actions: ArrayLike, robots: int) -> Array:
-        """Actions of a batch, each its own copy, shape (robots, len(names)); a ParameterError if they are none: wrong
-        shape, NaN, out of range."""
+        """Actions of a batch, each its own copy, shape (robots, len(names)). Raises ParameterError if they are none:
+        wrong shape, NaN, out of range."""
         array, shape = as_array("action", actions), (robots, len(self.names))
         if array.shape != shape:
             raise ParameterError("has the wrong shape", field="action", value=array.shape, allowed=str(shape))

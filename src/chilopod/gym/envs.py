@@ -48,7 +48,8 @@ def _drawn(env: Any) -> list[Pixels] | None:
 
 
 class RobotVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
-    """Robots with one task, all in one walk of an engine. What cannot be is a ParameterError.
+    """Robots with one task, all in one walk of an engine. Raises ParameterError if there is no such robot, engine, task
+    or render mode.
 
     Parameters
     ----------

@@ -65,7 +65,8 @@ class Moment:
 
 
 class Episodes:
-    """Robots that walk to targets, each in an episode of its own. What cannot be is a ParameterError.
+    """Robots that walk to targets, each in an episode of its own. Raises ParameterError if there is no such robot,
+    engine or task.
 
     Parameters
     ----------
@@ -156,8 +157,8 @@ class Episodes:
 
     def step(self, actions: ArrayLike) -> Step:
         """Walk for a gait cycle by actions of shape (robots, numbers of an action), see :class:`chilopod.gym.Actions`;
-        those of robots whose episode was over are not used. Before the first episode, or where an action is none, that
-        is a ParameterError and nothing has changed."""
+        those of robots whose episode was over are not used. Raises ParameterError, and changes nothing, before the
+        first episode, or if an action is none."""
         if self._walk is None:
             raise ParameterError("there is no episode yet", field="step", allowed="reset() first")
         told, waiting, walk = self.actions.checked(actions, self.count), self._ended, self._walk

@@ -26,7 +26,7 @@ _FONT, _MARGIN = 14.0, 0.3  # pixels; m
 
 
 class Picture:
-    """Pictures of the robot of a number while its episodes go on."""
+    """Pictures of one robot of a batch while its episodes go on."""
 
     def __init__(self, episodes: Episodes, robot: int) -> None:
         self._episodes, self._robot = episodes, robot

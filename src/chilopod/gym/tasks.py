@@ -145,8 +145,8 @@ TASKS: Final[Mapping[str, Task]] = {
 
 
 def task_of(task: str | Task, chosen: Mapping[str, Any]) -> Task:
-    """A task, or the one of this name, with some of its attributes chosen otherwise; a ParameterError if there is no
-    such task, or it has no such attribute."""
+    """A task, or the one of this name, with some of its attributes chosen otherwise. Raises ParameterError if there is
+    no such task, or it has no such attribute."""
     found = TASKS.get(task) if isinstance(task, str) else task
     if not isinstance(found, Task):
         nearest, allowed = nearest_name(str(task), TASKS), f"{', '.join(TASKS)}, or a chilopod.gym.Task"

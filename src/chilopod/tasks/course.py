@@ -203,7 +203,7 @@ def driver(
 
 def drive(driver: Driver, course: Course, **options: Unpack[RunOptions]) -> Driven:
     """Let a robot walk a course, with any radius of the tightest circle, see :meth:`Driver.trial`, and with
-    :class:`chilopod.tasks.RunOptions`. What is out of range, or too much for memory, is a ParameterError."""
+    :class:`chilopod.tasks.RunOptions`. Raises ParameterError if memory cannot hold the records."""
     trial = driver.trial(course, poses=engine_named(driver.engine).traits.poses)
     trials, records = runs(trial, **options)
     return Driven(trials, driver, tuple(records))

@@ -80,7 +80,7 @@ def that_holds(law: RadiusLaw, robot: Robot, engine: str = "planar") -> RadiusLa
 
     A robot bends farther on its way into a circle than on the circle, and no two feet are alike, so that a joint may
     leave its range although that of the settled walk does not. The softest spring that is left is the first at which
-    none of :data:`HELD` walks does, with the disturbance that all studies have; an AnalysisError if that leaves no law.
+    none of :data:`HELD` walks does, with the disturbance that all studies have. Raises AnalysisError if none is left.
     """
     for first, value in enumerate(law.values[:-2].tolist()):
         walker = robot.with_value(K1, value)

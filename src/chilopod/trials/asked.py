@@ -25,8 +25,8 @@ _MAY_LACK = ("foot_load", "command_stiffness", "command_torque", "seen_bearing",
 
 
 def check_asked(data: Any, walk: Walk, trials: Sequence[Trial], drawn: Sequence[Drawn]) -> xr.Dataset:
-    """The record that an engine gave of a batch, if it is that of these trials and of what was drawn for them; else an
-    AnalysisError names the engine and what is wrong."""
+    """The record that an engine gave of a batch. Raises AnalysisError, which names the engine and what is wrong, if it
+    is not that of these trials and of what was drawn for them."""
     if not isinstance(data, xr.Dataset):
         raise _refused("its record is no xarray.Dataset", trials[0].engine)
     try:
@@ -39,7 +39,7 @@ def check_asked(data: Any, walk: Walk, trials: Sequence[Trial], drawn: Sequence[
 
 
 def check_finite(values: Mapping[str, Any], engine: str) -> None:
-    """Refuse the variables of a robot's record, by name, shape (times, 1, ...), by an AnalysisError unless a robot that
+    """Raise AnalysisError unless, in the variables of a robot's record by name, shape (times, 1, ...), a robot that
     walks is somewhere, and one that failed or was halted no more from some sample on."""
     label, there = str(values["status"][0]), np.isfinite(values["heading"][:, 0])
     count = len(there) if label == Status.WALKED.label else np.count_nonzero(there)

@@ -49,7 +49,7 @@ def batches(trials: Sequence[Trial], on_cores: int | None = None) -> list[list[T
 
 def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
     """Records of the trials of one of :func:`batches`, each with one ``robot``, and robot file and trial in the
-    attributes. What goes wrong in them is a ParameterError or AnalysisError."""
+    attributes. Raises ParameterError or AnalysisError if an argument is out of range or a controller fails."""
     first = trials[0]
     # Who steers otherwise when asked the same again is found out before.
     doubts = first.code[1] or first.code[2] or _doubts(first)

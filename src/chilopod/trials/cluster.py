@@ -120,9 +120,9 @@ class Cluster:
                 yield from self._pace.pieces(batch[i : i + size], threads)
 
     def walk(self, batches: Iterable[Sequence[Trial]]) -> Iterator[tuple[int, list[xr.Dataset]]]:
-        """The number of a batch and its records, as they come; a batch is taken when it is sent. A cluster that goes
-        away or has no worker for a minute, workers of other versions and, when all else is done, batches that kill
-        their workers are a ClusterError; a controller that workers cannot import is a ParameterError."""
+        """The number of a batch and its records, as they come; a batch is taken when it is sent. Raises ClusterError if
+        the cluster goes away or has no worker for a minute, if workers have other versions and, when all else is done,
+        for batches that kill their workers; ParameterError if workers cannot import a controller."""
         suspects: list[tuple[int, Sequence[Trial]]] = []
         yield from self._walk(enumerate(batches), suspects)
         # Dask blames all that a killed worker was given. What is killed alone, too, kills.

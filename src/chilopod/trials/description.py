@@ -26,8 +26,8 @@ _described: ContextVar[dict[object, tuple[str, str]] | None] = ContextVar("descr
 
 def plain(value: object, field: str) -> Any:
     """A number, text, None, enum, array, or a tuple or frozen dataclass of these, as JSON has it, different for
-    different values: of classes their path, of a dataclass the fields that count in comparisons. Anything else is a
-    ParameterError that names the field."""
+    different values: of classes their path, of a dataclass the fields that count in comparisons. Raises ParameterError
+    for anything else, naming the field."""
     kind: Any = type(value)
     if isinstance(value, enum.Enum):
         return {"enum": path_of(kind), "name": value.name}
@@ -55,7 +55,7 @@ def plain(value: object, field: str) -> Any:
 
 def code_of(value: object) -> tuple[str, str]:
     """Digest of everything that the code of a controller can reach, as it is now, and what of that answers otherwise
-    every time; empty for our own. What cannot be described is an UnknownKindError."""
+    every time; empty for our own. Raises UnknownKindError if it reaches what cannot be described."""
     told: list[str] = []
     chances: list[str] = []
     for each in _parts(value):
@@ -72,8 +72,8 @@ def code_of(value: object) -> tuple[str, str]:
 
 
 def sources_of(engine: str) -> str:
-    """Digest of the module of an engine of one's own, and of all its own that it imports; empty for our own. A file
-    that cannot be read is an UnknownKindError."""
+    """Digest of the module of an engine of one's own, and of all its own that it imports; empty for our own. Raises
+    UnknownKindError if a file cannot be read."""
     module = engine.partition(":")[0] if ":" in engine else "chilopod"
     return _once(sys.modules[module], module, module)[0]
 

@@ -28,8 +28,8 @@ class Header:
 
 
 def content_of(record: xr.Dataset) -> bytes:
-    """A record as it stands in its file. Anything but floating-point numbers, integers of 32 bits, truth values and
-    text, and a dimension of length 0, is an OutputError."""
+    """A record as it stands in its file. Raises OutputError if it holds anything but floating-point numbers, integers
+    of 32 bits, truth values and text, or has a dimension of length 0."""
     if not all(record.sizes.values()):
         sizes = {str(name): size for name, size in record.sizes.items()}
         raise OutputError("has a dimension of length 0 and cannot be kept", field="record", value=sizes)
@@ -76,8 +76,8 @@ def _describe(target: Any, field: str, attributes: Mapping[Any, Any]) -> None:
 
 
 def read_record(path: Path) -> xr.Dataset:
-    """A record as it was walked: of the same types, and with nothing about the file; or an error of
-    :func:`chilopod.netcdf.unsealed`."""
+    """A record as it was walked: of the same types, and with nothing about the file. Raises what
+    :func:`chilopod.netcdf.unsealed` does."""
     try:
         record = xr.load_dataset(io.BytesIO(unsealed(path)), engine="scipy").drop_encoding()
     except UnsoundError:
@@ -93,8 +93,8 @@ def read_record(path: Path) -> xr.Dataset:
 
 
 def read_header(path: Path, *, whole: bool = False) -> Header:
-    """Header of a record's file, all of which is held against its seal if ``whole``, otherwise its length alone; or an
-    error of :func:`chilopod.netcdf.unsealed`."""
+    """Header of a record's file, all of which is held against its seal if ``whole``, otherwise its length alone. Raises
+    what :func:`chilopod.netcdf.unsealed` does."""
     if whole:
         unsealed(path)
     with sealed_file(path) as file:

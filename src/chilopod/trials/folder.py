@@ -26,8 +26,7 @@ _ASIDE = re.compile(_TRIAL.pattern + r"\.aside\d*")
 _UNFINISHED = ".chilopod-"
 _EVERY = 50  # files between two signs of life
 
-Wrong = list[tuple[Path, str]]
-"""Files, and what is wrong with each."""
+Wrong = list[tuple[Path, str]]  # what is wrong with each
 
 
 class Contents(NamedTuple):
@@ -53,7 +52,7 @@ class Kept(NamedTuple):
 
 
 def contents(folder: Path) -> Contents:
-    """The names in a folder, in order; a ParameterError if there is no such folder, or it cannot be read."""
+    """The names in a folder, in order. Raises ParameterError if there is no such folder, or it cannot be read."""
     trials, aside, unfinished, foreign = list[Path](), list[Path](), list[Path](), list[Path]()
     try:
         with os.scandir(folder) as entries:
@@ -84,8 +83,8 @@ def checked(paths: Sequence[Path], progress: Progress = silent) -> tuple[list[Ke
 def clean(folder: Path, *, old: bool = False, dry: bool = False) -> tuple[list[Path], Wrong]:
     """Remove what is no trial's record and was written by chilopod: what was set aside, or left over by who was killed.
 
-    With ``old`` the records of other versions go too; with ``dry`` nothing goes. What was (or would be) removed is
-    returned, and what is left for a reason. What cannot be removed is an OutputError.
+    With ``old`` the records of other versions go too; with ``dry`` nothing goes. Returns what was (or would be)
+    removed, and what is left for a reason. Raises OutputError if a file cannot be removed.
     """
     found = contents(folder)
     remove = list(found.aside)

@@ -48,7 +48,7 @@ def versions(packages: Sequence[str] = (*PACKAGES, TWIN_PACKAGE)) -> dict[str, s
 
 
 def check_versions(expected: Mapping[str, str], found: Mapping[str, str], place: str) -> None:
-    """Refuse a worker that has other versions than the client, by a ClusterError that says which."""
+    """Raise a ClusterError that says which version is another on a worker, if one is."""
     for name, wanted in expected.items():
         there = found.get(name, "none")
         if there != wanted:
@@ -56,8 +56,8 @@ def check_versions(expected: Mapping[str, str], found: Mapping[str, str], place:
 
 
 def packed(batch: Sequence[Trial]) -> bytes:
-    """A batch as it travels to a worker: what it needs there, and its trials; a ParameterError if another process could
-    not find, or tell apart, what steers them."""
+    """A batch as it travels to a worker: what it needs there, and its trials. Raises ParameterError if another process
+    could not find, or tell apart, what steers them."""
     for trial in batch:
         if trial.code[1]:
             raise ParameterError(trial.not_kept(trial.code[1]), field="cluster", allowed="to walk them on this machine")

@@ -62,7 +62,7 @@ def run(
 
 
 def check_fits(trials: Sequence[Trial]) -> None:
-    """Refuse trials whose records memory cannot hold all together, by a ParameterError with what they would take."""
+    """Raise ParameterError if memory cannot hold the records of trials all together."""
     check_memory(_COPIES * sum(trial.least_bytes for trial in trials))
 
 

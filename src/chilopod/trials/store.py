@@ -32,7 +32,7 @@ class Store:
     walks the same trial writes the same file. The folder is made with the first record where there is none. ``tell`` is
     given a line about every file that is not what it should be; by default it is the logger of this module.
 
-    A folder into which files cannot be written is an OutputError.
+    Raises OutputError if files cannot be written into the folder.
     """
 
     def __init__(self, folder: str | Path, tell: Callable[[str], object] = _logger.warning) -> None:
@@ -46,8 +46,8 @@ class Store:
     def read(self, trial: Trial) -> xr.Dataset | None:
         """The record of a trial; None if there is none.
 
-        A file that is damaged, was edited, or holds another trial counts as none and gets the ending ``.aside``. What
-        cannot be moved, or read for want of memory, is an OutputError.
+        A file that is damaged, was edited, or holds another trial counts as none and gets the ending ``.aside``. Raises
+        OutputError if it cannot be moved, or memory to read it is missing.
         """
         path = self.folder / trial.file_name
         try:
@@ -62,8 +62,8 @@ class Store:
             return None
 
     def write(self, trial: Trial, record: xr.Dataset) -> None:
-        """Keep a record, for good once :meth:`sync` has been called; unless it says that it is not to be kept. Another
-        trial's record, and a file that cannot be written, is an OutputError."""
+        """Keep a record, for good once :meth:`sync` has been called; unless it says that it is not to be kept. Raises
+        OutputError if it is another trial's record, or the file cannot be written."""
         if record.attrs.get("trial") != trial.text:
             problem = "is that of another trial, or was walked by other code"
             raise OutputError(problem, field="record", allowed=f"a record for {trial.file_name}")

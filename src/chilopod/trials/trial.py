@@ -162,8 +162,8 @@ class Trial:
             return f"of this process {id(self.controller):x}", f"{error}, which cannot be described; {can}", ""
 
     def repeated(self, seed: int | None = None, repeats: int = 1) -> tuple[Trial, ...]:
-        """The same trial so many times, with seeds that count up; undisturbed where the seed is None, so that several
-        would be all alike, which is a ParameterError as no walks are."""
+        """The same trial so many times, with seeds that count up; undisturbed where the seed is None. Raises
+        ParameterError if there would be no walks, or several that are all alike."""
         if repeats < 1:
             raise ParameterError("must be positive", field="repeats", value=repeats)
         if repeats > 1 and seed is None:

@@ -35,7 +35,7 @@ FREE = ("ground.friction", "legs.half_width", "legs.forward_offset")
 _SCALE = np.array([200.0, 0.07, 0.05])
 _STARTS = ((150.0, 0.05, 0.03), (350.0, 0.10, 0.07), (200.0, 0.09, 0.02))
 _NO_PITCHFORK = 100.0
-_UNITS = {
+_UNITS = {  # of the profile, N*mm/deg where none is given
     "friction": "N*s/m",
     "half_width": "m",
     "largest_residual": "1",
@@ -43,7 +43,6 @@ _UNITS = {
     "coefficient": "1/rad^2",
     "verdict": "",
 }
-"""Units of the profile, N*mm/deg where none is given."""
 
 
 @dataclass(frozen=True)
