@@ -1,21 +1,20 @@
 """Finding the planar model's constants that are hard to measure, from where the straight walk bends and how.
 
-Three constants are free: foot friction, half-width and forward offset. They are fitted to the critical k1 and the mode
-of a robot, every number weighted by its tolerance, so that a residual of 1 is exactly what that allows (of printed
-numbers, half their last digit). The profile over the forward offset shows how far the data determine them: at each
-offset the other two are fitted again.
+Foot friction, half-width and forward offset are fitted to the critical k1 and the mode of a robot. Every number is
+weighted by its tolerance: a residual of 1 is exactly what that allows (of printed numbers, half their last digit). The
+profile over the forward offset shows how far the data determine them: at each offset the other two are fitted again.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from chilopod import units
@@ -24,11 +23,10 @@ from chilopod.analysis.straight_walk import bifurcations, first_loss, pitchfork
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Short
 from chilopod.progress import Progress, silent
+from chilopod.record import Array
 from chilopod.robot import Robot
 from chilopod.stability import Kind
 from chilopod.tasks.identify.data import CriticalMode
-
-Array = NDArray[np.float64]
 
 FREE = ("ground.friction", "legs.half_width", "legs.forward_offset")
 """The constants that are fitted, SI."""
@@ -37,6 +35,14 @@ FREE = ("ground.friction", "legs.half_width", "legs.forward_offset")
 _SCALE = np.array([200.0, 0.07, 0.05])
 _STARTS = ((150.0, 0.05, 0.03), (350.0, 0.10, 0.07), (200.0, 0.09, 0.02))
 _NO_PITCHFORK = 100.0
+_UNITS = {  # of the profile, N*mm/deg where none is given
+    "friction": "N*s/m",
+    "half_width": "m",
+    "largest_residual": "1",
+    "uniform_frequency": "rad/s",
+    "coefficient": "1/rad^2",
+    "verdict": "",
+}
 
 
 @dataclass(frozen=True)
@@ -45,16 +51,13 @@ class Identification(Short):
 
     Attributes
     ----------
-    given
-        The robot as it was given.
-    best
-        The robot with the best constants.
-    residuals
-        At the best constants: critical k1 and the components of the mode, in units of their tolerance, shape (N,).
+    given, best
+        The robot as it was given, and with the best constants.
+    residuals, preset_residuals
+        Critical k1 and the components of the mode less the data, in units of their tolerance, shape (N,), at the best
+        constants and for ``given``.
     starts
         Constants reached from every starting point, shape (starts, 3), SI.
-    preset_residuals
-        The same residuals for ``given``.
     profile
         Dataset over ``forward_offset``: the fitted constants, the largest residual, and what each point predicts for
         the numbers that were not fitted.
@@ -77,13 +80,12 @@ class Identification(Short):
         constants = {}
         for path in FREE:
             unit, span = self.best.unit_of(path), self.allowed(path.partition(".")[2])
+            edges = [units.format(edge, unit, digits=3) for edge in span or ()]
             constants[path] = {
                 "value_si": self.best.get(path),
                 "text": units.format(self.best.get(path), unit, digits=4),
                 "allowed_si": span,
-                "allowed_text": "nothing"
-                if span is None
-                else " to ".join(units.format(edge, unit, digits=3) for edge in span),
+                "allowed_text": " to ".join(edges) or "nothing",
             }
         return {
             "constants": constants,
@@ -97,9 +99,8 @@ def residuals(robot: Robot, data: CriticalMode) -> Array:
     """Computed numbers less the data, over their tolerance, shape (N,)."""
     count = len(data.components) + 1
     if robot.body.modules != count:
-        raise AnalysisError(
-            f"the mode of the data is that of {count} modules", field="body.modules", value=robot.body.modules
-        )
+        problem = f"the mode of the data is that of {count} modules"
+        raise AnalysisError(problem, field="body.modules", value=robot.body.modules)
     low, high = data.between
     try:
         points = bifurcations(robot, K1, (stiffness(low), stiffness(high)), normal_form=False)
@@ -132,10 +133,8 @@ def identify_planar(
 
     Parameters
     ----------
-    robot
-        Everything but the free constants; their values are only looked at for comparison.
-    data
-        Data that are fitted.
+    robot, data
+        Robot, whose free constants are only looked at for comparison, and the data that are fitted.
     points
         Points of the profile.
     variants
@@ -154,11 +153,8 @@ def identify_planar(
         progress(0.3 * (index + 1) / len(_STARTS), f"fit from start {index + 1}")
     best = min(fits, key=lambda fit: float((fit[1] ** 2).sum()))
     if (best[1] == _NO_PITCHFORK).all():
-        raise AnalysisError(
-            "its straight walk has no pitchfork with any constants that were tried, so nothing can be fitted",
-            field="robot",
-            value=robot.name,
-        )
+        problem = "its straight walk has no pitchfork with any constants that were tried, so nothing can be fitted"
+        raise AnalysisError(problem, field="robot", value=robot.name)
     return Identification(
         given=robot,
         best=with_constants(robot, best[0]),
@@ -208,23 +204,9 @@ def _profile(
             }
             done += 1
             progress(0.3 + 0.7 * done / count, f"profile, forward offset {1e3 * offsets[index]:.0f} mm")
-    unit_of = {
-        "friction": "N*s/m",
-        "half_width": "m",
-        "largest_residual": "1",
-        "uniform_frequency": "rad/s",
-        "coefficient": "1/rad^2",
-        "verdict": "",
-    }
+    columns = {name: np.array([rows[i][name] for i in range(count)]) for name in rows[0]}
     return xr.Dataset(
-        {
-            name: (
-                ("forward_offset",),
-                np.array([rows[i][name] for i in range(count)]),
-                {"units": unit_of.get(name, PAPER_UNIT)},
-            )
-            for name in rows[0]
-        },
+        {name: (("forward_offset",), each, {"units": _UNITS.get(name, PAPER_UNIT)}) for name, each in columns.items()},
         coords={"forward_offset": ("forward_offset", offsets, {"units": "m"})},
         attrs={"robot": robot.name, "about": "largest_residual <= 1: all data are met within their tolerance"},
     )
@@ -233,24 +215,16 @@ def _profile(
 def _predictions(robot: Robot, variants: Mapping[str, Sequence[str]]) -> dict[str, float | str]:
     """Predictions of a set of constants for numbers that were not fitted."""
 
-    def critical(setting: Sequence[str]) -> float:
-        try:
-            return pitchfork(robot.set_from_text(setting), normal_form=False).value
-        except AnalysisError:
-            return float("nan")
-
-    found: dict[str, float | str] = {"critical_k1": critical([])}
-    for name, setting in variants.items():
-        found[name] = critical(setting)
-    try:
+    found: dict[str, float | str] = dict.fromkeys(["critical_k1", *variants], np.nan)
+    found |= {"uniform": np.nan, "uniform_frequency": np.nan, "coefficient": np.nan, "verdict": ""}
+    for name, setting in {"critical_k1": (), **variants}.items():
+        with suppress(AnalysisError):
+            found[name] = pitchfork(robot.set_from_text(setting), normal_form=False).value
+    with suppress(AnalysisError):
         point = first_loss(robot, ALL, (stiffness(2.0), stiffness(75.0)), Kind.NEIMARK_SACKER, normal_form=False)
         found["uniform"], found["uniform_frequency"] = point.value, point.point.frequency
-    except AnalysisError:
-        found["uniform"], found["uniform_frequency"] = float("nan"), float("nan")
-    try:
+    with suppress(AnalysisError):
         point = pitchfork(robot)
-        found["coefficient"] = point.coefficient if point.coefficient is not None else float("nan")
+        found["coefficient"] = np.nan if point.coefficient is None else point.coefficient
         found["verdict"] = point.point.criticality.label if point.point.criticality.known else ""
-    except AnalysisError:
-        found["coefficient"], found["verdict"] = float("nan"), ""
     return found
