@@ -2,7 +2,8 @@
 
 Foot friction, half-width and forward offset are fitted to the critical k1 and the mode of a robot. Every number is
 weighted by its tolerance: a residual of 1 is exactly what that allows (of printed numbers, half their last digit). The
-profile over the forward offset shows how far the data determine them: at each offset the other two are fitted again.
+range of a constant is the projection of the set in which no residual exceeds 1. The profile over the forward offset
+shows the valley: at each offset the other two are fitted again.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.optimize import least_squares
+from numpy.typing import NDArray
+from scipy.optimize import least_squares, minimize
 
 from chilopod import units
 from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT, stiffness
@@ -31,9 +33,13 @@ from chilopod.tasks.identify.data import CriticalMode
 FREE = ("ground.friction", "legs.half_width", "legs.forward_offset")
 """The constants that are fitted, SI."""
 
-# Sizes of the steps of the optimiser, and rough starting points from which it is run: far from the answer on purpose.
-_SCALE = np.array([200.0, 0.07, 0.05])
-_STARTS = ((150.0, 0.05, 0.03), (350.0, 0.10, 0.07), (200.0, 0.09, 0.02))
+# Starting points of the fit, in the units of `_scale`: far from the answer on purpose.
+_STARTS = ((0.6, 0.2, 0.15), (1.5, 0.45, 0.3), (0.8, 0.4, 0.1))
+_LEAST, _MOST = np.array([0.05, 0.02, -0.6]), np.array([20.0, 3.0, 1.2])
+"""Bounds of the search, in the same units."""
+_STEP = 1e-6  # of differences, in the same units
+_MET = 1.0 + 1e-6  # residual that counts as 1
+_BESIDE = 0.25  # of the range of the offset, by which the profile goes beyond it
 _NO_PITCHFORK = 100.0
 _UNITS = {  # of the profile, N*mm/deg where none is given
     "friction": "N*s/m",
@@ -58,6 +64,11 @@ class Identification(Short):
         constants and for ``given``.
     starts
         Constants reached from every starting point, shape (starts, 3), SI.
+    ranges
+        Least and largest value of each constant for which every datum is met within its tolerance, shape (3, 2), SI;
+        NaN if there is none.
+    cut
+        True where a bound of the search ends a range, shape (3, 2).
     profile
         Dataset over ``forward_offset``: the fitted constants, the largest residual, and what each point predicts for
         the numbers that were not fitted.
@@ -68,24 +79,27 @@ class Identification(Short):
     residuals: Array
     starts: Array
     preset_residuals: Array
+    ranges: Array
+    cut: NDArray[np.bool_]
     profile: xr.Dataset
 
-    def allowed(self, name: str) -> tuple[float, float] | None:
-        """Range of a constant along the profile within which every datum is met, SI; None if nowhere."""
-        values = self.profile[name].values[self.profile.largest_residual.values <= 1.0]
-        return (float(values.min()), float(values.max())) if values.size else None
+    def allowed(self, path: str) -> tuple[float, float] | None:
+        """Range of a constant of :data:`FREE` within which every datum is met, SI; None if there is none."""
+        low, high = self.ranges[FREE.index(path)].tolist()
+        return None if np.isnan(low) else (low, high)
 
     def as_json(self) -> dict[str, Any]:
         """Constants with what the tolerances allow, and the residuals, as plain numbers and text."""
         constants = {}
         for path in FREE:
-            unit, span = self.best.unit_of(path), self.allowed(path.partition(".")[2])
+            unit, span = self.best.unit_of(path), self.allowed(path)
             edges = [units.format(edge, unit, digits=3) for edge in span or ()]
             constants[path] = {
                 "value_si": self.best.get(path),
                 "text": units.format(self.best.get(path), unit, digits=4),
                 "allowed_si": span,
                 "allowed_text": " to ".join(edges) or "nothing",
+                "cut_by_the_search": self.cut[FREE.index(path)].tolist(),
             }
         return {
             "constants": constants,
@@ -147,47 +161,119 @@ def identify_planar(
     AnalysisError
         If the robot has another number of modules than the data, or no pitchfork with any constants.
     """
-    fits = []
+    scale, fits = _scale(robot, data), []
     for index, start in enumerate(_STARTS):
-        fits.append(_fit(robot, data, np.array(start), fixed=0))
+        fits.append(_fit(robot, data, np.array(start) * scale, fixed=0))
         progress(0.3 * (index + 1) / len(_STARTS), f"fit from start {index + 1}")
     best = min(fits, key=lambda fit: float((fit[1] ** 2).sum()))
     if (best[1] == _NO_PITCHFORK).all():
         problem = "its straight walk has no pitchfork with any constants that were tried, so nothing can be fitted"
         raise AnalysisError(problem, field="robot", value=robot.name)
+    ranges, cut = _ranges(robot, data, best[0])
+    progress(0.4, "ranges")
     return Identification(
         given=robot,
         best=with_constants(robot, best[0]),
         residuals=best[1],
         starts=np.array([fit[0] for fit in fits]),
         preset_residuals=residuals(robot, data),
-        profile=_profile(robot, data, best[0], points, variants, progress),
+        ranges=ranges,
+        cut=cut,
+        profile=_profile(robot, data, best[0], ranges[2], points, variants, progress),
     )
+
+
+def _scale(robot: Robot, data: CriticalMode) -> Array:
+    """Units of the constants, SI: only k/(c v duty L), half-width/L and offset/L enter the mode of a slow robot, with
+    the critical spring k, speed v and module length L. The paper's robot has the friction 1.0 in them."""
+    length, gait = robot.module_length, robot.gait
+    return np.array([4.0 * stiffness(data.k1) / (gait.speed * gait.duty * length), length, length])
+
+
+class _Residuals:
+    """Residuals and their derivatives over the constants in units of :func:`_scale`, each computed once."""
+
+    def __init__(self, robot: Robot, data: CriticalMode) -> None:
+        self._robot, self._data, self._scale = robot, data, _scale(robot, data)
+        self._values: dict[bytes, Array] = {}
+
+    def __call__(self, scaled: Array) -> Array:
+        key = scaled.tobytes()
+        if key not in self._values:
+            self._values[key] = residuals(with_constants(self._robot, scaled * self._scale), self._data)
+        return self._values[key]
+
+    def jacobian(self, scaled: Array) -> Array:
+        """Forward differences, shape (N, 3)."""
+        here = self(scaled)
+        return np.stack([(self(scaled + _STEP * each) - here) / _STEP for each in np.eye(len(FREE))], axis=1)
+
+
+def _ranges(robot: Robot, data: CriticalMode, best: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Projections of the set {max |residual| <= 1}, shape (3, 2), SI, and where a bound of the search ends them.
+
+    Each end is a minimum of one constant within the set, by sequential quadratic programming from the best constants
+    and from the ends that were found before: the set is a curved valley.
+    """
+    off, scale = _Residuals(robot, data), _scale(robot, data)
+    within = {
+        "type": "ineq",
+        "fun": lambda scaled: np.concatenate([1.0 - off(scaled), 1.0 + off(scaled)]),
+        "jac": lambda scaled: np.concatenate([-off.jacobian(scaled), off.jacobian(scaled)]),
+    }
+    bounds = list(zip(_LEAST, _MOST, strict=True))
+    ends: dict[tuple[int, int], Array] = {}
+    for constant in range(len(FREE)):
+        for side, sign in enumerate((1.0, -1.0)):
+            goal = sign * np.eye(len(FREE))[constant]
+            for start in (best / scale, *ends.values()):
+                found = minimize(
+                    lambda scaled, goal=goal: goal @ scaled, start, jac=lambda scaled, goal=goal: goal,
+                    method="SLSQP", bounds=bounds, constraints=[within], options={"maxiter": 60, "ftol": 1e-8},
+                ).x  # fmt: skip
+                known = ends.get((constant, side))
+                if np.abs(off(found)).max() <= _MET and (known is None or goal @ found < goal @ known):
+                    ends[constant, side] = found
+    ranges, cut = np.full((len(FREE), 2), np.nan), np.zeros((len(FREE), 2), dtype=np.bool_)
+    if len(ends) == ranges.size:
+        for (constant, side), found in ends.items():
+            ranges[constant, side] = found[constant] * scale[constant]
+            limit = (_LEAST, _MOST)[side][constant]
+            cut[constant, side] = abs(found[constant] - limit) <= _STEP * abs(limit)
+    return ranges, cut
 
 
 def _fit(robot: Robot, data: CriticalMode, start: Array, fixed: int) -> tuple[Array, Array]:
     """Least squares over the constants but the last ``fixed``; returns constants and residuals."""
-    free = len(start) - fixed
+    free, scale = len(start) - fixed, _scale(robot, data)
 
     def cost(scaled: Array) -> Array:
-        return residuals(with_constants(robot, np.concatenate([scaled * _SCALE[:free], start[free:]])), data)
+        return residuals(with_constants(robot, np.concatenate([scaled * scale[:free], start[free:]])), data)
 
     answer = least_squares(
         cost,
-        start[:free] / _SCALE[:free],
-        bounds=(0.05, 10.0) if fixed else ([0.05, 0.05, -2.0], [10.0, 10.0, 4.0]),
+        start[:free] / scale[:free],
+        bounds=(_LEAST[:free], _MOST[:free]),
         x_scale=0.1,
         diff_step=1e-5,
         xtol=1e-9,
     )
-    return np.concatenate([answer.x * _SCALE[:free], start[free:]]), np.asarray(answer.fun)
+    return np.concatenate([answer.x * scale[:free], start[free:]]), np.asarray(answer.fun)
 
 
 def _profile(
-    robot: Robot, data: CriticalMode, best: Array, count: int, variants: Mapping[str, Sequence[str]], progress: Progress
+    robot: Robot,
+    data: CriticalMode,
+    best: Array,
+    span: Array,
+    count: int,
+    variants: Mapping[str, Sequence[str]],
+    progress: Progress,
 ) -> xr.Dataset:
     """Fits at fixed forward offsets, outward from the best so that each starts next to its neighbour."""
-    offsets = np.linspace(0.030, 0.070, count)
+    low, high = span if np.isfinite(span).all() else best[2] + 0.1 * robot.module_length * np.array([-1.0, 1.0])
+    beside = _BESIDE * (high - low)
+    offsets = np.linspace(low - beside, high + beside, count)
     rows: dict[int, dict[str, float | str]] = {}
     middle = int(np.abs(offsets - best[2]).argmin())
     done = 0
@@ -203,7 +289,7 @@ def _profile(
                 **_predictions(with_constants(robot, constants), variants),
             }
             done += 1
-            progress(0.3 + 0.7 * done / count, f"profile, forward offset {1e3 * offsets[index]:.0f} mm")
+            progress(0.4 + 0.6 * done / count, f"profile, forward offset {1e3 * offsets[index]:.0f} mm")
     columns = {name: np.array([rows[i][name] for i in range(count)]) for name in rows[0]}
     return xr.Dataset(
         {name: (("forward_offset",), each, {"units": _UNITS.get(name, PAPER_UNIT)}) for name, each in columns.items()},
