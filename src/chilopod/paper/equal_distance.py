@@ -18,10 +18,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from chilopod.analysis.square_root import square_root_fit
-from chilopod.errors import AnalysisError
 from chilopod.paper.scatter import drawn_anew, mean_and_error
-from chilopod.paper.walk_measures import counted
+from chilopod.paper.walk_measures import counted, fitted, point_of
 
 Array = NDArray[np.float64]
 
@@ -86,8 +84,7 @@ def law_ratio(springs: Sequence[float], base_onset: float, onset: float) -> floa
 
 
 def onset_of_bend(data: xr.Dataset) -> float:
-    """Where the curved walks of a series set in by the square-root fit to their summed bend, N*mm/deg; NaN if they
-    determine no point."""
+    """Where the curved walks of a series set in by a fit to their summed bend, N*mm/deg; NaN if nowhere."""
     return _onset(*_bends(data))
 
 
@@ -137,17 +134,13 @@ def _ratios(inverse: Sequence[Array], bends: Sequence[Array]) -> tuple[float, fl
 
 def _squared(inverse: Array, bend: Array) -> tuple[Array, Array]:
     """Distance from the onset of these trials, rising, and the square of their mean bend; NaN if they have no onset."""
-    onset = _onset(inverse, bend)
-    if np.isnan(onset):
+    distance = inverse - 1.0 / _onset(inverse, bend)
+    if np.isnan(distance).all():
         return np.array([np.nan]), np.array([np.nan])
-    distance = inverse - 1.0 / onset
     return distance[distance > 0.0], (np.nanmean(bend, axis=1) ** 2)[distance > 0.0]
 
 
 def _onset(inverse: Array, bend: Array) -> float:
     here = np.isfinite(bend)
-    try:
-        each = np.broadcast_to(inverse[:, None], bend.shape)[here]
-        return square_root_fit(each, bend[here], resampled=0).critical
-    except AnalysisError:
-        return float("nan")
+    each = np.broadcast_to(inverse[:, None], bend.shape)[here]
+    return point_of(fitted(each, bend[here], resampled=0))[0]

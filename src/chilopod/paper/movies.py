@@ -17,6 +17,7 @@ from chilopod.steering import LegYawController
 from chilopod.trials import NONE, Trial, run, together
 
 TASK_A = printed.TASKS["A"].target
+Springs = tuple[float, float, float]
 
 _WALK = 45.0  # s
 _ROBOT_STILLS = ((2.0, 30.0, 60.0, 88.0), (0.5, 8.0, 16.0, 24.0))  # s
@@ -31,12 +32,8 @@ class Movie:
 
     Attributes
     ----------
-    name
-        Name of its files.
-    heading
-        Above all panels.
-    titles
-        Titles of the panels.
+    name, heading, titles
+        Name of its files, heading above all panels, and titles of these.
     record
         The walks.
     speed
@@ -58,7 +55,7 @@ class Movie:
 
 def movies(
     robot: Robot,
-    springs: tuple[float, float, float],
+    springs: Springs,
     best: float,
     folder: str | Path | None = None,
     progress: Progress = silent,
@@ -68,36 +65,27 @@ def movies(
 
     Parameters
     ----------
-    robot
-        The robot.
     springs
         First springs of the three walks of movie 1, N*m/rad: one that walks straight, one that curves a little, one
         that curves a lot. They start bent in the shape of the critical mode, for from straight it would take them
         minutes to bend.
     best
         First spring for task A, N*m/rad; movie 2 shows it between one that is too stiff and one that is too soft.
-    folder
-        Folder of the records.
-    progress
-        Called with the part done (0 to 1) and a few words.
+    folder, progress
+        As for :func:`chilopod.trials.run`.
     shorter
         Part of the durations that is walked.
     """
-
     joints = robot.body.modules - 1
-    bend = (_BEND + (0.0,) * joints)[:joints]
-    walks = [
-        Trial(robot.with_value(K1, value), shorter * _WALK, 0, bend, disturbance=NONE, rate=25.0) for value in springs
-    ]
-    tried = (4.0 * best, best, 0.7 * best)
-    records = run([*walks, *_tasks(robot, tried, shorter * _TASK)], folder, progress)
-    return _movies("", (*springs, *tried), records)
+    bend, tried = (_BEND + (0.0,) * joints)[:joints], (4.0 * best, best, 0.7 * best)
+    walk = Trial(robot, shorter * _WALK, 0, bend, disturbance=NONE, rate=25.0)
+    return _movies("", walk, shorter * _TASK, (springs, tried), folder, progress)
 
 
 def robot_movies(
     robot: Robot,
-    springs: tuple[float, float, float],
-    tried: tuple[float, float, float],
+    springs: Springs,
+    tried: Springs,
     folder: str | Path | None = None,
     progress: Progress = silent,
     shorter: float = 1.0,
@@ -108,36 +96,46 @@ def robot_movies(
     ----------
     robot
         With a twin.
-    springs
-        As for :func:`movies`.
     tried
         First springs for task A, N*m/rad: too stiff, best, too soft.
-    folder, progress, shorter
+    springs, folder, progress, shorter
         As for :func:`movies`.
     """
-    walks = [
-        Trial(robot.with_value(K1, value), shorter * _ROBOT_WALK, 1, rate=25.0, engine="twin", poses=True)
-        for value in springs
-    ]
-    tasks = [replace(each, engine="twin", poses=True) for each in _tasks(robot, tried, shorter * _ROBOT_TASK)]
-    records = run([*walks, *tasks], folder, progress)
-    first, second = _movies("robot-", (*springs, *tried), records, speed=3.0)
+    walk = Trial(robot, shorter * _ROBOT_WALK, 1, rate=25.0, engine="twin", poses=True)
+    found = _movies("robot-", walk, shorter * _ROBOT_TASK, (springs, tried), folder, progress, speed=3.0)
     return [
         replace(movie, stills=tuple(shorter * moment for moment in stills))
-        for movie, stills in zip((first, second), _ROBOT_STILLS, strict=True)
+        for movie, stills in zip(found, _ROBOT_STILLS, strict=True)
     ]
 
 
-def _tasks(robot: Robot, tried: tuple[float, float, float], duration: float) -> list[Trial]:
-    return [
-        Trial(robot.with_value(K1, value), duration, 0, (), TASK_A, LegYawController(), NONE, rate=25.0)
-        for value in tried
+def _movies(
+    prefix: str,
+    walk: Trial,
+    duration: float,
+    springs: tuple[Springs, Springs],
+    folder: str | Path | None,
+    progress: Progress,
+    speed: float = 2.0,
+) -> list[Movie]:
+    """Movie 1 of a walk, and movie 2 of task A, in the same engine and so long, with three springs each."""
+    task = replace(
+        walk,
+        duration=duration,
+        seed=0,
+        joint_angles=(),
+        target=TASK_A,
+        controller=LegYawController(),
+        disturbance=NONE,
+    )
+    asked = [
+        replace(each, robot=walk.robot.with_value(K1, value))
+        for each, values in zip((walk, task), springs, strict=True)
+        for value in values
     ]
-
-
-def _movies(prefix: str, springs: tuple[float, ...], records: list[xr.Dataset], speed: float = 2.0) -> list[Movie]:
+    records = run(asked, folder, progress)
     kinds = ("straight", "curved a little", "curved a lot", "too stiff", "best", "too soft")
-    names = [units.format(value, "N*mm/deg", digits=3).replace("*", "·") for value in springs]
+    names = [units.format(value, "N*mm/deg", digits=3).replace("*", "·") for values in springs for value in values]
     titles = tuple(f"k1 = {name}: {kind}" for name, kind in zip(names, kinds, strict=True))
     return [
         Movie(f"{prefix}movie-1", "One spring decides how the robot walks", titles[:3], together(records[:3]), speed),

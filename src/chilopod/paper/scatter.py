@@ -25,13 +25,7 @@ SURE = 2.0
 
 @dataclass(frozen=True)
 class Difference:
-    """One mean less another.
-
-    Attributes
-    ----------
-    value, error
-        The difference and its standard error; the error is NaN where it is not known, as of single trials.
-    """
+    """One mean less another, and its standard error, which is NaN where it is not known, as of single trials."""
 
     value: float
     error: float
@@ -88,6 +82,12 @@ def mean_and_error(values: ArrayLike) -> tuple[float, float]:
     finite = finite[np.isfinite(finite)]
     mean = float(finite.mean()) if finite.size else float("nan")
     return mean, float(finite.std(ddof=1) / np.sqrt(finite.size)) if finite.size > 1 else float("nan")
+
+
+def means(values: Array, here: NDArray[np.bool_] | bool = True) -> tuple[Array, Array]:
+    """Mean and standard error at every spring (row) of the trials chosen; the error is NaN for a single one."""
+    mean, error = np.array([mean_and_error(row) for row in np.where(here, values, np.nan)]).T
+    return mean, error
 
 
 def with_error(value: float, error: float, digits: int) -> str:

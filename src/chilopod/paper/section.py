@@ -1,22 +1,48 @@
-"""Sections of the report, and what they find."""
+"""Sections of the report, what they find, and how they are computed."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from enum import Enum
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+import xarray as xr
+
+from chilopod import trials
+from chilopod.errors import OutputError
 from chilopod.paper.movies import Movie
-from chilopod.paper.size import Size
 from chilopod.paper.statements import ORDER
 from chilopod.paper.table import OfPlanar, OfTwin, RobotRow, Row, robot_rows
-from chilopod.progress import Progress
+from chilopod.progress import Progress, silent
 from chilopod.robot import Robot, load_robot
 from chilopod.show.panel import Panel
+from chilopod.trials import Trial
 
+S = TypeVar("S")
 T = TypeVar("T")
 Line = Row | OfTwin | OfPlanar
+
+SectionProgress = Callable[[str, float, str], None]
+"""Called with the section, the part of it that is done (0 to 1), and a few words."""
+
+
+class Size(Enum):
+    """Size of a report: how much of everything it computes."""
+
+    FULL = "as much as the paper"
+    QUICK = "coarser sweeps, fewer module counts, springs and repeats; what does not depend on chance is as exact"
+    TINY = "every section, but hardly anything of it: walks of the whole robot are cut before they have settled"
+
+    def of(self, full: S, quick: S, tiny: S) -> S:
+        """The one of three that is this size's."""
+        return {Size.FULL: full, Size.QUICK: quick, Size.TINY: tiny}[self]
+
+    def cut(self, usual: S, tiny: S) -> S:
+        """Value for a report that is not tiny; a tiny one has less of it."""
+        return self.of(usual, usual, tiny)
 
 
 @dataclass(frozen=True)
@@ -28,18 +54,26 @@ class Context:
     robot
         Robot of the planar model; the paper's numbers are those of ``aoi2022-planar``.
     whole
-        Whole of the sections in three dimensions, with a twin.
+        Whole robot of the sections in three dimensions, with a twin.
     size
         Amount of every computation.
     folder
-        Folder of the records of trials, with which a stopped computation is resumed; without one nothing is
-        kept.
+        Folder of the records of trials, with which a stopped computation is resumed; without one nothing is kept.
     """
 
     robot: Robot = field(default_factory=lambda: load_robot("aoi2022-planar"))
     whole: Robot = field(default_factory=lambda: load_robot("aoi2022"))
     size: Size = Size.FULL
     folder: Path | None = None
+
+    def run(self, asked: Sequence[Trial], progress: Progress = silent) -> list[xr.Dataset]:
+        """Records of trials, kept in the folder."""
+        return trials.run(asked, self.folder, progress)
+
+
+def nothing(*found: object) -> Sequence[Any]:
+    """No rows, panels or films."""
+    return ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,24 +82,22 @@ class Section(Generic[T]):
 
     Attributes
     ----------
-    name
-        Name on the command line.
-    chapter
-        Chapter of the page.
+    name, chapter
+        Name on the command line, and chapter of the page.
     sentence
         Description in a few words.
     compute
-        Finds it, given the context, what the sections it needs have found, and where to say how far it is.
+        Computation, given the context, where to say how far it is, and the results of what the section needs.
     rows
-        Its lines of the tables, given what it found and what the sections it needs have found.
+        Lines of the tables, given what was computed and the results of what the section needs.
     panels
-        Its figures, given what it found and what the sections beside it have found.
+        Figures, given what was computed and the results of the sections beside it.
     films
-        Its films, given what it found.
+        Films, given what was computed.
     needs
-        Other sections whose results it uses where they were computed; they come before it.
+        Sections whose results it uses; they come before it. A result that was not computed is None.
     beside
-        Other sections that its figures show where they were computed; they are drawn once more when these are.
+        Sections whose results its figures show; they are drawn once more when these are computed.
     beyond
         True if it goes beyond the paper's own experiments.
     on_request
@@ -77,10 +109,10 @@ class Section(Generic[T]):
     name: str
     chapter: str
     sentence: str
-    compute: Callable[[Context, Found, Progress], T]
-    rows: Callable[[T, Found], Sequence[Line]] = lambda value, found: ()
-    panels: Callable[[T, Found], Iterable[Panel]] = lambda value, found: ()
-    films: Callable[[T], Iterable[Movie]] = lambda value: ()
+    compute: Callable[..., T]
+    rows: Callable[..., Sequence[Line]] = nothing
+    panels: Callable[..., Iterable[Panel]] = nothing
+    films: Callable[[T], Iterable[Movie]] = nothing
     needs: tuple[Section[Any], ...] = ()
     beside: tuple[Section[Any], ...] = ()
     beyond: bool = False
@@ -97,7 +129,7 @@ class Found:
     context
         Robots, size and folder of the computation.
     values, rows, seconds
-        Values, rows and seconds of the sections that were computed: result, lines of the tables, and how long it took.
+        Result, lines of the tables and duration (s) of the sections that were computed.
     failures
         Errors of sections that could not be computed.
     """
@@ -115,14 +147,16 @@ class Found:
         """True if it was computed, or failed."""
         return section in self.values or section in self.failures
 
-    def add(self, section: Section[T], value: T) -> None:
-        """Keep a result, and make its lines of the tables."""
-        rows = section.rows(value, self.seen_by(section.needs))
-        self.values[section], self.rows[section] = value, rows
+    def of(self, sections: Iterable[Section[Any]]) -> list[Any]:
+        """Results of some sections."""
+        return [self[section] for section in sections]
 
-    def seen_by(self, needs: Iterable[Section[Any]]) -> Found:
-        """The results of some sections; asking for others fails."""
-        return _Seen(self.context, {section: self[section] for section in needs})
+    def add(self, section: Section[T], progress: Progress = silent) -> None:
+        """Compute a section, and make its lines of the tables."""
+        needed = self.of(section.needs)
+        value = section.compute(self.context, progress, *needed)
+        rows = section.rows(value, *needed)
+        self.values[section], self.rows[section] = value, rows
 
     def copy(self) -> Found:
         """As it is now, whatever is added later."""
@@ -140,10 +174,45 @@ class Found:
         return robot_rows((row for rows in self.rows.values() for row in rows), ORDER)
 
 
-class _Seen(Found):
-    """Insists that what is used was said to be needed."""
+def reproduce(
+    sections: Sequence[Section[Any]],
+    context: Context | None = None,
+    progress: SectionProgress = lambda what, done, words: None,
+    told: Callable[[Found, Section[Any]], None] = lambda found, section: None,
+) -> Found:
+    """Compute sections of the report; one that fails does not keep the others from being computed.
 
-    def __getitem__(self, section: Section[T]) -> T | None:
-        if section not in self.values:
-            raise KeyError(f"{section.name} is not among the sections that are needed")
-        return super().__getitem__(section)
+    Parameters
+    ----------
+    sections
+        See :func:`chilopod.paper.registry.chosen`.
+    context
+        By default the paper's robots.
+    progress
+        Called as the work goes on.
+    told
+        Called after every section with all that is found by then, and the section.
+
+    Raises
+    ------
+    OutputError
+        If trials cannot be kept.
+    """
+    found = Found(context or Context())
+    for section in sections:
+        started = time.perf_counter()
+        progress(section.sentence, 0.0, section.sentence)
+
+        def report(done: float, words: str, section: Section[Any] = section) -> None:
+            progress(section.sentence, done, words)
+
+        try:
+            found.add(section, report)
+        except OutputError:  # where nothing can be written any more, no other section fares better
+            raise
+        except Exception as error:
+            found.failures[section] = error
+        found.seconds[section] = time.perf_counter() - started
+        progress(section.sentence, 1.0, "failed" if section in found.failures else "done")
+        told(found, section)
+    return found

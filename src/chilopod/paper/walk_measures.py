@@ -1,33 +1,85 @@
-"""Measures of the paper on series of walks from straight on."""
+"""Series of walks with several springs, and the paper's measures on them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from chilopod import trials
 from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
 from chilopod.analysis.square_root import RESAMPLED, SquareRootFit, square_root_fit
 from chilopod.errors import AnalysisError
 from chilopod.paper.scatter import drawn_anew, mean_and_error
+from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.tasks.radius_law import in_settled_curve, is_curved
-from chilopod.trials import Trial, run
+from chilopod.trials import Trial
 
 Array = NDArray[np.float64]
+Folder = str | Path | None
+
+SEEDS = 10_000
+"""Seeds between springs, so that more repeats leave the other trials as they are."""
 
 _RATE = 50.0  # Hz
+
+
+def spring_walks(
+    robot: Robot,
+    springs: Sequence[float],
+    duration: float | Sequence[float],
+    *,
+    repeats: int = 1,
+    seeds: Sequence[int] | None = None,
+    parameter: str = K1,
+    folder: Folder = None,
+    progress: Progress = silent,
+    **walk: Any,
+) -> list[xr.Dataset]:
+    """Records of walks with some springs, one spring after the other.
+
+    Parameters
+    ----------
+    springs, parameter
+        Values of a stiffness, N*mm/deg, and its path.
+    duration
+        Duration of all walks, or of those with each spring, s.
+    repeats, seeds
+        Number of walks with each spring, and seed of the first of them, from which the others count up; by default 0.
+    folder, progress
+        As for :func:`chilopod.trials.run`.
+    walk
+        Other fields of :class:`chilopod.trials.Trial`.
+    """
+    durations = np.broadcast_to(duration, len(springs)).tolist()
+    asked = [
+        Trial(robot.with_value(parameter, stiffness(float(spring))), seconds, seed + repeat, **walk)
+        for spring, seconds, seed in zip(springs, durations, seeds or [0] * len(springs), strict=True)
+        for repeat in range(repeats)
+    ]
+    return trials.run(asked, folder, progress)
+
+
+def spring_seeds(springs: Sequence[float]) -> list[int]:
+    """First seed of the walks with each spring."""
+    return [int(SEEDS * spring) for spring in springs]
 
 
 def by_spring(walks: Sequence[xr.Dataset], springs: Sequence[float]) -> xr.Dataset:
     """Measures of walks, over spring (N*mm/deg) and repeat; of each spring as many, one after the other."""
     repeats = len(walks) // len(springs)
     rows = [xr.concat(walks[i : i + repeats], "repeat") for i in range(0, len(walks), repeats)]
-    each = ("spring", np.asarray(springs, dtype=np.float64), {"units": PAPER_UNIT})
-    return xr.concat(rows, "spring").assign_coords(spring=each, repeat=np.arange(repeats))
+    return xr.concat(rows, "spring").assign_coords(spring=over_springs(springs), repeat=np.arange(repeats))
+
+
+def over_springs(springs: Sequence[float]) -> tuple[str, Array, dict[str, str]]:
+    """Coordinate of springs, N*mm/deg."""
+    return "spring", np.asarray(springs, dtype=np.float64), {"units": PAPER_UNIT}
 
 
 def example_walks(
@@ -36,31 +88,22 @@ def example_walks(
     duration: float,
     seeds: Sequence[int],
     engine: str = "planar",
-    folder: str | Path | None = None,
+    folder: Folder = None,
 ) -> xr.Dataset:
-    """Joint angles over time of one walk at each of some springs.
-
-    Returns
-    -------
-    Dataset over (time, spring, joint): ``joint_angle`` (rad).
-    """
-    robots = [robot.with_value(K1, stiffness(spring)) for spring in springs]
-    pairs = zip(robots, seeds, strict=True)
-    records = run([Trial(each, duration, seed, rate=_RATE, engine=engine) for each, seed in pairs], folder)
+    """Joint angles of one walk with each of some springs, as a dataset over (time, spring, joint): ``joint_angle``
+    (rad)."""
+    records = spring_walks(robot, springs, duration, seeds=seeds, folder=folder, rate=_RATE, engine=engine)
     angles = [record.joint_angle.isel(robot=0, drop=True) for record in records]
     data = xr.concat(angles, dim="spring").transpose("time", "spring", "joint").to_dataset(name="joint_angle")
-    data = data.assign_coords(spring=("spring", np.asarray(springs, dtype=np.float64), {"units": PAPER_UNIT}))
     data.attrs = {"robot": robot.name, "varied": K1, "about": "yaw joint angles over time"}
-    return data
+    return data.assign_coords(spring=over_springs(springs))
 
 
 def shares(data: xr.Dataset) -> xr.Dataset:
-    """How many of the walks are ``curved`` and ``straight``, over spring."""
+    """Shares of the walks that are ``curved`` and ``straight``, over spring."""
+    found = {"curved": is_curved(data), "straight": (data.direction == "straight").values}
     return xr.Dataset(
-        {
-            "curved": ("spring", is_curved(data).mean(axis=1), {"units": "1"}),
-            "straight": ("spring", (data.direction == "straight").values.mean(axis=1), {"units": "1"}),
-        },
+        {name: ("spring", here.mean(axis=1), {"units": "1"}) for name, here in found.items()},
         coords={"spring": data.spring},
     )
 
@@ -72,23 +115,30 @@ def counted(data: xr.Dataset, settled: bool = True) -> NDArray[np.bool_]:
     return (in_settled_curve(data) if settled else is_curved(data)) & most[:, None]
 
 
-def onset(data: xr.Dataset, joint: int = 1, settled: bool = True) -> SquareRootFit | None:
-    """Where curved walks set in by the paper's method: the square-root fit to the trials that are :func:`counted`.
-
-    None if they do not determine a point.
-    """
-    here = counted(data, settled)
-    inverse = np.broadcast_to(1.0 / data.spring.values[:, None], here.shape)
+def fitted(inverse: ArrayLike, bends: ArrayLike, resampled: int = RESAMPLED) -> SquareRootFit | None:
+    """The square-root law of bends over 1/k, as of :func:`square_root_fit`; None if they do not determine a point."""
     try:
-        return square_root_fit(inverse[here], data.mean_angle.sel(joint=joint).values[here])
+        return square_root_fit(inverse, bends, resampled)
     except AnalysisError:
         return None
 
 
-def onset_with_error(data: xr.Dataset, settled: bool = True) -> tuple[float, float]:
-    """:func:`onset` and its standard error by the bootstrap, N*mm/deg; NaN if there is none."""
-    fit = onset(data, settled=settled)
+def point_of(fit: SquareRootFit | None) -> tuple[float, float]:
+    """Point at which curved walks set in by a fit and its standard error by the bootstrap, N*mm/deg; NaN if there is
+    none."""
     return (fit.critical, fit.bootstrap_error) if fit else (float("nan"), float("nan"))
+
+
+def onset(data: xr.Dataset, joint: int = 1, settled: bool = True) -> SquareRootFit | None:
+    """Where curved walks set in by the paper's method: the square-root fit to the trials that are :func:`counted`."""
+    here = counted(data, settled)
+    inverse = np.broadcast_to(1.0 / data.spring.values[:, None], here.shape)
+    return fitted(inverse[here], data.mean_angle.sel(joint=joint).values[here])
+
+
+def onset_with_error(data: xr.Dataset, settled: bool = True) -> tuple[float, float]:
+    """:func:`onset` and its standard error, as of :func:`point_of`."""
+    return point_of(onset(data, settled=settled))
 
 
 def radius_at(data: xr.Dataset, spring: float, settled: bool = True) -> tuple[float, float]:
@@ -121,3 +171,8 @@ def spring_for(data: xr.Dataset, radius: float) -> tuple[float, float]:
     again = [found(drawn_anew(curvature, rng)) for _ in range(RESAMPLED)]
     single = (np.isfinite(curvature).sum(axis=1) < 2).all()  # nobody knows how it scatters
     return found(curvature), float("nan") if single else float(np.std(again, ddof=1))
+
+
+def cycle_means(angles: Array, samples: int) -> Array:
+    """Means of joint angles over gait cycles of so many samples, shape (cycles, joints)."""
+    return angles[: len(angles) // samples * samples].reshape(-1, samples, angles.shape[1]).mean(axis=1)

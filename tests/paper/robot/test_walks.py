@@ -11,9 +11,8 @@ from chilopod.paper import printed, statements
 from chilopod.paper.robot import walks as robot_walks
 from chilopod.paper.robot.figures import turning as turning_figures
 from chilopod.paper.robot.figures import walks as walk_figures
-from chilopod.paper.robot.rows import walk_rows
+from chilopod.paper.robot.rows import turning_rows, walk_rows
 from chilopod.paper.robot.turning import RobotTurning
-from chilopod.paper.robot.turning_rows import turning_rows
 from chilopod.paper.robot.walks import (
     RobotWalks,
     by_duration,

@@ -20,13 +20,7 @@ _DRAWN = 2000
 
 @dataclass(frozen=True)
 class Interval:
-    """A number and between which bounds it lies, as sure as :data:`LEVEL` says.
-
-    Attributes
-    ----------
-    value, low, high
-        NaN where nothing is known.
-    """
+    """A number and between which bounds it lies, as sure as :data:`LEVEL` says; NaN where nothing is known."""
 
     value: float
     low: float
@@ -45,13 +39,8 @@ class Interval:
 
 
 def wilson(successes: int, count: int) -> Interval:
-    """Share of successes with the interval of Wilson (1927), which holds for few trials and for shares near 0 and 1.
-
-    Parameters
-    ----------
-    successes, count
-        Number of successes, and of independent trials.
-    """
+    """Share of successes among independent trials with the interval of Wilson (1927), which holds for few trials and
+    for shares near 0 and 1."""
     if count == 0:
         return Interval(float("nan"), float("nan"), float("nan"))
     z = float(norm.ppf(0.5 + 0.5 * LEVEL))
@@ -69,8 +58,6 @@ def bootstrap_mean(values: ArrayLike, seed: int = 0) -> Interval:
     values
         Shape (groups,) or (groups, members). Groups are independent and are drawn anew as a whole; members of one, as
         the targets of one course, need not be.
-    seed
-        Seed of what is drawn.
     """
     table = np.asarray(values, dtype=np.float64)
     table = table.reshape(len(table), -1)
@@ -85,8 +72,6 @@ def bootstrap_ratio(of: ArrayLike, to: ArrayLike, seed: int = 0) -> Interval:
     of, to
         Sums of independent groups, which are drawn anew as a whole, shape (groups,); groups in which both are 0 count
         for nothing.
-    seed
-        Seed of what is drawn.
     """
     above, below = np.asarray(of, dtype=np.float64), np.asarray(to, dtype=np.float64)
     groups = np.flatnonzero((above != 0.0) | (below != 0.0))

@@ -27,19 +27,16 @@ class Summary:
     targets, courses
         Shares that are reached, of courses as a whole.
     seconds
-        For a target that is reached.
+        Time for a target that is reached, s.
     spent
-        On all targets, for every one that is reached, s; one that is not reached counts with its whole patience, also
-        where the robot has failed before.
-    later, course_later
-        By how much later than the variable spring, s, at targets that both reach, and of courses that both reach as a
-        whole; the mean of the differences.
-    work
-        Work of the actuators of springs and joints, J a course.
+        Time on all targets, for every one that is reached, s; one that is not reached counts with its whole patience,
+        also where the robot has failed before.
+    later
+        By how much later than the variable spring, s, at targets that both reach; the mean of the differences.
     spring_work, drive_work
-        Its two parts, mean, J a course.
+        Work of the actuators of springs and joints, mean, J a course.
     more_work
-        By how much more than the variable spring's it is, J a course.
+        By how much more than the variable spring's their sum is, J a course.
     effort
         Effort of the leg yaw, mean, rad^2 s a course.
     detour
@@ -55,8 +52,6 @@ class Summary:
     seconds: Interval
     spent: Interval
     later: Interval
-    course_later: Interval
-    work: Interval
     spring_work: float
     drive_work: float
     more_work: Interval
@@ -80,13 +75,7 @@ def titled(name: str, spring: float) -> str:
 
 
 def summaries(data: xr.Dataset) -> dict[str, Summary]:
-    """Summaries of all strategies, by name.
-
-    Parameters
-    ----------
-    data
-        See :func:`chilopod.paper.courses.study.compared`.
-    """
+    """Summaries of all strategies of :func:`chilopod.paper.courses.study.compared`, by name."""
     variable = data.sel(case=VARIABLE.name)
     return {str(name): _summary(data.sel(case=name), variable) for name in data.case.values}
 
@@ -102,8 +91,6 @@ def _summary(one: xr.Dataset, variable: xr.Dataset) -> Summary:
         seconds=bootstrap_mean(seconds),
         spent=bootstrap_ratio(np.where(arrived, seconds, one.attrs["patience_s"]).sum(axis=1), arrived.sum(axis=1)),
         later=bootstrap_mean(seconds - _reached(variable, "seconds")),
-        course_later=bootstrap_mean((seconds - _reached(variable, "seconds")).sum(axis=1)),
-        work=bootstrap_mean(_work(one)),
         spring_work=float(one.goal_spring_work.sum("goal").mean()),
         drive_work=float(one.goal_drive_work.sum("goal").mean()),
         more_work=bootstrap_mean(_work(one) - _work(variable)),
@@ -135,46 +122,42 @@ def _work(one: xr.Dataset) -> Array:
     return np.asarray((one.goal_spring_work + one.goal_drive_work).sum("goal").values)
 
 
-@dataclass(frozen=True)
-class Verdicts:
-    """Decisions of the intervals, each by the names of strategies that the variable spring is held against.
-
-    Attributes
-    ----------
-    fewer, as_many, more
-        Numbers of groups that reach fewer targets, that cannot be told apart, and that reach more.
-    slower, as_fast, faster
-        In the time spent for every target that is reached.
-    later, as_soon, sooner
-        At targets that both reach.
-    costlier
-        Number of groups that do more work, of those that do any.
-    """
-
-    fewer: Sequence[str]
-    as_many: Sequence[str]
-    more: Sequence[str]
-    slower: Sequence[str]
-    as_fast: Sequence[str]
-    faster: Sequence[str]
-    later: Sequence[str]
-    as_soon: Sequence[str]
-    sooner: Sequence[str]
-    costlier: Sequence[str]
-
-
-def verdicts(found: dict[str, Summary]) -> Verdicts:
-    """Decisions on the variable spring beside the others."""
+def verdicts(found: dict[str, Summary]) -> dict[str, list[str]]:
+    """Decisions of the intervals on the variable spring beside the others: names of these by the words for it."""
     ours, others = found[VARIABLE.name], [each for name, each in found.items() if name != VARIABLE.name]
-    reach = _decided(others, lambda each: ours.targets.above(each.targets))
-    spent = _decided(others, lambda each: each.spent.above(ours.spent))
-    time = _decided(others, lambda each: each.later.sign)
-    work = _decided(others, lambda each: each.more_work.sign)
-    costlier = [each.title for each in others if ON_COURSES[each.name].needs_torque and each.title in work[0]]
-    return Verdicts(*reach, *spent, *time, costlier)
-
-
-def _decided(others: Sequence[Summary], asked: Callable[[Summary], Answer]) -> tuple[list[str], list[str], list[str]]:
-    """Strategies for which the answer is yes, open, and no."""
-    yes, open_, no = ([each.title for each in others if asked(each) is answer] for answer in (True, None, False))
-    return yes, open_, no
+    worked = [each for each in others if ON_COURSES[each.name].needs_torque]
+    asked: tuple[tuple[Callable[[Summary], Answer], Sequence[Summary], dict[str, Answer]], ...] = (
+        (
+            lambda each: ours.targets.above(each.targets),
+            others,
+            {
+                "reaches more targets than": True,
+                "reaches as many, for all that can be told, as": None,
+                "reaches fewer than": False,
+            },
+        ),
+        (
+            lambda each: each.spent.above(ours.spent),
+            others,
+            {
+                "spends less time for every target reached than": True,
+                "spends as much, for all that can be told, as": None,
+                "spends more than": False,
+            },
+        ),
+        (
+            lambda each: each.later.sign,
+            others,
+            {
+                "is sooner at targets that both reach than": True,
+                "is there as soon, for all that can be told, as": None,
+                "is there later than": False,
+            },
+        ),
+        (lambda each: each.more_work.sign, worked, {"does less work than": True}),
+    )
+    return {
+        words: [each.title for each in beside if decided(each) is answer]
+        for decided, beside, answers in asked
+        for words, answer in answers.items()
+    }

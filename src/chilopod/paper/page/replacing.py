@@ -9,8 +9,7 @@ from typing import Any
 
 from chilopod.errors import OutputError
 from chilopod.output import check_files
-from chilopod.paper.section import Section
-from chilopod.paper.size import Size
+from chilopod.paper.section import Section, Size
 
 _HOLDS = re.compile('<meta name="chilopod-report" content="([A-Z]+)([^"]*)">')
 _FRONT = 1000  # characters of a page, in which that stands

@@ -16,8 +16,7 @@ from chilopod.output import check_folder, write_atomic
 from chilopod.paper.movies import Movie
 from chilopod.paper.page.movie import write_movie
 from chilopod.paper.page.page import Drawn, Shown, State, page
-from chilopod.paper.section import Context, Found, Section
-from chilopod.paper.sections import Progress
+from chilopod.paper.section import Context, Found, Section, SectionProgress
 from chilopod.robot import Robot, load_robot, presets
 from chilopod.show import style
 from chilopod.show.figures import schematic
@@ -39,10 +38,8 @@ class Report:
 
     Parameters
     ----------
-    sections
-        Sections that are shown.
-    context
-        Robots, size and folder of the computation.
+    sections, context
+        Sections that are shown, and ground that they are computed from.
     folder
         Created where there is none.
     progress
@@ -59,7 +56,7 @@ class Report:
         sections: Sequence[Section[Any]],
         context: Context,
         folder: str | Path,
-        progress: Progress = lambda what, done, words: None,
+        progress: SectionProgress = lambda what, done, words: None,
     ) -> None:
         self.page = check_folder(folder) / "index.html"
         self.failures: dict[Section[Any], Exception] = {}
@@ -126,8 +123,7 @@ class Report:
 
     def _draw(self, section: Section[Any], found: Found, new: bool) -> Shown:
         value = found[section]
-        panels = section.panels(value, found.seen_by(section.beside))
-        figures = tuple(self._draw_panel(panel) for panel in panels)
+        figures = tuple(self._draw_panel(panel) for panel in section.panels(value, *found.of(section.beside)))
         if not new and section in self._shown:
             return replace(self._shown[section], figures=figures)
         self._films += ((section, movie) for movie in section.films(value))
@@ -165,18 +161,7 @@ class Report:
 
 
 def write_report(found: Found, folder: str | Path) -> Path:
-    """Draw all that was found and write its page, see :class:`Report`.
-
-    Returns
-    -------
-    Path
-        Path of the page.
-
-    Raises
-    ------
-    OutputError
-        If the folder cannot be written.
-    """
+    """Draw all that was found and write its page, see :class:`Report`; returns the path of the page."""
     sections = [*found.values, *found.failures]
     with Report(sections, found.context, folder) as report:
         report.add(found, sections)

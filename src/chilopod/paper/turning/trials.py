@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -17,12 +17,13 @@ from numpy.typing import NDArray
 from chilopod import trials
 from chilopod.analysis.parameters import PAPER_UNIT, stiffness
 from chilopod.paper import printed
+from chilopod.paper.walk_measures import Folder, over_springs
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
-from chilopod.steering import STRATEGIES, Outcome, Target, earliest_arrival, evaluate
+from chilopod.steering import Outcome, Target, earliest_arrival, evaluate
 from chilopod.steering.criteria import efforts
 from chilopod.steering.strategies import strategy_named
-from chilopod.trials import Disturbance, Trial
+from chilopod.trials import Trial
 
 Array = NDArray[np.float64]
 
@@ -81,6 +82,21 @@ class TurningTask:
         return _best(self.criteria)
 
 
+def to_target(
+    robot: Robot,
+    target: Target,
+    spring: float,
+    strategy: str = "pitchfork",
+    *,
+    duration: float = DURATION,
+    rate: float = RATE,
+    **walk: Any,
+) -> Trial:
+    """A walk towards a target by a strategy with its spring (N*mm/deg); ``walk`` are other fields of a trial."""
+    walker, controller, _ = strategy_named(strategy).prepare(robot, None, stiffness(float(spring)))
+    return Trial(walker, duration, target=target, controller=controller, rate=rate, **walk)
+
+
 def turning_task(
     robot: Robot,
     target: Target,
@@ -90,24 +106,17 @@ def turning_task(
     *,
     time: float | None = None,
     duration: float = DURATION,
-    disturbance: Disturbance | None = None,
     shown: Sequence[float] | None = None,
-    engine: str = "planar",
-    folder: str | Path | None = None,
+    folder: Folder = None,
     progress: Progress = silent,
+    **walk: Any,
 ) -> TurningTask:
     """Walk towards a target with every spring, several times.
 
     Parameters
     ----------
-    robot
-        Its other springs stay.
-    target
-        Target of the walks.
-    springs
-        N*mm/deg.
-    repeats
-        Trials with each, with the seeds 0, 1, ...
+    springs, repeats
+        N*mm/deg, and trials with each, with the seeds 0, 1, ...
     strategy
         One of :data:`chilopod.steering.STRATEGIES`.
     time
@@ -115,31 +124,15 @@ def turning_task(
         paper, and ``duration`` if none arrives.
     duration
         Duration of every trial, s, at least the paper's.
-    disturbance
-        Differences from trial to trial; by default what all studies have.
     shown
         Springs of ``paths``, N*mm/deg.
-    engine
-        One of :data:`chilopod.engine.ENGINES`.
-    folder
-        Folder of the records, with which a stopped study is resumed.
-    progress
-        Called with the part done (0 to 1) and a few words.
+    walk
+        Other fields of the trials, such as their engine and disturbance.
     """
-    plan = strategy_named(strategy)
-    asked = []
+    asked: list[Trial] = []
     for spring in springs:
-        walker, controller, _ = plan.prepare(robot, None, stiffness(float(spring)))
-        walk = Trial(
-            walker,
-            duration,
-            target=target,
-            controller=controller,
-            disturbance=disturbance or Disturbance(),
-            rate=RATE,
-            engine=engine,
-        )
-        asked += [replace(walk, seed=seed) for seed in range(repeats)]
+        one = to_target(robot, target, spring, strategy, duration=duration, **walk)
+        asked += [replace(one, seed=seed) for seed in range(repeats)]
     record = trials.together(trials.run(asked, folder, progress))
     earliest = earliest_arrival(record)
     when = time if time is not None else earliest if np.isfinite(earliest) else duration
@@ -153,23 +146,24 @@ def turning_task(
         "radius_m": target.radius,
     }
     if shown is None:
-        shown = [_nearest(springs, _best(criteria) * part) for part in (15.0 / 21.0, 1.0, 41.0 / 21.0)]
+        wanted = [part / 21.0 * _best(criteria) for part in (15.0, 21.0, 41.0)]
+        shown = [springs[int(np.abs(np.log(np.asarray(springs) / each)).argmin())] for each in wanted]
     paths = _paths(record, springs, repeats, shown)
     paths.attrs = {**criteria.attrs, "target_x_m": target.position[0], "target_y_m": target.position[1]}
     return TurningTask(target, criteria, paths)
+
+
+def _best(criteria: xr.Dataset) -> float:
+    return float(criteria.spring[int(np.argmin(criteria.nearest.mean("repeat").values))])
 
 
 def _criteria(record: xr.Dataset, instants: tuple[float, float], springs: Sequence[float], repeats: int) -> xr.Dataset:
     shape = (len(springs), repeats)
     found = [evaluate(record, time) for time in instants]
     last = float(record.time[-1])
-    until = np.array(
-        [
-            efforts(record.isel(robot=[index]), arrival if np.isfinite(arrival) else last)[0]
-            for index, arrival in enumerate(found[0].arrival)
-        ]
-    )
-    data = xr.Dataset(coords={"spring": ("spring", np.asarray(springs, float), {"units": PAPER_UNIT})})
+    ends = np.where(np.isfinite(found[0].arrival), found[0].arrival, last).tolist()
+    until = np.array([efforts(record.isel(robot=[index]), end)[0] for index, end in enumerate(ends)])
+    data = xr.Dataset(coords={"spring": over_springs(springs)})
     data = data.assign_coords(instant=["earliest arrival", "paper"], repeat=np.arange(repeats))
     data["seconds"] = ("instant", np.array(instants), {"units": "s"})
     for name, unit in (("distance", "m"), ("angle", "rad"), ("effort", "rad^2*s")):
@@ -213,14 +207,6 @@ def _paths(record: xr.Dataset, springs: Sequence[float], repeats: int, shown: Se
     )
 
 
-def _best(criteria: xr.Dataset) -> float:
-    return float(criteria.spring[int(np.argmin(criteria.nearest.mean("repeat").values))])
-
-
-def _nearest(springs: Sequence[float], wanted: float) -> float:
-    return min(springs, key=lambda spring: abs(np.log(spring / wanted)))
-
-
 def springs_by_outcome(criteria: xr.Dataset) -> dict[Outcome, list[float]]:
     """Springs (N*mm/deg) by what became of most of their trials."""
     found: dict[str, list[float]] = {outcome.label: [] for outcome in Outcome}
@@ -244,15 +230,7 @@ def span(springs: list[float]) -> str:
 
 @dataclass(frozen=True)
 class LegYaw:
-    """Walks to a target at one spring, see :func:`without_leg_yaw`.
-
-    Attributes
-    ----------
-    name, spring
-        The spring's, N*mm/deg.
-    alone, helped
-        Walks without leg yaw and with it.
-    """
+    """Walks to a target at one spring (N*mm/deg), without leg yaw and with it, see :func:`without_leg_yaw`."""
 
     name: str
     spring: float
@@ -293,18 +271,18 @@ def without_leg_yaw(
     springs: Mapping[str, float],
     *,
     duration: float = DURATION,
-    engine: str = "planar",
-    folder: str | Path | None = None,
+    folder: Folder = None,
     progress: Progress = silent,
+    **walk: Any,
 ) -> xr.Dataset:
     """The same task with and without leg yaw (Fig. "without": five trials and nine).
 
     Parameters
     ----------
-    robot, target, duration, engine, folder, progress
-        As for :func:`turning_task`.
     springs
-        k1 by name, N*mm/deg.
+        Values of k1 by name, N*mm/deg.
+    duration, walk
+        As for :func:`turning_task`.
 
     Returns
     -------
@@ -314,20 +292,16 @@ def without_leg_yaw(
     """
     cases, most = [], printed.WITHOUT_LEG_YAW
     for index, ((name, spring), leg_yaw) in enumerate((item, with_) for item in springs.items() for with_ in (0, 1)):
-        strategy = "pitchfork" if leg_yaw else "open-loop"
-        walker, controller, _ = STRATEGIES[strategy].prepare(robot, None, stiffness(spring))
-        asked = [
-            Trial(walker, duration, seed, target=target, controller=controller, rate=RATE, engine=engine)
-            for seed in range(printed.REPEATS if leg_yaw else most)
-        ]
+        one = to_target(robot, target, spring, "pitchfork" if leg_yaw else "open-loop", duration=duration, **walk)
+        asked = [replace(one, seed=seed) for seed in range(printed.REPEATS if leg_yaw else most)]
         record = trials.together(trials.run(asked, folder))
         result = evaluate(record, duration)
         some = record.isel(time=slice(None, None, _PATH_STEP))
-        over = ("trial", "time")
+        place = some.position.transpose("axis", "robot", "time")
         case = xr.Dataset(
             {
-                "x": (over, some.position.sel(axis="x").transpose("robot", "time").values, {"units": "m"}),
-                "y": (over, some.position.sel(axis="y").transpose("robot", "time").values, {"units": "m"}),
+                "x": (("trial", "time"), place.sel(axis="x").values, {"units": "m"}),
+                "y": (("trial", "time"), place.sel(axis="y").values, {"units": "m"}),
                 "arrived": ("trial", np.isfinite(result.arrival).astype(float), {"units": "1"}),
                 "nearest": ("trial", result.nearest, {"units": "m"}),
                 "turned": ("trial", _last(record.heading), {"units": "rad"}),

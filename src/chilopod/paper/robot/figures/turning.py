@@ -11,9 +11,18 @@ from chilopod.paper.robot.turning import RobotTurning
 from chilopod.paper.robot.walks import RobotWalks
 from chilopod.paper.scatter import SURE
 from chilopod.paper.statements import listed
-from chilopod.paper.turning import hopf
-from chilopod.paper.turning.figures.criteria import both_strategies, draw_comparison, draw_criteria, places
-from chilopod.paper.turning.figures.turning import became, draw_turning, draw_without, sides
+from chilopod.paper.turning.criteria import in_words, saturation
+from chilopod.paper.turning.figures import (
+    became,
+    both_strategies,
+    draw_comparison,
+    draw_criteria,
+    draw_turning,
+    draw_without,
+    places,
+    sides,
+    walks_of,
+)
 from chilopod.paper.turning.trials import arrivals, by_leg_yaw, outcome_words
 from chilopod.paper.walk_measures import spring_for
 from chilopod.show.panel import Panel
@@ -60,7 +69,7 @@ def criteria(found: RobotTurning, letter: str, walks: RobotWalks | None) -> Pane
     return Panel(
         name=f"robot-criteria-{letter.lower()}",
         title=f"The robot in three dimensions: the three criteria, task {letter}",
-        draw=lambda narrow: draw_criteria(task, k_hat, narrow, _TOP),
+        draw=lambda narrow: draw_criteria({walks_of(task): task}, narrow, _TOP, k_hat=k_hat),
         alt=f"Distance, angle and leg yaw over 1/{k(1)}: {places(task)}.",
         text=(
             f"Means and standard errors of {task.criteria.sizes['repeat']} walks at {number(task.time)}\u00a0s. "
@@ -102,9 +111,9 @@ def comparison(found: RobotTurning) -> Panel:
         alt="The three criteria over the spring for the two strategies.",
         text=(
             "Task A with all springs alike, the paper's five values, at the same time and with the same disturbances. "
-            f"At best, pitchfork against Hopf: {typeset(hopf.words(task, found.hopf))}. In the paper all three are "
+            f"At best, pitchfork against Hopf: {typeset(in_words(task, found.hopf))}. In the paper all three are "
             f"lower for the pitchfork. {SURE:g} standard errors of the difference, seed by seed, decide here. The "
-            f"third says little where it is nearly saturated: {typeset(hopf.saturation(task, found.hopf))}.",
+            f"third says little where it is nearly saturated: {typeset(saturation(task, found.hopf))}.",
         ),
         data=both_strategies(task, found.hopf),
     )
