@@ -35,10 +35,9 @@ class RadiusRatio:
     ----------
     distance, distance_error
         At equal distances from each one's own onset, with its standard error; NaN if they have no distance in common.
-    springs, springs_error
-        At equal springs, mean over those at which two trials of both curve; NaN if there is none.
-    compared
-        These springs, N*mm/deg.
+    springs, springs_error, compared
+        At equal springs, mean over those (``compared``, N*mm/deg) at which two trials of both curve; NaN if there is
+        none.
     """
 
     distance: float
@@ -57,11 +56,9 @@ def radius_ratio(base: xr.Dataset, variant: xr.Dataset, drawn: int = DRAWN, seed
         Over spring and repeat: ``axis_radius``, ``direction`` and ``settled``, as
         :func:`chilopod.tasks.radius_law.end_of_walk` has them. What counts, see
         :func:`chilopod.paper.walk_measures.counted`.
-    drawn
-        Number of times that trials are drawn anew at every spring for the standard errors, onsets fitted anew each
-        time; 0 for none.
-    seed
-        Seed of the drawing.
+    drawn, seed
+        Number of times that trials are drawn anew at every spring for the standard errors, onsets fitted anew each time
+        (0 for none), and seed of the drawing.
     """
     inverse, bends = zip(*(_bends(each) for each in (base, variant)), strict=True)
     found = _ratios(inverse, bends)

@@ -34,12 +34,9 @@ class Movie:
     ----------
     name, heading, titles
         Name of its files, heading above all panels, and titles of these.
-    record
-        The walks.
-    speed
-        Seconds of the walks per second of the film.
-    stills
-        Moments of it that are pictured in three dimensions, s; none of a film from above.
+    speed, stills
+        Seconds of the walks per second of the film, and moments of it that are pictured in three dimensions, s; none of
+        a film from above.
     size
         Width and height of a film from above, pixels; that of three panels in a row.
     """
@@ -61,7 +58,7 @@ def movies(
     progress: Progress = silent,
     shorter: float = 1.0,
 ) -> list[Movie]:
-    """Walk what is filmed.
+    """Walk what is filmed, or a part of it that is ``shorter``.
 
     Parameters
     ----------
@@ -71,10 +68,6 @@ def movies(
         minutes to bend.
     best
         First spring for task A, N*m/rad; movie 2 shows it between one that is too stiff and one that is too soft.
-    folder, progress
-        As for :func:`chilopod.trials.run`.
-    shorter
-        Part of the durations that is walked.
     """
     joints = robot.body.modules - 1
     bend, tried = (_BEND + (0.0,) * joints)[:joints], (4.0 * best, best, 0.7 * best)
@@ -90,17 +83,8 @@ def robot_movies(
     progress: Progress = silent,
     shorter: float = 1.0,
 ) -> list[Movie]:
-    """The same of the whole robot: the walks of movie 1 start straight but for their disturbance, as the paper's do.
-
-    Parameters
-    ----------
-    robot
-        With a twin.
-    tried
-        First springs for task A, N*m/rad: too stiff, best, too soft.
-    springs, folder, progress, shorter
-        As for :func:`movies`.
-    """
+    """The same of the whole robot: the walks of movie 1 start straight but for their disturbance, as the paper's do;
+    those of movie 2 have the springs ``tried``, N*m/rad: too stiff, best, too soft."""
     walk = Trial(robot, shorter * _ROBOT_WALK, 1, rate=25.0, engine="twin", poses=True)
     found = _movies("robot-", walk, shorter * _ROBOT_TASK, (springs, tried), folder, progress, speed=3.0)
     return [

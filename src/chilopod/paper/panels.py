@@ -88,17 +88,8 @@ def draw_fork(
     fit: SquareRootFit | None,
     law: tuple[str, str],
 ) -> None:
-    """Mean angle of joint 1 over 1/k1.
-
-    Parameters
-    ----------
-    data
-        Trials over spring, repeat and joint.
-    sides
-        Colour, marker and name of the trials in each direction.
-    fit, law
-        Square-root law through them, if there is one, and its colour and name.
-    """
+    """Mean angle of joint 1 over 1/k1 of trials over spring, repeat and joint, with colour, marker and name of the
+    trials in each direction, and the square-root law through them, if there is one, with its colour and name."""
     inverse, angles = 1.0 / data.spring.values, np.rad2deg(data.mean_angle.sel(joint=1).values)
     for side, look in sides.items():
         errorbars(axes, inverse, *means(angles, data.direction.values == side), *look)
@@ -118,13 +109,8 @@ def draw_robot_radii(axes: Axes, places: Sequence[float]) -> None:
 
 
 def draw_joints(axes: Axes, data: xr.Dataset, here: NDArray[np.bool_] | bool, along: Array, angles: Array) -> None:
-    """Mean absolute angle of every joint over 1/k1, of the trials chosen, on lines.
-
-    Parameters
-    ----------
-    along, angles
-        1/k1 and angles (deg) of the lines, shapes (points,) and (points, joint).
-    """
+    """Mean absolute angle of every joint over 1/k1, of the trials chosen, on lines through angles (deg, shape (points,
+    joint)) at values of 1/k1."""
     inverse = 1.0 / data.spring.values
     styles = style.joint_styles(data.sizes["joint"])
     for joint, line, (color, marker) in zip(data.joint.values, np.abs(angles).T, styles, strict=True):

@@ -70,10 +70,9 @@ class Variant:
     ----------
     overrides
         Overrides of the robot's description, as ``--set`` takes them.
-    model
-        The planar model's critical k1, over that as built.
-    onset, radius
-        Spring at which the robot's curved walks set in, and their radius over that as built.
+    model, onset, radius
+        The planar model's critical k1 over that as built, the spring at which the robot's curved walks set in, and
+        their radius over that as built.
     """
 
     overrides: tuple[str, ...]

@@ -52,16 +52,10 @@ class Difference:
 
 
 def difference(one: ArrayLike, other: ArrayLike, *, paired: bool = False) -> Difference:
-    """The mean of some trials less that of others.
+    """The mean of some trials less that of others, shapes (n,) and (m,); NaN does not count.
 
-    Parameters
-    ----------
-    one, other
-        A value of every trial, shapes (n,) and (m,); NaN does not count.
-    paired
-        True if trials of equal index belong together, as those of one seed do; then the scatter of their differences
-        counts. Else the trials are independent.
-    """
+    If they are paired, trials of equal index belong together, as those of one seed do; then the scatter of their
+    differences counts. Else the trials are independent."""
     x, y = np.asarray(one, dtype=np.float64), np.asarray(other, dtype=np.float64)
     if paired:
         return Difference(*mean_and_error(x - y))

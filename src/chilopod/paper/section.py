@@ -51,14 +51,12 @@ class Context:
 
     Attributes
     ----------
-    robot
-        Robot of the planar model; the paper's numbers are those of ``aoi2022-planar``.
-    whole
-        Whole robot of the sections in three dimensions, with a twin.
-    size
-        Amount of every computation.
-    folder
-        Folder of the records of trials, with which a stopped computation is resumed; without one nothing is kept.
+    robot, whole
+        Robot of the planar model, and whole robot of the sections in three dimensions, with a twin; the paper's numbers
+        are those of ``aoi2022-planar`` and ``aoi2022``.
+    size, folder
+        Amount of every computation, and folder of the records of trials, with which a stopped computation is resumed;
+        without one nothing is kept.
     """
 
     robot: Robot = field(default_factory=lambda: load_robot("aoi2022-planar"))
@@ -82,28 +80,21 @@ class Section(Generic[T]):
 
     Attributes
     ----------
-    name, chapter
-        Name on the command line, and chapter of the page.
-    sentence
-        Description in a few words.
+    name, chapter, sentence
+        Name on the command line, chapter of the page, and description in a few words.
     compute
         Computation, given the context, where to say how far it is, and the results of what the section needs.
     rows
         Lines of the tables, given what was computed and the results of what the section needs.
-    panels
-        Figures, given what was computed and the results of the sections beside it.
-    films
-        Films, given what was computed.
-    needs
-        Sections whose results it uses; they come before it. A result that was not computed is None.
-    beside
-        Sections whose results its figures show; they are drawn once more when these are computed.
-    beyond
-        True if it goes beyond the paper's own experiments.
-    on_request
-        True if it is computed only if it is asked for by name.
-    full
-        True if it is left out of a quick report unless it is asked for by name.
+    panels, films
+        Figure or figures, given what was computed and the results of the sections beside it; films, given what was
+        computed.
+    needs, beside
+        Sections whose results it uses, which come before it, and sections whose results its figures show, which are
+        drawn once more when these are computed. A result that was not computed is None.
+    beyond, on_request, full
+        True if it goes beyond the paper's own experiments, if it is computed only if it is asked for by name, and if it
+        is left out of a quick report unless it is asked for by name.
     """
 
     name: str
@@ -111,13 +102,18 @@ class Section(Generic[T]):
     sentence: str
     compute: Callable[..., T]
     rows: Callable[..., Sequence[Line]] = nothing
-    panels: Callable[..., Iterable[Panel]] = nothing
+    panels: Callable[..., Panel | Iterable[Panel]] = nothing
     films: Callable[[T], Iterable[Movie]] = nothing
     needs: tuple[Section[Any], ...] = ()
     beside: tuple[Section[Any], ...] = ()
     beyond: bool = False
     on_request: bool = False
     full: bool = False
+
+    def figures(self, found: Found) -> list[Panel]:
+        """Figures of what was found."""
+        drawn = self.panels(found[self], *found.of(self.beside))
+        return [drawn] if isinstance(drawn, Panel) else list(drawn)
 
 
 @dataclass
@@ -127,11 +123,9 @@ class Found:
     Attributes
     ----------
     context
-        Robots, size and folder of the computation.
-    values, rows, seconds
-        Result, lines of the tables and duration (s) of the sections that were computed.
-    failures
-        Errors of sections that could not be computed.
+        Ground of the computation.
+    values, rows, seconds, failures
+        Results, lines of the tables, durations (s) and errors of the sections that were computed, or could not be.
     """
 
     context: Context = field(default_factory=Context)
@@ -184,14 +178,10 @@ def reproduce(
 
     Parameters
     ----------
-    sections
-        See :func:`chilopod.paper.registry.chosen`.
-    context
-        By default the paper's robots.
-    progress
-        Called as the work goes on.
-    told
-        Called after every section with all that is found by then, and the section.
+    sections, context
+        See :func:`chilopod.paper.registry.chosen`; by default of the paper's robots.
+    progress, told
+        Called as the work goes on, and after every section with all that is found by then, and the section.
 
     Raises
     ------

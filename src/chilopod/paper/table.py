@@ -79,14 +79,11 @@ class Row:
 
     Attributes
     ----------
-    quantity, paper
-        Subject of the line, and statement of the paper in words; it says so where the paper prints none.
-    computed
-        Result of the computation.
-    where
-        Section or figure of the paper.
-    verdict, remark
-        Verdict of the comparison, and reason for a difference, if there is one.
+    quantity, paper, where
+        Subject of the line, statement of the paper in words (it says so where the paper prints none), and its place
+        there.
+    computed, verdict, remark
+        Result of the computation, verdict of the comparison, and reason for a difference, if there is one.
     """
 
     quantity: str
@@ -117,17 +114,8 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Statement(Generic[S]):
-    """Something that the paper says of its robot, or that is asked of the twin besides.
-
-    Attributes
-    ----------
-    quantity
-        Subject of the statement.
-    said
-        Statement of the paper and condition on the twin, on a number if it is a :class:`Band`.
-    kind
-        Fitted if the twin was fitted to it.
-    """
+    """Something that the paper says of its robot, or that is asked of the twin besides: subject, statement and
+    condition on the twin, on a number if it is a :class:`Band`, and whether the twin was fitted to it."""
 
     quantity: str
     said: S

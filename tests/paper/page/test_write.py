@@ -25,8 +25,7 @@ from helpers.html_page import Page
 
 
 def figures(found):
-    drawn = [each for each in load_sections() if each in found.values]
-    panels = [panel for each in drawn for panel in each.panels(found[each], *found.of(each.beside))]
+    panels = [panel for each in load_sections() if each in found.values for panel in each.figures(found)]
     return sorted([schematic.panel(found.context.robot), *panels], key=lambda panel: panel.letter)
 
 

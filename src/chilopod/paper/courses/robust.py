@@ -62,16 +62,13 @@ class Condition:
 
     Attributes
     ----------
-    name
-        In a few words.
-    changes
-        Changes of the robot, as ``--set`` takes them; the law does not know.
+    name, changes
+        Name in a few words, and changes of the robot, as ``--set`` takes them; the law does not know.
     disturbance, engine
         Disturbance besides what the course's seed draws, and engine of the walks.
-    own_law
-        True if the law is made for what ``changes`` say, and drives the robot as it is.
-    only_variable
-        True if it concerns the actuator of the spring alone.
+    own_law, only_variable
+        True if the law is made for what ``changes`` say, and drives the robot as it is; true if the condition concerns
+        the actuator of the spring alone.
     """
 
     name: str
@@ -125,19 +122,9 @@ def under(
     seeds: Sequence[int],
     progress: Progress = silent,
 ) -> xr.Dataset:
-    """Courses under conditions that the law does not know of, by the variable spring and by one spring for all.
-
-    Parameters
-    ----------
-    spring
-        The one for all, N*mm/deg.
-    conditions
-        Conditions of walks whose engines have the same patience.
-
-    Returns
-    -------
-    As of :func:`chilopod.paper.courses.study.driven`, but over (condition, strategy, course, goal).
-    """
+    """Courses under conditions that the law does not know of, by the variable spring and by one spring for all
+    (N*mm/deg): as of :func:`chilopod.paper.courses.study.driven`, but over (condition, strategy, course, goal). The
+    engines of all conditions have the same patience."""
     robot, cases = robot_of(context, variable), []
     for condition in conditions:
         changed = robot.set_from_text(condition.changes)

@@ -87,7 +87,7 @@ ROBUST: Section[Robust] = Section(
     "random courses: what the law owes to its steps, and what it stands",
     _robust,
     lambda data, courses: robust_rows(data.steps, data.conditions),
-    lambda data: [figures.robust(data)],
+    figures.robust,
     needs=(COURSES,),
     beyond=True,
 )

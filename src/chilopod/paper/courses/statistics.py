@@ -53,26 +53,16 @@ def wilson(successes: int, count: int) -> Interval:
 def bootstrap_mean(values: ArrayLike, seed: int = 0) -> Interval:
     """Mean of what is not NaN, with the percentile interval of the bootstrap.
 
-    Parameters
-    ----------
-    values
-        Shape (groups,) or (groups, members). Groups are independent and are drawn anew as a whole; members of one, as
-        the targets of one course, need not be.
-    """
+    Groups, shape (groups,) or (groups, members), are independent and are drawn anew as a whole; members of one, as the
+    targets of one course, need not be."""
     table = np.asarray(values, dtype=np.float64)
     table = table.reshape(len(table), -1)
     return bootstrap_ratio(np.nansum(table, axis=1), np.isfinite(table).sum(axis=1), seed)
 
 
 def bootstrap_ratio(of: ArrayLike, to: ArrayLike, seed: int = 0) -> Interval:
-    """Sum over sum, with the percentile interval of the bootstrap.
-
-    Parameters
-    ----------
-    of, to
-        Sums of independent groups, which are drawn anew as a whole, shape (groups,); groups in which both are 0 count
-        for nothing.
-    """
+    """Sum over sum of independent groups, shape (groups,), which are drawn anew as a whole, with the percentile
+    interval of the bootstrap; groups in which both are 0 count for nothing."""
     above, below = np.asarray(of, dtype=np.float64), np.asarray(to, dtype=np.float64)
     groups = np.flatnonzero((above != 0.0) | (below != 0.0))
     if not below.any():

@@ -30,13 +30,8 @@ class InverseLaw(SpringLaw):
 
 @dataclass(frozen=True)
 class EarlierLaw(SpringLaw):
-    """As the law, but it never straightens for a target within its tightest circle.
-
-    Attributes
-    ----------
-    searches
-        True if a target that is not seen is looked for, else it leaves the spring as it is.
-    """
+    """As the law, but it never straightens for a target within its tightest circle; it looks for a target that is not
+    seen if it ``searches``, else that leaves the spring as it is."""
 
     searches: bool = True
 

@@ -76,10 +76,8 @@ def driven(context: Context, cases: Sequence[Case], seeds: Sequence[int], progre
 
     Parameters
     ----------
-    cases
-        In one engine, or in engines that have the same patience.
-    seeds
-        Seeds of the courses.
+    cases, seeds
+        In one engine, or in engines that have the same patience, and the seeds of the courses.
 
     Returns
     -------
@@ -120,12 +118,7 @@ def driven(context: Context, cases: Sequence[Case], seeds: Sequence[int], progre
 
 
 def compared(context: Context, variable: Driver, plan: Plan, progress: Progress = silent) -> xr.Dataset:
-    """All strategies on the same courses.
-
-    Parameters
-    ----------
-    variable
-        Robot with the spring that is set on the way, from :func:`prepared`.
+    """All strategies on the same courses; ``variable`` is the one of :func:`prepared`.
 
     Returns
     -------

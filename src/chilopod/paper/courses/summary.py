@@ -26,23 +26,17 @@ class Summary:
         The strategy's, and the one it walks with, N*mm/deg; NaN for none.
     targets, courses
         Shares that are reached, of courses as a whole.
-    seconds
-        Time for a target that is reached, s.
-    spent
-        Time on all targets, for every one that is reached, s; one that is not reached counts with its whole patience,
-        also where the robot has failed before.
+    seconds, spent
+        Time for a target that is reached, s, and time on all targets for every one that is reached; one that is not
+        reached counts with its whole patience, also where the robot has failed before.
     later
-        By how much later than the variable spring, s, at targets that both reach; the mean of the differences.
-    spring_work, drive_work
-        Work of the actuators of springs and joints, mean, J a course.
-    more_work
-        By how much more than the variable spring's their sum is, J a course.
-    effort
-        Effort of the leg yaw, mean, rad^2 s a course.
-    detour
-        Path over the shortest with circles of the radius law, of all targets that are reached together.
-    cost
-        Steering cost of transport.
+        Mean difference to the variable spring's time, s, at targets that both reach.
+    spring_work, drive_work, more_work
+        Mean work of the actuators of springs and of joints, and how much more their sum is than the variable spring's,
+        J a course.
+    effort, detour, cost
+        Mean effort of the leg yaw, rad^2 s a course; path over the shortest with circles of the radius law, of all
+        targets that are reached together; steering cost of transport.
     """
 
     name: str

@@ -25,12 +25,12 @@ BRANCH: Section[xr.Dataset] = Section(
     CHAPTER,
     "the curved walks beyond the pitchfork",
     lambda context, report: curved_walks(context.robot, K1, _SPRINGS, longest=0.05, progress=report),
-    panels=lambda data: [branch.panel(data)],
+    panels=branch.panel,
 )
 UNDULATION: Section[xr.Dataset] = Section(
     "undulation",
     CHAPTER,
     "undulating walks of uniform springs",
     lambda context, report: undulating_walks(context.robot, context.size.cut(DISTANCES, DISTANCES[-2:]), report),
-    panels=lambda data: [undulation.panel(data)],
+    panels=undulation.panel,
 )

@@ -42,18 +42,15 @@ class CurvedStudy:
 
     Attributes
     ----------
-    trials, examples
-        See :func:`chilopod.paper.curved.trials.curved_trials`, :func:`chilopod.paper.walk_measures.example_walks`.
+    trials, examples, agreement
+        See :mod:`chilopod.paper.curved.trials`: of ``curved_trials``, and ``off_branch`` (rad) of trials without spread
+        of friction; and :func:`chilopod.paper.walk_measures.example_walks`.
     branch
         The exact curved walks, turning right, see :func:`chilopod.analysis.branch.curved_walks`.
-    fits, law
-        See :func:`onset_fits` and :func:`law_along_branch`.
-    agreement
-        See :func:`chilopod.paper.curved.trials.off_branch`: rad, of trials without spread of friction.
+    fits, law, comparison
+        See :func:`onset_fits`, :func:`law_along_branch` and :func:`compared`.
     variants, branches
         Trials and branch by variant, "as built" first.
-    comparison
-        See :func:`compared`.
     """
 
     trials: xr.Dataset

@@ -110,16 +110,9 @@ def curved_trials(
 def off_branch(robot: Robot, trials: xr.Dataset, branch: xr.Dataset) -> xr.DataArray:
     """How far the walks ended from the periodic orbit of the branch at their very spring.
 
-    The orbit is solved anew at every spring, from the branch's points beside it; a left turn is compared with the
-    mirror image of the right one half a period later.
-
-    Parameters
-    ----------
-    robot, trials
-        Robot of trials and branch, and trials of :func:`curved_trials` without spread of friction, which the branch
-        does not have.
-    branch
-        From :func:`chilopod.analysis.branch.curved_walks` over k1, turning right.
+    The orbit is solved anew at every spring, from the points beside it of a branch that turns right; a left turn is
+    compared with the mirror image of the right one half a period later. The trials, from :func:`curved_trials`, are
+    without spread of friction, which the branch does not have.
 
     Returns
     -------
@@ -160,18 +153,8 @@ def variant_trials(
 ) -> dict[str, xr.Dataset]:
     """Trials of the paper's variants at the same springs relative to each one's own pitchfork.
 
-    Parameters
-    ----------
-    base
-        Trials of the robot as built, from :func:`curved_trials`, of which the springs up to 1.2 times the critical one
-        are used.
-    repeats
-        Trials at every spring; of ``base`` the first so many.
-
-    Returns
-    -------
-    By variant, "as built" first, a dataset as :func:`curved_trials` gives.
-    """
+    ``base`` are trials of the robot as built, from :func:`curved_trials`, of which the first so many repeats at springs
+    up to 1.2 times the critical one are used. By variant, "as built" first, a dataset as :func:`curved_trials` gives."""
     ratios = base.spring.values / base.attrs["critical_k1"]
     ratios = ratios[ratios < 1.2]
     robots = {name: each for name, each in printed.variant_robots(robot).items() if name != printed.AS_BUILT}

@@ -48,24 +48,19 @@ SPREAD: Section[xr.Dataset] = Section(
     CHAPTER,
     "the whole robot in 3-D: other constants that fit as well",
     twin_spread,
-    panels=lambda data: [trust.spread(data)],
+    panels=trust.spread,
     beyond=True,
     full=True,
 )
 NUMERICS: Section[xr.Dataset] = Section(
-    "robot-numerics",
-    CHAPTER,
-    "the whole robot in 3-D: finer steps",
-    numerics.twin_numerics,
-    numerics.rows,
-    beyond=True,
+    "robot-numerics", CHAPTER, "the whole robot in 3-D: finer steps", numerics.twin_numerics, numerics.rows, beyond=True
 )
 STRUCTURES: Section[xr.Dataset] = Section(
     "robot-structures",
     CHAPTER,
     "the whole robot in 3-D: what else it could be made of",
     structures,
-    panels=lambda data: [trust.structures(data)],
+    panels=trust.structures,
     beyond=True,
     on_request=True,
 )
@@ -75,6 +70,6 @@ WHY: Section[xr.Dataset] = Section(
     "why the robot bends earlier than the planar model",
     why.ablation,
     why.rows,
-    lambda data: [trust.why(data)],
+    trust.why,
     beyond=True,
 )

@@ -99,13 +99,8 @@ def predictions(robot: Robot, folder: Folder = None, engine: str = "twin", size:
     """Where curved and undulating walks set in other than in the base series, and how tight they are.
 
     Few and undisturbed walks, which begin bent, in place of the many from straight on that
-    :func:`chilopod.paper.robot.walks.robot_walks` has.
-
-    Returns
-    -------
-    By variant ``onset`` (N*mm/deg) and ``radius`` (over that as built, at an equal distance from each one's own onset),
-    NaN where walks determine none; and ``uniform`` (N*mm/deg).
-    """
+    :func:`chilopod.paper.robot.walks.robot_walks` has. By variant ``onset`` (N*mm/deg) and ``radius`` (over that as
+    built, at an equal distance from each one's own onset), NaN where walks determine none; and ``uniform`` (N*mm/deg)."""
     shape = np.array(printed.mode_shape(robot))
     bend = tuple(_BENT * shape / shape.sum())
     variants = printed.variant_robots(robot)

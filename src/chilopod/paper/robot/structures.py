@@ -111,14 +111,8 @@ HEAVY_FRONT = twin.Edited("heavy front", _heavy_front)
 
 @dataclass(frozen=True)
 class Structure:
-    """Structure that the robot could have, in a word and a sentence.
-
-    Attributes
-    ----------
-    overrides, edited
-        Overrides of the robot's description, as ``--set`` takes them, or the name of an engine in this module, if a
-        robot file cannot say it.
-    """
+    """Structure that the robot could have, in a word and a sentence: overrides of the robot's description, as ``--set``
+    takes them, or the name of an engine in this module, if a robot file cannot say it."""
 
     name: str
     sentence: str

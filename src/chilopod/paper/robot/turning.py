@@ -30,17 +30,8 @@ as long again lets a robot that is as fast arrive, or pass the target."""
 
 @dataclass(frozen=True)
 class RobotTurning:
-    """Results of the tasks.
-
-    Attributes
-    ----------
-    robot, tasks
-        The robot, and the paper's two tasks, by letter.
-    hopf
-        Task A with uniform springs.
-    without
-        Task A with and without leg yaw at the paper's spring.
-    """
+    """Results of the paper's two tasks, by letter, of task A with uniform springs, and of task A with and without leg
+    yaw at the paper's spring."""
 
     robot: Robot
     tasks: Mapping[str, TurningTask]

@@ -70,19 +70,14 @@ class RobotWalks:
 
     Attributes
     ----------
-    robot, base
-        The robot as built, and its walks, see :func:`walk_ends`.
-    durations
-        See :func:`by_duration`.
-    variants
-        As ``base``, of the paper's three variants, by name.
-    lower_steps
-        The same of those of them that change the stride, with another reading of what the paper leaves open: that a
-        shorter half ellipse of the leg tips is lower in proportion, see :func:`lower_steps`.
-    examples
-        Joint angles (rad) over time of one straight and one curved walk, over (time, spring, joint).
-    uniform
-        See :func:`undulations`.
+    robot, base, durations
+        The robot as built, and its walks, see :func:`walk_ends` and :func:`by_duration`.
+    variants, lower_steps
+        As ``base``, of the paper's three variants, by name; and of those of them that change the stride, with another
+        reading of what the paper leaves open: that a shorter half ellipse of the leg tips is lower in proportion, see
+        :func:`lower_steps`.
+    examples, uniform
+        See :func:`chilopod.paper.walk_measures.example_walks` and :func:`undulations`.
     """
 
     robot: Robot
@@ -144,17 +139,9 @@ def walk_records(
 def walk_ends(
     records: Sequence[xr.Dataset], robot: Robot, springs: Sequence[float], duration: float | None = None
 ) -> xr.Dataset:
-    """Numbers that walks of :func:`walk_records` come to at their ends.
-
-    Parameters
-    ----------
-    duration
-        s, after which the walks are cut; by default not at all.
-
-    Returns
-    -------
-    Dataset over spring (N*mm/deg), repeat and joint: what :func:`chilopod.tasks.radius_law.end_of_walk` makes of each.
-    """
+    """Numbers that walks of :func:`walk_records` come to at their ends, or where they are cut, ``duration`` (s) after
+    the start, over spring (N*mm/deg), repeat and joint: what :func:`chilopod.tasks.radius_law.end_of_walk` makes of
+    each."""
     last = float(records[0].time[-1]) if duration is None else duration
     ends = [end_of_walk(record.sel(time=record.time <= last + 1e-9), robot) for record in records]
     data = by_spring(ends, springs)

@@ -12,36 +12,16 @@ from chilopod.tasks.identify import Identification
 CHAPTER = "The straight walk and where it bends"
 
 MODE: Section[xr.Dataset] = Section(
-    "mode",
-    CHAPTER,
-    "the pitchfork in k1 and its mode",
-    study.critical_mode,
-    rows.mode_rows,
-    lambda data: [figures.mode(data)],
+    "mode", CHAPTER, "the pitchfork in k1 and its mode", study.critical_mode, rows.mode_rows, figures.mode
 )
 EXPONENTS: Section[xr.Dataset] = Section(
-    "exponents",
-    CHAPTER,
-    "Floquet exponents as k1 falls",
-    study.exponent_sweep,
-    panels=lambda data, mode: [exponents.panel(data, mode)],
-    beside=(MODE,),
+    "exponents", CHAPTER, "Floquet exponents as k1 falls", study.exponent_sweep, panels=exponents.panel, beside=(MODE,)
 )
 VARIANTS: Section[xr.Dataset] = Section(
-    "variants",
-    CHAPTER,
-    "critical k1 for the paper's variants",
-    study.variants,
-    rows.variant_rows,
-    lambda data: [figures.variants(data)],
+    "variants", CHAPTER, "critical k1 for the paper's variants", study.variants, rows.variant_rows, figures.variants
 )
 MODULES: Section[xr.Dataset] = Section(
-    "modules",
-    CHAPTER,
-    "critical k1 over the number of modules",
-    study.module_counts,
-    rows.module_rows,
-    lambda data: [figures.modules(data)],
+    "modules", CHAPTER, "critical k1 over the number of modules", study.module_counts, rows.module_rows, figures.modules
 )
 UNIFORM: Section[xr.Dataset] = Section(
     "uniform",
@@ -49,7 +29,7 @@ UNIFORM: Section[xr.Dataset] = Section(
     "the Neimark-Sacker point of uniform springs",
     study.uniform_springs,
     rows.uniform_rows,
-    lambda data: [figures.uniform(data)],
+    figures.uniform,
 )
 IDENTIFICATION: Section[Identification] = Section(
     "identification",
@@ -57,6 +37,6 @@ IDENTIFICATION: Section[Identification] = Section(
     "the constants the paper does not print",
     study.identified,
     rows.identification_rows,
-    lambda fit: [identification.panel(fit)],
+    identification.panel,
     beyond=True,
 )

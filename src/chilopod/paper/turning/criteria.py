@@ -24,12 +24,8 @@ _COLUMNS = ("spring", "at", "softest", "stiffest", "mean", "error")
 
 
 def minima(criteria: xr.Dataset, instant: int = 0) -> xr.Dataset:
-    """Where each criterion of a :class:`TurningTask` is smallest, in means over repeats.
-
-    Parameters
-    ----------
-    instant
-        0: the earliest arrival, 1: the paper's 23 s.
+    """Where each criterion of a :class:`TurningTask` is smallest, in means over repeats, at an instant: 0 is the
+    earliest arrival, 1 the paper's 23 s.
 
     Returns
     -------

@@ -302,12 +302,10 @@ def draw_criteria(
     name: str = k(1),
     k_hat: float | None = None,
 ) -> Figure:
-    """The three criteria over 1/k.
+    """The three criteria over 1/k of one or two tasks by their names.
 
     Parameters
     ----------
-    shown
-        One or two tasks by their names.
     top, name
         Springs to mark on the top axis, N*mm/deg, and the name of the spring.
     k_hat

@@ -50,14 +50,11 @@ class Turning:
 
     Attributes
     ----------
-    robot, laws
-        The robot, and its radius laws.
-    tasks
-        The paper's two, by letter.
-    hopf, rough
-        Task A with uniform springs, and with a disturbance :data:`ROUGH` times as large.
-    hopf_point
-        The Neimark-Sacker point of uniform springs, N*mm/deg.
+    robot, laws, tasks
+        The robot, its radius laws, and the paper's two tasks, by letter.
+    hopf, rough, hopf_point
+        Task A with uniform springs, and with a disturbance :data:`ROUGH` times as large; the Neimark-Sacker point of
+        uniform springs, N*mm/deg.
     without
         Task A with and without leg yaw, at the best spring and at the law's.
     settled, farther

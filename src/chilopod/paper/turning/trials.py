@@ -52,15 +52,12 @@ class TurningTask:
 
     Attributes
     ----------
-    target
-        Place of the target.
     criteria
         Over (instant, spring, repeat): ``distance`` (m), ``angle`` (rad) and ``effort`` (rad^2 s), epsilon 1 to 3, at
-        the ``seconds`` of the two instants "earliest arrival" and "paper" (:data:`DURATION`); means over repeats and
-        standard errors as
-        ``distance_mean``, ``distance_error`` and so on (NaN where a repeat did not walk so long). Over (spring,
-        repeat): ``effort_until_arrival`` (or until the end, rad^2 s), ``arrival`` (s, NaN if never), ``nearest`` (m),
-        ``outcome`` and ``status``.
+        the ``seconds`` of the two instants "earliest arrival" and "paper" (:data:`DURATION`); their means over repeats
+        and standard errors as ``distance_mean``, ``distance_error`` and so on (NaN where a repeat did not walk so
+        long). Over (spring, repeat): ``effort_until_arrival`` (or until the end, rad^2 s), ``arrival`` (s, NaN if
+        never), ``nearest`` (m), ``outcome`` and ``status``.
     paths
         Over (shown, repeat, time): ``x`` and ``y`` (m) of module 1, ``distance`` (m) and ``bearing`` (rad, continuous)
         of the target, of three springs: the best, and the grid's nearest to 15/21 and 41/21 of it as in the paper. The
@@ -111,14 +108,10 @@ def turning_task(
     progress: Progress = silent,
     **walk: Any,
 ) -> TurningTask:
-    """Walk towards a target with every spring, several times.
+    """Walk towards a target with every spring (N*mm/deg), several times, with the seeds 0, 1, ...
 
     Parameters
     ----------
-    springs, repeats
-        N*mm/deg, and trials with each, with the seeds 0, 1, ...
-    strategy
-        One of :data:`chilopod.steering.STRATEGIES`.
     time
         Time at which epsilon 1 to 3 are taken, s; by default the earliest arrival of any of these trials, as in the
         paper, and ``duration`` if none arrives.
@@ -275,14 +268,8 @@ def without_leg_yaw(
     progress: Progress = silent,
     **walk: Any,
 ) -> xr.Dataset:
-    """The same task with and without leg yaw (Fig. "without": five trials and nine).
-
-    Parameters
-    ----------
-    springs
-        Values of k1 by name, N*mm/deg.
-    duration, walk
-        As for :func:`turning_task`.
+    """The task of :func:`turning_task` with and without leg yaw (Fig. "without": five trials and nine), at values of k1
+    (N*mm/deg) by name.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Walks of the whole robot as the paper arranges them (Fig. "curved", "absolute", "different"), and how long they last."""
+"""Walks of the whole robot as the paper arranges them (Fig. "curved", "absolute", "different"), and their duration."""
 
 from __future__ import annotations
 
