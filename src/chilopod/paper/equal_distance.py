@@ -16,12 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from chilopod.paper.scatter import drawn_anew, mean_and_error
-from chilopod.paper.walk_measures import counted, fitted, point_of
-
-Array = NDArray[np.float64]
+from chilopod.paper.measures import counted, fitted, point_of
+from chilopod.paper.scatter import Array, drawn_anew, mean_and_error
 
 DRAWN = 200
 """Sets of trials that are drawn anew for the standard errors."""
@@ -55,7 +52,7 @@ def radius_ratio(base: xr.Dataset, variant: xr.Dataset, drawn: int = DRAWN, seed
     base, variant
         Over spring and repeat: ``axis_radius``, ``direction`` and ``settled``, as
         :func:`chilopod.tasks.radius_law.end_of_walk` has them. What counts, see
-        :func:`chilopod.paper.walk_measures.counted`.
+        :func:`chilopod.paper.measures.counted`.
     drawn, seed
         Number of times that trials are drawn anew at every spring for the standard errors, onsets fitted anew each time
         (0 for none), and seed of the drawing.

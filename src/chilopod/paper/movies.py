@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -103,15 +104,8 @@ def _movies(
     speed: float = 2.0,
 ) -> list[Movie]:
     """Movie 1 of a walk, and movie 2 of task A, in the same engine and so long, with three springs each."""
-    task = replace(
-        walk,
-        duration=duration,
-        seed=0,
-        joint_angles=(),
-        target=TASK_A,
-        controller=LegYawController(),
-        disturbance=NONE,
-    )
+    steered: dict[str, Any] = {"target": TASK_A, "controller": LegYawController(), "disturbance": NONE}
+    task = replace(walk, duration=duration, seed=0, joint_angles=(), **steered)
     asked = [
         replace(each, robot=walk.robot.with_value(K1, value))
         for each, values in zip((walk, task), springs, strict=True)

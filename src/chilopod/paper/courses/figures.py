@@ -9,19 +9,17 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from chilopod.paper.courses.robust import USUAL, Robust
 from chilopod.paper.courses.rows import percent, said
 from chilopod.paper.courses.statistics import Interval
 from chilopod.paper.courses.summary import Summary, share_of_courses, share_of_targets, summaries, verdicts
-from chilopod.paper.panels import finish, legend_below
+from chilopod.paper.scatter import Array
+from chilopod.paper.shapes import finish, legend_below
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import listing, number, spring
 from chilopod.steering import STRATEGIES, VARIABLE
-
-Array = NDArray[np.float64]
 
 _STRATEGIES = (style.Layout("ABC", 3.4, widths=(1.2, 1.0, 1.0)), style.Layout("A;B;C", 8.6))
 _WHERE = (style.Layout("AB", 3.9), style.Layout("A;B", 7.4))
@@ -210,7 +208,7 @@ def _draw_where(maps: dict[str, Array], narrow: bool) -> Figure:
 
 def robust(found: Robust) -> Panel:
     """Steps of the law, and conditions that it does not know of, in the planar model."""
-    steps, conditions = found.steps, found.conditions
+    steps, conditions = found.courses, found.conditions
     grown = listing(f"{name} {percent(share_of_targets(steps.arrived.sel(case=name)))}" for name in steps.case.values)
     return Panel(
         name="courses-robust",
@@ -270,7 +268,7 @@ def _decided(data: xr.Dataset) -> str:
 
 def _draw_robust(found: Robust, narrow: bool) -> Figure:
     figure, axes = style.figure(*_BOTH, narrow)
-    arrived = [found.steps.arrived.isel(case=row) for row in range(found.steps.sizes["case"])]
+    arrived = [found.courses.arrived.isel(case=row) for row in range(found.courses.sizes["case"])]
     targets, courses = ([share(each) for each in arrived] for share in (share_of_targets, share_of_courses))
     _reached(axes["A"], targets, courses, "A  The law, step by step")
     axes["A"].set_yticks(range(len(arrived)), list(_STEP_TITLES[: len(arrived)]))

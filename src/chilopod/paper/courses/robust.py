@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -11,7 +11,7 @@ import xarray as xr
 from chilopod.paper.courses import bumps
 from chilopod.paper.courses.steps import steps
 from chilopod.paper.courses.study import Case, driven, robot_of, without_setting
-from chilopod.paper.section import Context, Size
+from chilopod.paper.section import Context
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import VARIABLE, SpringLaw
@@ -21,17 +21,9 @@ from chilopod.trials import Disturbance
 USUAL = "as usual"
 """The case that others are held against."""
 
-PLANAR_COURSES: Mapping[Size, range] = {
-    Size.FULL: range(2000, 2200),
-    Size.QUICK: range(2000, 2040),
-    Size.TINY: range(2000, 2001),
-}
-WHOLE_COURSES: Mapping[Size, range] = {
-    Size.FULL: range(2000, 2020),
-    Size.QUICK: range(2000, 2005),
-    Size.TINY: range(2000, 2001),
-}
-"""Seeds."""
+PLANAR_COURSES = (range(2000, 2200), range(2000, 2040), range(2000, 2001))
+WHOLE_COURSES = (range(2000, 2020), range(2000, 2005), range(2000, 2001))
+"""Seeds, by :class:`chilopod.paper.section.Size`."""
 
 _FIXED = "pitchfork"
 _OTHER_FIT = ("ground.friction=256.5 N*s/m", "legs.half_width=72.8 mm", "legs.forward_offset=48 mm")
@@ -42,17 +34,10 @@ _ACTUATOR = ("springs.rate=20 N*mm/deg/s", "springs.lag=0.5 s")
 
 @dataclass(frozen=True, eq=False)
 class Robust:
-    """Contributions of the steps of the law, see :func:`ablated`, and disturbed conditions, see :func:`under`."""
+    """Courses by the steps of the law (:func:`ablated`), or by all strategies of the whole robot
+    (:func:`chilopod.paper.courses.study.compared`), and under disturbed conditions (:func:`under`)."""
 
-    steps: xr.Dataset
-    conditions: xr.Dataset
-
-
-@dataclass(frozen=True, eq=False)
-class Whole:
-    """Strategies of the whole robot, see :func:`chilopod.paper.courses.study.compared`, and disturbed conditions."""
-
-    compared: xr.Dataset
+    courses: xr.Dataset
     conditions: xr.Dataset
 
 

@@ -5,17 +5,8 @@ from __future__ import annotations
 import xarray as xr
 
 from chilopod.analysis.parameters import PAPER_UNIT
-from chilopod.paper.courses import figures
-from chilopod.paper.courses.robust import (
-    PLANAR_COURSES,
-    WHOLE_COURSES,
-    Robust,
-    Whole,
-    ablated,
-    planar_conditions,
-    under,
-    whole_conditions,
-)
+from chilopod.paper.courses import figures, robust
+from chilopod.paper.courses.robust import Robust
 from chilopod.paper.courses.rows import compared_rows, condition_rows, robust_rows
 from chilopod.paper.courses.study import PLANAR, WHOLE, compared, prepared, without_setting
 from chilopod.paper.movies import Movie
@@ -38,17 +29,17 @@ def _compared(context: Context, report: Progress) -> xr.Dataset:
 
 
 def _robust(context: Context, report: Progress, found: xr.Dataset | None) -> Robust:
-    variable, seeds = prepared(context), PLANAR_COURSES[context.size]
-    best, conditions = best_fixed(found, _BEST), planar_conditions(context.robot)
-    steps = ablated(context, variable, seeds, part(report, 0.0, 0.2, "steps"))
-    return Robust(steps, under(context, variable, best, conditions, seeds, part(report, 0.2, 1.0)))
+    variable, seeds = prepared(context), context.size.of(*robust.PLANAR_COURSES)
+    best, conditions = best_fixed(found, _BEST), robust.planar_conditions(context.robot)
+    steps = robust.ablated(context, variable, seeds, part(report, 0.0, 0.2, "steps"))
+    return Robust(steps, robust.under(context, variable, best, conditions, seeds, part(report, 0.2, 1.0)))
 
 
-def _whole(context: Context, report: Progress) -> Whole:
-    variable, seeds = prepared(context, "twin"), WHOLE_COURSES[context.size]
+def _whole(context: Context, report: Progress) -> Robust:
+    variable, seeds = prepared(context, "twin"), context.size.of(*robust.WHOLE_COURSES)
     data = compared(context, variable, WHOLE[context.size], part(report, 0.0, 0.7))
-    best, conditions = best_fixed(data, _WHOLE_BEST), whole_conditions(context.whole)
-    return Whole(data, under(context, variable, best, conditions, seeds, part(report, 0.7, 1.0)))
+    best, conditions = best_fixed(data, _WHOLE_BEST), robust.whole_conditions(context.whole)
+    return Robust(data, robust.under(context, variable, best, conditions, seeds, part(report, 0.7, 1.0)))
 
 
 def _film(context: Context, report: Progress, found: xr.Dataset | None) -> list[Movie]:
@@ -86,18 +77,18 @@ ROBUST: Section[Robust] = Section(
     CHAPTER,
     "random courses: what the law owes to its steps, and what it stands",
     _robust,
-    lambda data, courses: robust_rows(data.steps, data.conditions),
+    lambda data, courses: robust_rows(data.courses, data.conditions),
     figures.robust,
     needs=(COURSES,),
     beyond=True,
 )
-ROBOT_COURSES: Section[Whole] = Section(
+ROBOT_COURSES: Section[Robust] = Section(
     "robot-courses",
     CHAPTER,
     "random courses of the whole robot in 3-D",
     _whole,
-    lambda data: [*compared_rows(data.compared), *condition_rows(data.conditions)],
-    lambda data: [figures.strategies(data.compared), figures.whole(data.conditions)],
+    lambda data: [*compared_rows(data.courses), *condition_rows(data.conditions)],
+    lambda data: [figures.strategies(data.courses), figures.whole(data.conditions)],
     beyond=True,
     full=True,
 )

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.stats import norm
 
 from chilopod.paper.scatter import Answer
-
-Array = NDArray[np.float64]
 
 LEVEL = 0.95
 """Level of all intervals."""

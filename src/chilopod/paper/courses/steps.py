@@ -6,12 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.engine import Observation
+from chilopod.paper.scatter import Array
 from chilopod.steering import ARRIVAL_RADIUS, SpringLaw
-
-Array = NDArray[np.float64]
 
 _ALL_THE_WAY = 1e9  # m: to the target, however far
 

@@ -11,18 +11,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from chilopod import trials
 from chilopod.analysis.parameters import PAPER_UNIT, stiffness
+from chilopod.paper.scatter import Array
 from chilopod.paper.section import Context, Size
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.steering import ON_COURSES, VARIABLE, Course, Goal, Verdict
 from chilopod.tasks.course import Driver, driver, random_courses, steering_cost
 from chilopod.trials import Disturbance, Trial
-
-Array = NDArray[np.float64]
 
 _SUMS = {
     "goal_path": "m",

@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from chilopod.paper.courses.statistics import Interval, bootstrap_mean, bootstrap_ratio, wilson
-from chilopod.paper.scatter import Answer
+from chilopod.paper.scatter import Answer, Array
 from chilopod.steering import ON_COURSES, VARIABLE
 
-Array = NDArray[np.float64]
+# Words for yes, undecided and no.
+_REACH = ("reaches more targets than", "reaches as many, for all that can be told, as", "reaches fewer than")
+_SPENT = (
+    "spends less time for every target reached than",
+    "spends as much, for all that can be told, as",
+    "spends more than",
+)
+_LATER = (
+    "is sooner at targets that both reach than",
+    "is there as soon, for all that can be told, as",
+    "is there later than",
+)
+_WORK = ("does less work than",)
 
 
 @dataclass(frozen=True)
@@ -119,39 +130,14 @@ def _work(one: xr.Dataset) -> Array:
 def verdicts(found: dict[str, Summary]) -> dict[str, list[str]]:
     """Decisions of the intervals on the variable spring beside the others: names of these by the words for it."""
     ours, others = found[VARIABLE.name], [each for name, each in found.items() if name != VARIABLE.name]
-    worked = [each for each in others if ON_COURSES[each.name].needs_torque]
-    asked: tuple[tuple[Callable[[Summary], Answer], Sequence[Summary], dict[str, Answer]], ...] = (
-        (
-            lambda each: ours.targets.above(each.targets),
-            others,
-            {
-                "reaches more targets than": True,
-                "reaches as many, for all that can be told, as": None,
-                "reaches fewer than": False,
-            },
-        ),
-        (
-            lambda each: each.spent.above(ours.spent),
-            others,
-            {
-                "spends less time for every target reached than": True,
-                "spends as much, for all that can be told, as": None,
-                "spends more than": False,
-            },
-        ),
-        (
-            lambda each: each.later.sign,
-            others,
-            {
-                "is sooner at targets that both reach than": True,
-                "is there as soon, for all that can be told, as": None,
-                "is there later than": False,
-            },
-        ),
-        (lambda each: each.more_work.sign, worked, {"does less work than": True}),
-    )
+    answers: dict[tuple[str, ...], Callable[[Summary], Answer]] = {
+        _REACH: lambda each: ours.targets.above(each.targets),
+        _SPENT: lambda each: each.spent.above(ours.spent),
+        _LATER: lambda each: each.later.sign,
+        _WORK: lambda each: ON_COURSES[each.name].needs_torque and each.more_work.sign,
+    }
     return {
-        words: [each.title for each in beside if decided(each) is answer]
-        for decided, beside, answers in asked
+        word: [each.title for each in others if answer(each) is wanted]
         for words, answer in answers.items()
+        for word, wanted in zip(words, (True, None, False), strict=False)
     }

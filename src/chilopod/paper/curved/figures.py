@@ -10,42 +10,22 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from chilopod.paper import printed
+from chilopod.paper import printed, shapes
 from chilopod.paper.curved.study import CurvedStudy, axis_radius, bend_order, fluctuation
 from chilopod.paper.curved.trials import on_branch
-from chilopod.paper.panels import (
-    DASHED,
-    INVERSE_UNIT,
-    JOINTS,
-    WALKS,
-    draw_examples,
-    draw_fork,
-    draw_joints,
-    draw_robot_radii,
-    errorbars,
-    finish,
-    over_compliance,
-)
-from chilopod.paper.scatter import means
+from chilopod.paper.scatter import Array, means
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, k, listing, number, signed, spring, typeset
 from chilopod.tasks.radius_law import is_curved
 from chilopod.trials import Disturbance
 
-Array = NDArray[np.float64]
-
 _ONSET = (style.Layout("AB", 3.9), style.Layout("A;B", 7.4))
 _VARIANTS = (style.Layout("AB;CC", 6.6, heights=(1.5, 1.0)), style.Layout("A;B;C", 11.6))
 _STYLES = tuple(zip((style.BLACK, style.BLUE, style.GREEN, style.PURPLE), "os^D", strict=True))
 _MARKED = (41.0, 15.0, 11.0, 9.0, 7.0)  # springs on a short scale
-_SIDES = {
-    "right": (style.BLACK, "o", "trials"),
-    "left": (style.BLACK, "o", ""),
-    "straight": (style.BLACK, "o", ""),
-}
+_SIDES = {"right": (style.BLACK, "o", "trials"), "left": (style.BLACK, "o", ""), "straight": (style.BLACK, "o", "")}
 
 
 def panels(study: CurvedStudy) -> Iterator[Panel]:
@@ -200,8 +180,8 @@ def _along(study: CurvedStudy) -> tuple[Array, Array]:
 
 
 def _draw_walks(study: CurvedStudy, narrow: bool) -> Figure:
-    figure, axes = style.figure(*WALKS, narrow)
-    draw_examples(axes, study.examples, narrow)
+    figure, axes = style.figure(*shapes.WALKS, narrow)
+    shapes.draw_examples(axes, study.examples, narrow)
     trials, exact = study.trials, study.trials.attrs["critical_k1"]
     grid, angles = _along(study)
 
@@ -212,16 +192,16 @@ def _draw_walks(study: CurvedStudy, narrow: bool) -> Figure:
     line = [1.0 / exact, grid[-1]], [0.0, 0.0]
     axes["C"].plot(*line, color=style.BLUE, lw=1.0, linestyle=(0, (1, 2)), label="unstable")
     axes["C"].plot(1.0 / exact, 0.0, "D", color=style.VERMILLION, label="pitchfork", zorder=5)
-    draw_fork(axes["C"], trials, _SIDES, study.fit, (style.ORANGE, "square-root fit"))
+    shapes.draw_fork(axes["C"], trials, _SIDES, study.fit, (style.ORANGE, "square-root fit"))
     axes["C"].set_xlim(start, grid[-1] + 0.004)
-    over_compliance(axes["C"], _MARKED)
+    shapes.over_compliance(axes["C"], _MARKED)
 
     radius, error = means(trials.axis_radius.values, is_curved(trials))
     exact_radius = axis_radius(study.branch, 1.0 / grid[1:])
     axes["D"].plot(exact * grid[1:], exact_radius, color=style.BLUE, label="model, exact")
-    errorbars(axes["D"], exact / trials.spring.values, radius, error, style.BLUE, "o", "model, trials")
+    shapes.errorbars(axes["D"], exact / trials.spring.values, radius, error, style.BLUE, "o", "model, trials")
     places = [printed.ONSET.value / each for each in printed.RADII]
-    draw_robot_radii(axes["D"], places)
+    shapes.draw_robot_radii(axes["D"], places)
     for at, (name, value) in zip(places, printed.RADII.items(), strict=True):
         style.note(axes["D"], f"{k(1)} = {name:g}", (at, value.value), (0, 9), ha="center")
     axes["D"].set(xlim=(0.97, exact * grid[-1] + 0.04), ylim=(0.0, 1.6), xlabel=f"critical {k(1)} / {k(1)}")
@@ -229,11 +209,11 @@ def _draw_walks(study: CurvedStudy, narrow: bool) -> Figure:
 
 
 def _draw_joints(study: CurvedStudy, narrow: bool) -> Figure:
-    figure, axes = style.figure(*JOINTS, narrow)
+    figure, axes = style.figure(*shapes.JOINTS, narrow)
     trials, (grid, angles) = study.trials, _along(study)
-    draw_joints(axes["A"], trials, is_curved(trials) | (trials.direction.values == "straight"), grid, angles)
+    shapes.draw_joints(axes["A"], trials, is_curved(trials) | (trials.direction.values == "straight"), grid, angles)
     axes["A"].set_xlim(0.9 / trials.spring.values.max(), grid[-1] + 0.005)
-    over_compliance(axes["A"], _MARKED if narrow else (41.0, 20.0, 15.0, 13.0, 11.0, 10.0, 9.0, 8.0, 7.0))
+    shapes.over_compliance(axes["A"], _MARKED if narrow else (41.0, 20.0, 15.0, 13.0, 11.0, 10.0, 9.0, 8.0, 7.0))
     return figure
 
 
@@ -243,18 +223,20 @@ def _draw_onset(study: CurvedStudy, narrow: bool) -> Figure:
     below, along = (100.0 * (1.0 - each.softest.values / exact) for each in (fits, law))
     axes["A"].semilogx(along, law.critical_k1.values, color=style.ORANGE, label="fit to exact walks, evenly spread")
     name = "fit to the trials"
-    errorbars(axes["A"], below, fits.critical_k1.values, fits.bootstrap_error.values, style.BLACK, "o", name)
+    shapes.errorbars(axes["A"], below, fits.critical_k1.values, fits.bootstrap_error.values, style.BLACK, "o", name)
     name = "the same springs, exact walks"
     look: dict[str, Any] = {"color": style.ORANGE, "markerfacecolor": "white", "markersize": 8.0, "zorder": 3.0}
     axes["A"].plot(below, fits.exact_walks.values, "o", label=name, **look)
     axes["A"].axhline(exact, color=style.VERMILLION, lw=1.2, label=f"pitchfork, {number(exact, 5)}")
-    finish(axes["A"], legend="upper left", ylabel=f"critical {k(1)} ({SPRING_UNIT})", title="A  What the fit gives")
+    shapes.finish(
+        axes["A"], legend="upper left", ylabel=f"critical {k(1)} ({SPRING_UNIT})", title="A  What the fit gives"
+    )
     axes["A"].set_xlabel(f"softest spring fitted, below critical {k(1)} by (%)")
     axes["B"].semilogx(along, law.power.values, color=style.BLUE)
     for value, name in ((0.5, "square root"), (0.25, "fourth root")):
-        axes["B"].axhline(value, color=style.GREY, lw=1.0, linestyle=DASHED)
+        axes["B"].axhline(value, color=style.GREY, lw=1.0, linestyle=shapes.DASHED)
         style.note(axes["B"], name, (along[0], value), (0, 4))
-    finish(axes["B"], ylim=(0.2, 0.56), ylabel="power that the bend grows with", title="B  Why")
+    shapes.finish(axes["B"], ylim=(0.2, 0.56), ylabel="power that the bend grows with", title="B  Why")
     axes["B"].set_xlabel(f"{k(1)} below its critical value by (%)")
     for each in axes.values():
         each.xaxis.set_major_formatter(lambda value, position: f"{value:g}")
@@ -272,10 +254,10 @@ def _draw_variants(study: CurvedStudy, narrow: bool) -> Figure:
         radius, error = at.radius.values[here], at.radius_error.values[here]
         for letter, scale in (("A", 1.0), ("B", exact)):
             axes[letter].plot(scale / line, axis_radius(branch, line), color=color, lw=1.2)
-            errorbars(axes[letter], scale / springs, radius, error, color, marker, typeset(str(name)))
+            shapes.errorbars(axes[letter], scale / springs, radius, error, color, marker, typeset(str(name)))
     for letter in "AB":
-        finish(axes[letter], ylim=(0.2, 1.0), ylabel="radius of the body axis (m)")
-    axes["A"].set(xlabel=f"1/{k(1)} ({INVERSE_UNIT})", title=f"A  Over 1/{k(1)}")
+        shapes.finish(axes[letter], ylim=(0.2, 1.0), ylabel="radius of the body axis (m)")
+    axes["A"].set(xlabel=f"1/{k(1)} ({shapes.INVERSE_UNIT})", title=f"A  Over 1/{k(1)}")
     axes["B"].set(xlabel=f"critical {k(1)} / {k(1)}", title="B  Over its own critical spring")
     axes["B"].legend(loc="upper right")
     _draw_onsets(axes["C"], data, narrow)
@@ -300,6 +282,6 @@ def _draw_onsets(axes: Axes, data: xr.Dataset, narrow: bool) -> None:
     axes.hlines(rows + 0.12, data.exact_k1, data.stiffest_k1, **look)
     axes.set_yticks(rows, [re.sub(r" (?=\d)", "\n", typeset(str(name))) for name in data.variant.values])
     axes.tick_params(axis="y", length=0)
-    finish(axes, "x", ylim=(rows[-1] + 0.6, -0.6), xlabel=f"critical {k(1)} ({SPRING_UNIT})")
+    shapes.finish(axes, "x", ylim=(rows[-1] + 0.6, -0.6), xlabel=f"critical {k(1)} ({SPRING_UNIT})")
     axes.set_title("C  Where the bend sets in")
     axes.legend(loc="upper left", bbox_to_anchor=(-0.3 if narrow else 0.0, -0.26), ncols=1 if narrow else 3)

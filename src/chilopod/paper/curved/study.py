@@ -10,22 +10,19 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from chilopod.analysis.branch import curved_walks
 from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
 from chilopod.analysis.square_root import SquareRootFit, square_root_fit
 from chilopod.paper import printed
 from chilopod.paper.curved.trials import EXAMPLES, SPRINGS, curved_trials, off_branch, on_branch, variant_trials
-from chilopod.paper.scatter import Difference, means, spread_difference
+from chilopod.paper.measures import example_walks
+from chilopod.paper.scatter import Array, Difference, means, spread_difference
 from chilopod.paper.section import Context, Size
-from chilopod.paper.walk_measures import example_walks
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.tasks.radius_law import is_curved
 from chilopod.trials import Disturbance
-
-Array = NDArray[np.float64]
 
 AGREEMENT_SPRINGS = (8.0, 10.0, 11.0)
 """N*mm/deg, where trials without spread of friction are held against the branch."""
@@ -44,7 +41,7 @@ class CurvedStudy:
     ----------
     trials, examples, agreement
         See :mod:`chilopod.paper.curved.trials`: of ``curved_trials``, and ``off_branch`` (rad) of trials without spread
-        of friction; and :func:`chilopod.paper.walk_measures.example_walks`.
+        of friction; and :func:`chilopod.paper.measures.example_walks`.
     branch
         The exact curved walks, turning right, see :func:`chilopod.analysis.branch.curved_walks`.
     fits, law, comparison

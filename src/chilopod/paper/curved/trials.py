@@ -14,7 +14,6 @@ from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from chilopod import stability
@@ -22,15 +21,14 @@ from chilopod.analysis.parameters import K1, stiffness
 from chilopod.analysis.straight_walk import pitchfork
 from chilopod.engine import Status
 from chilopod.paper import printed
-from chilopod.paper.walk_measures import SEEDS, Folder, by_spring, spring_walks
+from chilopod.paper.measures import SEEDS, Folder, by_spring, spring_walks
+from chilopod.paper.scatter import Array
 from chilopod.planar import PlanarModel
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.stability.returns import whole_period
 from chilopod.tasks.radius_law import is_curved
 from chilopod.trials import AVERAGED, Disturbance, mean_joint_angles
-
-Array = NDArray[np.float64]
 
 SPRINGS = (7.0, 8.0, 9.0, 10.0, 11.0, 11.5, 13.0, 15.0, 41.0)
 """k1 of the trials, N*mm/deg."""
@@ -154,7 +152,7 @@ def variant_trials(
     """Trials of the paper's variants at the same springs relative to each one's own pitchfork.
 
     ``base`` are trials of the robot as built, from :func:`curved_trials`, of which the first so many repeats at springs
-    up to 1.2 times the critical one are used. By variant, "as built" first, a dataset as :func:`curved_trials` gives."""
+    up to 1.2 times the critical one are used. By variant, "as built" first, one dataset each."""
     ratios = base.spring.values / base.attrs["critical_k1"]
     ratios = ratios[ratios < 1.2]
     robots = {name: each for name, each in printed.variant_robots(robot).items() if name != printed.AS_BUILT}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 from base64 import b64encode
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from importlib.metadata import version
@@ -85,12 +85,10 @@ def page(
     robot_file: str,
     state: State = State.DONE,
 ) -> str:
-    """The page as HTML.
+    """The page as HTML, which reloads itself while it is running.
 
     Parameters
     ----------
-    found, sections
-        Results computed so far, and sections that are shown in the end, in the order they are computed.
     opening, shown
         Figures of the robot itself, at the beginning of the first chapter, and figures and films drawn so far, in the
         order they stand within their chapters; figures with a letter come first, in the order of their letters.
@@ -98,8 +96,6 @@ def page(
         Errors of sections that could not be computed or drawn, and sections that are still to be.
     robot_file
         Name of this robot on the command line: a preset, or the path of a file.
-    state
-        While it is running, the page reloads itself.
     """
     folder = files("chilopod.paper.page")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
@@ -183,12 +179,8 @@ def _robots(results: Found) -> list[dict[str, Any]]:
     return [{"says": says, "name": robot.name, "file": file, "numbers": _numbers(robot)} for says, robot, file in found]
 
 
-def _numbers(robot: Robot) -> list[dict[str, str]]:
-    return [
-        {
-            "path": path,
-            "value": minus(units.format(robot.get(path), robot.unit_of(path), digits=6)).replace("*", "·"),
-            "origin": robot.provenance_of(path) or "not said",
-        }
-        for path in robot.parameters()
-    ]
+def _numbers(robot: Robot) -> Iterator[tuple[str, str, str]]:
+    """Path, value and origin of every number of a robot."""
+    for path in robot.parameters():
+        value = minus(units.format(robot.get(path), robot.unit_of(path), digits=6)).replace("*", "·")
+        yield path, value, robot.provenance_of(path) or "not said"

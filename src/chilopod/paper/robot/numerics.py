@@ -7,10 +7,10 @@ import xarray as xr
 
 from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.paper.fit_data import base_series_data
+from chilopod.paper.measures import fitted, over_springs, point_of
 from chilopod.paper.section import Context, Size
 from chilopod.paper.statements import NUMERICS
 from chilopod.paper.table import OfTwin, Result, of_twin
-from chilopod.paper.walk_measures import fitted, over_springs, point_of
 from chilopod.progress import Progress, silent
 from chilopod.tasks.identify.twin_series import DURATION, base_series
 from chilopod.twin.walk import TOLERANCE

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.paper import printed, statements
 from chilopod.paper.equal_distance import change, law_ratio, radius_ratio
+from chilopod.paper.measures import onset_with_error, radius_at, shares, spring_for
 from chilopod.paper.printed import Band, Said, Task
 from chilopod.paper.robot.turning import RobotTurning
 from chilopod.paper.robot.walks import RobotWalks
@@ -19,7 +20,6 @@ from chilopod.paper.statements import listed
 from chilopod.paper.table import OfTwin, Result, Statement, Verdict, of_twin, within
 from chilopod.paper.turning.criteria import SCALES, all_lower, around, in_words, minima, saturation, softest_minima
 from chilopod.paper.turning.trials import LegYaw, arrivals, by_leg_yaw, outcome_words, springs_by_outcome
-from chilopod.paper.walk_measures import onset_with_error, radius_at, shares, spring_for
 from chilopod.show.words import listing
 from chilopod.steering import Outcome
 from chilopod.tasks.radius_law import in_settled_curve
@@ -58,18 +58,24 @@ def _spring(statement: Statement[Band], twin: tuple[float, float], reading: str 
 
 
 def _straight(base: xr.Dataset) -> OfTwin:
-    springs = printed.STRAIGHT
-    words = f"straight: {_counts(base, 'straight', springs)}"
-    return OfTwin(statements.STRAIGHT, Result(words), within(_most(shares(base).straight, springs)))
+    words, most = _most(base, "straight", printed.STRAIGHT)
+    return OfTwin(statements.STRAIGHT, Result(words), within(most))
 
 
 def _curved(base: xr.Dataset) -> OfTwin:
-    springs = printed.CURVED
-    directions = base.direction.sel(spring=list(springs)).values
+    words, most = _most(base, "curved", printed.CURVED)
+    directions = base.direction.sel(spring=list(printed.CURVED)).values
     left, right = (int((directions == side).sum()) for side in ("left", "right"))
-    words = f"curved: {_counts(base, 'curved', springs)}; {left} to the left, {right} to the right"
-    both = min(left, right) > 0
-    return OfTwin(statements.CURVED, Result(words), within(_most(shares(base).curved, springs) and both))
+    result = Result(f"{words}; {left} to the left, {right} to the right")
+    return OfTwin(statements.CURVED, result, within(most and min(left, right) > 0))
+
+
+def _most(base: xr.Dataset, what: str, springs: tuple[float, ...]) -> tuple[str, bool]:
+    """How many walks at each of some springs are curved or straight, in words, and whether most at each are."""
+    share, repeats = shares(base)[what].sel(spring=list(springs)).values, base.sizes["repeat"]
+    pairs = zip(springs, repeats * share, strict=True)
+    counts = ", ".join(f"{count:.0f} of {repeats} at {spring:g}" for spring, count in pairs)
+    return f"{what}: {counts}", bool((share > 0.5).all())
 
 
 def _radius(base: xr.Dataset, spring: float, statement: Statement[Band]) -> OfTwin:
@@ -149,17 +155,6 @@ def _duration_row(data: xr.Dataset, statement: Statement[Said], values: str, ans
         Result(f"{values} after {listing(times)} s: {', '.join(judged)}"),
         within(every(None if None in (each, last) else each == last for each in answers)),
     )
-
-
-def _most(share: xr.DataArray, springs: tuple[float, ...]) -> bool:
-    """True if most walks at each of some springs are counted."""
-    return bool((share.sel(spring=list(springs)) > 0.5).all())
-
-
-def _counts(data: xr.Dataset, what: str, springs: tuple[float, ...]) -> str:
-    counts = data.sizes["repeat"] * shares(data)[what].sel(spring=list(springs)).values
-    of = data.sizes["repeat"]
-    return ", ".join(f"{count:.0f} of {of} at {spring:g}" for spring, count in zip(springs, counts, strict=True))
 
 
 def _numbers(values: NDArray[np.float64], digits: int) -> str:

@@ -17,11 +17,11 @@ from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.paper import printed
 from chilopod.paper.equal_distance import radius_ratio
 from chilopod.paper.fit_data import base_series_data
+from chilopod.paper.measures import Folder, onset_with_error, spring_walks
 from chilopod.paper.robot.turning import TASK_DURATION
 from chilopod.paper.robot.walks import UNIFORM_DURATION, lower_steps, undulations, walk_ends
 from chilopod.paper.section import Context, Size
 from chilopod.paper.turning.trials import to_target
-from chilopod.paper.walk_measures import Folder, onset_with_error, spring_walks
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import ARRIVAL_RADIUS
@@ -100,7 +100,7 @@ def predictions(robot: Robot, folder: Folder = None, engine: str = "twin", size:
 
     Few and undisturbed walks, which begin bent, in place of the many from straight on that
     :func:`chilopod.paper.robot.walks.robot_walks` has. By variant ``onset`` (N*mm/deg) and ``radius`` (over that as
-    built, at an equal distance from each one's own onset), NaN where walks determine none; and ``uniform`` (N*mm/deg)."""
+    built, at an equal distance from each one's own onset), NaN where walks determine none; and ``uniform``."""
     shape = np.array(printed.mode_shape(robot))
     bend = tuple(_BENT * shape / shape.sum())
     variants = printed.variant_robots(robot)

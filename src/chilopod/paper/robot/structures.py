@@ -16,27 +16,25 @@ from typing import Any
 import mujoco
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from chilopod import twin
 from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.paper import printed
 from chilopod.paper.fit_data import base_series_data
+from chilopod.paper.measures import Folder
 from chilopod.paper.printed import CRITERION_NAMES
 from chilopod.paper.robot.spread import LOWER, predictions, printed_number
 from chilopod.paper.robot.turning import TASK_DURATION
+from chilopod.paper.scatter import Array
 from chilopod.paper.section import Context, Size
 from chilopod.paper.turning.criteria import minima
 from chilopod.paper.turning.trials import turning_task
-from chilopod.paper.walk_measures import Folder
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.tasks.identify.data import BaseSeries
 from chilopod.tasks.identify.twin import corrected, damped_step
 from chilopod.tasks.identify.twin_constants import FREE, constants_of, parts_of, values_at, with_constants
 from chilopod.tasks.identify.twin_series import DURATION, base_series, residuals
-
-Array = NDArray[np.float64]
 
 PHASE, UNIFORM = "module phase 180 deg", "all springs alike"
 """Names of the variants, and of the predictions."""

@@ -16,23 +16,9 @@ import xarray as xr
 
 from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT
 from chilopod.analysis.square_root import SquareRootFit
-from chilopod.paper import printed
+from chilopod.paper import measures, printed
+from chilopod.paper.measures import Folder
 from chilopod.paper.section import Context
-from chilopod.paper.walk_measures import (
-    Folder,
-    by_spring,
-    cycle_means,
-    example_walks,
-    fitted,
-    onset,
-    onset_with_error,
-    over_springs,
-    point_of,
-    radius_at,
-    shares,
-    spring_seeds,
-    spring_walks,
-)
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.tasks.radius_law import DURATION, end_of_walk
@@ -77,7 +63,7 @@ class RobotWalks:
         reading of what the paper leaves open: that a shorter half ellipse of the leg tips is lower in proportion, see
         :func:`lower_steps`.
     examples, uniform
-        See :func:`chilopod.paper.walk_measures.example_walks` and :func:`undulations`.
+        See :func:`chilopod.paper.measures.example_walks` and :func:`undulations`.
     """
 
     robot: Robot
@@ -91,7 +77,7 @@ class RobotWalks:
     @property
     def fit(self) -> SquareRootFit | None:
         """The square-root law of the base series."""
-        return onset(self.base)
+        return measures.onset(self.base)
 
 
 def robot_walks(context: Context, progress: Progress = silent) -> RobotWalks:
@@ -118,7 +104,7 @@ def robot_walks(context: Context, progress: Progress = silent) -> RobotWalks:
     variants, lower = dict(zip(robots, found, strict=False)), dict(zip(strides, found[len(robots) :], strict=True))
     told = part(progress, 0.91, 1.0, "uniform springs")
     uniform = undulations(robot, uniform_springs, fewest, duration=swinging, folder=folder, progress=told)
-    examples = example_walks(robot, _EXAMPLES, duration, spring_seeds(_EXAMPLES), "twin", folder)
+    examples = measures.example_walks(robot, _EXAMPLES, duration, measures.spring_seeds(_EXAMPLES), "twin", folder)
     return RobotWalks(robot, base, durations, variants, lower, examples, uniform)
 
 
@@ -131,9 +117,11 @@ def lower_steps(robot: Robot, variant: Robot) -> Robot:
 def walk_records(
     robot: Robot, springs: Sequence[float] = SPRINGS, repeats: int = REPEATS, *, duration: float = DURATION, **walk: Any
 ) -> list[xr.Dataset]:
-    """Records of walks of the twin from straight on, all with seeds of their own, as of :func:`spring_walks`."""
-    seeds = spring_seeds(springs)
-    return spring_walks(robot, springs, duration, repeats=repeats, seeds=seeds, rate=_RATE, engine="twin", **walk)
+    """Records of walks of the twin from straight on, all with seeds of their own."""
+    seeds = measures.spring_seeds(springs)
+    return measures.spring_walks(
+        robot, springs, duration, repeats=repeats, seeds=seeds, rate=_RATE, engine="twin", **walk
+    )
 
 
 def walk_ends(
@@ -144,7 +132,7 @@ def walk_ends(
     each."""
     last = float(records[0].time[-1]) if duration is None else duration
     ends = [end_of_walk(record.sel(time=record.time <= last + 1e-9), robot) for record in records]
-    data = by_spring(ends, springs)
+    data = measures.by_spring(ends, springs)
     data.attrs = {"robot": robot.name, "varied": K1, "averaged_s": AVERAGED, "duration_s": last}
     return data
 
@@ -155,21 +143,21 @@ def by_duration(records: Sequence[xr.Dataset], robot: Robot, springs: Sequence[f
     Returns
     -------
     Dataset over duration (s; those of :data:`SHORTER`, and the walks' own last): ``onset`` with ``onset_error`` (of the
-    bootstrap), N*mm/deg; over duration and spring: those of :func:`shares`, and ``axis_radius`` with
-    ``axis_radius_error`` as of :func:`radius_at`, m.
+    bootstrap), N*mm/deg; over duration and spring: those of :func:`chilopod.paper.measures.shares`, and ``axis_radius``
+    with ``axis_radius_error`` as of :func:`chilopod.paper.measures.radius_at`, m.
     """
     last = float(records[0].time[-1])
     durations = [*(each for each in SHORTER if each < last), last]
     series = [walk_ends(records, robot, springs, duration) for duration in durations]
     # Short walks have not settled: what they show is what one would take for the radius.
-    onsets = np.array([onset_with_error(each, settled=False) for each in series])
-    radii = np.array([[radius_at(each, spring, settled=False) for spring in springs] for each in series])
+    onsets = np.array([measures.onset_with_error(each, settled=False) for each in series])
+    radii = np.array([[measures.radius_at(each, spring, settled=False) for spring in springs] for each in series])
     both = ("duration", "spring")
     return xr.Dataset(
         {
             "onset": ("duration", onsets[:, 0], {"units": PAPER_UNIT}),
             "onset_error": ("duration", onsets[:, 1], {"units": PAPER_UNIT}),
-            **xr.concat([shares(each) for each in series], "duration"),
+            **xr.concat([measures.shares(each) for each in series], "duration"),
             "axis_radius": (both, radii[..., 0], {"units": "m"}),
             "axis_radius_error": (both, radii[..., 1], {"units": "m"}),
         },
@@ -198,12 +186,12 @@ def undulations(
     bootstrap; NaN if they determine no point.
     """
     wave = tuple(np.deg2rad(4.0) * np.cos(np.arange(robot.body.modules - 1) * np.pi / 2.0))
-    records = spring_walks(
+    records = measures.spring_walks(
         robot,
         springs,
         duration,
         repeats=repeats,
-        seeds=spring_seeds(springs),
+        seeds=measures.spring_seeds(springs),
         parameter=ALL,
         folder=folder,
         progress=progress,
@@ -214,15 +202,15 @@ def undulations(
     shape, last, amplitudes = (len(springs), repeats), round(_WINDOW / robot.gait.period), []
     for record in records:
         angles = record.joint_angle.isel(robot=0).transpose("time", "joint").values[1:]
-        amplitudes.append(np.sqrt(cycle_means(angles, _PER_CYCLE)[-last:].var(axis=0).sum()))
+        amplitudes.append(np.sqrt(measures.cycle_means(angles, _PER_CYCLE)[-last:].var(axis=0).sum()))
     amplitude = np.array(amplitudes).reshape(shape)
     status = np.array([record.status.values[0] for record in records], dtype=object).reshape(shape)
     soft = np.asarray(springs) <= SWINGING
     inverse = np.broadcast_to(1.0 / np.asarray(springs)[:, None], shape)
-    critical, error = point_of(fitted(inverse[soft].ravel(), amplitude[soft].ravel()))
+    critical, error = measures.point_of(measures.fitted(inverse[soft].ravel(), amplitude[soft].ravel()))
     both = ("spring", "repeat")
     return xr.Dataset(
         {"amplitude": (both, amplitude, {"units": "rad"}), "status": (both, status)},
-        coords={"spring": over_springs(springs), "repeat": np.arange(repeats)},
+        coords={"spring": measures.over_springs(springs), "repeat": np.arange(repeats)},
         attrs={"robot": robot.name, "critical_k": critical, "critical_k_error": error},
     )

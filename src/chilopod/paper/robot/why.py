@@ -17,23 +17,22 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.analysis.straight_walk import pitchfork
 from chilopod.paper import printed
+from chilopod.paper.measures import Folder, cycle_means, fitted, point_of, spring_walks
+from chilopod.paper.scatter import Array
 from chilopod.paper.section import Context, Size
 from chilopod.paper.statements import PLANAR_LIMIT
 from chilopod.paper.table import OfPlanar, OfTwin, Result, of_twin
-from chilopod.paper.walk_measures import Folder, cycle_means, fitted, point_of, spring_walks
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot, Twin
 from chilopod.tasks.radius_law import CURVED
 from chilopod.trials import NONE
 from chilopod.twin.creep import foot_creep
 from chilopod.twin.legs import twin_of
-
-Array = NDArray[np.float64]
 
 SPRINGS = (7.0, 10.0, 15.0, 22.0, 33.0, 50.0)
 """k1 that is tried first, N*mm/deg."""
@@ -77,9 +76,7 @@ FACTORS = (
     Factor("grip", "how firmly the floor holds a foot that does not slide", ()),
     Factor("dry friction", "feet slide beyond the Coulomb limit", ("twin.sliding_friction",)),
     Factor(
-        "soft legs",
-        "servos give way under load",
-        ("twin.servo_stiffness", "twin.servo_damping", "twin.joint_inertia"),
+        "soft legs", "servos give way under load", ("twin.servo_stiffness", "twin.servo_damping", "twin.joint_inertia")
     ),
     Factor("dragging feet", "swing feet are hardly lifted and touch the floor", ("twin.clearance",)),
     Factor("joint damping", "friction in the yaw joints", ("springs.damping",)),
@@ -247,19 +244,17 @@ def ablation(context: Context, progress: Progress = silent) -> xr.Dataset:
     """
     robot, planar, folder, size = context.whole, context.robot, context.folder, context.size
     names = [factor.name for factor in FACTORS]
-    wanted: dict[str, list[list[str]]] = {"path": [names[: i + 1] for i in range(len(names))]}
+    every = frozenset(names)
+    wanted = {"path": [frozenset(names[: i + 1]) for i in range(len(names))]}
     if size is Size.FULL:
-        wanted["alone"] = [[name] for name in names]
-        wanted["without"] = [[other for other in names if other != name] for name in names]
-    sets = [frozenset(), *(frozenset(on) for rows in wanted.values() for on in rows)]
-    points: dict[frozenset[str], float] = {}
-    for on in sets:
-        if on not in points:
-            progress(len(points) / len(set(sets)), ", ".join(sorted(on)) or "planar limit")
-            points[on] = onset(with_factors(robot, planar, sorted(on)), folder, size)
+        wanted |= {"alone": [frozenset([name]) for name in names], "without": [every - {name} for name in names]}
+    points = dict.fromkeys([frozenset[str](), *(on for sets in wanted.values() for on in sets)], np.nan)
+    for index, on in enumerate(points):
+        progress(index / len(points), ", ".join(sorted(on)) or "planar limit")
+        points[on] = onset(with_factors(robot, planar, sorted(on)), folder, size)
     data = xr.Dataset(coords={"factor": names})
     for name in ("alone", "without", "path"):
-        values = [points[frozenset(on)] for on in wanted[name]] if name in wanted else [np.nan] * len(names)
+        values = [points[on] for on in wanted[name]] if name in wanted else [np.nan] * len(names)
         data[name] = ("factor", np.array(values), {"units": PAPER_UNIT})
     data["about"] = ("factor", np.array([factor.sentence for factor in FACTORS], dtype=object))
     progress(1.0, "planar limit by growth")
@@ -268,7 +263,7 @@ def ablation(context: Context, progress: Progress = silent) -> xr.Dataset:
         "vouched": limit_point(robot, planar, FINER if size is Size.FULL else PLANAR, folder, size.cut(_DURATION, 9.0)),
         "exact": pitchfork(planar, normal_form=False).value,
         "limit": points[frozenset()],
-        "twin": points[frozenset(names)],
+        "twin": points[every],
         "grip": foot_creep(robot).across,
         "viscous": planar.ground.friction,
     }

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from chilopod.paper import printed
-from chilopod.paper.panels import finish
+from chilopod.paper.shapes import finish
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.scene.outline import chain, draw_heading, draw_joints, draw_modules, turned_about_tail
@@ -23,10 +23,7 @@ _MODE = (
     style.Layout("AC;BC", 5.2, heights=(1.5, 1.0), widths=(1.15, 1.0)),
     style.Layout("A;B;C", 10.8, heights=(1.2, 0.9, 1.9)),
 )
-_UNIFORM = (
-    style.Layout("AB;CC", 6.4, heights=(1.0, 1.25)),
-    style.Layout("A;B;C", 9.6, heights=(0.8, 0.8, 1.9)),
-)
+_UNIFORM = (style.Layout("AB;CC", 6.4, heights=(1.0, 1.25)), style.Layout("A;B;C", 9.6, heights=(0.8, 0.8, 1.9)))
 _ROUNDING = printed.MODE[0].tolerance
 _DRAWN_BEND = 75.0  # degrees from head to tail: the mode leaves the size free
 _SNAPSHOTS = 8
@@ -345,6 +342,5 @@ def _snapshots(axes: Axes, data: xr.Dataset, columns: int) -> None:
         moment = f"{share * data.attrs['oscillation_period_s']:.1f} s"
         axes.text(shift[0] - half - 0.5, shift[1], moment, ha="right", va="center", fontsize=style.SMALL)
     axes.set(
-        xlim=(-half - 2.2, (columns - 1) * across + half + 1.0),
-        ylim=(-(rows - 1) * down - 0.7 * down, 0.7 * down),
+        xlim=(-half - 2.2, (columns - 1) * across + half + 1.0), ylim=(-(rows - 1) * down - 0.7 * down, 0.7 * down)
     )

@@ -7,15 +7,12 @@ import math
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.paper.printed import CRITERION_NAMES, Band
-from chilopod.paper.scatter import SURE, Answer, Difference, difference, every
+from chilopod.paper.scatter import SURE, Answer, Array, Difference, difference, every
 from chilopod.paper.turning.trials import CRITERIA, TurningTask
 from chilopod.steering import LegYawController
-
-Array = NDArray[np.float64]
 
 SCALES = {"distance": (1.0, "m"), "angle": (180.0 / math.pi, "deg"), "effort": (1.0, "rad²·s")}
 """Units in which the criteria are shown: factor and unit."""

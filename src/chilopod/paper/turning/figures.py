@@ -10,11 +10,11 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle
-from numpy.typing import NDArray
 
 from chilopod.paper import printed
-from chilopod.paper.panels import DASHED, DOTTED, errorbars, finish, legend_below, over_compliance
 from chilopod.paper.printed import CRITERION_NAMES
+from chilopod.paper.scatter import Array
+from chilopod.paper.shapes import DASHED, DOTTED, errorbars, finish, legend_below, over_compliance
 from chilopod.paper.statements import listed
 from chilopod.paper.turning.criteria import SCALES, all_lower, in_words, minima, saturation, softest_minima
 from chilopod.paper.turning.study import Turning
@@ -34,12 +34,7 @@ from chilopod.show.scene.outline import draw_modules
 from chilopod.show.words import SPRING_UNIT, k, listing, number, spring, typeset
 from chilopod.steering import ARRIVAL_RADIUS, Outcome
 
-Array = NDArray[np.float64]
-
-_TURNING = (
-    style.Layout("AB;CD", 7.6, heights=(1.5, 1.0)),
-    style.Layout("A;B;C;D", 12.6, heights=(1.0, 1.3, 0.9, 0.9)),
-)
+_TURNING = (style.Layout("AB;CD", 7.6, heights=(1.5, 1.0)), style.Layout("A;B;C;D", 12.6, heights=(1.0, 1.3, 0.9, 0.9)))
 _CRITERIA = (style.Layout("ABC", 3.9), style.Layout("A;B;C", 9.9))
 _WITHOUT = (style.Layout("AB", 4.0), style.Layout("A;B", 7.4))
 _WITHOUT_ONE = (style.Layout("A", 4.4), style.Layout("A", 4.2))
@@ -54,8 +49,8 @@ _TOP, _TOP_HOPF = (41, 15, 10, 7, 5), (41, 10, 5, 3, 2)  # N*mm/deg, on the uppe
 def panels(found: Turning) -> Iterator[Panel]:
     """All figures, in the paper's order."""
     yield turning(found)
-    yield criteria(found)
-    yield another(found)
+    yield criteria(found, "A")
+    yield criteria(found, "B")
     yield without(found)
     yield comparison(found)
     yield why(found)
@@ -176,36 +171,30 @@ def _geometry(axes: Axes, robot: Robot, x: float, y: float) -> None:
     axes.set_title("A  The circle to the target, to scale")
 
 
-def criteria(found: Turning) -> Panel:
-    """Fig. "turning" E: task A."""
-    task = found.tasks["A"]
+def criteria(found: Turning, letter: str) -> Panel:
+    """Fig. "turning" E, task A, and Fig. "another", task B."""
+    task, first = found.tasks[letter], letter == "A"
     flat, whole = (minima(task.criteria).sel(criterion=name) for name in ("effort", "effort_until_arrival"))
+    smallest = minima(task.criteria)["at"].sel(criterion=list(CRITERION_NAMES)).values
+    psi, away, law = np.rad2deg(task.target.bearing), task.target.distance, found.laws.k_hat(task.target.radius)[0]
+    shown = {walks_of(task): task}
     return Panel(
-        name="turning-criteria",
-        title="Task A: the paper's three criteria over the spring",
-        draw=lambda narrow: _draw_criteria(found, task, narrow),
-        alt=_alt(found, "A"),
+        name="turning-criteria" if first else "turning-another",
+        title="Task A: the paper's three criteria over the spring"
+        if first
+        else f"Task {letter} ({psi:g}°, {away:g} m): the criteria again",
+        draw=lambda narrow: draw_criteria(shown, narrow, _TOP, k_hat=law),
+        alt="Distance, angle and leg yaw over the compliance of the first spring, smallest at "
+        f"{listing(number(float(each), 2) for each in smallest)} {SPRING_UNIT}.",
         text=(
-            _said(found, "A"),
+            _said(found, letter),
             f"ε3 has no clear minimum within this task: from {flat.softest:g} to {flat.stiffest:g}\u00a0{SPRING_UNIT} "
             "it is the same within two standard errors, because the legs stand at their limit of 5° until the target "
-            "is passed, to whichever side. Integrated until each "
-            "robot arrives, when its task is done, it is smallest "
-            f"at {spring(float(whole['at']), 2)}. A farther target shows a minimum (last figure).",
+            "is passed, to whichever side. Integrated until each robot arrives, when its task is done, it is smallest "
+            f"at {spring(float(whole['at']), 2)}. A farther target shows a minimum (last figure)."
+            if first
+            else "",
         ),
-        data=task.criteria,
-    )
-
-
-def another(found: Turning) -> Panel:
-    """Fig. "another": task B."""
-    task = found.tasks["B"]
-    return Panel(
-        name="turning-another",
-        title=f"Task B ({task.target.bearing * 180.0 / np.pi:g}°, {task.target.distance:g} m): the criteria again",
-        draw=lambda narrow: _draw_criteria(found, task, narrow),
-        alt=_alt(found, "B"),
-        text=(_said(found, "B"),),
         data=task.criteria,
     )
 
@@ -244,15 +233,6 @@ def both_strategies(*tasks: TurningTask) -> xr.Dataset:
     return xr.concat(each, dim="strategy", join="outer", combine_attrs="drop_conflicts")
 
 
-def _alt(found: Turning, letter: str) -> str:
-    low = minima(found.tasks[letter].criteria)
-    return (
-        "Distance, angle and leg yaw over the compliance of the first spring, smallest at "
-        + listing(number(float(low["at"].sel(criterion=name)), 2) for name in CRITERION_NAMES)
-        + f" {SPRING_UNIT}."
-    )
-
-
 def _said(found: Turning, letter: str) -> str:
     task = found.tasks[letter]
     low, k_hat = minima(task.criteria), found.laws.k_hat(task.target.radius)[0]
@@ -280,10 +260,6 @@ def places(task: TurningTask) -> str:
     )
 
 
-def _draw_criteria(found: Turning, task: TurningTask, narrow: bool) -> Figure:
-    return draw_criteria({walks_of(task): task}, narrow, _TOP, k_hat=found.laws.k_hat(task.target.radius)[0])
-
-
 def walks_of(task: TurningTask) -> str:
     """Name of the means of a task."""
     return f"mean of {task.criteria.sizes['repeat']} walks ± standard error"
@@ -296,11 +272,7 @@ def draw_comparison(task: TurningTask, hopf: TurningTask, narrow: bool, top: Seq
 
 
 def draw_criteria(
-    shown: Mapping[str, TurningTask],
-    narrow: bool,
-    top: Sequence[float],
-    name: str = k(1),
-    k_hat: float | None = None,
+    shown: Mapping[str, TurningTask], narrow: bool, top: Sequence[float], name: str = k(1), k_hat: float | None = None
 ) -> Figure:
     """The three criteria over 1/k of one or two tasks by their names.
 

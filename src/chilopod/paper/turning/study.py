@@ -14,6 +14,7 @@ from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT, stiffness
 from chilopod.analysis.radius_law import RadiusLaws, radius_laws
 from chilopod.analysis.straight_walk import first_loss
 from chilopod.paper import printed
+from chilopod.paper.measures import Folder, over_springs
 from chilopod.paper.section import Context, Size
 from chilopod.paper.turning.trials import (
     DURATION,
@@ -25,7 +26,6 @@ from chilopod.paper.turning.trials import (
     turning_task,
     without_leg_yaw,
 )
-from chilopod.paper.walk_measures import Folder, over_springs
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.stability import Kind

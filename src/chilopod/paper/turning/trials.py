@@ -12,20 +12,18 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from chilopod import trials
 from chilopod.analysis.parameters import PAPER_UNIT, stiffness
 from chilopod.paper import printed
-from chilopod.paper.walk_measures import Folder, over_springs
+from chilopod.paper.measures import Folder, over_springs
+from chilopod.paper.scatter import Array
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import Outcome, Target, earliest_arrival, evaluate
 from chilopod.steering.criteria import efforts
 from chilopod.steering.strategies import strategy_named
 from chilopod.trials import Trial
-
-Array = NDArray[np.float64]
 
 DURATION = printed.ARRIVAL.value
 """s: when the paper evaluates, and how long trials of the planar model are, which arrives well before."""
@@ -156,13 +154,12 @@ def _criteria(record: xr.Dataset, instants: tuple[float, float], springs: Sequen
     last = float(record.time[-1])
     ends = np.where(np.isfinite(found[0].arrival), found[0].arrival, last).tolist()
     until = np.array([efforts(record.isel(robot=[index]), end)[0] for index, end in enumerate(ends)])
-    data = xr.Dataset(coords={"spring": over_springs(springs)})
-    data = data.assign_coords(instant=["earliest arrival", "paper"], repeat=np.arange(repeats))
-    data["seconds"] = ("instant", np.array(instants), {"units": "s"})
+    both = ("spring", "repeat")
+    names = {"spring": over_springs(springs), "repeat": np.arange(repeats), "instant": ["earliest arrival", "paper"]}
+    data = xr.Dataset({"seconds": ("instant", np.array(instants), {"units": "s"})}, names)
     for name, unit in (("distance", "m"), ("angle", "rad"), ("effort", "rad^2*s")):
         values = np.stack([getattr(each, name).reshape(shape) for each in found])
-        data[name] = (("instant", "spring", "repeat"), values, {"units": unit})
-    both = ("spring", "repeat")
+        data[name] = (("instant", *both), values, {"units": unit})
     data["effort_until_arrival"] = (both, until.reshape(shape), {"units": "rad^2*s"})
     for name in CRITERIA:
         data[f"{name}_mean"] = data[name].mean("repeat", skipna=False, keep_attrs=True)
@@ -177,20 +174,17 @@ def _criteria(record: xr.Dataset, instants: tuple[float, float], springs: Sequen
 
 
 def _paths(record: xr.Dataset, springs: Sequence[float], repeats: int, shown: Sequence[float]) -> xr.Dataset:
-    rows = [springs.index(spring) * repeats + repeat for spring in shown for repeat in range(repeats)]
-    some = record.isel(robot=rows, time=slice(None, None, _PATH_STEP))
-
-    def split(values: Array) -> tuple[tuple[str, ...], Array]:
-        return ("shown", "repeat", "time"), values.T.reshape(len(shown), repeats, -1)
-
-    position = some.position.transpose("axis", "time", "robot").values
-    bearing = np.unwrap(some.bearing.transpose("time", "robot").values, axis=0)
+    over = ("shown", "repeat", "time")
+    rows = [[springs.index(spring) * repeats + repeat for repeat in range(repeats)] for spring in shown]
+    some = record.isel(robot=xr.DataArray(rows, dims=over[:2]), time=slice(None, None, _PATH_STEP))
+    x, y = some.position.transpose("axis", *over).values
+    bearing = np.unwrap(some.bearing.transpose(*over).values, axis=2)
     return xr.Dataset(
         {
-            "x": (*split(position[0]), {"units": "m"}),
-            "y": (*split(position[1]), {"units": "m"}),
-            "distance": (*split(some.distance.transpose("time", "robot").values), {"units": "m"}),
-            "bearing": (*split(bearing), {"units": "rad"}),
+            "x": (over, x, {"units": "m"}),
+            "y": (over, y, {"units": "m"}),
+            "distance": (over, some.distance.transpose(*over).values, {"units": "m"}),
+            "bearing": (over, bearing, {"units": "rad"}),
         },
         coords={
             "shown": ("shown", np.asarray(shown, float), {"units": PAPER_UNIT}),

@@ -13,11 +13,11 @@ from matplotlib.patches import Patch
 
 from chilopod import units
 from chilopod.paper import printed
-from chilopod.paper.panels import DASHED, draw_asked, finish, legend_below
 from chilopod.paper.robot.spread import printed_number
 from chilopod.paper.robot.structures import TOLERANCE
 from chilopod.paper.robot.walks import SPRINGS
 from chilopod.paper.robot.why import SPRINGS as TRIED
+from chilopod.paper.shapes import DASHED, draw_asked, finish, legend_below
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, listing, number, typeset
@@ -107,16 +107,9 @@ def _bars(axes: Axes, rows: np.ndarray, values: np.ndarray, colors: list[str], h
         if np.isnan(value):
             continue
         axes.barh(row, min(value, _BEYOND), height, color=color)
-        inside = value > 0.8 * _BEYOND
-        style.note(
-            axes,
-            "all springs tried" if np.isinf(value) else number(value, 3),
-            (min(value, _BEYOND), row),
-            (-4 if inside else 4, 0),
-            va="center",
-            ha="right" if inside else "left",
-            color="white" if inside else style.BLACK,
-        )
+        text, at = "all springs tried" if np.isinf(value) else number(value, 3), (min(value, _BEYOND), row)
+        away, side, ink = (-4, "right", "white") if value > 0.8 * _BEYOND else (4, "left", style.BLACK)
+        style.note(axes, text, at, (away, 0), va="center", ha=side, color=ink)
 
 
 def spread(data: xr.Dataset) -> Panel:

@@ -9,26 +9,12 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from chilopod.paper import printed, statements
+from chilopod.paper import printed, shapes, statements
 from chilopod.paper.equal_distance import onset_of_bend
-from chilopod.paper.panels import (
-    INVERSE_UNIT,
-    JOINTS,
-    WALKS,
-    draw_asked,
-    draw_examples,
-    draw_fork,
-    draw_joints,
-    draw_robot_radii,
-    errorbars,
-    finish,
-    legend_below,
-    over_compliance,
-)
+from chilopod.paper.measures import onset_with_error, radius_at
 from chilopod.paper.robot.rows import duration_rows
 from chilopod.paper.robot.walks import RobotWalks
 from chilopod.paper.scatter import means
-from chilopod.paper.walk_measures import onset_with_error, radius_at
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, k, listing, number, typeset
@@ -173,32 +159,32 @@ def durations(data: xr.Dataset) -> Panel:
 
 
 def _draw_walks(found: RobotWalks, narrow: bool) -> Figure:
-    figure, axes = style.figure(*WALKS, narrow)
-    draw_examples(axes, found.examples, narrow)
+    figure, axes = style.figure(*shapes.WALKS, narrow)
+    shapes.draw_examples(axes, found.examples, narrow)
     base, fit, paper = found.base, found.fit, printed.ONSET.value
     inverse = 1.0 / base.spring.values
     axes["C"].axvline(1.0 / paper, color=style.ORANGE, lw=1.4, label=f"robot's onset, {paper:g}")
     law = (style.VERMILLION, f"square root from {number(fit.critical, 3)}" if fit else "")
-    draw_fork(axes["C"], base, _SIDES, fit, law)
+    shapes.draw_fork(axes["C"], base, _SIDES, fit, law)
     axes["C"].set_xlim(0.0, 1.06 * inverse.max())
-    over_compliance(axes["C"], (75.0, 41.0, 28.0, 21.0, 15.0))
+    shapes.over_compliance(axes["C"], (75.0, 41.0, 28.0, 21.0, 15.0))
     radius, error = means(base.axis_radius.values, in_settled_curve(base))
-    errorbars(axes["D"], inverse, radius, error, style.BLUE, "o", "twin")
-    draw_robot_radii(axes["D"], [1.0 / spring for spring in printed.RADII])
+    shapes.errorbars(axes["D"], inverse, radius, error, style.BLUE, "o", "twin")
+    shapes.draw_robot_radii(axes["D"], [1.0 / spring for spring in printed.RADII])
     highest = np.nanmax([*(radius + np.nan_to_num(error)), *(each.value for each in printed.RADII.values())])
     axes["D"].set(ylim=(0.0, 1.1 * highest), xlim=(0.02, 1.06 * inverse.max()))
-    over_compliance(axes["D"], (41.0, 28.0, 21.0, 17.0, 15.0))
+    shapes.over_compliance(axes["D"], (41.0, 28.0, 21.0, 17.0, 15.0))
     return figure
 
 
 def _draw_joints(found: RobotWalks, narrow: bool) -> Figure:
-    figure, axes = style.figure(*JOINTS, narrow)
+    figure, axes = style.figure(*shapes.JOINTS, narrow)
     inverse = 1.0 / found.base.spring.values
     angles = np.rad2deg(np.abs(found.base.mean_angle).mean("repeat").transpose("spring", "joint").values)
-    draw_joints(axes["A"], found.base, True, inverse, angles)
+    shapes.draw_joints(axes["A"], found.base, True, inverse, angles)
     axes["A"].set_xlim(0.0, 1.06 * inverse.max())
     axes["A"].set_ylim(bottom=0.0)
-    over_compliance(axes["A"], (75.0, 41.0, 28.0, 21.0, 17.0, 15.0))
+    shapes.over_compliance(axes["A"], (75.0, 41.0, 28.0, 21.0, 17.0, 15.0))
     return figure
 
 
@@ -210,14 +196,14 @@ def _draw_different(found: RobotWalks, narrow: bool) -> Figure:
         away = inverse - 1.0 / onset_of_bend(data)
         for letter, place, shown in (("A", inverse, inverse > 0.0), ("B", away, away > 0.0)):
             points = place[shown], radius[shown], error[shown]
-            errorbars(axes[letter], *points, color, marker, typeset(name), joined=True)
+            shapes.errorbars(axes[letter], *points, color, marker, typeset(name), joined=True)
     for letter in "AB":
-        finish(axes[letter], ylim=(0.0, 3.0), ylabel="radius of the body axis (m)")
-    over_compliance(axes["A"], (34.0, 28.0, 21.0, 17.0, 15.0, 12.0))
+        shapes.finish(axes[letter], ylim=(0.0, 3.0), ylabel="radius of the body axis (m)")
+    shapes.over_compliance(axes["A"], (34.0, 28.0, 21.0, 17.0, 15.0, 12.0))
     axes["A"].set_title("A  Radius over the spring")
     axes["B"].set_xlim(left=0.0)
-    axes["B"].set(xlabel=f"1/{k(1)} − 1/{k(1)}* ({INVERSE_UNIT})", title="B  Radius, like with like")
-    legend_below(figure, axes["A"], 2 if narrow else 5)
+    axes["B"].set(xlabel=f"1/{k(1)} − 1/{k(1)}* ({shapes.INVERSE_UNIT})", title="B  Radius, like with like")
+    shapes.legend_below(figure, axes["A"], 2 if narrow else 5)
     _draw_onsets(axes["C"], found)
     return figure
 
@@ -228,7 +214,7 @@ def _draw_onsets(axes: Axes, found: RobotWalks) -> None:
         *((title, printed.onset(name), onset_with_error(data)[0]) for title, (name, data) in _variants(found).items()),
         ("all springs alike", printed.UNIFORM, found.uniform.attrs["critical_k"]),
     ]
-    draw_asked(axes, [(title, paper.value, paper.band) for title, paper, _ in found_at])
+    shapes.draw_asked(axes, [(title, paper.value, paper.band) for title, paper, _ in found_at])
     twin = [at for *_, at in found_at]
     axes.plot(twin, range(len(twin)), "o", color=style.BLUE, markersize=7, label="twin")
     axes.set(xlim=(0.0, 45.0), xlabel=f"onset ({SPRING_UNIT})", title="C  Onset of curved walks")
@@ -239,13 +225,13 @@ def _draw_durations(data: xr.Dataset, narrow: bool) -> Figure:
     figure, axes = style.figure(*_DURATIONS, narrow)
     times = data.duration.values
     axes["A"].axhspan(printed.ONSET.band.low, printed.ONSET.band.high, color=style.PALE, zorder=0)
-    errorbars(axes["A"], times, data.onset.values, data.onset_error.values, style.BLUE, "o", joined=True)
+    shapes.errorbars(axes["A"], times, data.onset.values, data.onset_error.values, style.BLUE, "o", joined=True)
     axes["A"].set(ylabel=f"onset ({SPRING_UNIT})", title="A  Where curved walks set in")
     for (spring, radius), (color, marker) in zip(printed.RADII.items(), _SPRINGS, strict=False):
         at, label = data.sel(spring=spring), f"{k(1)} = {spring:g}"
         axes["B"].axhspan(radius.band.low, radius.band.high, color=style.PALE, zorder=0)
         radii, errors = at.axis_radius.values, at.axis_radius_error.values
-        errorbars(axes["B"], times, radii, errors, color, marker, label, joined=True)
+        shapes.errorbars(axes["B"], times, radii, errors, color, marker, label, joined=True)
     axes["B"].set(ylabel="radius of the body axis (m)", title="B  Radius")
     springs = sorted({*printed.RADII, *statements.SLOWEST.values()})
     for spring, (color, marker) in zip(springs, _SPRINGS, strict=False):
@@ -253,7 +239,9 @@ def _draw_durations(data: xr.Dataset, narrow: bool) -> Figure:
         axes["C"].plot(times, share, color=color, marker=marker, lw=1.0, label=f"{k(1)} = {spring:g}")
     axes["C"].set(ylabel="walks that curve (%)", title="C  Share that curves")
     for letter, each in axes.items():
-        finish(each, legend=None if letter == "A" else "best", xlabel="walks last (s)", xlim=(0.0, 1.05 * times.max()))
+        shapes.finish(
+            each, legend=None if letter == "A" else "best", xlabel="walks last (s)", xlim=(0.0, 1.05 * times.max())
+        )
         each.set_ylim(0.0, 1.1 * max(each.dataLim.y1, np.nextafter(0.0, 1.0)))
     axes["C"].set_ylim(-4.0, 104.0)
     return figure

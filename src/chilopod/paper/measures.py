@@ -14,13 +14,12 @@ from chilopod import trials
 from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
 from chilopod.analysis.square_root import RESAMPLED, SquareRootFit, square_root_fit
 from chilopod.errors import AnalysisError
-from chilopod.paper.scatter import drawn_anew, mean_and_error
+from chilopod.paper.scatter import Array, drawn_anew, mean_and_error
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.tasks.radius_law import in_settled_curve, is_curved
 from chilopod.trials import Trial
 
-Array = NDArray[np.float64]
 Folder = str | Path | None
 
 SEEDS = 10_000

@@ -14,11 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.analysis.square_root import SquareRootFit
 from chilopod.paper import printed
 from chilopod.paper.printed import Band
-from chilopod.paper.scatter import means
+from chilopod.paper.scatter import Array, means
 from chilopod.show import style
 from chilopod.show.words import SPRING_UNIT, k, typeset
-
-Array = NDArray[np.float64]
 
 INVERSE_UNIT: Final = "deg/(N·mm)"
 DASHED: Final[Any] = (0, (4, 2))
