@@ -5,9 +5,8 @@ import pytest
 import xarray as xr
 
 from chilopod import load_robot
-from chilopod.paper.movies import Movie
 from chilopod.paper.registry import chosen
-from chilopod.paper.section import Context, Found, Size, reproduce
+from chilopod.paper.section import Context, Found, Movie, Size, reproduce
 from chilopod.paper.straight.sections import EXPONENTS, IDENTIFICATION, MODE, MODULES
 from chilopod.paper.table import Result, Row, Verdict
 from chilopod.paper.turning.sections import MOVIES

@@ -45,18 +45,11 @@ class RadiusRatio:
 
 
 def radius_ratio(base: xr.Dataset, variant: xr.Dataset, drawn: int = DRAWN, seed: int = 0) -> RadiusRatio:
-    """Compare the radii of two series of trials.
+    """Compare the radii of two series of trials over spring and repeat, as
+    :func:`chilopod.tasks.radius_law.end_of_walk` has them, of which those count that
+    :func:`chilopod.paper.measures.counted` tells.
 
-    Parameters
-    ----------
-    base, variant
-        Over spring and repeat: ``axis_radius``, ``direction`` and ``settled``, as
-        :func:`chilopod.tasks.radius_law.end_of_walk` has them. What counts, see
-        :func:`chilopod.paper.measures.counted`.
-    drawn, seed
-        Number of times that trials are drawn anew at every spring for the standard errors, onsets fitted anew each time
-        (0 for none), and seed of the drawing.
-    """
+    Trials are drawn anew at every spring for the standard errors, onsets fitted anew each time; 0 times for none."""
     inverse, bends = zip(*(_bends(each) for each in (base, variant)), strict=True)
     found = _ratios(inverse, bends)
     rng = np.random.default_rng(seed)

@@ -50,8 +50,6 @@ def spring_walks(
         Duration of all walks, or of those with each spring, s.
     repeats, seeds
         Number of walks with each spring, and seed of the first of them, from which the others count up; by default 0.
-    folder, progress
-        As for :func:`chilopod.trials.run`.
     walk
         Other fields of :class:`chilopod.trials.Trial`.
     """

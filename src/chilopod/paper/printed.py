@@ -64,16 +64,8 @@ class Number:
 
 @dataclass(frozen=True)
 class Variant:
-    """A change of the robot.
-
-    Attributes
-    ----------
-    overrides
-        Overrides of the robot's description, as ``--set`` takes them.
-    model, onset, radius
-        The planar model's critical k1 over that as built, the spring at which the robot's curved walks set in, and
-        their radius over that as built.
-    """
+    """A change of the robot, as ``--set`` takes it: the planar model's critical k1 over that as built, the spring at
+    which the robot's curved walks set in, and their radius over that as built."""
 
     overrides: tuple[str, ...]
     model: Band
@@ -83,17 +75,8 @@ class Variant:
 
 @dataclass(frozen=True)
 class Task:
-    """A turning task.
-
-    Attributes
-    ----------
-    target, radius, k_hat
-        Place of the target, radius of the circle to it, and the spring whose walk has this radius.
-    minima, outcomes
-        Springs at which all three criteria are smallest, and outcomes of walks with some springs.
-    source
-        Section or figure of the paper.
-    """
+    """A turning task: place of the target, radius of the circle to it, the spring whose walk has this radius, springs
+    at which all three criteria are smallest, outcomes of walks with some springs, and section or figure of the paper."""
 
     target: Target
     radius: Number

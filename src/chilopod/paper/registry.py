@@ -46,16 +46,8 @@ def load_sections() -> tuple[Section[Any], ...]:
 
 
 def chosen(only: Iterable[str] | None = None, quick: bool = False, paper: bool = False) -> list[Section[Any]]:
-    """The sections asked for, in the order they are computed.
-
-    Parameters
-    ----------
-    only
-        Their names; by default all but those that are computed on request.
-    quick
-        True to leave out those that a quick report leaves out, unless they are named.
-    paper
-        True for the paper's own experiments only.
+    """The sections asked for, by default all but those that are computed on request, in the order they are computed; a
+    quick report leaves out some that are not named, and one of the paper what goes beyond its own experiments.
 
     Raises
     ------

@@ -13,7 +13,6 @@ import xarray as xr
 
 from chilopod import trials
 from chilopod.errors import OutputError
-from chilopod.paper.movies import Movie
 from chilopod.paper.statements import ORDER
 from chilopod.paper.table import OfPlanar, OfTwin, RobotRow, Row, robot_rows
 from chilopod.progress import Progress, silent
@@ -67,6 +66,30 @@ class Context:
     def run(self, asked: Sequence[Trial], progress: Progress = silent) -> list[xr.Dataset]:
         """Records of trials, kept in the folder."""
         return trials.run(asked, self.folder, progress)
+
+
+@dataclass(frozen=True)
+class Movie:
+    """A film of walks side by side.
+
+    Attributes
+    ----------
+    name, heading, titles
+        Name of its files, heading above all panels, and titles of these.
+    speed, stills
+        Seconds of the walks per second of the film, and moments of it that are pictured in three dimensions, s; none of
+        a film from above.
+    size
+        Width and height of a film from above, pixels; that of three panels in a row.
+    """
+
+    name: str
+    heading: str
+    titles: tuple[str, ...]
+    record: xr.Dataset
+    speed: float
+    stills: tuple[float, ...] = ()
+    size: tuple[int, int] = (1280, 320)
 
 
 def nothing(*found: object) -> Sequence[Any]:

@@ -50,10 +50,9 @@ class Result:
     ----------
     text
         Words, for what is not one number, or with more than its number; by default the number with its error and unit.
-    value, error, unit
-        Number that is compared, and its standard error or the bound of its error; NaN where there is none.
-    digits
-        Number of decimals that are shown.
+    value, error, unit, digits
+        Number that is compared, its standard error or the bound of its error (NaN where there is none), its unit, and
+        how many decimals are shown.
     """
 
     text: str = ""

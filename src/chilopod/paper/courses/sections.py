@@ -9,8 +9,7 @@ from chilopod.paper.courses import figures, robust
 from chilopod.paper.courses.robust import Robust
 from chilopod.paper.courses.rows import compared_rows, condition_rows, robust_rows
 from chilopod.paper.courses.study import PLANAR, WHOLE, compared, prepared, without_setting
-from chilopod.paper.movies import Movie
-from chilopod.paper.section import Context, Section
+from chilopod.paper.section import Context, Movie, Section
 from chilopod.progress import Progress, part
 from chilopod.steering import COURSES as COURSES_NAMED
 from chilopod.steering import STRATEGIES, Course

@@ -61,17 +61,10 @@ def curved_trials(
     folder: Folder = None,
     progress: Progress = silent,
 ) -> xr.Dataset:
-    """Walks from straight on, several at every spring, and the bend that each ends in.
+    """Walks from straight on, several at every spring (N*mm/deg, rising), and the bend that each ends in.
 
-    Parameters
-    ----------
-    springs
-        Values of k1, N*mm/deg, rising.
-    repeats, disturbance
-        Trials at each of them, all with seeds of their own, and their disturbance, by default that of all studies.
-    e_folds
-        Duration of a trial, in e-folds of the slowest motion about the straight walk, but 180 s at least and 1200 s
-        at most.
+    A trial walks for a number of e-folds of the slowest motion about the straight walk, but 180 s at least and 1200 s
+    at most. All have seeds of their own, and by default the disturbance of all studies.
 
     Returns
     -------

@@ -85,18 +85,9 @@ def page(
     robot_file: str,
     state: State = State.DONE,
 ) -> str:
-    """The page as HTML, which reloads itself while it is running.
-
-    Parameters
-    ----------
-    opening, shown
-        Figures of the robot itself, at the beginning of the first chapter, and figures and films drawn so far, in the
-        order they stand within their chapters; figures with a letter come first, in the order of their letters.
-    failures, waiting
-        Errors of sections that could not be computed or drawn, and sections that are still to be.
-    robot_file
-        Name of this robot on the command line: a preset, or the path of a file.
-    """
+    """The page as HTML, which reloads itself while it is running: figures of the robot itself open the first chapter,
+    and figures and films drawn so far stand in their chapters, those with a letter first; some sections failed, and
+    some are waiting to be computed or drawn. Commands call this robot ``robot_file``: a preset, or the path of a file."""
     folder = files("chilopod.paper.page")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     environment.filters["embedded"] = _embedded

@@ -14,9 +14,8 @@ from typing import Any, TypeVar
 
 from chilopod.errors import OutputError
 from chilopod.output import check_files, check_folder, write_atomic
-from chilopod.paper.movies import Movie
 from chilopod.paper.page.page import Drawn, Film, Shown, State, page
-from chilopod.paper.section import Context, Found, Section, SectionProgress, Size
+from chilopod.paper.section import Context, Found, Movie, Section, SectionProgress, Size
 from chilopod.robot import Robot, load_robot, presets
 from chilopod.show import style
 from chilopod.show.figures import schematic

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import xarray as xr
 
-from chilopod.analysis.parameters import stiffness
-from chilopod.paper.movies import Movie, robot_movies
+from chilopod.paper.movies import robot_movies
 from chilopod.paper.robot import numerics, why
 from chilopod.paper.robot.figures import trust, turning, walks
 from chilopod.paper.robot.rows import turning_rows, walk_rows
@@ -13,19 +12,9 @@ from chilopod.paper.robot.spread import twin_spread
 from chilopod.paper.robot.structures import structures
 from chilopod.paper.robot.turning import RobotTurning, robot_turning
 from chilopod.paper.robot.walks import RobotWalks, robot_walks
-from chilopod.paper.section import Context, Section
-from chilopod.progress import Progress
+from chilopod.paper.section import Movie, Section
 
 CHAPTER = "The whole robot in three dimensions"
-
-_FILMED = (stiffness(41.0), stiffness(26.0), stiffness(15.0))  # the paper's large, small and very small
-_TRIED = (stiffness(41.0), stiffness(21.0), stiffness(15.0))  # the paper's of task A
-
-
-def _films(context: Context, report: Progress) -> list[Movie]:
-    shorter = context.size.cut(1.0, 0.013)
-    return robot_movies(context.whole, _FILMED, _TRIED, context.folder, report, shorter=shorter)
-
 
 WALKS: Section[RobotWalks] = Section(
     "robot-walks", CHAPTER, "the whole robot in 3-D: its walks", robot_walks, walk_rows, walks.panels
@@ -41,7 +30,7 @@ TASKS: Section[RobotTurning] = Section(
     beside=(WALKS,),
 )
 FILMS: Section[list[Movie]] = Section(
-    "robot-movies", CHAPTER, "the paper's two movies in 3-D", _films, films=lambda films: films
+    "robot-movies", CHAPTER, "the paper's two movies in 3-D", robot_movies, films=lambda films: films
 )
 SPREAD: Section[xr.Dataset] = Section(
     "robot-spread",

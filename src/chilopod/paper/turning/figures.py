@@ -274,16 +274,10 @@ def draw_comparison(task: TurningTask, hopf: TurningTask, narrow: bool, top: Seq
 def draw_criteria(
     shown: Mapping[str, TurningTask], narrow: bool, top: Sequence[float], name: str = k(1), k_hat: float | None = None
 ) -> Figure:
-    """The three criteria over 1/k of one or two tasks by their names.
+    """The three criteria over 1/k of one or two tasks by their names, with some springs (N*mm/deg) on the top axis.
 
-    Parameters
-    ----------
-    top, name
-        Springs to mark on the top axis, N*mm/deg, and the name of the spring.
-    k_hat
-        Spring of a radius law, N*mm/deg; with it the springs that arrive are shaded, without it the lowest mean of the
-        first task is marked.
-    """
+    With the spring of a radius law, ``k_hat`` (N*mm/deg), the springs that arrive are shaded; without it the lowest
+    mean of the first task is marked."""
     figure, axes = style.figure(*_CRITERIA, narrow)
     first = next(iter(shown.values()))
     arrived = springs_by_outcome(first.criteria)[Outcome.ARRIVED]

@@ -113,10 +113,8 @@ def turning_task(
     time
         Time at which epsilon 1 to 3 are taken, s; by default the earliest arrival of any of these trials, as in the
         paper, and ``duration`` if none arrives.
-    duration
-        Duration of every trial, s, at least the paper's.
-    shown
-        Springs of ``paths``, N*mm/deg.
+    duration, shown
+        Duration of every trial, s, at least the paper's, and springs of ``paths``, N*mm/deg.
     walk
         Other fields of the trials, such as their engine and disturbance.
     """

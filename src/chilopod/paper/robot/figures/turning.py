@@ -84,8 +84,8 @@ def without(found: RobotTurning) -> Panel:
         alt="Paths of module 1 with and without leg yaw.",
         text=(
             f"Task A with {k(1)} = {case.spring:g}\u00a0{SPRING_UNIT}. Without leg yaw {few} of {walks} arrive, "
-            f"{planar.sides(case)}: the bend takes its time, and chance has the side. With it {many} of {with_} arrive. "
-            "The paper's robot: many of nine fail, all of five do not.",
+            f"{planar.sides(case)}: the bend takes its time, and chance has the side. With it {many} of {with_} "
+            "arrive. The paper's robot: many of nine fail, all of five do not.",
         ),
         data=data,
     )
