@@ -75,8 +75,8 @@ class Variant:
 
 @dataclass(frozen=True)
 class Task:
-    """A turning task: place of the target, radius of the circle to it, the spring whose walk has this radius, springs
-    at which all three criteria are smallest, outcomes of walks with some springs, and section or figure of the paper."""
+    """A turning task: target, radius of the circle to it, the spring whose walk has this radius, springs at which all
+    three criteria are smallest, outcomes of walks with some springs, and section or figure of the paper."""
 
     target: Target
     radius: Number

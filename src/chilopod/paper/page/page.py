@@ -85,9 +85,11 @@ def page(
     robot_file: str,
     state: State = State.DONE,
 ) -> str:
-    """The page as HTML, which reloads itself while it is running: figures of the robot itself open the first chapter,
-    and figures and films drawn so far stand in their chapters, those with a letter first; some sections failed, and
-    some are waiting to be computed or drawn. Commands call this robot ``robot_file``: a preset, or the path of a file."""
+    """The page as HTML, which reloads itself while it is running.
+
+    Figures of the robot itself open the first chapter; figures and films drawn so far stand in their chapters, those
+    with a letter first. Sections failed, or are waiting to be computed or drawn. Commands call this robot
+    ``robot_file``: a preset, or the path of a file."""
     folder = files("chilopod.paper.page")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     environment.filters["embedded"] = _embedded

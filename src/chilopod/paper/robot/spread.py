@@ -50,10 +50,10 @@ def twin_spread(context: Context, progress: Progress = silent) -> xr.Dataset:
     Returns
     -------
     Dataset over set (0 the preset's): the constants (SI; ``unit`` is the unit of the robot file) by path over
-    ``constant``, ``misfit``, and predictions: over
-    variant ``onset`` (N*mm/deg, NaN where walks determine none; ``paper`` what is printed) and ``radius`` (over that as
-    built, at an equal distance from each one's own onset), ``uniform`` (N*mm/deg), and over task ``best``, the spring
-    that comes nearest to the target (N*mm/deg), and ``arrives``, whether that arrives.
+    ``constant``, ``misfit``, and predictions: over variant ``onset`` (N*mm/deg, NaN where walks determine none;
+    ``paper`` what is printed) and ``radius`` (over that as built, at an equal distance from each one's own onset),
+    ``uniform`` (N*mm/deg), and over task ``best``, the spring that comes nearest to the target (N*mm/deg), and
+    ``arrives``, whether that arrives.
     """
     robot, folder, size = context.whole, context.folder, context.size
     fits = unlike(known(), size.of(COUNT, 2, 1))

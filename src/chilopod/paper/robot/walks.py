@@ -17,7 +17,6 @@ import xarray as xr
 from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT
 from chilopod.analysis.square_root import SquareRootFit
 from chilopod.paper import measures, printed
-from chilopod.paper.measures import Folder
 from chilopod.paper.section import Context
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
@@ -173,7 +172,7 @@ def undulations(
     *,
     duration: float = UNIFORM_DURATION,
     engine: str = "twin",
-    folder: Folder = None,
+    folder: measures.Folder = None,
     progress: Progress = silent,
 ) -> xr.Dataset:
     """Walks with all springs alike: how far the body swings once it has settled.
