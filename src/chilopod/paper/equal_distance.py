@@ -49,7 +49,8 @@ def radius_ratio(base: xr.Dataset, variant: xr.Dataset, drawn: int = DRAWN, seed
     :func:`chilopod.tasks.radius_law.end_of_walk` has them, of which those count that
     :func:`chilopod.paper.measures.counted` tells.
 
-    Trials are drawn anew at every spring for the standard errors, onsets fitted anew each time; 0 times for none."""
+    Trials are drawn anew at every spring for the standard errors, onsets fitted anew each time; 0 times for none.
+    """
     inverse, bends = zip(*(_bends(each) for each in (base, variant)), strict=True)
     found = _ratios(inverse, bends)
     rng = np.random.default_rng(seed)

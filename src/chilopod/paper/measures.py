@@ -87,8 +87,7 @@ def example_walks(
     engine: str = "planar",
     folder: Folder = None,
 ) -> xr.Dataset:
-    """Joint angles of one walk with each of some springs, as a dataset over (time, spring, joint): ``joint_angle``
-    (rad)."""
+    """Joint angles of one walk with each of some springs, over (time, spring, joint): ``joint_angle`` (rad)."""
     records = spring_walks(robot, springs, duration, seeds=seeds, folder=folder, rate=_RATE, engine=engine)
     angles = [record.joint_angle.isel(robot=0, drop=True) for record in records]
     data = xr.concat(angles, dim="spring").transpose("time", "spring", "joint").to_dataset(name="joint_angle")
@@ -121,8 +120,7 @@ def fitted(inverse: ArrayLike, bends: ArrayLike, resampled: int = RESAMPLED) -> 
 
 
 def point_of(fit: SquareRootFit | None) -> tuple[float, float]:
-    """Point at which curved walks set in by a fit and its standard error by the bootstrap, N*mm/deg; NaN if there is
-    none."""
+    """Point of a fit and its standard error by the bootstrap, N*mm/deg; NaN if there is none."""
     return (fit.critical, fit.bootstrap_error) if fit else (float("nan"), float("nan"))
 
 

@@ -13,7 +13,7 @@ from chilopod.paper import printed
 from chilopod.paper.section import Context, Movie
 from chilopod.progress import Progress
 from chilopod.steering import LegYawController
-from chilopod.trials import NONE, Trial, together
+from chilopod.trials import NONE, Trial, run, together
 
 TASK_A = printed.TASKS["A"].target
 
@@ -56,7 +56,8 @@ def _movies(
     steered: dict[str, Any] = {"target": TASK_A, "controller": LegYawController(), "disturbance": NONE}
     task = replace(walk, duration=duration, seed=0, joint_angles=(), **steered)
     pairs = zip([walk] * 3 + [task] * 3, springs, strict=True)
-    records = context.run([replace(each, robot=walk.robot.with_value(K1, spring)) for each, spring in pairs], progress)
+    asked = [replace(each, robot=walk.robot.with_value(K1, spring)) for each, spring in pairs]
+    records = run(asked, context.folder, progress)
     kinds = ("straight", "curved a little", "curved a lot", "too stiff", "best", "too soft")
     names = [units.format(value, "N*mm/deg", digits=3).replace("*", "·") for value in springs]
     titles = tuple(f"k1 = {name}: {kind}" for name, kind in zip(names, kinds, strict=True))

@@ -35,8 +35,7 @@ REGISTRY: dict[str, str] = {
     "robot-courses": "courses.sections.ROBOT_COURSES",
     "courses-movie": "courses.sections.COURSES_FILM",
 }
-"""Module below :mod:`chilopod.paper` and constant of each section, by its name: the paper's own experiments, then what
-goes beyond them."""
+"""Module and constant of each section, by its name: the paper's own experiments, then what goes beyond them."""
 
 
 def load_sections() -> tuple[Section[Any], ...]:

@@ -55,7 +55,8 @@ def difference(one: ArrayLike, other: ArrayLike, *, paired: bool = False) -> Dif
     """The mean of some trials less that of others, shapes (n,) and (m,); NaN does not count.
 
     If they are paired, trials of equal index belong together, as those of one seed do; then the scatter of their
-    differences counts. Else the trials are independent."""
+    differences counts. Else the trials are independent.
+    """
     x, y = np.asarray(one, dtype=np.float64), np.asarray(other, dtype=np.float64)
     if paired:
         return Difference(*mean_and_error(x - y))

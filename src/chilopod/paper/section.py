@@ -11,14 +11,12 @@ from typing import Any, Generic, TypeVar
 
 import xarray as xr
 
-from chilopod import trials
 from chilopod.errors import OutputError
 from chilopod.paper.statements import ORDER
 from chilopod.paper.table import OfPlanar, OfTwin, RobotRow, Row, robot_rows
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot, load_robot
 from chilopod.show.panel import Panel
-from chilopod.trials import Trial
 
 S = TypeVar("S")
 T = TypeVar("T")
@@ -62,10 +60,6 @@ class Context:
     whole: Robot = field(default_factory=lambda: load_robot("aoi2022"))
     size: Size = Size.FULL
     folder: Path | None = None
-
-    def run(self, asked: Sequence[Trial], progress: Progress = silent) -> list[xr.Dataset]:
-        """Records of trials, kept in the folder."""
-        return trials.run(asked, self.folder, progress)
 
 
 @dataclass(frozen=True)

@@ -52,7 +52,8 @@ def bootstrap_mean(values: ArrayLike, seed: int = 0) -> Interval:
     """Mean of what is not NaN, with the percentile interval of the bootstrap.
 
     Groups, shape (groups,) or (groups, members), are independent and are drawn anew as a whole; members of one, as the
-    targets of one course, need not be."""
+    targets of one course, need not be.
+    """
     table = np.asarray(values, dtype=np.float64)
     table = table.reshape(len(table), -1)
     return bootstrap_ratio(np.nansum(table, axis=1), np.isfinite(table).sum(axis=1), seed)

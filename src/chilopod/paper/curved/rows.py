@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from chilopod.analysis.parameters import PAPER_UNIT
@@ -11,7 +9,7 @@ from chilopod.paper import printed, statements
 from chilopod.paper.curved.study import CurvedStudy, axis_radius, bend_order, fluctuation
 from chilopod.paper.equal_distance import change, radius_ratio
 from chilopod.paper.scatter import INCREASES, increases
-from chilopod.paper.table import OfPlanar, Result, Row, agreement, unprinted
+from chilopod.paper.table import OfPlanar, Result, Row, Verdict, agreement, unprinted
 from chilopod.tasks.radius_law import is_curved
 
 
@@ -36,14 +34,15 @@ def _model_rows(study: CurvedStudy) -> list[Row]:
             printed.ANALYSIS,
             agreement(order == printed.MODE_ORDER),
         ),
-        replace(
-            unprinted(
-                "how the bend of joint 1 grows from the point",
+        Row(
+            "how the bend of joint 1 grows from the point",
+            "not printed (robot: fitted by a square root of 1/k1)",
+            Result(
                 f"power {float(below.power):.2f} of the distance {100 * (1 - float(below.softest) / exact):.1f} % "
-                f"below, {float(law.power[0]):.2f} at {100 * (1 - float(law.softest[0]) / exact):.2g} %",
-                printed.EXPERIMENTS,
+                f"below, {float(law.power[0]):.2f} at {100 * (1 - float(law.softest[0]) / exact):.2g} %"
             ),
-            paper="not printed (robot: fitted by a square root of 1/k1)",
+            printed.EXPERIMENTS,
+            Verdict.NOT_PRINTED,
         ),
         unprinted(
             "where trials settle",

@@ -142,10 +142,11 @@ def on_branch(branch: xr.Dataset, name: str, spring: float | Array) -> Array:
 def variant_trials(
     robot: Robot, base: xr.Dataset, repeats: int = 5, *, folder: Folder = None, progress: Progress = silent
 ) -> dict[str, xr.Dataset]:
-    """Trials of the paper's variants at the same springs relative to each one's own pitchfork.
+    """Trials of the paper's variants, by name, at the same springs relative to each one's own pitchfork.
 
     ``base`` are trials of the robot as built, from :func:`curved_trials`, of which the first so many repeats at springs
-    up to 1.2 times the critical one are used. By variant, "as built" first, one dataset each."""
+    up to 1.2 times the critical one are used.
+    """
     ratios = base.spring.values / base.attrs["critical_k1"]
     ratios = ratios[ratios < 1.2]
     robots = {name: each for name, each in printed.variant_robots(robot).items() if name != printed.AS_BUILT}

@@ -89,7 +89,8 @@ def page(
 
     Figures of the robot itself open the first chapter; figures and films drawn so far stand in their chapters, those
     with a letter first. Sections failed, or are waiting to be computed or drawn. Commands call this robot
-    ``robot_file``: a preset, or the path of a file."""
+    ``robot_file``: a preset, or the path of a file.
+    """
     folder = files("chilopod.paper.page")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     environment.filters["embedded"] = _embedded

@@ -96,11 +96,12 @@ def printed_number(reading: str) -> printed.Number:
 
 
 def predictions(robot: Robot, folder: Folder = None, engine: str = "twin", size: Size = Size.FULL) -> dict[str, Any]:
-    """Where curved and undulating walks set in other than in the base series, and how tight they are.
+    """Where curved and undulating walks set in other than in the base series, and how tight they are, by few and
+    undisturbed walks, which begin bent.
 
-    Few and undisturbed walks, which begin bent, in place of the many from straight on that
-    :func:`chilopod.paper.robot.walks.robot_walks` has. By variant ``onset`` (N*mm/deg) and ``radius`` (over that as
-    built, at an equal distance from each one's own onset), NaN where walks determine none; and ``uniform``."""
+    By variant ``onset`` (N*mm/deg) and ``radius`` (over that as built, at an equal distance from each one's own onset),
+    NaN where walks determine none; and ``uniform``.
+    """
     shape = np.array(printed.mode_shape(robot))
     bend = tuple(_BENT * shape / shape.sum())
     variants = printed.variant_robots(robot)

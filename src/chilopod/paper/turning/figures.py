@@ -43,6 +43,7 @@ _SHOWN = (style.ORANGE, style.GREEN, style.BLUE)
 _DASHES = ("-", (0, (5, 1.5)), (0, (1.5, 1.2)), (0, (5, 1.5, 1.2, 1.5)))
 _CURVES = tuple(zip(style.CURVES, _DASHES, strict=False))
 _AXES = {"distance": ("target distance", "m"), "angle": ("target angle", "deg"), "effort": ("leg yaw", "rad²·s")}
+_STRATEGIES = ((style.BLUE, "o"), (style.ORANGE, "s"))
 _TOP, _TOP_HOPF = (41, 15, 10, 7, 5), (41, 10, 5, 3, 2)  # N*mm/deg, on the upper axis
 
 
@@ -277,15 +278,14 @@ def draw_criteria(
     """The three criteria over 1/k of one or two tasks by their names, with some springs (N*mm/deg) on the top axis.
 
     With the spring of a radius law, ``k_hat`` (N*mm/deg), the springs that arrive are shaded; without it the lowest
-    mean of the first task is marked."""
+    mean of the first task is marked.
+    """
     figure, axes = style.figure(*_CRITERIA, narrow)
     first = next(iter(shown.values()))
     arrived = springs_by_outcome(first.criteria)[Outcome.ARRIVED]
     for place, criterion in zip("ABC", CRITERION_NAMES, strict=True):
         one, factor = axes[place], SCALES[criterion][0]
-        for (label, task), (color, marker) in zip(
-            shown.items(), ((style.BLUE, "o"), (style.ORANGE, "s")), strict=False
-        ):
+        for (label, task), (color, marker) in zip(shown.items(), _STRATEGIES, strict=False):
             data = task.criteria.isel(instant=0, missing_dims="ignore")
             mean, error = (factor * data[f"{criterion}_{what}"].values for what in ("mean", "error"))
             errorbars(one, 1.0 / data.spring.values, mean, error, color, marker, label, joined=True)
