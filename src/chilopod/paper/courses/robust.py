@@ -128,4 +128,4 @@ def under(
         if "case" in each.dims
     }
     names = {"condition": [each.name for each in conditions], "strategy": [VARIABLE.name, _FIXED]}
-    return data.drop_dims("case").assign(both).assign_coords(names).assign_attrs(spring=spring)
+    return xr.Dataset(both, names, {**data.attrs, "spring": spring}).merge(data.drop_dims("case"))

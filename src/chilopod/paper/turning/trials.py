@@ -153,8 +153,9 @@ def _criteria(record: xr.Dataset, instants: tuple[float, float], springs: Sequen
     ends = np.where(np.isfinite(found[0].arrival), found[0].arrival, last).tolist()
     until = np.array([efforts(record.isel(robot=[index]), end)[0] for index, end in enumerate(ends)])
     both = ("spring", "repeat")
-    names = {"spring": over_springs(springs), "repeat": np.arange(repeats), "instant": ["earliest arrival", "paper"]}
-    data = xr.Dataset({"seconds": ("instant", np.array(instants), {"units": "s"})}, names)
+    names = {"spring": over_springs(springs), "instant": ["earliest arrival", "paper"], "repeat": np.arange(repeats)}
+    data = xr.Dataset(coords=names)
+    data["seconds"] = ("instant", np.array(instants), {"units": "s"})
     for name, unit in (("distance", "m"), ("angle", "rad"), ("effort", "rad^2*s")):
         values = np.stack([getattr(each, name).reshape(shape) for each in found])
         data[name] = (("instant", *both), values, {"units": unit})
