@@ -10,7 +10,7 @@ import pytest
 
 from chilopod.cli import main
 from chilopod.paper.fit_data import critical_mode_data, variant_settings
-from chilopod.paper.sections import SECTIONS
+from chilopod.paper.registry import load_sections
 from chilopod.paper.straight.sections import IDENTIFICATION
 from chilopod.tasks.identify import planar
 from helpers.browser import CHROMIUM, Browser
@@ -44,7 +44,7 @@ def browser(tmp_path_factory):
 
 
 def test_every_section_is_computed_and_on_the_page(tiny):
-    assert list(tiny.found.values) == list(SECTIONS)
+    assert list(tiny.found.values) == list(load_sections())
     assert tiny.failures == {}
     drawn = {path.stem for path in (tiny.folder / "figures").iterdir()}
     page = PAGE((tiny.folder / "index.html").read_text(encoding="utf-8"))
