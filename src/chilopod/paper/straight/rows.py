@@ -83,9 +83,8 @@ def uniform_rows(data: xr.Dataset) -> list[Row | OfPlanar]:
 
 def identification_rows(found: Identification) -> list[Row]:
     """The constants the paper does not print."""
-    legs, profile = found.best.legs, found.profile
-    inside = profile.forward_offset.values[profile.largest_residual.values <= 1.0]
-    span = f"{1e3 * inside.min():.0f} to {1e3 * inside.max():.0f} mm" if inside.size else "nowhere"
+    legs, allowed = found.best.legs, found.allowed("legs.forward_offset")
+    span = "nowhere" if allowed is None else f"{1e3 * allowed[0]:.0f} to {1e3 * allowed[1]:.0f} mm"
     return [
         unprinted(
             "foot friction, half-width, forward offset",

@@ -54,7 +54,7 @@ def panel(fit: Identification) -> Panel:
             f"{1e3 * best.legs.forward_offset:.1f} mm, with a largest residual of "
             f"{number(float(np.abs(fit.residuals).max()), 2)}: {'all six are met' if met else 'not all six are met'}. "
             + f"This robot, with {1e3 * fit.given.legs.forward_offset:.1f} mm, has {number(float(ours), 3)}. "
-            + _valley(data, inside),
+            + _valley(fit),
             _predicted(data, inside),
             _verdict(data, inside),
         ),
@@ -67,13 +67,13 @@ def _inside(data: xr.Dataset) -> NDArray[np.bool_]:
     return allowed
 
 
-def _valley(data: xr.Dataset, inside: NDArray[np.bool_]) -> str:
-    if not inside.any():
-        return "No forward offset of the profile meets all six."
-    offsets = 1e3 * data.forward_offset.values[inside]
+def _valley(fit: Identification) -> str:
+    allowed = fit.allowed("legs.forward_offset")
+    if allowed is None:
+        return "No constants meet all six."
     return (
-        f"But the valley is flat: wherever the forward offset is fixed between {offsets.min():.0f} and "
-        f"{offsets.max():.0f} mm (shaded), the other two can be chosen so that all six printed numbers come out."
+        f"The valley is flat: for every forward offset between {1e3 * allowed[0]:.0f} and {1e3 * allowed[1]:.0f} mm "
+        "(shaded) there are values of the other two with which all six printed numbers come out."
     )
 
 
@@ -124,10 +124,10 @@ def _draw(fit: Identification, narrow: bool) -> Figure:
     data = fit.profile
     figure, axes = style.figure(_WIDE, _NARROW, narrow)
     x = 1e3 * data.forward_offset.values
-    inside = _inside(data)
+    allowed = fit.allowed("legs.forward_offset")
     for one in axes.values():
-        if inside.any():
-            one.axvspan(x[inside].min(), x[inside].max(), color=style.PALE, lw=0, label="rounding allows")
+        if allowed is not None:
+            one.axvspan(1e3 * allowed[0], 1e3 * allowed[1], color=style.PALE, lw=0, label="rounding allows")
         one.set(xlim=(x[0], x[-1]), xlabel="forward offset (mm)")
     _fitted(axes["A"], x, data.largest_residual.values, "How well the six fit", "largest residual")
     axes["A"].axhline(1.0, color=style.BLACK, lw=1.0, linestyle=":")

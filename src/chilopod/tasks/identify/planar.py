@@ -3,7 +3,7 @@
 Foot friction, half-width and forward offset are fitted to the critical k1 and the mode of a robot. Every number is
 weighted by its tolerance: a residual of 1 is exactly what that allows (of printed numbers, half their last digit). The
 range of a constant is the projection of the set in which no residual exceeds 1. The profile over the forward offset
-shows the valley: at each offset the other two are fitted again.
+shows the valley: at each offset the other two make the largest residual as small as it can be.
 """
 
 from __future__ import annotations
@@ -163,7 +163,7 @@ def identify_planar(
     """
     scale, fits = _scale(robot, data), []
     for index, start in enumerate(_STARTS):
-        fits.append(_fit(robot, data, np.array(start) * scale, fixed=0))
+        fits.append(_fit(robot, data, np.array(start) * scale))
         progress(0.3 * (index + 1) / len(_STARTS), f"fit from start {index + 1}")
     best = min(fits, key=lambda fit: float((fit[1] ** 2).sum()))
     if (best[1] == _NO_PITCHFORK).all():
@@ -243,22 +243,40 @@ def _ranges(robot: Robot, data: CriticalMode, best: Array) -> tuple[Array, NDArr
     return ranges, cut
 
 
-def _fit(robot: Robot, data: CriticalMode, start: Array, fixed: int) -> tuple[Array, Array]:
-    """Least squares over the constants but the last ``fixed``; returns constants and residuals."""
-    free, scale = len(start) - fixed, _scale(robot, data)
+def _fit(robot: Robot, data: CriticalMode, start: Array) -> tuple[Array, Array]:
+    """Least squares over the constants; returns these and the residuals."""
+    off, scale = _Residuals(robot, data), _scale(robot, data)
+    how = {"bounds": (_LEAST, _MOST), "x_scale": 0.1, "diff_step": 1e-5, "xtol": 1e-9}
+    answer = least_squares(off, start / scale, **how)
+    return answer.x * scale, np.asarray(answer.fun)
 
-    def cost(scaled: Array) -> Array:
-        return residuals(with_constants(robot, np.concatenate([scaled * scale[:free], start[free:]])), data)
 
-    answer = least_squares(
-        cost,
-        start[:free] / scale[:free],
-        bounds=(_LEAST[:free], _MOST[:free]),
-        x_scale=0.1,
-        diff_step=1e-5,
-        xtol=1e-9,
-    )
-    return np.concatenate([answer.x * scale[:free], start[free:]]), np.asarray(answer.fun)
+def _smallest(robot: Robot, data: CriticalMode, start: Array) -> Array:
+    """Constants with the offset of ``start`` whose largest residual is smallest, near the fit by least squares."""
+    off, scale = _Residuals(robot, data), _scale(robot, data)
+
+    def all_of(free: Array) -> Array:
+        return np.append(free[:2], start[2] / scale[2])
+
+    def within(free: Array) -> Array:
+        found = off(all_of(free))
+        return np.concatenate([free[2] - found, free[2] + found])
+
+    def slopes(free: Array) -> Array:
+        found = off.jacobian(all_of(free))[:, :2]
+        return np.hstack([np.concatenate([-found, found]), np.ones((2 * len(found), 1))])
+
+    near = least_squares(
+        lambda free: off(all_of(free)), start[:2] / scale[:2], bounds=(_LEAST[:2], _MOST[:2]), x_scale=0.1
+    ).x
+    last = np.array([0.0, 0.0, 1.0])
+    found = minimize(
+        lambda free: free[2], np.append(near, np.abs(off(all_of(near))).max()), jac=lambda free: last,
+        method="SLSQP", bounds=[*zip(_LEAST[:2], _MOST[:2], strict=True), (0.0, None)],
+        constraints=[{"type": "ineq", "fun": within, "jac": slopes}], options={"maxiter": 60, "ftol": 1e-8},
+    ).x  # fmt: skip
+    best = min((all_of(found), all_of(near)), key=lambda scaled: float(np.abs(off(scaled)).max()))
+    return best * scale
 
 
 def _profile(
@@ -280,8 +298,8 @@ def _profile(
     for direction in (range(middle, count), range(middle - 1, -1, -1)):
         last = best
         for index in direction:
-            constants, off = _fit(robot, data, np.append(last[:2], offsets[index]), fixed=1)
-            last = constants
+            constants = _smallest(robot, data, np.append(last[:2], offsets[index]))
+            last, off = constants, residuals(with_constants(robot, constants), data)
             rows[index] = {
                 "friction": constants[0],
                 "half_width": constants[1],
