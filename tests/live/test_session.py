@@ -10,7 +10,7 @@ from chilopod.analysis.parameters import stiffness
 from chilopod.engine import Status
 from chilopod.errors import ParameterError
 from chilopod.live import Session, wishes
-from chilopod.live.state import STRIDES
+from chilopod.live.sliders import STRIDES
 from chilopod.robot import load_robot
 from chilopod.show.scene.replay import replay
 
@@ -184,7 +184,7 @@ def test_a_robot_that_fails_stays_until_it_begins_anew():
 @pytest.mark.parametrize(
     ("asked", "part"),
     [
-        (wishes.Spring(0, float("nan")), "stiffness = nan: is no number"),
+        (wishes.Spring(0, float("nan")), "stiffness[0] = nan: is no number"),
         (wishes.Spring(None, -1.0), "springs.stiffness"),
         (wishes.Friction(float("inf")), "friction = inf"),
         (wishes.Friction(7.0), "0.3 to 3"),
