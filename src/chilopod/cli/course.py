@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chilopod.cli.options import OutOption, WalkOptions, print_table, reading, with_options
+from chilopod.cli.options import OutOption, WalkOptions, reading, with_options
 
 if TYPE_CHECKING:
     from chilopod.progress import Progress
@@ -96,69 +96,4 @@ def course(
         ready = driver(described, chosen, spring, **how, folder=options.trials, progress=told("radius law"))
         return drive(ready, goals, **options.runs(told("course")))
 
-    options.walk_into(out, "course", walked, _print)
-
-
-def _print(done: Driven) -> None:
-    told = done.as_json()
-    walks, goals = told["walks"], len(done.course.goals)
-    typer.echo(f"{done.who}, {done.strategy.name}: {done.strategy.sentence}")
-    typer.echo(f"  {goals} target{'s' * (goals > 1)}, {done.course.patience:g} s for each")
-    for remark in done.driver.remarks:
-        typer.echo(f"  {remark}")
-    if len(walks) == 1:
-        print_table(_of_targets(walks[0]["targets"]), "  ")
-    else:
-        print_table(_of_walks(walks, goals), "  ")
-    missed = {each["verdict"]: each["sentence"] for walk in walks for each in walk["targets"]}
-    missed.pop("arrived", None)
-    for verdict, sentence in missed.items():
-        typer.echo(f"  {verdict}: {sentence}")
-    if len(walks) == 1:
-        (walk,) = walks
-        typer.echo(
-            f"  {walk['arrived']} of {goals} targets in {walk['time_s']:.1f} s; work {walk['spring_work_J']:.3g} J on "
-            f"springs, {walk['drive_work_J']:.3g} J by drives; steering's part of the cost of transport "
-            f"{_shown(walk['steering_cost_of_transport'], '.2g')}"
-        )
-    else:
-        whole = sum(walk["arrived"] == goals for walk in walks)
-        typer.echo(
-            f"  {sum(walk['arrived'] for walk in walks)} of {len(walks) * goals} targets, {whole} of {len(walks)} "
-            "courses whole"
-        )
-
-
-def _of_targets(goals: list[dict[str, Any]]) -> Iterable[tuple[str, ...]]:
-    yield "target", "verdict", "time (s)", "path / shortest", "leg yaw (rad2 s)", "springs (J)", "drives (J)"
-    for number, goal in enumerate(goals, 1):
-        if not goal["path_m"]:  # it had no turn
-            yield str(number), goal["verdict"], *"-----"
-            continue
-        yield (
-            str(number),
-            goal["verdict"],
-            f"{goal['end_s'] - goal['begin_s']:.1f}",
-            f"{goal['path_m']:.2f} / {goal['shortest_m']:.2f} m",
-            f"{goal['leg_yaw_effort_rad2_s']:.4f}",
-            f"{goal['spring_work_J']:.3f}",
-            f"{goal['drive_work_J']:.3f}",
-        )
-
-
-def _of_walks(walks: list[dict[str, Any]], goals: int) -> Iterable[tuple[str, ...]]:
-    yield "seed", "targets", "time (s)", "springs (J)", "drives (J)", "cost of transport", "status"
-    for walk in walks:
-        yield (
-            str(walk["seed"]),
-            f"{walk['arrived']} of {goals}",
-            f"{walk['time_s']:.1f}",
-            f"{walk['spring_work_J']:.3f}",
-            f"{walk['drive_work_J']:.3f}",
-            _shown(walk["steering_cost_of_transport"], ".2g"),
-            walk["status"],
-        )
-
-
-def _shown(value: float | None, form: str) -> str:
-    return "-" if value is None else format(value, form)
+    options.walk_into(out, "course", walked)

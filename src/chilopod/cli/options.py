@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from chilopod.tasks.runs import Runs
 
 Found = TypeVar("Found", bound="Runs")
-STAYS_STRAIGHT = "nothing disturbed it, so nothing bends it, even where the straight walk is unstable"
-
 
 _TYPED_AS = {"joint_angles": "initial_joints", "spring": "k1"}
 """Options that are called otherwise than the argument of the function that they are for."""
@@ -233,12 +231,15 @@ class RobotOptions:
         free(files, self.force)
         return files
 
-    def deliver_json(self, files: Sequence[Path], result: dict[str, Any], show: Callable[[], None]) -> None:
-        """Write a result into these files as JSON, and print it."""
+    def deliver_json(self, files: Sequence[Path], result: dict[str, Any], lines: Iterable[str]) -> None:
+        """Write a result into these files as JSON, and print it as that or as lines of text."""
         from chilopod.output import write_all
 
         texts = [(file, json_text(result) + "\n") for file in files]
-        deliver(lambda: write_all(texts, replace=self.force), lambda: print_json(result) if self.as_json else show())
+        deliver(
+            lambda: write_all(texts, replace=self.force),
+            lambda: print_json(result) if self.as_json else print_lines(lines),
+        )
 
 
 @dataclass(frozen=True)
@@ -274,30 +275,19 @@ class WalkOptions(RobotOptions):
         with progress_bar(what) as show, own_code(show), walking_on(self.cluster):
             yield lambda title: partial(show, title)
 
-    def walk_into(
-        self,
-        out: Path | None,
-        what: str,
-        walk: Callable[[Callable[[str], Progress]], Found],
-        show: Callable[[Found], None],
-    ) -> None:
+    def walk_into(self, out: Path | None, what: str, walk: Callable[[Callable[[str], Progress]], Found]) -> None:
         """Walk a ``turn`` or a ``course``, write its files into the folder, if there is one, and print it."""
-        if out:
-            from chilopod.show.walked import files_of_walks
+        from chilopod.show.walked import files_of_walks, write_walks
 
+        if out:
             free(files_of_walks(what, out), self.force)
         with self.walking(what) as told:
             done = walk(told)
+        self.deliver(lambda: write_walks(what, done, out, replace=self.force) if out else [], done)
 
-        def write() -> Iterable[Path]:
-            from chilopod.show.walked import write_walks
-
-            return write_walks(what, done, out, replace=self.force) if out else ()
-
-        self.deliver(write, done, show)
-
-    def deliver(self, write: Callable[[], Iterable[Path]], done: Found, show: Callable[[Found], None]) -> None:
-        """Write the files of walks, and print what they came to, as JSON where that was asked for."""
+    def deliver(self, write: Callable[[], Iterable[Path]], done: Found, hint: str = "--seed 1") -> None:
+        """Write the files of walks, and print what they came to, as JSON where that was asked for; of walks that
+        nothing bends the hint says which options do."""
 
         def printed() -> None:
             with progress_bar("creep of the feet"):  # may take as long as the walk
@@ -305,7 +295,9 @@ class WalkOptions(RobotOptions):
             if self.as_json:
                 print_json(done.as_json())
                 return
-            show(done)
+            print_lines(done.lines())
+            if getattr(done, "straight", False):
+                typer.echo(f"  nothing disturbed it, so nothing bends it, even where it is unstable: try {hint}")
             if creeps is not None:
                 typer.echo(f"  standing feet creep like viscous ones of {creeps:.0f} N*s/m")
 
@@ -350,13 +342,10 @@ def json_text(result: dict[str, Any]) -> str:
     return json.dumps(result, indent=2, allow_nan=False)
 
 
-def print_table(rows: Iterable[Sequence[str]], indent: str = "") -> None:
-    """Print rows in columns, the first of them as headings."""
-    table = list(rows)
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    for line in table:
-        cells = (f"{cell:<{width}}" for cell, width in zip(line, widths, strict=True))
-        typer.echo(f"{indent}{'  '.join(cells)}".rstrip())
+def print_lines(lines: Iterable[str]) -> None:
+    """Print lines of text."""
+    for line in lines:
+        typer.echo(line)
 
 
 def free(paths: Iterable[Path], force: bool) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from chilopod.cli.options import JsonOption, new_app, print_json, print_table
+from chilopod.cli.options import JsonOption, new_app, print_json, print_lines
 from chilopod.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -89,6 +89,7 @@ def listed(folder: FolderArg, as_json: JsonOption = False) -> None:
 
 def _print_table(rows: Sequence[Group]) -> None:
     from chilopod.memory import in_words
+    from chilopod.notebook import aligned
 
     table = [("robot", "engine", "walk", "target", "controller", "robots", "seeds", "trials", "size")]
     for row in rows:
@@ -105,7 +106,7 @@ def _print_table(rows: Sequence[Group]) -> None:
                 f"{in_words(row.size)}{'' if row.found else ', another version'}",
             )
         )
-    print_table(table if rows else ())
+    print_lines(aligned(table) if rows else ())
 
 
 def _target(row: Group) -> str:

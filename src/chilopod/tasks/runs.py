@@ -12,7 +12,7 @@ import xarray as xr
 
 from chilopod.engine import HasFootCreep, engine_named
 from chilopod.engine.named import path_of
-from chilopod.frozen import Short
+from chilopod.notebook import Summary
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.trials import NONE, Trial, run
@@ -52,7 +52,7 @@ def runs(
 
 
 @dataclass(frozen=True)
-class Runs(Short):
+class Runs(Summary):
     """Walks that differ in nothing but their seed.
 
     Attributes

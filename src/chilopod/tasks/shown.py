@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from chilopod.notebook import picture
+from chilopod.notebook import axes_for, picture
 from chilopod.steering import ARRIVAL_RADIUS
+from chilopod.tasks.runs import Runs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,13 +17,24 @@ if TYPE_CHECKING:
 _MOST = 12  # walks that are drawn
 
 
-def paths(record: xr.Dataset) -> str:
-    """SVG of the paths of the walks in a record."""
-    count = record.sizes["robot"]
-    alt = f"paths of {'a walk' if count == 1 else f'{count} walks'} from above"
-    if count > _MOST:
-        alt += f", the first {_MOST} drawn"
-    return picture(lambda axes: draw_paths(axes, record), alt)
+class Pathed(Runs):
+    """Base of walks that have a record, and are drawn as paths over the floor."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def record(self) -> xr.Dataset: ...
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the path of module 1 in every walk, the first dozen of them, and the targets."""
+        axes = axes_for(axes)
+        draw_paths(axes, self.record)
+        return axes
+
+    def _picture(self) -> str:
+        count = self.record.sizes["robot"]
+        alt = f"paths of {'a walk' if count == 1 else f'{count} walks'} from above"
+        return picture(self.plot, alt if count <= _MOST else f"{alt}, the first {_MOST} drawn")
 
 
 def draw_paths(axes: Axes, record: xr.Dataset) -> None:

@@ -11,12 +11,11 @@ import numpy as np
 import xarray as xr
 
 from chilopod.engine import Controller
-from chilopod.notebook import block, table
 from chilopod.progress import Progress, silent
 from chilopod.record import RATE
 from chilopod.robot import Robot
 from chilopod.tasks.runs import RunOptions, Runs, runs
-from chilopod.tasks.shown import paths
+from chilopod.tasks.shown import Pathed
 from chilopod.trials import Trial, WalkSummary, as_now, run_each, straight, summaries, together
 
 
@@ -51,26 +50,25 @@ class Ends(Runs):
             "walks": [{"seed": trial.seed, **end.as_json()} for trial, end in ends],
         }
 
-    def _repr_html_(self) -> str:
-        return block(self.title, self._table)
-
-    @property
-    def _table(self) -> str:
-        rows = [
-            (
-                label,
-                end.sentence,
-                f"{end.x:.3f}",
-                f"{end.y:.3f}",
-                f"{end.axis_radius:.4g}" if np.isfinite(end.axis_radius) else "straight",
-            )
-            for label, end in zip(self.labels, self.summaries, strict=True)
+    def _told(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
+        rows: list[Sequence[str]] = [
+            ("seed", "x (m)", "y (m)", "radius (m)", "joint angles, mean of the last 5 s (deg)")
         ]
-        return table(("seed", "", "x (m)", "y (m)", "radius (m)"), rows)
+        for label, end in zip(self.labels, self.summaries, strict=True):
+            if end.failed:
+                rows.append((label, "-", "-", "-", end.sentence))
+                continue
+            bends = "  ".join(f"{angle:+7.2f}" for angle in end.joint_angles_deg)
+            radius = f"{end.axis_radius:.4g}" if np.isfinite(end.axis_radius) else "straight"
+            rows.append((label, f"{end.x:.3f}", f"{end.y:.3f}", radius, bends))
+        return [], rows, []
+
+    def _picture(self) -> str:
+        return ""
 
 
 @dataclass(frozen=True)
-class Walks(Ends):
+class Walks(Pathed, Ends):
     """Walks that differ in nothing but their seed, and what they came to.
 
     Attributes
@@ -82,9 +80,6 @@ class Walks(Ends):
     """
 
     record: xr.Dataset
-
-    def _repr_html_(self) -> str:
-        return block(self.title, paths(self.record), self._table)
 
 
 def walk(

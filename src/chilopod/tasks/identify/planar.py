@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -22,11 +22,14 @@ from chilopod import units
 from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT, stiffness
 from chilopod.analysis.straight_walk import bifurcations, first_loss, pitchfork
 from chilopod.errors import AnalysisError
-from chilopod.frozen import Short
+from chilopod.notebook import Summary, axes_for
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import Kind
 from chilopod.tasks.identify.data import CriticalMode
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
 
@@ -40,7 +43,7 @@ _NO_PITCHFORK = 100.0
 
 
 @dataclass(frozen=True)
-class Identification(Short):
+class Identification(Summary):
     """Result of an identification of the planar constants.
 
     Attributes
@@ -91,6 +94,25 @@ class Identification(Short):
             "largest_residual": float(np.abs(self.residuals).max()),
             "constants_from_every_start_si": self.starts.tolist(),
         }
+
+    @property
+    def title(self) -> str:
+        """Robot, and how well its constants meet the data."""
+        largest = np.abs(self.residuals).max()
+        return f"{self.given.name}: largest residual {largest:.2f}; 1 is what the tolerances of the data allow"
+
+    def _told(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
+        constants = self.as_json()["constants"].items()
+        rows = [(path, each["text"], each["allowed_text"]) for path, each in constants]
+        return [], [("constant", "best", "allowed by the data"), *rows], []
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the largest residual over the forward offset, where the other constants are fitted again."""
+        axes = axes_for(axes)
+        axes.plot(1e3 * self.profile.forward_offset, self.profile.largest_residual)
+        axes.axhline(1.0, linestyle=":", color="C7")
+        axes.set(xlabel="forward offset (mm)", ylabel="largest residual", ylim=(0.0, None))
+        return axes
 
 
 def residuals(robot: Robot, data: CriticalMode) -> Array:
