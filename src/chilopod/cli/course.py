@@ -33,9 +33,9 @@ def course(
         str,
         typer.Option(
             metavar="TARGETS|FILE|slalom|square|eight|random:SEED",
-            help='Where to, one after another, such as "45 deg, 1.3 m; -60 deg, 1.5 m", each seen from where the robot '
-            'is by then, or "1 m, 0.5 m; 2 m, 0 m", places on the floor; a file with one a line; a course by name; or '
-            "five at random.",
+            help='Targets one after another, such as "45 deg, 1.3 m; -60 deg, 1.5 m", each seen from where the robot '
+            'is by then, or "1 m, 0.5 m; 2 m, 0 m", places on the floor; a file with one target a line; a course by '
+            "name; or five random targets.",
             autocompletion=_courses,
         ),
     ],
@@ -43,9 +43,9 @@ def course(
         str,
         typer.Option(
             metavar="variable|pitchfork|hopf|leg-yaw|actuated",
-            help="How it turns. variable: the first spring is set anew in every gait cycle; pitchfork: a soft first "
-            "spring, the same on all the way; hopf: all springs alike and soft; leg-yaw: the springs as they are; "
-            "actuated: torques at all joints. The legs of module 1 yaw towards the target in all of them.",
+            help="Strategy of turning. variable: first spring set anew in every gait cycle; pitchfork: soft first "
+            "spring, the same all the way; hopf: all springs alike and soft; leg-yaw: springs as they are; actuated: "
+            "torques at all joints. In all of them the legs of module 1 yaw towards the target.",
             autocompletion=_strategies,
         ),
     ] = "variable",
@@ -61,13 +61,13 @@ def course(
         str | None,
         typer.Option(
             metavar="TIME",
-            help='How long for each target, such as "60 s", before the next has its turn; by default 40 s (planar) or '
-            "70 s (twin).",
+            help='Time for each target, such as "60 s", before the next has its turn; by default 40 s (planar) or 70 s '
+            "(twin).",
         ),
     ] = None,
     out: OutOption = None,
 ) -> None:
-    """Let a robot walk from target to target, and say what became of each.
+    """Let a robot walk from target to target, and report what became of each.
 
     A target is reached where the robot comes within 0.15 m of it; then, or when its time is over, the next has its
     turn. The robot knows of it what a laser scanner on module 1 sees: within 4.1 m and 120 deg to either side.

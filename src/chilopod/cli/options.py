@@ -43,15 +43,15 @@ def _strategies() -> list[str]:
 
 
 RobotArg = Annotated[
-    str, typer.Argument(metavar="ROBOT", help="A robot file, or one of the presets aoi2022 and aoi2022-planar.")
+    str, typer.Argument(metavar="ROBOT", help="Robot file, or one of the presets aoi2022 and aoi2022-planar.")
 ]
 SetOption = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
         metavar="PATH=VALUE",
-        help='Change a number of the robot, such as "springs.stiffness[0]=12 N*mm/deg"; may be repeated. '
-        "`chilopod robot show` lists them all.",
+        help='Other value of a number of the robot, such as "springs.stiffness[0]=12 N*mm/deg"; may be repeated. '
+        "`chilopod robot show` lists all numbers.",
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout instead of text.")]
@@ -59,16 +59,18 @@ ParameterOption = Annotated[
     str,
     typer.Option(
         metavar="PATH",
-        help="Which number of the robot to vary, such as springs.stiffness[0], the first yaw spring (the paper's k1), "
-        "or springs.stiffness, all of them together.",
+        help="Number of the robot that varies, such as springs.stiffness[0], the first yaw spring (the paper's k1), or "
+        "springs.stiffness, all springs together.",
     ),
 ]
 BetweenOption = Annotated[
     tuple[str, str],
-    typer.Option(metavar="LOW HIGH", help='Between which values, with their unit, such as "2 N*mm/deg" "75 N*mm/deg".'),
+    typer.Option(
+        metavar="LOW HIGH", help='Interval of its values, with their unit, such as "2 N*mm/deg" "75 N*mm/deg".'
+    ),
 ]
 OutOption = Annotated[
-    Path | None, typer.Option("--out", metavar="FOLDER", help="Write the results into this folder too.")
+    Path | None, typer.Option("--out", metavar="FOLDER", help="Folder for the results, besides the text.")
 ]
 ForceOption = Annotated[bool, typer.Option("--force", help="Replace files that are already there.")]
 SeedOption = Annotated[
@@ -76,16 +78,16 @@ SeedOption = Annotated[
     typer.Option(
         metavar="N",
         min=0,
-        help="Disturb start, feet and sensor a little, at random; the same seed disturbs in the same way. Without it "
-        "nothing is disturbed.",
+        help="Seed of small random disturbances of start, feet and sensor; the same seed gives the same walk. Without "
+        "it nothing is disturbed.",
     ),
 ]
 EngineOption = Annotated[
     str,
     typer.Option(
         metavar="planar|twin|MODULE:OBJECT",
-        help="What computes the walk: the paper's planar model, the whole robot in three dimensions (MuJoCo; a robot "
-        "with a [twin] section, such as aoi2022), or an engine of your own.",
+        help="Engine that computes the walk. planar: the paper's model; twin: the whole robot in three dimensions, by "
+        "MuJoCo (needs a [twin] section, as in aoi2022); or an engine of your own.",
         autocompletion=_engines,
     ),
 ]
@@ -93,28 +95,32 @@ StrategyOption = Annotated[
     str,
     typer.Option(
         metavar="pitchfork|hopf|leg-yaw|open-loop",
-        help="How it turns. pitchfork: a soft first spring, and the legs of module 1 yaw towards the target; hopf: all "
-        "springs alike and soft, with leg yaw; leg-yaw: leg yaw alone; open-loop: a soft first spring alone.",
+        help="Strategy of turning. pitchfork: soft first spring, and the legs of module 1 yaw towards the target; hopf: "
+        "all springs alike and soft, with leg yaw; leg-yaw: leg yaw alone; open-loop: soft first spring alone.",
         autocompletion=_strategies,
     ),
 ]
 ControllerOption = Annotated[
     str | None,
-    typer.Option(metavar="MODULE:CLASS", help="A controller of your own, from this folder or an installed package."),
+    typer.Option(metavar="MODULE:CLASS", help="Controller of your own, from this folder or an installed package."),
 ]
 TrialsOption = Annotated[
     Path | None,
-    typer.Option("--trials", metavar="FOLDER", help="Keep all trials here, and walk none that is there already."),
+    typer.Option(
+        "--trials",
+        metavar="FOLDER",
+        help="Folder that keeps all trials; a trial that is there already is not walked again.",
+    ),
 ]
 RepeatsOption = Annotated[
-    int, typer.Option(metavar="N", min=1, max=100_000, help="How many walks, with seeds counting up from --seed.")
+    int, typer.Option(metavar="N", min=1, max=100_000, help="Number of walks; their seeds count up from --seed.")
 ]
 ClusterOption = Annotated[
     str | None,
     typer.Option(
         "--cluster",
         metavar="ADDRESS|N",
-        help="Trials walk on a dask cluster: the address of its scheduler, or N worker processes on this machine.",
+        help="Dask cluster on which trials walk: address of its scheduler, or number of worker processes here.",
     ),
 ]
 

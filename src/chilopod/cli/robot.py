@@ -25,26 +25,27 @@ app = new_app("Make, show, check and export robot files.")
 
 @app.command()
 def new(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="The robot file to write, such as my.toml.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Robot file to write, such as my.toml.")],
     modules: Annotated[
         str | None,
         typer.Option(
-            metavar="N", help="Number of modules; length and mass stay those of the whole, the last spring is repeated."
+            metavar="N",
+            help="Number of modules; the whole robot keeps its length and mass, the last spring is repeated.",
         ),
     ] = None,
     preset: Annotated[
         str | None,
         typer.Option(
             metavar="ROBOT",
-            help=f"The robot to start from, a preset or a file; by default {_PLANAR}, with --twin {_WHOLE}.",
+            help=f"Robot to start from, a preset or a file; by default {_PLANAR}, with --twin {_WHOLE}.",
         ),
     ] = None,
     twin: Annotated[
         bool,
         typer.Option(
             "--twin",
-            help="With a [twin] section, so that it walks in three dimensions too; where the robot to start from has "
-            f"none, that of {_WHOLE}.",
+            help="Write a [twin] section, so that the robot walks in three dimensions too; that of "
+            f"{_WHOLE} where the robot to start from has none.",
         ),
     ] = False,
     overrides: SetOption = None,
@@ -127,7 +128,7 @@ def check(robot: RobotArg, overrides: SetOption = None, as_json: JsonOption = Fa
 def export(
     robot: RobotArg,
     out: Annotated[
-        Path, typer.Option("--out", metavar="FILE", help="The file to write: .xml for MJCF (MuJoCo), .urdf for URDF.")
+        Path, typer.Option("--out", metavar="FILE", help="File to write: .xml for MJCF (MuJoCo), .urdf for URDF.")
     ],
     overrides: SetOption = None,
     force: ForceOption = False,

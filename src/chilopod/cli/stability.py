@@ -12,7 +12,7 @@ from chilopod.cli.progress import progress_bar
 
 @with_options
 def stability(options: RobotOptions, out: OutOption = None) -> None:
-    """Is the straight walk stable in the planar model? Its Floquet multipliers, exponents and modes.
+    """Floquet multipliers, exponents and modes of the straight walk in the planar model: is it stable?
 
     A small disturbance is a sum of modes. A mode grows with its exponent, and by its multiplier from one period T of
     the gait to the next: the walk is stable if every |multiplier| is below 1, every exponent's real part below 0.
@@ -33,15 +33,14 @@ def bifurcation(
     parameter: ParameterOption,
     between: BetweenOption,
     seconds: Annotated[
-        float, typer.Option(metavar="S", min=0.0, help="Time for the search, s; then it ends with what it has.")
+        float, typer.Option(metavar="S", min=0.0, help="Time limit of the search, s; it ends with what it has found.")
     ] = 60.0,
     out: OutOption = None,
 ) -> None:
-    """Where does the straight walk give way as one number of the robot varies, and how?
+    """Values of one number of the robot at which the straight walk gains or loses stability, and how.
 
-    Every bifurcation in the interval, that is every value at which the straight walk gains or loses stability: its
-    kind, its error bound, the mode that grows, and whether what replaces the straight walk sets in gently
-    (supercritical) or by a jump (subcritical).
+    Every bifurcation in the interval has its kind, its error bound, the mode that grows, and its direction: new walks
+    set in gently (supercritical) or by a jump (subcritical).
     """
     described = options.described
     limits = interval(described, parameter, between)

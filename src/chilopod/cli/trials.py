@@ -24,17 +24,17 @@ app = new_app("List, check and clean a folder in which trials are kept.")
 FolderArg = Annotated[
     Path,
     typer.Argument(
-        metavar="FOLDER", help="What --trials was given; of a report the folder trials in it, such as report/trials."
+        metavar="FOLDER", help="Folder that --trials named; of a report its folder trials, such as report/trials."
     ),
 ]
 
 
 @app.command("list")
 def listed(folder: FolderArg, as_json: JsonOption = False) -> None:
-    """Say which trials are kept in a folder: of which robots, how long, with which seeds.
+    """List the trials in a folder: robots, durations, targets and seeds.
 
-    Only the front of every file is read, ten thousand in some seconds; `chilopod trials check` reads all of it. Robots
-    of one name that differ in their numbers are counted.
+    Only the front of every file is read; `chilopod trials check` reads all of it. The column robots counts robots of
+    one name that differ in their numbers.
     """
     from chilopod.memory import in_words
     from chilopod.trials.folder import contents, groups, kept
@@ -124,11 +124,11 @@ def _target_json(row: Group) -> dict[str, Any]:
 
 @app.command()
 def check(folder: FolderArg, as_json: JsonOption = False) -> None:
-    """Say whether every trial in a folder is whole: its checksum, and whether its name is that of what it holds.
+    """Check that every trial in a folder is whole: its checksum, and that its name belongs to its content.
 
-    All of every file is read. A line for each that is not what it should be; the exit code is 0, or 2 if there is one.
-    Who walks finds such a file too, sets it aside and walks the trial again. Trials of another version of chilopod, or
-    of MuJoCo where that walked, are counted: they are whole, but walk again too.
+    All of every file is read. Each damaged file is a line; the exit code is 0, or 2 if there is one. A command that
+    walks sets such a file aside and walks the trial again. Trials of another version of chilopod or MuJoCo are counted:
+    they are whole, but walk again too.
     """
     from chilopod.trials.folder import checked, contents
 
@@ -156,13 +156,13 @@ def check(folder: FolderArg, as_json: JsonOption = False) -> None:
 @app.command()
 def clean(
     folder: FolderArg,
-    old: Annotated[bool, typer.Option("--old", help="Remove the trials of other versions, too.")] = False,
-    dry: Annotated[bool, typer.Option("--dry-run", help="Say what would be removed, and remove nothing.")] = False,
+    old: Annotated[bool, typer.Option("--old", help="Remove trials of other versions too.")] = False,
+    dry: Annotated[bool, typer.Option("--dry-run", help="List what would be removed, and remove nothing.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Remove what is of no use in a folder of trials: what was set aside, and what killed processes left unfinished.
+    """Remove useless files from a folder of trials: those set aside, and those that killed processes left unfinished.
 
-    What chilopod has not written stays and is listed, and so does what a process that walks there is just writing.
+    Files that chilopod has not written, and those that a process is writing, stay and are listed.
     """
     from chilopod.trials.folder import clean as cleaned
 

@@ -21,19 +21,19 @@ _MUCH = 1e9  # bytes
 @with_options
 def walk(
     options: WalkOptions,
-    duration: Annotated[str, typer.Option(metavar="TIME", help='How long, such as "60 s" or "2 min".')] = "60 s",
+    duration: Annotated[str, typer.Option(metavar="TIME", help='Time to walk, such as "60 s" or "2 min".')] = "60 s",
     initial_joints: Annotated[
         str | None,
         typer.Option(
             metavar="ANGLES",
-            help='How the body is bent at the start, joint by joint from the front: "2,0,0,0,0 deg"; one angle is that '
-            "of all joints. Without it the robot starts straight.",
+            help='Joint angles at the start, from the front: "2,0,0,0,0 deg"; one angle is for all joints. By default '
+            "the robot starts straight.",
         ),
     ] = None,
     rate: Annotated[float | None, typer.Option(metavar="HZ", help="Samples per second, by default 100.")] = None,
     forces: Annotated[bool, typer.Option("--forces", help="Record the force on every foot.")] = False,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE.nc", help="Write everything over time into this netCDF file.")
+        Path | None, typer.Option("--out", metavar="FILE.nc", help="NetCDF file for everything over time.")
     ] = None,
 ) -> None:
     """Let a robot walk, once or many times, and say where it gets to.
