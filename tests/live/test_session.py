@@ -12,7 +12,7 @@ from chilopod.errors import ParameterError
 from chilopod.live import Session, wishes
 from chilopod.live.sliders import STRIDES
 from chilopod.robot import load_robot
-from chilopod.show.scene.replay import replay
+from chilopod.show import replay
 
 PLANAR = load_robot("aoi2022-planar")
 SOFT = wishes.Spring(0, stiffness(8.0))
@@ -154,7 +154,7 @@ def test_a_recording_is_of_one_floor_and_can_be_played():
     assert "stride = 0.025" in second.attrs["robot"].replace('"', "") or "2.5 cm" in second.attrs["robot"]
     gap = second.position.values[0] - first.position.values[-1]
     assert np.abs(gap).max() < 0.02
-    assert "<html" in replay(second, titles=["it"], heading="recorded")
+    assert "<html" in replay(second, titles=["it"], heading="recorded").html
 
 
 def test_a_recording_begun_again_at_once_is_another():

@@ -95,8 +95,8 @@ StrategyOption = Annotated[
     str,
     typer.Option(
         metavar="pitchfork|hopf|leg-yaw|open-loop",
-        help="Strategy of turning. pitchfork: soft first spring, and the legs of module 1 yaw towards the target; hopf: "
-        "all springs alike and soft, with leg yaw; leg-yaw: leg yaw alone; open-loop: soft first spring alone.",
+        help="Strategy of turning. pitchfork: soft first spring, and legs of module 1 that yaw towards the target; "
+        "hopf: all springs alike and soft, with leg yaw; leg-yaw: leg yaw alone; open-loop: soft first spring alone.",
         autocompletion=_strategies,
     ),
 ]

@@ -28,9 +28,9 @@ def turn(
         typer.Option(
             "--k1",
             metavar="auto|law|VALUE",
-            help="Stiffness of the springs that the strategy softens. auto: the one that comes nearest to the target in "
-            "undisturbed trials; law: the one that bends the settled walk into the circle to the target (the paper's "
-            'k1-hat); or a value such as "10 N*mm/deg".',
+            help="Stiffness of the springs that the strategy softens. auto: nearest to the target in undisturbed "
+            "trials; law: the settled walk is the circle to the target (the paper's k1-hat); or a value such as "
+            '"10 N*mm/deg".',
         ),
     ] = "auto",
     strategy: StrategyOption = "pitchfork",
@@ -38,8 +38,8 @@ def turn(
         str | None,
         typer.Option(
             metavar="TIME",
-            help='Time to walk, such as "30 s"; by default 1.6 (planar) or 2.8 (twin) times what the circle to the target '
-            "takes at the speed of the straight walk, 5 s at least.",
+            help='Time to walk, such as "30 s"; by default 1.6 (planar) or 2.8 (twin) times what the circle to the '
+            "target takes at the speed of the straight walk, 5 s at least.",
         ),
     ] = None,
     out: OutOption = None,

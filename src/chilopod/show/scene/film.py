@@ -25,7 +25,7 @@ from chilopod.show import style
 from chilopod.show.scene.encoder import ENCODER, encoded, has_encoder
 from chilopod.show.scene.frames import Outcome, Scene, scene
 from chilopod.show.scene.outline import SLIMNESS
-from chilopod.show.scene.replay import COLORS
+from chilopod.show.style import SCENE as COLORS
 
 Array = NDArray[np.float64]
 
@@ -75,7 +75,7 @@ def filmed(
 
 
 def frame_times(record: xr.Dataset, size: tuple[int, int], fps: int, speed: float) -> Array:
-    """When the frames of a film are, s of the record.
+    """Times of the frames of a film, s.
 
     Raises
     ------

@@ -47,16 +47,9 @@ def film_3d(
     size: tuple[int, int] = (1440, 400),
     follow: bool = False,
 ) -> bytes:
-    """Walks of the twin as a film, side by side, H.264 in mp4.
+    """Walks of the twin as a film, side by side, H.264 in mp4, as :func:`chilopod.show.scene.film.filmed`.
 
-    Parameters
-    ----------
-    record
-        As described at the top of this module; the film is no smoother.
-    titles, heading, fps, speed, size
-        As for :func:`chilopod.show.scene.film.filmed`.
-    follow
-        True if every panel follows its robot; otherwise all show the same piece of floor, with all of all walks.
+    Every panel follows its robot, or all show the same piece of floor, with all of all walks.
 
     Raises
     ------
@@ -83,16 +76,8 @@ def stills(
     heading: str = "",
     size: tuple[int, int] = _PICTURE,
 ) -> bytes:
-    """Moments of walks as pictures in one PNG, all of the same piece of floor; a row for every robot.
-
-    Parameters
-    ----------
-    record, titles, heading
-        As for :func:`film_3d`; by default without titles and heading.
-    times
-        Times of the moments, s, shape (T,); the nearest samples are shown.
-    size
-        Width and height of a picture, pixels.
+    """Moments of walks (s, shape (T,)) as pictures of a size (pixels) in one PNG, all of the same piece of floor; a row
+    for every robot. The nearest samples are shown.
 
     Raises
     ------

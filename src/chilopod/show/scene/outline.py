@@ -19,20 +19,8 @@ SLIMNESS = 0.36
 
 
 def chain(angles: ArrayLike, length: float) -> tuple[Array, Array, Array]:
-    """Modules of one length with given joint angles, about their mean position and heading.
-
-    Parameters
-    ----------
-    angles
-        Heading of each module less that of the module in front of it, rad, shape (N-1,).
-    length
-        Length of a module.
-
-    Returns
-    -------
-    centres, headings, joints
-        Shapes (N, 2), (N,), (N-1, 2).
-    """
+    """Centres (N, 2), headings (N,) and joints (N-1, 2) of modules of one length with given joint angles (rad), about
+    their mean position and heading."""
     headings = module_headings(0.0, angles)
     headings -= headings.mean()
     centres = module_centres(np.zeros(2), headings, length)
