@@ -166,15 +166,7 @@ class _App(typer.Typer):
 
 
 def new_app(help_text: str, *, completion: bool = False) -> typer.Typer:
-    """Return an empty group of commands with the settings all groups share.
-
-    Parameters
-    ----------
-    help_text
-        Help text of the command.
-    completion
-        True if it has the options that make a shell complete its commands; only the outermost can.
-    """
+    """An empty group of commands with the settings all groups share; only the outermost can complete commands."""
     # Help without rich: importing it costs a third of what --help may take. Tracebacks are the business of `main`.
     app = _App(
         help=help_text,
@@ -362,15 +354,7 @@ def free(paths: Iterable[Path], force: bool) -> None:
 
 
 def deliver(write: Callable[[], Iterable[Path]], show: Callable[[], None]) -> None:
-    """Write the files of a result, say so on stderr, and print the result, also where a file cannot be written.
-
-    Parameters
-    ----------
-    write
-        Gives what it wrote.
-    show
-        Prints.
-    """
+    """Write the files of a result, name them on stderr, and print the result, also where a file cannot be written."""
     from chilopod.errors import OutputError
 
     failure = None

@@ -42,17 +42,7 @@ _FRONT = _lit(VERMILLION)
 
 
 class View:
-    """View in three dimensions.
-
-    Parameters
-    ----------
-    server
-        Server of the page.
-    placed
-        The robot's parts at the start.
-    length
-        Length of the robot, m.
-    """
+    """View in three dimensions of a robot of some length (m), whose parts are placed somewhere at the start."""
 
     def __init__(self, server: viser.ViserServer, placed: Mapping[str, Placed], length: float) -> None:
         scene = server.scene
@@ -145,15 +135,7 @@ class View:
 
 
 def floor_place(origin: Array, start: tuple[float, ...], direction: tuple[float, ...]) -> tuple[float, float] | None:
-    """Where a ray of sight meets the floor, m; None if it looks up.
-
-    Parameters
-    ----------
-    origin
-        Origin of the floor, as seen, m, (3,).
-    start, direction
-        Start and direction of the ray.
-    """
+    """Place where a ray of sight meets the floor with this origin, m; None if the ray does not go down."""
     if not direction[2] < 0.0:
         return None
     reach = (origin[2] - start[2]) / direction[2]

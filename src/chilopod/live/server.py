@@ -44,39 +44,31 @@ _ALONE = 0.1  # s from one look to the next while no browser watches
 
 
 class Live:
-    """A page with a walking robot.
-
-    One thread owns the walk; what is done at the page only leaves wishes for it. While no browser watches, the robot
-    stands still.
+    """A page with a walking robot, which stands still while no browser watches.
 
     Parameters
     ----------
     robot, engine, seed, strategy
         As for :class:`chilopod.live.Session`.
-    host
-        Address to listen at; by default this machine only. At others a browser needs the token in :attr:`address`.
-    port
-        Port to listen at; 0 for any that is free.
+    host, port
+        Address and port to listen at; 0 for any port that is free. At other addresses than this machine's own a browser
+        needs the token in :attr:`address`.
     token
-        True if a browser needs a token on this machine too, where others use it.
+        True if a browser needs a token on this machine too.
     kept
-        Called with the name of a recording and its two files, netCDF and HTML, besides the download in the browser.
-        What it raises of :mod:`chilopod.errors` is shown at the page.
+        Function of the name of a recording and its two files, netCDF and HTML, besides the download in the browser; its
+        errors are shown at the page.
 
     Attributes
     ----------
     address
         Link to open in a browser, with the token if one is needed.
     gate
-        Look at every request and message; counts what it refused.
+        Checks of requests and messages; counts those that it refused.
     undelivered
-        Names and files of recordings that nobody took: neither ``kept`` nor a browser, or while the page ended.
-    seen
-        The last frame.
-    frames
-        Number of frames that were shown.
-    busy
-        s that the thread of the walk was at work.
+        Names and files of recordings that neither ``kept`` nor a browser took.
+    seen, frames, busy
+        The last frame, the number of frames that were shown, and the time for which the walk's thread worked, s.
     failure
         Error that ended the thread, if one did.
 
@@ -146,18 +138,12 @@ class Live:
         server.on_client_connect(self._send_undelivered)
 
     def wish(self, wish: wishes.Wish) -> None:
-        """Want something of the walk, from any thread, as if somebody had done it at the page."""
+        """Leave a wish, from any thread, as if somebody had done it at the page."""
         self._session.box.put(wish)
         self._told = True
 
     def wait(self, seconds: float | None = None) -> None:
-        """So long, or until the thread of the walk ends, which it does not by itself unless it fails.
-
-        Raises
-        ------
-        RuntimeError
-            If it failed.
-        """
+        """Wait so long, or until the thread of the walk fails, and raise its error then."""
         end = math.inf if seconds is None else time.monotonic() + seconds
         # Not by joining the thread: Ctrl-C within a join that has a limit leaves a thread that counts as ended.
         while not self._ended.wait(min(0.5, max(0.0, end - time.monotonic()))) and time.monotonic() < end:
@@ -240,7 +226,7 @@ class Live:
                 self._plots.show(self.seen, self._theory)
 
     def _obey(self) -> bool:
-        """Wishes, and what has come of questions; whether there were any of the former."""
+        """Grant wishes and take answers; True if there was a wish."""
         session, before = self._session, self._session.settings
         told, self._told = self._told, False
         obeyed = session.obey()
@@ -350,7 +336,7 @@ class Live:
 
 
 class _Rate:
-    """How many seconds were walked a second, of late."""
+    """Seconds walked a second, of late."""
 
     def __init__(self) -> None:
         self.value = 0.0

@@ -105,7 +105,7 @@ class Session:
     # ---------------------------------------------------------------------------------------------------------------
 
     def seen(self) -> Seen:
-        """State of the walk that there is to see now."""
+        """State of the walk now."""
         looked = self._walk.observe()
         means = np.array(self._looks).mean(axis=0)
         return Seen(
@@ -126,14 +126,13 @@ class Session:
         )
 
     def said(self) -> list[str]:
-        """Sentences on what happened since this was asked last."""
+        """Sentences on what happened since the last call."""
         sentences = list(self._said)
         self._said.clear()
         return sentences
 
     def records(self) -> list[xr.Dataset]:
-        """Records written since this was asked last, see :func:`chilopod.record.walk_record`: one record for
-        every stretch of a walk with one floor and one gait."""
+        """Records since the last call, see :func:`chilopod.record.walk_record`: one for every floor and gait."""
         records, self._records = self._records, []
         return records
 
@@ -141,7 +140,7 @@ class Session:
     # ---------------------------------------------------------------------------------------------------------------
 
     def obey(self) -> bool:
-        """Do what is wished for; what cannot be is said. Tells whether there was anything."""
+        """Grant all wishes, or say why not; True if there was one."""
         waiting = self.box.take()
         for wish in waiting:
             try:

@@ -22,10 +22,8 @@ class Seen:
 
     Attributes
     ----------
-    time
-        Time since the last reset, s.
-    clock
-        Time of the gait, s: at 0 it is at phase 0.
+    time, clock
+        Time since the last reset, and time of the gait, which is at phase 0 at 0; s.
     robot
         Robot that walks, with its floor and steps; its springs may have changed since.
     status
@@ -102,13 +100,7 @@ def but_springs(robot: Robot) -> tuple[object, ...]:
 
 
 def as_seed(seed: object) -> int:
-    """A whole number, 0 to :data:`chilopod.live.wishes.LARGEST_SEED`.
-
-    Raises
-    ------
-    ParameterError
-        If it is not.
-    """
+    """A whole number, 0 to :data:`chilopod.live.wishes.LARGEST_SEED`; a ParameterError if it is not."""
     number = as_finite("seed", seed)
     if number != int(number) or not 0 <= number <= LARGEST_SEED:
         allowed = f"a whole number, 0 to {LARGEST_SEED}"
@@ -117,13 +109,7 @@ def as_seed(seed: object) -> int:
 
 
 def as_finite(field: str, value: object) -> float:
-    """A finite number.
-
-    Raises
-    ------
-    ParameterError
-        If it is not, naming the field.
-    """
+    """A finite number; a ParameterError with the name of the field if it is not."""
     try:
         number = math.nan if isinstance(value, bool) or not isinstance(value, int | float) else float(value)
     except OverflowError:  # an int may have any number of digits
@@ -134,13 +120,7 @@ def as_finite(field: str, value: object) -> float:
 
 
 def as_within(field: str, value: object, limits: tuple[float, float], unit: str) -> float:
-    """A number between two others.
-
-    Raises
-    ------
-    ParameterError
-        If it is not, naming the field and what is allowed.
-    """
+    """A number between two others; a ParameterError that names the field and what is allowed if it is not."""
     number, (low, high) = as_finite(field, value), limits
     # The ends of a slider are those of its range up to round-off.
     if not low * (1.0 - 1e-9) <= number <= high * (1.0 + 1e-9):

@@ -29,15 +29,7 @@ def radius_of(seen: Seen) -> float:
 
 
 def sentences(seen: Seen, settings: Settings, theory: Theory, growth: Growth | None) -> list[str]:
-    """Sentences on a walk now, the most important first.
-
-    Parameters
-    ----------
-    seen, settings
-        The walk and how everything is set.
-    theory, growth
-        Theory of this robot, and growth of its bend; not valid for another robot.
-    """
+    """Sentences on a walk now, the most important first; theory and growth are those of this robot."""
     if seen.status is not Status.WALKED:
         return [f"It has stopped: {seen.status.sentence}. Press R to begin anew."]
     said = []

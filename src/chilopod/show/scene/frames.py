@@ -95,8 +95,8 @@ def bodies(
 ) -> BodyFrames:
     """Place modules and feet of robots of one description at T times (s).
 
-    ``position``, ``heading``, ``joint_angles`` and ``leg_yaw`` are as in a record, NaN after a robot stopped: (T, R, 2),
-    (T, R), (T, R, N-1) and (T, R, 2), m and rad.
+    ``position``, ``heading``, ``joint_angles`` and ``leg_yaw`` are as in a record, NaN after a robot stopped, in m and
+    rad: (T, R, 2), (T, R), (T, R, N-1) and (T, R, 2).
     """
     walks = np.isfinite(position).all(-1) & np.isfinite(heading) & np.isfinite(joint_angles).all(-1)
     walks &= np.isfinite(leg_yaw).all(-1)
@@ -188,8 +188,8 @@ class Floor:
 
 @dataclass(frozen=True)
 class Scene:
-    """Everything that is drawn: bodies, floor, and of each robot title, outcome and targets in the order of their turns;
-    the radius (m) is 0 where there are no targets."""
+    """Everything that is drawn: bodies, floor, and of each robot title, outcome and targets in the order of their
+    turns; the radius (m) is 0 where there are no targets."""
 
     frames: BodyFrames
     floor: Floor

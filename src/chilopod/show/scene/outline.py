@@ -11,6 +11,7 @@ from matplotlib.transforms import Affine2D
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.kinematics import directions, module_centres, module_headings
+from chilopod.show import style
 
 Array = NDArray[np.float64]
 
@@ -48,6 +49,14 @@ def draw_modules(axes: Axes, centres: Array, headings: Array, length: float, **l
         )
         box.set_transform(Affine2D().rotate(heading).translate(x, y) + axes.transData)
         axes.add_patch(box)
+
+
+def draw_spines(axes: Axes, spines: Array) -> None:
+    """Draw bodies (moments, points, 2) as lines with their joints, the front end a larger dot."""
+    look: dict[str, Any] = {"alpha": 0.35, "linewidth": 2.5, "markersize": 3, "zorder": 2}
+    for spine in spines:
+        axes.plot(spine[:, 0], spine[:, 1], "-o", color=style.BLACK, **look)
+        axes.plot(*spine[0], "o", color=style.BLACK, markersize=4.5, zorder=4)
 
 
 def draw_joints(axes: Axes, joints: Array, color: str, size: float = 4.0) -> None:
