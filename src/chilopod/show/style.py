@@ -132,6 +132,11 @@ def note(axes: Axes, text: str, at: tuple[float, float], away: tuple[float, floa
     axes.annotate(text, at, away, textcoords="offset points", fontsize=SMALL, **look)
 
 
+def arrow(axes: Axes, start: tuple[float, float], end: tuple[float, float], **look: Any) -> None:
+    """An arrow from a point to another; `look` as for an arrow's patch."""
+    axes.annotate("", end, start, zorder=7, arrowprops={"arrowstyle": "-|>", "shrinkA": 0, "shrinkB": 0, **look})
+
+
 def joint_styles(count: int) -> list[tuple[Any, str]]:
     """Colour and marker of every joint, front to rear: all different, also of more joints than there are colours to
     tell apart easily."""

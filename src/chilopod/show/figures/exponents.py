@@ -271,10 +271,5 @@ def _arrow(axes: Axes, x: Array, y: Array, share: float, color: str) -> None:
     if not inside or length[-1] < 0.1:
         return
     index = int(np.searchsorted(length, share * length[-1]))
-    axes.annotate(
-        "",
-        (x[index], y[index]),
-        (x[index - 1], y[index - 1]),
-        zorder=7,
-        arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8, "mutation_scale": 15, "shrinkA": 0, "shrinkB": 0},
-    )
+    start, end = (x[index - 1], y[index - 1]), (x[index], y[index])
+    style.arrow(axes, start, end, color=color, lw=1.8, mutation_scale=15)

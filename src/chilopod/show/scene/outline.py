@@ -67,9 +67,4 @@ def draw_joints(axes: Axes, joints: Array, color: str, size: float = 4.0) -> Non
 def draw_heading(axes: Axes, centre: Array, heading: float, length: float, color: str) -> None:
     """Draw the arrow that says which end is the front."""
     ahead = np.array([np.cos(heading), np.sin(heading)])
-    axes.annotate(
-        "",
-        tuple(centre + 1.15 * length * ahead),
-        tuple(centre + 0.6 * length * ahead),
-        arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.6, "shrinkA": 0, "shrinkB": 0},
-    )
+    style.arrow(axes, tuple(centre + 0.6 * length * ahead), tuple(centre + 1.15 * length * ahead), color=color, lw=1.6)
