@@ -78,9 +78,9 @@ def listed(folder: FolderArg, as_json: JsonOption = False) -> None:
     if others:
         typer.echo(f"{_trials(others)} of another version: this one does not find them (clean --old removes them)")
     for paths, words in (
-        ([path for path, _ in wrong], "not to be read (chilopod trials check says why)"),
+        ([path for path, _ in wrong], "that cannot be read (chilopod trials check says why)"),
         (there.aside, "set aside, because they were not what they should be (chilopod trials clean removes them)"),
-        (there.unfinished, "being written, or left over by who was killed (chilopod trials clean removes the latter)"),
+        (there.unfinished, "being written, or left over by a killed process (chilopod trials clean removes the latter)"),
         (there.foreign, "not written by chilopod"),
     ):
         if paths:

@@ -329,7 +329,7 @@ class Session:
         if settings.robot.springs == before.springs:
             return
         if self._steers_springs:
-            self._said.append("the springs are as you set them again when the target is reached")
+            self._said.append("your springs are back when the target is reached")
         else:
             self._set_springs()
 
@@ -342,7 +342,7 @@ class Session:
         as_within("target", math.hypot(x, y), (0.0, FARTHEST), "m from where the walk began")
         strategy = ON_THE_WAY[self.settings.strategy]
         if strategy.needs_law and self.law is None:
-            self._said.append(f"how tightly it turns is not known (yet), so leg yaw alone steers, not {strategy.name}")
+            self._said.append(f"the radius law is not known (yet): leg yaw alone steers, not {strategy.name}")
             strategy = LEG_YAW
         controller, steering = strategy.prepare(self.settings.robot, self.law).controller, strategy.name
         if self._target is not None:
@@ -360,7 +360,7 @@ class Session:
         self._pulled_until[joint] = self._before + self._walk.time + time
         self._push()
         if isinstance(self._controller, ActuatedAxis):
-            self._said.append("the strategy actuated drives the joints itself: nobody else can pull them")
+            self._said.append("the strategy actuated drives the joints, so they cannot be pulled")
 
 
 def _with_springs(robot: Robot, stiffness: Sequence[float]) -> Robot:
