@@ -91,6 +91,8 @@ def test_robots_of_any_length_fit(modules):
 def test_straight_walk():
     found = straight_walk(ROBOT)
     assert "the straight walk is stable" in said(found._repr_html_())
+    assert read(found._repr_html_()).find(f"{SVG}svg") is not None
+    assert len(str(found).splitlines()) == 15  # and no more of a chain of any length
     assert float(cells(found._repr_html_())[1][0]) == pytest.approx(found.moduli[0], abs=1e-6)
 
 
@@ -99,6 +101,7 @@ def test_point():
     html = point._repr_html_()
     assert "pitchfork at springs.stiffness[0] = 11.99142966 N·mm/deg" in said(html)
     assert "Supercritical: " in said(html)
+    assert len(point.plot(Figure().add_subplot()).patches) == 5
     assert [float(angle) for angle in cells(html)[1][1:]] == pytest.approx(point.joint_components.real, abs=1e-3)
 
 

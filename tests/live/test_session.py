@@ -186,6 +186,9 @@ def test_a_robot_that_fails_stays_until_it_begins_anew():
     [
         (wishes.Spring(0, float("nan")), "stiffness[0] = nan: is no number"),
         (wishes.Spring(None, -1.0), "springs.stiffness"),
+        (wishes.Spring(0, stiffness(99.0)), "springs.stiffness[0] = "),
+        (wishes.Spring(17, stiffness(9.0)), "there is no such slider"),
+        (wishes.Set("frictoin", 1.0), "did you mean 'friction'"),
         (wishes.Friction(float("inf")), "friction = inf"),
         (wishes.Friction(7.0), "0.3 to 3"),
         (wishes.Stride(0.0), f"{STRIDES[0] * PLANAR.gait.stride:g} to"),
@@ -211,6 +214,20 @@ def test_what_cannot_be_is_said_in_a_line_and_changes_nothing(asked, part):
     assert walking.settings == before
     walking.walk_on(1.0)
     assert walking.seen().status is Status.WALKED
+
+
+def test_a_slider_is_one_row_of_a_table():
+    begun = session()
+    before = begun.settings
+    for name, row in begun.sliders.items():
+        low, high = row.limits
+        assert low <= row.read(before) <= high
+        assert row.from_page(row.at_page(high)) == pytest.approx(high, rel=1e-8)
+        wish(begun, wishes.Set(name, 0.5 * (low + high)))
+        assert row.read(begun.settings) == pytest.approx(0.5 * (low + high))
+    assert not begun.said()
+    begun.walk_on(1.5)
+    assert begun.seen().status is Status.WALKED
 
 
 def test_a_flood_of_wishes_takes_no_room_and_the_last_counts():

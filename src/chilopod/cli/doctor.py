@@ -210,6 +210,7 @@ def _again(package: str) -> str:
 def _guarded(name: str, look: Callable[[], tuple[str, ...]]) -> Finding:
     """Finding of a check, even where a package that it takes is not there."""
     try:
-        return Finding(name, *look())
+        says, *mend = look()
+        return Finding(name, says, "".join(mend))
     except Exception as error:  # said once more, among the versions, with what mends it
         return Finding(name, f"cannot be looked at: {briefly(error)}", looked=False)

@@ -275,13 +275,19 @@ class WalkOptions(RobotOptions):
 
     def walk_into(self, out: Path | None, what: str, walk: Callable[[Callable[[str], Progress]], Found]) -> None:
         """Walk a ``turn`` or a ``course``, write its files into the folder, if there is one, and print it."""
-        from chilopod.show.walked import files_of_walks, write_walks
-
         if out:
+            from chilopod.show.walked import files_of_walks
+
             free(files_of_walks(what, out), self.force)
         with self.walking(what) as told:
             done = walk(told)
-        self.deliver(lambda: write_walks(what, done, out, replace=self.force) if out else [], done)
+
+        def write() -> Iterable[Path]:
+            from chilopod.show.walked import write_walks
+
+            return write_walks(what, done, out or "", replace=self.force)
+
+        self.deliver(write if out else list, done)
 
     def deliver(self, write: Callable[[], Iterable[Path]], done: Found, hint: str = "--seed 1") -> None:
         """Write the files of walks, and print what they came to, as JSON where that was asked for; of walks that

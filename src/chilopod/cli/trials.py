@@ -80,7 +80,10 @@ def listed(folder: FolderArg, as_json: JsonOption = False) -> None:
     for paths, words in (
         ([path for path, _ in wrong], "that cannot be read (chilopod trials check says why)"),
         (there.aside, "set aside, because they were not what they should be (chilopod trials clean removes them)"),
-        (there.unfinished, "being written, or left over by a killed process (chilopod trials clean removes the latter)"),
+        (
+            there.unfinished,
+            "being written, or left over by a killed process (chilopod trials clean removes the latter)",
+        ),
         (there.foreign, "not written by chilopod"),
     ):
         if paths:
