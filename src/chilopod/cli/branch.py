@@ -15,7 +15,6 @@ from chilopod.cli.options import (
     free,
     interval,
     print_json,
-    print_lines,
     with_options,
 )
 from chilopod.cli.progress import progress_bar
@@ -102,7 +101,7 @@ def branch(
 
         return write_branch(data, folder, replace=replace) if folder else []
 
-    deliver(write, lambda: print_json(plain(data)) if options.as_json else print_lines(_lines(data)))
+    deliver(write, lambda: print_json(plain(data)) if options.as_json else typer.echo("\n".join(_lines(data))))
 
 
 def _lines(data: xr.Dataset) -> list[str]:

@@ -7,6 +7,7 @@ import platform
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 import typer
@@ -103,8 +104,6 @@ def _version(package: str) -> str:
 
 def _fault(module: str) -> str:
     """Why a package cannot be imported; empty if it can."""
-    from importlib import import_module
-
     try:
         import_module(module)
     except Exception as error:  # packages with compiled parts fail in many ways
@@ -112,34 +111,10 @@ def _fault(module: str) -> str:
     return ""
 
 
-def _processor() -> tuple[str, ...]:
-    from chilopod.processor import processor
-
-    return (processor(),)
-
-
-def _compiled_for() -> tuple[str, ...]:
-    from chilopod.processor import compiled_for
-
-    return (compiled_for(),)
-
-
 def _kernels() -> tuple[str, ...]:
     from chilopod.processor import blas_kernels
 
     return (", ".join(f"{blas_kernels(name)} ({name})" for name in ("numpy", "scipy")),)
-
-
-def _cores() -> tuple[str, ...]:
-    from chilopod.cores import cores
-
-    return (f"{cores()} to be used",)
-
-
-def _threads() -> tuple[str, ...]:
-    import numba
-
-    return (str(numba.get_num_threads()),)
 
 
 def _cache() -> tuple[str, ...]:
@@ -190,11 +165,11 @@ def _fonts() -> tuple[str, ...]:
 
 
 _LOOKS: dict[str, Callable[[], tuple[str, ...]]] = {
-    "processor": _processor,
-    "compiled for": _compiled_for,
+    "processor": lambda: (import_module("chilopod.processor").processor(),),
+    "compiled for": lambda: (import_module("chilopod.processor").compiled_for(),),
     "BLAS kernels": _kernels,
-    "cores": _cores,
-    "numba threads": _threads,
+    "cores": lambda: (f"{import_module('chilopod.cores').cores()} to be used",),
+    "numba threads": lambda: (str(import_module("numba").get_num_threads()),),
     "compile cache": _cache,
     "OpenGL": _drawing,
     "mp4 encoder": _encoder,

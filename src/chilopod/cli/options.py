@@ -236,7 +236,7 @@ class RobotOptions:
         texts = [(file, json_text(result) + "\n") for file in files]
         deliver(
             lambda: write_all(texts, replace=self.force),
-            lambda: print_json(result) if self.as_json else print_lines(lines),
+            lambda: print_json(result) if self.as_json else typer.echo("\n".join(lines)),
         )
 
 
@@ -299,7 +299,7 @@ class WalkOptions(RobotOptions):
             if self.as_json:
                 print_json(done.as_json())
                 return
-            print_lines(done.lines())
+            typer.echo("\n".join(done.lines()))
             if getattr(done, "straight", False):
                 typer.echo(f"  nothing disturbed it, so nothing bends it, even where it is unstable: try {hint}")
             if creeps is not None:
@@ -344,12 +344,6 @@ def print_json(result: dict[str, Any]) -> None:
 def json_text(result: dict[str, Any]) -> str:
     """A result as :func:`print_json` prints it."""
     return json.dumps(result, indent=2, allow_nan=False)
-
-
-def print_lines(lines: Iterable[str]) -> None:
-    """Print lines of text."""
-    for line in lines:
-        typer.echo(line)
 
 
 def free(paths: Iterable[Path], force: bool) -> None:

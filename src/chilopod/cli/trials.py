@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from chilopod.cli.options import JsonOption, new_app, print_json, print_lines
+from chilopod.cli.options import JsonOption, new_app, print_json
 from chilopod.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -109,7 +109,8 @@ def _print_table(rows: Sequence[Group]) -> None:
                 f"{in_words(row.size)}{'' if row.found else ', another version'}",
             )
         )
-    print_lines(aligned(table) if rows else ())
+    if rows:
+        typer.echo("\n".join(aligned(table)))
 
 
 def _target(row: Group) -> str:
