@@ -7,16 +7,7 @@ from typing import Annotated
 
 import typer
 
-from chilopod.cli.options import (
-    ForceOption,
-    JsonOption,
-    RobotArg,
-    SetOption,
-    new_app,
-    print_json,
-    read_robot,
-    reading,
-)
+from chilopod.cli.options import ForceOption, JsonOption, RobotArg, SetOption, new_app, print_json, read_robot, reading
 
 _PLANAR, _WHOLE = "aoi2022-planar", "aoi2022"
 
@@ -72,6 +63,7 @@ def new(
 def show(robot: RobotArg, overrides: SetOption = None, as_json: JsonOption = False) -> None:
     """Print every number of a robot, its unit, and where it comes from."""
     from chilopod import units
+    from chilopod.notebook import aligned
 
     described = read_robot(robot, overrides)
     derived = {
@@ -103,10 +95,7 @@ def show(robot: RobotArg, overrides: SetOption = None, as_json: JsonOption = Fal
         return
     rows = described.listed()
     rows += [(name, units.format(value, unit, digits=6), "derived") for name, (value, unit) in derived.items()]
-    widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
-    typer.echo(described.name)
-    for name, quantity, origin in rows:
-        typer.echo(f"  {name:<{widths[0]}}  {quantity:<{widths[1]}}  {origin}".rstrip())
+    typer.echo("\n  ".join([described.name, *aligned(rows)]))
 
 
 @app.command()

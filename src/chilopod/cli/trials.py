@@ -37,6 +37,7 @@ def listed(folder: FolderArg, as_json: JsonOption = False) -> None:
     one name that differ in their numbers.
     """
     from chilopod.memory import in_words
+    from chilopod.notebook import aligned
     from chilopod.trials.folder import contents, groups, kept
 
     there = contents(folder)
@@ -45,35 +46,18 @@ def listed(folder: FolderArg, as_json: JsonOption = False) -> None:
     rows, size = groups(trials), sum(each.size for each in trials)
     others = sum(not each.found for each in trials)
     if as_json:
-        print_json(
-            {
-                "folder": str(folder),
-                "trials": len(trials),
-                "bytes": size,
-                "of_other_versions": others,
-                "unreadable": [path.name for path, _ in wrong],
-                "set_aside": [path.name for path in there.aside],
-                "unfinished": [path.name for path in there.unfinished],
-                "foreign": [path.name for path in there.foreign],
-                "groups": [
-                    {
-                        "robot": row.robot,
-                        "robots": row.robots,
-                        "engine": row.engine,
-                        "controller": row.controller,
-                        "duration_s": row.duration,
-                        **_target_json(row),
-                        "seeds": _ranges(row.seeds),
-                        "trials": row.count,
-                        "bytes": row.size,
-                        "of_this_version": row.found,
-                    }
-                    for row in rows
-                ],
-            }
-        )
+        found = {"trials": len(trials), "bytes": size, "of_other_versions": others}
+        files = {
+            "unreadable": [path.name for path, _ in wrong],
+            "set_aside": [path.name for path in there.aside],
+            "unfinished": [path.name for path in there.unfinished],
+            "foreign": [path.name for path in there.foreign],
+        }
+        print_json({"folder": str(folder), **found, **files, "groups": [_as_json(row) for row in rows]})
         return
-    _print_table(rows)
+    if rows:
+        head = ("robot", "engine", "walk", "target", "controller", "robots", "seeds", "trials", "size")
+        typer.echo("\n".join(aligned([head, *map(_cells, rows)])))
     typer.echo(f"{_trials(len(trials))}, {in_words(size)}")
     if others:
         typer.echo(f"{_trials(others)} of another version: this one does not find them (clean --old removes them)")
@@ -90,40 +74,34 @@ def listed(folder: FolderArg, as_json: JsonOption = False) -> None:
             typer.echo(f"{len(paths)} file{'s' * (len(paths) > 1)} {words}")
 
 
-def _print_table(rows: Sequence[Group]) -> None:
+def _as_json(row: Group) -> dict[str, Any]:
+    """A group of trials; of several targets there is only their number."""
+    one = row.target if isinstance(row.target, tuple) else None
+    return {
+        "robot": row.robot,
+        "robots": row.robots,
+        "engine": row.engine,
+        "controller": row.controller,
+        "duration_s": row.duration,
+        "target": {"bearing_rad": one[0], "distance_m": one[1]} if one else None,
+        "targets": 1 if one else row.target or 0,
+        "seeds": _ranges(row.seeds),
+        "trials": row.count,
+        "bytes": row.size,
+        "of_this_version": row.found,
+    }
+
+
+def _cells(row: Group) -> tuple[str, ...]:
     from chilopod.memory import in_words
-    from chilopod.notebook import aligned
 
-    table = [("robot", "engine", "walk", "target", "controller", "robots", "seeds", "trials", "size")]
-    for row in rows:
-        table.append(
-            (
-                row.robot,
-                row.engine,
-                f"{row.duration:g} s",
-                _target(row),
-                row.controller.rpartition(":")[2] if row.controller else "-",
-                str(row.robots),
-                _ranges(row.seeds) or "-",
-                str(row.count),
-                f"{in_words(row.size)}{'' if row.found else ', another version'}",
-            )
-        )
-    if rows:
-        typer.echo("\n".join(aligned(table)))
-
-
-def _target(row: Group) -> str:
+    target = f"course of {row.target}" if row.target else "-"
     if isinstance(row.target, tuple):
-        return f"{math.degrees(row.target[0]):.4g} deg, {row.target[1]:g} m"
-    return f"course of {row.target}" if row.target else "-"
-
-
-def _target_json(row: Group) -> dict[str, Any]:
-    """One target, or how many there are one after another."""
-    if isinstance(row.target, tuple):
-        return {"target": {"bearing_rad": row.target[0], "distance_m": row.target[1]}, "targets": 1}
-    return {"target": None, "targets": row.target or 0}
+        target = f"{math.degrees(row.target[0]):.4g} deg, {row.target[1]:g} m"
+    controller = row.controller.rpartition(":")[2] if row.controller else "-"
+    numbers = str(row.robots), _ranges(row.seeds) or "-", str(row.count)
+    size = f"{in_words(row.size)}{'' if row.found else ', another version'}"
+    return row.robot, row.engine, f"{row.duration:g} s", target, controller, *numbers, size
 
 
 @app.command()

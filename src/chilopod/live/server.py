@@ -23,7 +23,7 @@ from chilopod.live import wishes
 from chilopod.live.body import Body, FlatBody, Placed
 from chilopod.live.session import Session
 from chilopod.live.theory import Beside, Growth, Theory
-from chilopod.live.words import described, sentences
+from chilopod.live.words import sentences
 from chilopod.netcdf import netcdf
 from chilopod.robot import Robot
 
@@ -113,7 +113,7 @@ class Live:
         try:
             # The first steps ever are compiled, which takes a while: better before anybody looks.
             Session(robot, engine).walk_on(1.5 * robot.gait.period)
-            self._build(described(robot, engine))
+            self._build(f"{robot.name}, {robot.body.modules} modules, {engine}")
         except BaseException:
             self.close()
             raise
