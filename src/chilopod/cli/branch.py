@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -85,11 +86,7 @@ def branch(
 
         free(files_of("branch", folder), replace)
     with progress_bar("branch") as show:
-
-        def progress(done: float, words: str) -> None:
-            show("branch", done, words)
-
-        how: dict[str, Any] = {"points": points, "longest": longest, "progress": progress}
+        how: dict[str, Any] = {"points": points, "longest": longest, "progress": partial(show, "branch")}
         if saved is None:
             assert limits is not None
             data = curved_walks(described, parameter, limits, side=-1 if left else 1, **how)
