@@ -94,7 +94,7 @@ class StraightWalk(Summary, ReadOnlyArrays):
         for modulus, exponent, components in zip(
             self.moduli, self.exponents.values, self.joint_components, strict=True
         ):
-            rows.append((f"{modulus:.6f}", _in_words(exponent, 6), "  ".join(map(_in_words, components))))
+            rows.append((f"{modulus:.6g}", _in_words(exponent, 6), "  ".join(map(_in_words, components))))
         nearer = "; the largest is nearer to 1 than that" if self.stable is None else ""
         return [], rows, [f"multipliers are within {self.exponents.multipliers.error_bound:.1e}{nearer}"]
 
@@ -156,10 +156,13 @@ class WalkBifurcation(Summary, ReadOnlyArrays):
     def title(self) -> str:
         """Kind and place in words."""
         unit = self.unit.replace("*", "·")
-        return f"{self.point.kind.label} at {self.parameter} = {self.value:.10g} {unit} (± {self.error_bound:.1e})"
+        return f"{self.point.kind.label} at {self.parameter} = {self.value:.12g} {unit} (± {self.error_bound:.1e})"
 
     def _told(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
-        point, above = self.point, [self.point.sentences]
+        point, above = self.point, [f"{self.point.kind.sentence}."]
+        if point.criticality.known:
+            above.append(f"{point.criticality.label}: {point.criticality.sentence}.")
+        above = [each[0].upper() + each[1:] for each in above]
         if self.coefficient is not None:
             above.append(f"Cubic coefficient of the normal form: {self.coefficient:.6g} /rad².")
         if point.frequency:

@@ -134,9 +134,8 @@ class Driven(Pathed):
 
     @property
     def title(self) -> str:
-        """Robot, engine, number of targets and strategy in words."""
-        goals = len(self.course.goals)
-        return f"{self.who}: a course of {goals} target{'s' * (goals > 1)} by {self.strategy.name}"
+        """Robot, engine and strategy in words."""
+        return f"{self.who}, {self.strategy.name}: {self.strategy.sentence}"
 
     def _told(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
         walks, goals = self._found()["walks"], len(self.course.goals)
