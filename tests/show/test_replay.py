@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from chilopod.errors import ParameterError
+from chilopod.errors import OutputError, ParameterError
 from chilopod.show import replay
 from chilopod.show.scene.frames import body_frames
 from helpers.html_page import Page
@@ -107,3 +107,27 @@ def test_page_is_small():
 def test_every_robot_needs_a_title(record):
     with pytest.raises(ParameterError, match="titles"):
         replay(record, titles=["only one"], heading="h")
+
+
+def test_notebook_plays_the_page():
+    shown = replay(walk(0.0, 0.6, duration=1.0), titles=['a "<b>"', "c"], heading='"Two" & <more>')
+    ((tag, frame),) = Page(shown._repr_html_()).tags
+    assert tag == "iframe"
+    assert frame["srcdoc"] == shown.html
+    assert frame["title"] == '"Two" & <more>'
+    assert frame["sandbox"] == "allow-scripts"
+
+
+def test_untitled_walks_are_numbered_and_few():
+    shown = replay(walk(*[0.1] * 8, duration=1.0))
+    assert shown.heading == "aoi2022-planar"
+    assert "walk 6" in shown.html
+    assert "walk 7" not in shown.html
+
+
+def test_written_page_is_not_replaced_unasked(tmp_path):
+    shown = replay(walk(0.0, duration=1.0))
+    shown.write(tmp_path / "walk.html")
+    assert (tmp_path / "walk.html").read_text(encoding="utf-8") == shown.html
+    with pytest.raises(OutputError):
+        shown.write(tmp_path / "walk.html")

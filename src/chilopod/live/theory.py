@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -209,59 +208,36 @@ class _Stale(Exception):
     """Another question has come."""
 
 
-class _Desk:
-    """The end of the pipe at which questions arrive."""
-
-    def __init__(self, pipe: Connection) -> None:
-        self._pipe = pipe
-        self._waiting: dict[str, Robot] = {}
-
-    def wait(self) -> None:
-        """Until there is a question."""
-        while not self._waiting:
-            self._take()
-
-    def next(self) -> tuple[str, Robot]:
-        """The question that is quickest to answer."""
-        what = "growth" if "growth" in self._waiting else "theory"
-        return what, self._waiting.pop(what)
-
-    def tell(self, answer: Any) -> None:
-        """Answer, unless another question of that kind has come meanwhile."""
-        while self._pipe.poll():
-            self._take()
-        if isinstance(answer, Theory) and "theory" in self._waiting:
-            raise _Stale
-        self._pipe.send(answer)
-        # While the long question is at work, a short one is answered in between.
-        if isinstance(answer, Theory) and "growth" in self._waiting:
-            self.growth(self._waiting.pop("growth"))
-
-    def growth(self, robot: Robot) -> None:
-        with suppress(ChilopodError):  # where there is no straight walk to speak of
-            self._pipe.send(growth_of(robot))
-
-    def _take(self) -> None:
-        what, robot = self._pipe.recv()
-        self._waiting[what] = robot
-
-
 def _answer(pipe: Connection, engine: str) -> None:
-    """The process."""
+    """Work of the process: the last question of each kind, the quick one first, also while the long one is at work."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # as it is from the start, unless a thread of the page started it
     if hasattr(os, "nice"):
         os.nice(_NICE)
-    desk = _Desk(pipe)
-    try:
+    waiting: dict[str, Robot] = {}
+
+    def take() -> None:
+        what, robot = pipe.recv()
+        waiting[what] = robot
+
+    def growth() -> None:
+        with suppress(ChilopodError):  # where there is no straight walk to speak of
+            pipe.send(growth_of(waiting.pop("growth")))
+
+    def tell(known: Theory) -> None:
+        while pipe.poll():
+            take()
+        if "theory" in waiting:
+            raise _Stale
+        pipe.send(known)
+        if "growth" in waiting:
+            growth()
+
+    with suppress(EOFError, OSError):  # the page is gone
         while True:
-            desk.wait()
-            what, robot = desk.next()
-            if what == "growth":
-                desk.growth(robot)
+            while not waiting or pipe.poll():
+                take()
+            if "growth" in waiting:
+                growth()
                 continue
-            try:
-                theory_of(robot, engine, desk.tell)
-            except _Stale:
-                continue
-    except (EOFError, OSError):
-        return  # the page is gone
+            with suppress(_Stale):
+                theory_of(waiting.pop("theory"), engine, tell)
