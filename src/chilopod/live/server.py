@@ -22,6 +22,7 @@ from chilopod.extras import needs
 from chilopod.live import wishes
 from chilopod.live.body import Body, FlatBody, Placed
 from chilopod.live.session import Session
+from chilopod.live.state import but_springs
 from chilopod.live.theory import Beside, Growth, Theory
 from chilopod.live.words import sentences
 from chilopod.netcdf import netcdf
@@ -258,7 +259,9 @@ class Live:
         robot = self._session.settings.robot
         if engine_named(self._session.engine).traits.exact:
             self._beside.ask_growth(robot)
-        if before is None or _but_first_spring(robot) != _but_first_spring(before):
+        # The theory is of any first spring.
+        parts = [(each.springs.stiffness[1:], *but_springs(each)) for each in (robot, before) if each is not None]
+        if before is None or parts[0] != parts[1]:
             self._theory = Theory(remark="it is being computed")
             self._session.law = None
             self._beside.ask(robot)
@@ -358,11 +361,6 @@ def _body(robot: Robot, engine: str) -> Body:
     return SolidBody(robot)
 
 
-def _but_first_spring(robot: Robot) -> tuple[object, ...]:
-    """Numbers of a robot that its theory depends on, whatever its first spring."""
-    return robot.springs.stiffness[1:], robot.gait, robot.ground, robot.twin
-
-
 def _quiet() -> contextlib.AbstractContextManager[object]:
     """Silence of viser, which would print where it listens and that it ends."""
     return contextlib.redirect_stdout(io.StringIO())
@@ -380,7 +378,8 @@ def _free_port(host: str, port: int) -> int:
             free: int = trial.getsockname()[1]
             return free
     except (socket.gaierror, UnicodeError) as error:
-        raise ParameterError("is no address of this machine", field="host", value=host) from error
+        allowed = "an address or a name of this machine, or 0.0.0.0 for all of them"
+        raise ParameterError("is no address of this machine", field="host", value=host, allowed=allowed) from error
     except OSError as error:
         raise ParameterError(
             f"cannot be listened at: {error.strerror}", field="port", value=port, allowed="another --port, or 0"

@@ -50,18 +50,12 @@ def filmed(
 
     Parameters
     ----------
-    record
-        As described in :mod:`chilopod.show.scene.frames`.
-    titles
-        Names of the robots: by label in the record, or in the order of the record.
+    record, titles
+        Record, and titles of its robots by label or in their order, see :mod:`chilopod.show.scene.frames`.
     heading
         Text above all panels.
-    fps
-        Frames per second of the film.
-    speed
-        Seconds of the walk per second of the film.
-    size
-        Width and height, pixels, both even.
+    fps, speed, size
+        Frames per second of the film, seconds of the walk per second of it, and its width and height, even pixels.
 
     Raises
     ------

@@ -43,20 +43,16 @@ class BodyFrames:
     robot
         Description of the robots, but for their springs.
     time
-        (T,) s.
+        Times, (T,), s.
     spine
-        (T, R, N+1, 2) m: front end of module 1, the yaw joints, rear end of module N.
-    centres
-        (T, R, N, 2) m, of the modules.
-    headings
-        (T, R, N) rad, of the modules, left positive.
-    feet
-        (T, R, N, 2, 2) m, by module, side (left, right) and axis.
-    stands
-        (T, R, N, 2) whether the foot is on the floor.
+        Front end of module 1, the yaw joints and the rear end of module N, (T, R, N+1, 2), m.
+    centres, headings
+        Centres (T, R, N, 2), m, and headings (T, R, N), rad, left positive, of the modules.
+    feet, stands
+        Places of the feet by module, side (left, right) and axis, (T, R, N, 2, 2), m, and True for each on the floor.
     walks
-        (T, R) whether the record has the robot then. Once it has not, all of the above stay as they were last; of a
-        robot that never started they are NaN, and no foot stands.
+        True while the record has the robot, (T, R). After that all of the above stay as they were last; of a robot that
+        never started they are NaN, and no foot stands.
     """
 
     robot: Robot
@@ -230,7 +226,7 @@ def _titles(record: xr.Dataset, titles: Mapping[Any, str] | Sequence[str]) -> tu
     if isinstance(titles, Mapping):
         missing = [label for label in labels if label not in titles]
         if missing:
-            raise ParameterError(f"has none for robot {missing[0]!r}", field="titles")
+            raise ParameterError(f"has no title of robot {missing[0]!r}", field="titles", allowed="one for each robot")
         return tuple(titles[label] for label in labels)
     if len(titles) != len(labels):
         raise ParameterError(f"has {len(titles)} titles", field="titles", allowed=f"{len(labels)}, one for each robot")
