@@ -54,6 +54,7 @@ class View:
         self._floor = scene.add_line_segments(
             f"{WORLD}/floor", _lines(self._step, _FLOOR_LINES), (205, 205, 205), thickness=1.0, thickness_units="screen"
         )
+        plain: dict[str, Any] = {"lod": "off", "cast_shadow": False, "receive_shadow": False}
         self._batches = {
             kind: scene.add_batched_meshes_simple(
                 f"{WORLD}/{kind}",
@@ -62,10 +63,8 @@ class View:
                 placed[kind].centres,
                 batched_scales=placed[kind].scales,
                 batched_colors=_colors(kind, len(placed[kind].centres)),
-                lod="off",
                 flat_shading=kind == "box",
-                cast_shadow=False,
-                receive_shadow=False,
+                **plain,
             )
             for kind in KINDS
         }
@@ -82,10 +81,8 @@ class View:
             batched_scales=np.array([[ARRIVAL_RADIUS, ARRIVAL_RADIUS, 0.002], [0.01, 0.01, 0.3]]),
             batched_colors=np.tile(_FRONT, (2, 1)),
             opacity=0.6,
-            lod="off",
-            cast_shadow=False,
-            receive_shadow=False,
             visible=False,
+            **plain,
         )
         self._centre = np.zeros(3)
         server.initial_camera.position = (-0.9 * length, -1.0 * length, 0.9 * length)

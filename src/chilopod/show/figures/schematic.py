@@ -16,7 +16,7 @@ from chilopod.robot import Robot
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.scene.outline import SLIMNESS, draw_modules
-from chilopod.show.words import SPRING_UNIT, k, minus, number
+from chilopod.show.words import SPRING_UNIT, k, minus, number, round_down
 
 _SIDES = ("left", "right")
 _GUIDE: Any = {"color": style.GREY, "lw": 0.7, "linestyle": ":"}
@@ -117,7 +117,7 @@ def _whole(axes: Axes, robot: Robot, data: xr.Dataset, narrow: bool) -> None:
     end = 0.05 * robot.body.length
     style.arrow(axes, (0.25 * end, 0.0), (1.45 * end, 0.0), color=style.BLACK, lw=1.8)
     y = -1.7 * reach
-    bar = _round(0.15 * robot.body.length)
+    bar = round_down(0.15 * robot.body.length)
     axes.plot([-robot.body.length, -robot.body.length + bar], [y, y], color=style.BLACK, lw=3, solid_capstyle="butt")
     axes.text(-robot.body.length + 1.15 * bar, y, f"{number(100 * bar, 2)} cm", va="center", fontsize=style.SMALL)
     axes.text(0.0, y, "walks this way →", ha="right", va="center", fontsize=style.SMALL)
@@ -236,9 +236,3 @@ def _gait(axes: Axes, robot: Robot, data: xr.Dataset) -> None:
 
 def _mm(value: float) -> str:
     return minus(f"{1e3 * value:.4g} mm")
-
-
-def _round(value: float) -> float:
-    """The largest of 1, 2, 5 times a power of ten that is no larger."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(max(step * power for step in (1, 2, 5) if step * power <= value * (1 + 1e-9)))

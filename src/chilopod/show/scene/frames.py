@@ -23,6 +23,7 @@ from chilopod.errors import ParameterError
 from chilopod.kinematics import directions, foot_places, from_modules, module_centres, module_headings
 from chilopod.robot import Robot
 from chilopod.show.scene.aims import Aim, aims_of, places_of
+from chilopod.show.words import round_down
 from chilopod.steering import ARRIVAL_RADIUS
 
 Array = NDArray[np.float64]
@@ -272,7 +273,4 @@ def _floor(frames: BodyFrames, aims: Array, radius: float) -> Floor:
 
 def _grid(extent: float) -> float:
     """1 m where that makes a readable grid, otherwise 1, 2 or 5 times the power of ten that does."""
-    if 2.0 <= extent <= 14.0:
-        return 1.0
-    power = 10.0 ** np.floor(np.log10(extent / 3.0))
-    return float(max(step * power for step in (1, 2, 5) if step * power <= extent / 3.0 * (1.0 + 1e-9)))
+    return 1.0 if 2.0 <= extent <= 14.0 else round_down(extent / 3.0)
