@@ -25,24 +25,29 @@ if TYPE_CHECKING:
 
 _BETWEEN = ("7.5 N*mm/deg", "20 N*mm/deg")
 
+BetweenOption = Annotated[
+    tuple[str, str] | None,
+    typer.Option(
+        metavar="LOW HIGH",
+        help='Interval; by default "7.5 N*mm/deg" "20 N*mm/deg", or that of the branch that is resumed.',
+    ),
+]
+PointsOption = Annotated[
+    int,
+    typer.Option(metavar="N", min=1, max=10_000, help="Largest number of points; with --resume, of further points."),
+]
+ResumeOption = Annotated[
+    Path | None,
+    typer.Option(metavar="FOLDER", help="Folder of a saved branch to go on with; without --out it grows there."),
+]
+
 
 @with_options
 def branch(
     options: RobotOptions,
     parameter: ParameterOption = "springs.stiffness[0]",
-    between: Annotated[
-        tuple[str, str] | None,
-        typer.Option(
-            metavar="LOW HIGH",
-            help='Interval; by default "7.5 N*mm/deg" "20 N*mm/deg", or that of the branch that is resumed.',
-        ),
-    ] = None,
-    points: Annotated[
-        int,
-        typer.Option(
-            metavar="N", min=1, max=10_000, help="Largest number of points; with --resume, of further points."
-        ),
-    ] = 60,
+    between: BetweenOption = None,
+    points: PointsOption = 60,
     longest: Annotated[
         float,
         typer.Option(
@@ -56,10 +61,7 @@ def branch(
         bool, typer.Option("--left", help="Follow the left turn, the mirror image of the right one.")
     ] = False,
     out: OutOption = None,
-    resume: Annotated[
-        Path | None,
-        typer.Option(metavar="FOLDER", help="Folder of a saved branch to go on with; without --out it grows there."),
-    ] = None,
+    resume: ResumeOption = None,
 ) -> None:
     """Follow the curved walks from the pitchfork at which the straight walk gives way: how tightly they turn, how
     fast and stable they are, folds and other points on the way.

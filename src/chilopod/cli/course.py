@@ -26,29 +26,33 @@ def _strategies() -> list[str]:
     return list(ON_COURSES)
 
 
+TargetsOption = Annotated[
+    str,
+    typer.Option(
+        metavar="TARGETS|FILE|slalom|square|eight|random:SEED",
+        help='Targets one after another, such as "45 deg, 1.3 m; -60 deg, 1.5 m", each seen from where the robot '
+        'is by then, or "1 m, 0.5 m; 2 m, 0 m", places on the floor; a file with one target a line; a course by '
+        "name; or five random targets.",
+        autocompletion=_courses,
+    ),
+]
+StrategyOption = Annotated[
+    str,
+    typer.Option(
+        metavar="variable|pitchfork|hopf|leg-yaw|actuated",
+        help="Strategy of turning. variable: first spring set anew in every gait cycle; pitchfork: soft first "
+        "spring, the same all the way; hopf: all springs alike and soft; leg-yaw: springs as they are; actuated: "
+        "torques at all joints. In all of them the legs of module 1 yaw towards the target.",
+        autocompletion=_strategies,
+    ),
+]
+
+
 @with_options
 def course(
     options: WalkOptions,
-    targets: Annotated[
-        str,
-        typer.Option(
-            metavar="TARGETS|FILE|slalom|square|eight|random:SEED",
-            help='Targets one after another, such as "45 deg, 1.3 m; -60 deg, 1.5 m", each seen from where the robot '
-            'is by then, or "1 m, 0.5 m; 2 m, 0 m", places on the floor; a file with one target a line; a course by '
-            "name; or five random targets.",
-            autocompletion=_courses,
-        ),
-    ],
-    strategy: Annotated[
-        str,
-        typer.Option(
-            metavar="variable|pitchfork|hopf|leg-yaw|actuated",
-            help="Strategy of turning. variable: first spring set anew in every gait cycle; pitchfork: soft first "
-            "spring, the same all the way; hopf: all springs alike and soft; leg-yaw: springs as they are; actuated: "
-            "torques at all joints. In all of them the legs of module 1 yaw towards the target.",
-            autocompletion=_strategies,
-        ),
-    ] = "variable",
+    targets: TargetsOption,
+    strategy: StrategyOption = "variable",
     k1: Annotated[
         str | None,
         typer.Option(

@@ -24,35 +24,40 @@ def _strategies() -> list[str]:
     return list(ON_THE_WAY)
 
 
+StrategyOption = Annotated[
+    str,
+    typer.Option(
+        metavar="variable|leg-yaw|actuated",
+        help="Strategy on the way to a target; the page can change it.",
+        autocompletion=_strategies,
+    ),
+]
+HostOption = Annotated[
+    str,
+    typer.Option(
+        metavar="ADDRESS",
+        help="Address to listen at, by default for this machine only. At any other address, such as 0.0.0.0 (all), "
+        "a browser needs the token in the printed link.",
+    ),
+]
+TokenOption = Annotated[
+    bool, typer.Option("--token", help="Require the token on this machine too, where others use it as well.")
+]
+
+
 def live(
     robot: Annotated[
         str, typer.Argument(metavar="[ROBOT]", help="Robot file, or one of the presets aoi2022 and aoi2022-planar.")
     ] = "aoi2022-planar",
     engine: EngineOption = "planar",
-    strategy: Annotated[
-        str,
-        typer.Option(
-            metavar="variable|leg-yaw|actuated",
-            help="Strategy on the way to a target; the page can change it.",
-            autocompletion=_strategies,
-        ),
-    ] = "variable",
+    strategy: StrategyOption = "variable",
     seed: Annotated[
         int,
         typer.Option(metavar="N", min=0, max=LARGEST_SEED, help="Seed of the start and of the nudges of the floor."),
     ] = 1,
-    host: Annotated[
-        str,
-        typer.Option(
-            metavar="ADDRESS",
-            help="Address to listen at, by default for this machine only. At any other address, such as 0.0.0.0 (all), "
-            "a browser needs the token in the printed link.",
-        ),
-    ] = "127.0.0.1",
+    host: HostOption = "127.0.0.1",
     port: Annotated[int, typer.Option(metavar="N", help="Port to listen at; 0 for any that is free.")] = 8080,
-    token: Annotated[
-        bool, typer.Option("--token", help="Require the token on this machine too, where others use it as well.")
-    ] = False,
+    token: TokenOption = False,
     duration: Annotated[
         str | None, typer.Option(metavar="TIME", help='Time after which the page ends by itself, such as "10 min".')
     ] = None,
