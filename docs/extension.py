@@ -21,6 +21,9 @@ from sphinx.environment import BuildEnvironment
 from sphinx.util.typing import stringify_annotation
 from sphinx.writers.html5 import HTML5Translator
 
+from chilopod.robot import load_robot
+from chilopod.show.play import play
+
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 _LITERAL = re.compile(r"(``.*?``|`.*?`)")
 
@@ -98,6 +101,12 @@ def visit_math(self: HTML5Translator, node: nodes.math | nodes.math_block) -> No
     raise nodes.SkipNode
 
 
+def play_page(app: Sphinx, failure: Exception | None) -> None:
+    """Write the page in which the planar robot walks beside its description."""
+    if failure is None and app.builder.format == "html":
+        (Path(app.outdir) / "docs" / "play-page.html").write_text(play(load_robot("aoi2022-planar")), encoding="utf-8")
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     """Make all of it known to Sphinx."""
     app.add_object_type("robotkey", "robotkey", "pair: %s; robot file")
@@ -111,4 +120,5 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("viewcode-follow-imported", source_of)
     app.connect("doctree-read", lead_to_gallery)
     app.connect("missing-reference", resolve)
+    app.connect("build-finished", play_page)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,6 +1,6 @@
 """The pictures of docs/courses.md and of the README: ``python docs/law_pictures.py`` writes them to ``docs/images``.
 
-``law-*.webp`` show one idea of the spring law each: the way of one robot without the idea and with it, on the same
+Each of ``law-*.webp`` shows one idea of the spring law: the path of one robot without the idea and with it, on the same
 targets. ``course.webp`` is a course.
 """
 
@@ -28,10 +28,10 @@ from chilopod.tasks import drive, driver
 
 PATIENCE = 40.0  # s
 IDEAS = {
-    "bend": ("45 deg, 1.3 m; -50 deg, 1.2 m", 0, "k1-hat of the circle, every cycle", "bend against bend"),
-    "search": ("130 deg, 1 m", 1, "does not look for it", "looks for it"),
-    "near": ("60 deg, 1.2 m; 60 deg, 0.3 m", 2, "round and round", "leaves the circle"),
-    "ahead": ("1.5 m, 0.5 m; 3 m, -0.5 m; 4.5 m, 0.5 m", 3, "one circle to each", "two modules ahead"),
+    "bend": ("45 deg, 1.3 m; -50 deg, 1.2 m", 0, "k1-hat of the circle in every cycle", "bends compared"),
+    "search": ("130 deg, 1 m", 1, "without search", "with search"),
+    "near": ("60 deg, 1.2 m; 60 deg, 0.3 m", 2, "stays on the circle", "leaves the circle"),
+    "ahead": ("1.5 m, 0.5 m; 3 m, -0.5 m; 4.5 m, 0.5 m", 3, "one circle to each target", "two modules ahead"),
 }
 """By name: the targets, the step before the idea (see :func:`chilopod.paper.courses.steps.steps`), and what the walks
 without it and with it are called."""

@@ -13,6 +13,11 @@ In a page these are results:
   A path leads through the printed JSON by keys, positions and names of rows; ``* 1000`` behind it scales the number,
   ``~ at (.*?) m`` takes its part of a text. A number is written with as many decimals as it had.
 
+A table whose last columns are numbers of the rows that its first column names has one line for all of them::
+
+      <!-- make torture
+           rows = classes: seed, tried, faults -->
+
 ``make torture`` and the campaign of branches stand for what their last run counted: those minutes are not spent
 again.
 
@@ -127,8 +132,21 @@ def results_of(text: str) -> Iterator[Result]:
     """What a page shows, in its order."""
     places = [place for kind in (_SHOWN, _BLOCK, _NAMED) for place in kind.finditer(text)]
     for place in sorted(places, key=lambda place: place.start()):
-        named = _NAME.finditer(place.groupdict().get("names") or "")
-        yield Result(place, tuple(Number(**each.groupdict()) for each in named))
+        yield Result(place, tuple(_numbers(place.groupdict().get("names") or "", place.groupdict().get("text") or "")))
+
+
+def _numbers(names: str, text: str) -> Iterator[Number]:
+    """Numbers that a comment names: one by one, or all in the last columns of a table."""
+    for each in _NAME.finditer(names):
+        if each["text"] != "rows":
+            yield Number(**each.groupdict())
+            continue
+        table, _, columns = each["path"].partition(": ")
+        wanted = columns.split(", ")
+        for row in text.split("\n")[2:]:
+            cells = [cell.strip(" `*") for cell in row.strip("|").split("|")]
+            for column, cell in zip(wanted, cells[-len(wanted) :], strict=True):
+                yield Number(cell, f"{table} > {cells[0]} > {column}", None, None)
 
 
 def run(command: str) -> str:

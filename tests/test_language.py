@@ -7,6 +7,7 @@ from pathlib import Path
 import chilopod
 
 SOURCES = Path(chilopod.__file__).parent
+ROOT = Path(__file__).resolve().parent.parent
 HEAD = re.compile(r"(Of|That|Whose|What|Whether|Which)\b")
 FRAGMENT = re.compile(r"(Of|That|Whose|What|Whether|Which|Where|When|Why|Who|How)\b")
 TERM = re.compile(r"[\w*`]+(, [\w*`]+)*")
@@ -42,3 +43,22 @@ def test_a_fragment_is_found():
         "Whether it is done.",
         "That of chilopod.",
     ]
+
+
+def long_lines(page):
+    """Numbers of the lines of prose that have more than 120 characters; tables, code and pictures may."""
+    code = False
+    for number, line in enumerate(page.split("\n"), 1):
+        code ^= line.lstrip().startswith("```")
+        if len(line) > 120 and not (code or line.lstrip().startswith(("|", "![", "<!--")) or line.startswith("     ")):
+            yield number
+
+
+def test_lines_of_pages_are_short():
+    pages = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]  # `make bench` writes its page
+    found = {str(path): list(long_lines(path.read_text(encoding="utf-8"))) for path in pages}
+    assert {name: lines for name, lines in found.items() if lines} == {}
+
+
+def test_a_long_line_is_found():
+    assert list(long_lines(f"short\n{'long ' * 25}\n| {'cell ' * 25} |\n```\n{'code ' * 25}\n```\n")) == [2]

@@ -14,7 +14,7 @@ from chilopod.notebook import block, folded, picture, table, words
 from chilopod.stability import PeriodicSystem, begin, follow, follow2, from_rhs, locate
 from chilopod.steering import Target, course_named, strategy_named
 from chilopod.tasks import Driver, drive, ends, turn, walk
-from chilopod.tasks.shown import draw_paths
+from chilopod.tasks.runs import draw_paths
 from chilopod.trials import Trial
 
 ROBOT = load_robot("aoi2022-planar")

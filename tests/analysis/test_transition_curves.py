@@ -33,8 +33,8 @@ def test_pitchfork_turns_along_its_curve():
     assert point.values[1] == pytest.approx(offsets[0] + 2e-4 * low / (low - high), abs=1e-7)
     assert point.error_bound[1] < 1e-8
     np.testing.assert_allclose(point.values[0], np.mean([each.point.value for each in beside]), rtol=1e-6)
-    for each, walk in zip(found.curve.points, found.as_json()["points"], strict=True):
-        assert walk["values"][1] == pytest.approx(found.shown(each.values)[1])
+    for each, values in zip(found.curve.points, found.values, strict=True):
+        assert values[1] == pytest.approx(found.shown(each.values)[1])
     axes = found.plot(Figure().add_subplot())
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("springs.stiffness[0] (N·mm/deg)", "legs.forward_offset (m)")
     line, mark = (each.get_xydata() for each in axes.lines)

@@ -1,6 +1,7 @@
 """The environments keep Gymnasium's contract, alone and in a batch, and their episodes are those of trials."""
 
 import copy
+import dataclasses
 import pickle
 import sys
 from importlib import reload
@@ -16,9 +17,10 @@ from gymnasium.wrappers.vector import RecordEpisodeStatistics as RecordBatchStat
 import chilopod.gym
 from chilopod import load_robot, planar
 from chilopod.errors import ChilopodError, ExtraError, ParameterError
-from chilopod.gym import Episodes, Rewards, Steered, baseline, episodes
-from chilopod.steering import SpringLaw, random_course
-from chilopod.trials import NONE, Disturbance
+from chilopod.gym import Episodes, OneTarget, Rewards, RobotEnv, Steered, baseline, episodes
+from chilopod.paper import printed
+from chilopod.steering import SpringLaw, Target, random_course
+from chilopod.trials import NONE, Disturbance, Trial, run
 
 TURN, COURSE = "chilopod/Turn-v0", "chilopod/Course-v0"
 SHORT = {"patience": 32.0}
@@ -30,6 +32,45 @@ FOUR = pytest.mark.parametrize(
 @FOUR
 def test_gymnasium_finds_nothing_wrong(name, engine):
     check_env(gymnasium.make(name, engine=engine).unwrapped)
+
+
+@pytest.mark.parametrize("task", ["A", "B"])
+def test_the_tasks_of_the_paper_are_its_targets_and_are_arrived_at(task):
+    name = f"chilopod/Task{task}-v0"
+    check_env(gymnasium.make(name).unwrapped)
+    batch = gymnasium.make_vec(name, num_envs=3)
+    wanted = printed.TASKS[task].target
+    assert batch.unwrapped.episodes.task.target == wanted
+    (seen, info), policy = batch.reset(seed=2), baseline("variable", batch.unwrapped.episodes)
+    np.testing.assert_allclose(info["distance"], wanted.distance, rtol=1e-12)
+    # A robot is disturbed as in a trial of its seed, and the target is where it is.
+    (record,) = run([Trial(load_robot("aoi2022-planar"), 0.01, 3, target=wanted)])
+    assert info["distance"][1] == pytest.approx(record.distance.values[0, 0])
+    assert info["pose"][1, 2] == pytest.approx(record.heading.values[0, 0])
+    ends = np.full(3, "", dtype="U12")
+    while not all(ends):
+        seen, _, terminated, _, info = batch.step(policy(seen))
+        ends = np.where(ends == "", info["verdict"], ends)
+        assert (terminated | (info["distance"] > 0.15) | (ends != "")).all()
+    assert ends.tolist() == ["arrived"] * 3
+
+
+@dataclasses.dataclass(frozen=True)
+class Straight(OneTarget):
+    """A task of one's own: ahead, without a reward, over after three steps."""
+
+    def reward(self, look):
+        return np.zeros(len(look.busy))
+
+    def ending(self, look):
+        return look.busy & (look.left < 40.0 - 3 * 0.6 + 1e-9), look.judged.gone
+
+
+def test_a_task_of_one_s_own_is_a_class():
+    env = RobotEnv(task=Straight(target=Target(0.0, 1.0)), patience=40.0)
+    _, info = env.reset(seed=0)
+    assert info["distance"] == pytest.approx(1.0)
+    assert [env.step(np.zeros(3))[1:4] for _ in range(3)] == [(0.0, over, False) for over in (False, False, True)]
 
 
 def towards(seen):
@@ -293,11 +334,15 @@ def test_an_action_that_is_none_is_one_line(action, words):
         ({"robot": 5}, "robot = 5"),
         ({"disturbance": 5}, "disturbance = 5: must be a Disturbance"),
         ({"rewards": 5}, "rewards = 5: must be a Rewards"),
+        ({"task": "Tern"}, "there is no such task; did you mean 'Turn'. allowed: Turn, Course, TaskA, TaskB"),
+        ({"task": 5}, "task = 5: there is no such task"),
+        ({"task": "TaskA", "targets": 2}, "targets = 2: is no attribute of a OneTarget; allowed: rewards, target"),
+        ({"task": "TaskA", "target": 5}, "target = 5: must be a Target"),
     ],
 )
 def test_an_environment_that_cannot_be_is_one_line(named, words):
     with pytest.raises(ChilopodError, match=words) as caught:
-        chilopod.gym.TurnEnv(**named)
+        RobotEnv(**named)
     assert "\n" not in str(caught.value)
 
 
@@ -350,13 +395,13 @@ def test_controllers_as_policies_do_what_they_do_with_what_is_seen():
 @pytest.mark.parametrize("count", [0, -1, 1.5, "2", 10**9])
 def test_a_batch_has_a_number_of_robots(count):
     with pytest.raises(ParameterError, match=r"num_envs.*must be a whole number"):
-        chilopod.gym.TurnVectorEnv(num_envs=count)
+        chilopod.gym.RobotVectorEnv(num_envs=count)
 
 
 def test_episodes_that_no_memory_holds_are_refused(monkeypatch):
     monkeypatch.setattr(episodes.memory, "available", lambda: 1e6)
     with pytest.raises(ParameterError, match=r"num_envs \* targets \* patience.*of memory"):
-        chilopod.gym.TurnVectorEnv(num_envs=1000, targets=50)
+        chilopod.gym.RobotVectorEnv(num_envs=1000, targets=50)
 
 
 @pytest.mark.parametrize("worth", [np.nan, "1", None, np.inf])

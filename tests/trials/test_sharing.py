@@ -2,12 +2,13 @@
 
 import dataclasses
 import errno
+import sys
 from contextlib import ExitStack
 
 import pytest
 
 from chilopod import load_robot
-from chilopod.trials import Store, Trial, batch, claims, run, sharing
+from chilopod.trials import Store, Trial, batch, claims, run
 
 BASE = Trial(load_robot("aoi2022-planar"), 0.5, rate=20.0)
 TRIALS = [dataclasses.replace(BASE, seed=seed) for seed in range(4)]
@@ -64,7 +65,7 @@ def test_what_another_walks_is_waited_for_at_the_end(tmp_path, walked_here, brou
 
 
 def test_nobody_is_waited_for_without_end(tmp_path, walked_here, monkeypatch):
-    monkeypatch.setattr(sharing, "_PATIENCE", 0.0)
+    monkeypatch.setattr(sys.modules["chilopod.trials.run"], "_PATIENCE", 0.0)
     with Store(tmp_path).claims() as other:
         assert other.take(NAMES[2])
         run(TRIALS, tmp_path)

@@ -66,17 +66,13 @@ def curved_walks(
 
     Parameters
     ----------
-    robot
-        The robot.
-    parameter
-        Dotted path of a spring, such as ``springs.stiffness[0]``.
+    robot, parameter
+        Robot, and dotted path of a spring, such as ``springs.stiffness[0]``.
     between
         Interval in SI units; the pitchfork must lie in it, and the branch ends where it leaves it.
-    points
-        At most so many points along the branch, special ones not counted.
-    longest
-        Largest distance between two of them along the curve, over orbit (SI units) and parameter (over the width of
-        the interval); halve it for twice as many.
+    points, longest
+        At most so many points along the branch, special ones not counted, and largest distance between two of them
+        along the curve, over orbit (SI units) and parameter (over the width of the interval).
     side
         +1: positive joint angles, a right turn; -1: the mirror image.
     progress
@@ -104,11 +100,8 @@ def curved_walks(
     """
     forks = [each for each in bifurcations(robot, parameter, between) if each.point.kind is Kind.PITCHFORK]
     if not forks:
-        raise AnalysisError(
-            "the straight walk has no pitchfork in this interval",
-            field=parameter,
-            value=interval_text(robot, parameter, between),
-        )
+        searched = interval_text(robot, parameter, between)
+        raise AnalysisError("the straight walk has no pitchfork in this interval", field=parameter, value=searched)
     fork = forks[-1]
     make = _followed(robot, parameter)
     # The positive side of the mode is that of positive joint angles.
@@ -145,16 +138,9 @@ def resumed(
     data
         From :func:`curved_walks`, from here, or from :func:`read_walks`.
     robot, parameter, side
-        Must be those of the branch (``side`` None is not compared); what the robot has for the parameter does not
-        matter.
-    between
-        Interval in SI units, by default that of the branch.
-    points
-        At most so many points are added.
-    longest
-        As for :func:`curved_walks`.
-    progress
-        Called with the part done (0 to 1) and a few words.
+        Those of the branch (``side`` None is not compared); what the robot has for the parameter does not matter.
+    between, points, longest, progress
+        As for :func:`curved_walks`; the interval is by default that of the branch.
 
     Returns
     -------

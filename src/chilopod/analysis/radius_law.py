@@ -21,15 +21,8 @@ _BETWEEN = (1.0 / 20.0, 3.0)
 
 @dataclass(frozen=True)
 class RadiusLaws(Short):
-    """Radii over k1, by two measures of a radius.
-
-    Attributes
-    ----------
-    axis, path
-        By the paper's (N-1) L / sum |theta|, with mean angles, and by the path that module 1 really walks.
-    walks
-        The branch they come from, of left turns.
-    """
+    """Radii over k1 by the paper's measure (N-1) L / sum |theta|, with mean angles (``axis``), and by the path that
+    module 1 really walks; and the branch that they come from, of left turns."""
 
     axis: RadiusLaw
     path: RadiusLaw
@@ -52,13 +45,6 @@ class RadiusLaws(Short):
 
 def radius_laws(robot: Robot, progress: Progress = silent) -> RadiusLaws:
     """The laws from the branch of curved walks, from the pitchfork down to where a joint bends by a right angle.
-
-    Parameters
-    ----------
-    robot
-        The robot.
-    progress
-        Called with the part done (0 to 1) and a few words.
 
     Raises
     ------

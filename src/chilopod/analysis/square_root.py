@@ -30,19 +30,14 @@ class SquareRootFit:
 
     Attributes
     ----------
-    critical
-        The spring kc, in the unit of the springs that were fitted.
-    error
-        Its standard error from the covariance of the least squares: what the residuals say, lack of fit included, as
-        if they were independent and of one size.
+    critical, error
+        The spring kc, in the unit of the springs that were fitted; its standard error from the covariance of the least
+        squares: what the residuals say, lack of fit included, as if they were independent and of one size.
     bootstrap_error
         Its standard error from drawing trials anew at every spring: how well another set of trials at the same springs
-        would repeat it, whatever the law; NaN where every spring has one trial only, or none are
-        drawn.
-    amplitude
-        In the unit of the angles times the root of that of the springs.
-    residual
-        Root mean square of the residuals, in the unit of the angles.
+        would repeat it, whatever the law; NaN where every spring has one trial only, or none are drawn.
+    amplitude, residual
+        Amplitude, in the unit of the angles times the root of that of the springs; root mean square of the residuals.
     trials
         Number of trials that were fitted.
     """
@@ -64,14 +59,11 @@ def square_root_fit(inverse: ArrayLike, angle: ArrayLike, resampled: int = RESAM
 
     Parameters
     ----------
-    inverse
-        1/k of every trial, positive, shape (trials,); trials at one spring have equal values.
-    angle
-        Their mean angles, shape (trials,); the sign is ignored.
-    resampled
-        Number of times that trials are drawn anew for the bootstrap; 0 for no bootstrap.
-    seed
-        Seed of the drawing.
+    inverse, angle
+        1/k of every trial, positive, equal for trials at one spring, and their mean angles, whose sign is ignored,
+        shape (trials,).
+    resampled, seed
+        Number of times that trials are drawn anew for the bootstrap, 0 for none, and seed of the drawing.
 
     Raises
     ------

@@ -37,10 +37,8 @@ class StraightWalk(Summary, ReadOnlyArrays):
 
     Attributes
     ----------
-    robot
-        The robot.
-    exponents
-        Exponents, modes and multipliers of the reduced system, 2N+1 of each.
+    robot, exponents
+        Robot; exponents, modes and multipliers of its reduced system, 2N+1 of each.
     joint_components
         Joint angles of every mode, shape (2N+1, N-1), see :func:`joint_components`.
     """
@@ -78,8 +76,8 @@ class StraightWalk(Summary, ReadOnlyArrays):
             "half_period_multipliers": None if half is None else _pairs(half),
             "error_estimate": multipliers.error_bound,
             "modes": [
-                {"exponent": _pair(exponent), "joint_components": _numbers(components)}
-                for exponent, components in zip(self.exponents.values, self.joint_components, strict=True)
+                {"exponent": exponent, "joint_components": _numbers(components)}
+                for exponent, components in zip(_pairs(self.exponents.values), self.joint_components, strict=True)
             ],
         }
 
@@ -109,14 +107,12 @@ class WalkBifurcation(Summary, ReadOnlyArrays):
 
     Attributes
     ----------
-    point
-        Kind and place of the point, in SI units (see :class:`chilopod.stability.BifurcationPoint`).
-    parameter, unit
-        Dotted path of the parameter and the unit it is shown in.
-    joint_components
-        Joint angles of the critical mode, shape (N-1,), see :func:`joint_components`.
-    coefficient
-        Cubic coefficient per period (1/rad^2) for an amplitude measured along ``joint_components``.
+    point, parameter, unit
+        Kind and place of the point, in SI units (see :class:`chilopod.stability.BifurcationPoint`); dotted path of the
+        parameter and the unit it is shown in.
+    joint_components, coefficient
+        Joint angles of the critical mode, shape (N-1,), see :func:`joint_components`; cubic coefficient per period
+        (1/rad^2) for an amplitude measured along them.
     """
 
     point: stability.BifurcationPoint
@@ -200,13 +196,12 @@ def straight_walk(robot: Robot, longest: float = _LONGEST) -> StraightWalk:
     parts = max(_FEWEST_PARTS, 0.5 * contraction / math.log(1e6))
     seconds = _A_PART * parts * model.dimension**2.5
     if seconds > longest:
-        raise AnalysisError(
+        problem = (
             f"the exponents would take about {_duration(seconds)}: {model.dimension} states, the fastest of which dies "
-            f"out {contraction:.3g} e-folds a period or more",
-            field="body.modules",
-            value=robot.body.modules,
-            allowed=f"what takes about {_duration(longest)}: fewer modules, or longer and heavier ones",
+            f"out {contraction:.3g} e-folds a period or more"
         )
+        allowed = f"what takes about {_duration(longest)}: fewer modules, or longer and heavier ones"
+        raise AnalysisError(problem, field="body.modules", value=robot.body.modules, allowed=allowed)
     found = stability.exponents(model)
     components = np.array([joint_components(mode, robot.body.modules) for mode in found.modes.T])
     return StraightWalk(robot, found, components)
@@ -246,10 +241,8 @@ def bifurcations(
 
     Parameters
     ----------
-    robot
-        The robot; what it has for ``parameter`` does not matter.
-    parameter
-        Dotted path, such as ``springs.stiffness[0]``; ``springs.stiffness`` moves all springs together.
+    robot, parameter
+        Robot, and dotted path, such as ``springs.stiffness[0]``; ``springs.stiffness`` moves all springs together.
     between
         The interval in SI units, rising.
     normal_form
@@ -298,12 +291,10 @@ def first_loss(
                     return points[-1]
                 near = points[-1].point.value * np.array([1.0 - 1e-3, 1.0 + 1e-3])
                 return bifurcations(robot, parameter, (float(near[0]), float(near[1])))[-1]
-            raise AnalysisError(
-                f"stability is lost by a {points[-1].point.kind.label}, not a {kind.label}", field=parameter
-            )
-    raise AnalysisError(
-        f"no {kind.label} in the interval", field=parameter, value=interval_text(robot, parameter, between)
-    )
+            problem = f"stability is lost by a {points[-1].point.kind.label}, not a {kind.label}"
+            raise AnalysisError(problem, field=parameter)
+    searched = interval_text(robot, parameter, between)
+    raise AnalysisError(f"no {kind.label} in the interval", field=parameter, value=searched)
 
 
 def interval_text(robot: Robot, parameter: str, between: tuple[float, float]) -> str:
@@ -335,18 +326,12 @@ def _joints(modules: int) -> slice:
     return slice(3, modules + 2)
 
 
-def _pair(value: complex) -> list[float]:
-    return [float(value.real), float(value.imag)]
+def _pairs(values: ComplexArray) -> list[Any]:
+    return np.column_stack([values.real, values.imag]).tolist()
 
 
-def _pairs(values: ComplexArray) -> list[list[float]]:
-    return [_pair(value) for value in values]
-
-
-def _numbers(values: ComplexArray) -> list[float] | list[list[float]]:
-    if _is_real(values):
-        return [float(value) for value in values.real]
-    return _pairs(values)
+def _numbers(values: ComplexArray) -> list[Any]:
+    return values.real.tolist() if _is_real(values) else _pairs(values)
 
 
 def _is_real(values: ComplexArray) -> bool:

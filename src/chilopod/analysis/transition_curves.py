@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,15 +29,8 @@ Box = tuple[tuple[float, float], tuple[float, float]]
 
 @dataclass(frozen=True)
 class TransitionCurve(Summary):
-    """A curve of bifurcations of the straight walk in the plane of two parameters.
-
-    Attributes
-    ----------
-    curve
-        In SI units, see :class:`chilopod.stability.Curve2`.
-    parameters, units
-        Dotted paths of the two parameters, and the units they are shown in.
-    """
+    """A curve of bifurcations of the straight walk in the plane of two parameters, in SI units, with the dotted paths
+    of the parameters and the units that they are shown in."""
 
     curve: Curve2
     parameters: tuple[str, str]
@@ -51,32 +44,6 @@ class TransitionCurve(Summary):
     def shown(self, values: Array) -> Array:
         """SI values of both parameters, or errors of them, in ``units``."""
         return np.array([units.from_si(float(value), unit) for value, unit in zip(values, self.units, strict=True)])
-
-    def as_json(self) -> dict[str, Any]:
-        """The result as plain numbers, in ``units``."""
-        return {
-            "kind": self.curve.kind.label,
-            "parameters": list(self.parameters),
-            "units": list(self.units),
-            "endings": [ending.label for ending in self.curve.endings],
-            "points": [
-                {
-                    "values": self.shown(point.values).tolist(),
-                    "error_bounds": np.abs(self.shown(point.error_bound)).tolist(),
-                    "frequency_rad_s": point.frequency,
-                    "coefficient": point.coefficient,
-                }
-                for point in self.curve.points
-            ],
-            "special": [
-                {
-                    "kind": point.kind.label,
-                    "values": self.shown(point.values).tolist(),
-                    "error_bounds": np.abs(self.shown(point.error_bound)).tolist(),
-                }
-                for point in self.curve.special
-            ],
-        }
 
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the curve in ``units``, points of codimension two marked, on axes of matplotlib or on new ones."""
@@ -139,22 +106,16 @@ def transition_curve(
 
     Parameters
     ----------
-    robot
-        The robot; what it has for the two parameters does not matter.
-    parameters
-        Their dotted paths, such as ``springs.stiffness[0]`` and ``legs.forward_offset``.
+    robot, parameters
+        Robot, and dotted paths of two parameters, such as ``springs.stiffness[0]`` and ``legs.forward_offset``.
     between
         Both intervals in SI units: the first is searched for a point to start from, and the curve is followed in both.
-    kind
-        Kind of the bifurcation.
-    second
-        Value of the second parameter (SI) at which the first is searched.
-    points
-        At most so many, in each direction.
-    longest
-        Largest step, in units of ``between``.
+    kind, second
+        Kind of the bifurcation; value of the second parameter (SI) at which the first is searched.
+    points, longest
+        At most so many points in each direction; largest step, in units of ``between``.
     progress
-        Told how many points there are.
+        Called with how many points there are.
 
     Raises
     ------
@@ -166,18 +127,11 @@ def transition_curve(
     found = [each.point for each in bifurcations(there, parameters[0], between[0], normal_form=False)]
     starts = [point for point in found if point.kind is kind]
     if not starts:
-        raise AnalysisError(
-            f"no {kind.label} in the interval",
-            field=parameters[0],
-            allowed=", ".join(point.kind.label for point in found),
-        )
-    curve = follow2(
-        family,
-        starts[-1],
-        between,
-        second=second,
-        points=points,
-        longest=longest,
-        progress=lambda count, point: progress(min(1.0, count / points), f"{count} points"),
-    )
+        others = ", ".join(point.kind.label for point in found)
+        raise AnalysisError(f"no {kind.label} in the interval", field=parameters[0], allowed=others)
+
+    def told(count: int, point: object) -> None:
+        progress(min(1.0, count / points), f"{count} points")
+
+    curve = follow2(family, starts[-1], between, second=second, points=points, longest=longest, progress=told)
     return TransitionCurve(curve, parameters, (robot.unit_of(parameters[0]), robot.unit_of(parameters[1])))

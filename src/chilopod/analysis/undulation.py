@@ -45,10 +45,8 @@ def undulating_walks(robot: Robot, distances: Sequence[float] = DISTANCES, progr
 
     Parameters
     ----------
-    robot
-        The robot; its springs do not matter.
-    distances
-        1 - k/k* of the springs, each above 0 and below 1.
+    robot, distances
+        Robot, whose springs do not matter; 1 - k/k* of the springs, each above 0 and below 1.
     progress
         Called as the simulation goes on.
 
@@ -150,12 +148,8 @@ def _expected(model: FollowedModel, point: BifurcationPoint) -> _Expected:
 
 
 def _settled(models: list[FollowedModel], expected: list[_Expected], progress: Progress) -> tuple[ComplexArray, Array]:
-    """Run all robots from the predicted undulation until it has settled, then record it period by period.
-
-    Returns
-    -------
-    Amplitudes along the critical mode, shape (robots, periods), and states, shape (robots, periods, 2N+1).
-    """
+    """Amplitudes along the critical mode, shape (robots, periods), and states, shape (robots, periods, 2N+1), of all
+    robots, period by period, after the predicted undulation has settled."""
     period = models[0].period
     states = np.array([each.orbit + 2.0 * (each.amplitude * each.mode).real for each in expected])
     # Near the torus a disturbance of the radius dies out twice as fast as one of the straight walk grows.

@@ -1,6 +1,6 @@
-"""Gymnasium environments: a robot that turns to a target, or walks a course, told once a gait cycle what to do.
+"""Gymnasium environments: a robot with a task, told once a gait cycle what to do.
 
-Importing this registers ``chilopod/Turn-v0`` and ``chilopod/Course-v0``, and so does
+Importing this registers ``chilopod/NAME-v0`` for every name of ``tasks.TASKS``, and so does
 ``gymnasium.make("chilopod.gym:chilopod/Turn-v0")``. ``episodes`` is the one implementation, of a batch over
 :class:`chilopod.engine.Walk`, which needs no Gymnasium; ``envs`` shows it as :class:`gymnasium.vector.VectorEnv` and,
 one robot of it, as :class:`gymnasium.Env`.
@@ -15,42 +15,49 @@ needs("gymnasium", extra="gym")
 
 import gymnasium  # noqa: E402  (there, as has just been seen)
 
+from chilopod.gym.tasks import TASKS  # noqa: E402
+
 if TYPE_CHECKING:
     from chilopod.gym.actions import Actions
-    from chilopod.gym.envs import CourseEnv, CourseVectorEnv, TurnEnv, TurnVectorEnv
-    from chilopod.gym.episodes import Episodes, Rewards
+    from chilopod.gym.envs import RobotEnv, RobotVectorEnv
+    from chilopod.gym.episodes import Episodes
     from chilopod.gym.policies import Policy, Steered, baseline
     from chilopod.gym.sight import Sight
+    from chilopod.gym.tasks import Look, OneTarget, RandomTargets, Rewards, Task
 else:
     __getattr__, __dir__ = exports(
         __name__,
         {
             "actions": ("Actions",),
-            "envs": ("CourseEnv", "CourseVectorEnv", "TurnEnv", "TurnVectorEnv"),
-            "episodes": ("Episodes", "Rewards"),
+            "envs": ("RobotEnv", "RobotVectorEnv"),
+            "episodes": ("Episodes",),
             "policies": ("Policy", "Steered", "baseline"),
             "sight": ("Sight",),
+            "tasks": ("Look", "OneTarget", "RandomTargets", "Rewards", "Task"),
         },
     )
 
 __all__ = [
     "Actions",
-    "CourseEnv",
-    "CourseVectorEnv",
     "Episodes",
+    "Look",
+    "OneTarget",
     "Policy",
+    "RandomTargets",
     "Rewards",
+    "RobotEnv",
+    "RobotVectorEnv",
     "Sight",
     "Steered",
-    "TurnEnv",
-    "TurnVectorEnv",
+    "Task",
     "baseline",
 ]
 
-for _task in ("Turn", "Course"):
+for _task in TASKS:
     if f"chilopod/{_task}-v0" not in gymnasium.registry:  # this module may be loaded again
         gymnasium.register(
             f"chilopod/{_task}-v0",
-            entry_point=f"chilopod.gym.envs:{_task}Env",
-            vector_entry_point=f"chilopod.gym.envs:{_task}VectorEnv",
+            entry_point="chilopod.gym.envs:RobotEnv",
+            vector_entry_point="chilopod.gym.envs:RobotVectorEnv",
+            kwargs={"task": _task},
         )

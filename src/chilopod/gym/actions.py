@@ -6,15 +6,14 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chilopod.engine import Command
 from chilopod.engine.arguments import as_array
 from chilopod.errors import ParameterError
+from chilopod.record import Array
 from chilopod.robot import Robot
 from chilopod.steering.leg_yaw import SIDES, LegYawController
-
-Array = NDArray[np.float64]
 
 SPRINGS = ("first", "all")
 """Springs that an action sets."""
@@ -37,12 +36,10 @@ class Actions:
 
     Attributes
     ----------
-    robot
-        With an actuator for each of the springs.
-    joints
-        Joints of these springs, counted from 0.
+    robot, joints
+        Robot with an actuator for each of the springs, and their joints, counted from 0.
     softest, stiffest
-        Softest and stiffest of these springs, N*m/rad.
+        Ends of the range of each spring, N*m/rad.
     legs
         Leg controller that defines yaw limit and swing.
     """
@@ -55,20 +52,11 @@ class Actions:
 
     @classmethod
     def of(cls, robot: Robot, springs: Literal["first", "all"] = "first") -> Actions:
-        """The actions of a robot.
+        """The actions of a robot, on its first spring or on all that can be adjusted.
 
-        Parameters
-        ----------
-        robot
-            A robot without any actuator is given them.
-        springs
-            The first, or all that can be adjusted. Where the robot file gives no range, it goes from a seventh of the
-            stiffest spring of the axis to that.
-
-        Raises
-        ------
-        ParameterError
-            If a spring has no actuator, or that leaves it no range.
+        A robot without any actuator is given them. Where the robot file gives no range, it goes from a seventh of the
+        stiffest spring of the axis to that. Raises ParameterError if a spring has no actuator, or that leaves it no
+        range.
         """
         if springs not in SPRINGS:
             raise ParameterError("are no springs", field="springs", value=springs, allowed=" or ".join(SPRINGS))
@@ -85,11 +73,8 @@ class Actions:
         stiffest = tuple(own.stiffest[joint] if own.stiffest else most for joint in joints)
         for low, high in zip(softest, stiffest, strict=True):
             if not low < high:
-                raise ParameterError(
-                    "leave a spring no range",
-                    field="springs.softest, springs.stiffest",
-                    value=f"{low:g}, {high:g} N*m/rad",
-                )
+                given, names = f"{low:g}, {high:g} N*m/rad", "springs.softest, springs.stiffest"
+                raise ParameterError("leave a spring no range", field=names, value=given)
         return cls(robot, joints, softest, stiffest)
 
     @property
@@ -107,25 +92,17 @@ class Actions:
         return tuple(sorted((each.phase, each.window, SIDES.index(each.name)) for each in events))
 
     def checked(self, actions: ArrayLike, robots: int) -> Array:
-        """Actions of a batch, each its own copy, shape (robots, len(names)).
-
-        Raises
-        ------
-        ParameterError
-            If they are none: wrong shape, NaN, out of range.
-        """
+        """Actions of a batch, each its own copy, shape (robots, len(names)). Raises ParameterError if they are none:
+        wrong shape, NaN, out of range."""
         array, shape = as_array("action", actions), (robots, len(self.names))
         if array.shape != shape:
             raise ParameterError("has the wrong shape", field="action", value=array.shape, allowed=str(shape))
         inside = np.abs(array) <= 1.0 + _ROUNDING
         if not inside.all():
             robot, number = (int(each) for each in np.argwhere(~inside)[0])
-            raise ParameterError(
-                f"the {self.names[number]} is out of range",
-                field=f"action[{number}]" if robots == 1 else f"action[{robot}, {number}]",
-                value=float(array[robot, number]),
-                allowed="-1 to 1",
-            )
+            problem, value = f"the {self.names[number]} is out of range", float(array[robot, number])
+            where = f"action[{number}]" if robots == 1 else f"action[{robot}, {number}]"
+            raise ParameterError(problem, field=where, value=value, allowed="-1 to 1")
         return np.clip(array, -1.0, 1.0)
 
     def stiffness(self, actions: Array) -> Array:
@@ -139,15 +116,8 @@ class Actions:
         return np.clip(2.0 * (np.log(stiffness) - low) / (high - low) - 1.0, -1.0, 1.0)
 
     def commands(self, actions: Array, leg_yaw: Array) -> list[tuple[float, Command]]:
-        """Commands of a gait cycle by actions: parts of the cycle and the commands that come then.
-
-        Parameters
-        ----------
-        actions
-            As :meth:`checked`.
-        leg_yaw
-            As it is, rad, shape (robots, 2).
-        """
+        """Commands of a gait cycle by :meth:`checked` actions and the present leg yaw, rad, shape (robots, 2): parts of
+        the cycle, and the commands that come then."""
         stiffness = np.tile(self.robot.springs.stiffness, (len(actions), 1))
         stiffness[:, self.joints] = self.stiffness(actions)
         wanted, yaw = self.legs.limit * actions[:, len(self.joints) :], leg_yaw.copy()

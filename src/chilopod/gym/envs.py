@@ -33,33 +33,37 @@ _FPS = 10  # pictures of a film, each a gait cycle
 
 def _without_pictures(env: Any) -> dict[str, Any]:
     """State of an environment for copies; pictures are drawn from the episodes anew."""
-    return {name: None if name in ("_picture", "_pictures") else each for name, each in env.__dict__.items()}
+    return {**env.__dict__, "_pictures": None}
 
 
-class CourseVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
-    """Robots that walk random courses, all in one walk of an engine; an episode is five targets.
+def _drawn(env: Any) -> list[Pixels] | None:
+    """Pictures of all robots; None without a render mode."""
+    if env.render_mode is None:
+        return None
+    if env._pictures is None:
+        from chilopod.gym.picture import Picture
+
+        env._pictures = [Picture(env.episodes, robot) for robot in range(env.episodes.count)]
+    return [picture.drawn() for picture in env._pictures]
+
+
+class RobotVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
+    """Robots with one task, all in one walk of an engine. Raises ParameterError if there is no such robot, engine, task
+    or render mode.
 
     Parameters
     ----------
     num_envs
         Number of robots.
-    robot
-        A preset, a robot file, or a robot; by default the paper's.
-    engine
-        ``planar``, ``twin``, or one's own as ``package.module:object``.
+    robot, engine
+        A preset, a robot file, or a robot, by default the paper's; and an engine's name.
     render_mode
         ``rgb_array`` or None.
     named
-        As of :class:`chilopod.gym.Episodes`: springs, targets, patience, disturbance, rewards.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such robot, engine, task or render mode.
+        As of :class:`chilopod.gym.Episodes`: task, springs, patience, disturbance, and what the task has.
     """
 
     metadata = {"render_modes": [*_RENDER_MODES], "render_fps": _FPS, "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
-    targets = 5
 
     def __init__(
         self,
@@ -70,7 +74,7 @@ class CourseVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
         render_mode: str | None = None,
         **named: Any,
     ) -> None:
-        self.episodes = _episodes(num_envs, robot, engine, render_mode, {"targets": self.targets, **named})
+        self.episodes = _episodes(num_envs, robot, engine, render_mode, named)
         self.num_envs, self.render_mode = num_envs, render_mode
         self.single_observation_space, self.single_action_space = _spaces(self.episodes)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -83,15 +87,8 @@ class CourseVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Row, dict[str, Any]]:
-        """Begin an episode with every robot.
-
-        Parameters
-        ----------
-        seed
-            Seed of robot 0, to which that of robot i adds i, or one each; None: as the generators go on.
-        options
-            Not used.
-        """
+        """Begin an episode with every robot: ``seed`` is that of robot 0, to which that of robot i adds i, or one each;
+        None: as the generators go on."""
         seeds = _seeds(seed, self.num_envs)
         super().reset(seed=None if np.ndim(seed) else seeds[0])  # type: ignore[arg-type]
         if self._generators is None:
@@ -112,26 +109,14 @@ class CourseVectorEnv(VectorEnv[Row, Row, NDArray[Any]]):
 
     def render(self) -> tuple[Pixels, ...] | None:
         """A picture of every robot, from above; None without a render mode."""
-        if self.render_mode is None:
-            return None
-        if self._pictures is None:
-            from chilopod.gym.picture import Picture
-
-            self._pictures = [Picture(self.episodes, robot) for robot in range(self.num_envs)]
-        return tuple(picture.drawn() for picture in self._pictures)
+        drawn = _drawn(self)
+        return None if drawn is None else tuple(drawn)
 
 
-class TurnVectorEnv(CourseVectorEnv):
-    """As :class:`CourseVectorEnv`, with one target in an episode."""
-
-    targets = 1
-
-
-class CourseEnv(gymnasium.Env[Row, Row]):
-    """One robot of :class:`CourseVectorEnv`, whose parameters these are."""
+class RobotEnv(gymnasium.Env[Row, Row]):
+    """One robot of :class:`RobotVectorEnv`, whose parameters these are."""
 
     metadata = {"render_modes": [*_RENDER_MODES], "render_fps": _FPS}  # noqa: RUF012
-    targets = 5
 
     def __init__(
         self,
@@ -142,10 +127,10 @@ class CourseEnv(gymnasium.Env[Row, Row]):
         **named: Any,
     ) -> None:
         self.render_mode = render_mode
-        self.episodes = _episodes(1, robot, engine, render_mode, {"targets": self.targets, **named})
+        self.episodes = _episodes(1, robot, engine, render_mode, named)
         self.observation_space, self.action_space = _spaces(self.episodes)
         self._over = False
-        self._picture: Picture | None = None
+        self._pictures: list[Picture] | None = None
 
     __getstate__ = _without_pictures
 
@@ -167,28 +152,16 @@ class CourseEnv(gymnasium.Env[Row, Row]):
 
     def render(self) -> Pixels | None:
         """A picture of the robot, from above; None without a render mode."""
-        if self.render_mode is None:
-            return None
-        if self._picture is None:
-            from chilopod.gym.picture import Picture
-
-            self._picture = Picture(self.episodes, 0)
-        return self._picture.drawn()
-
-
-class TurnEnv(CourseEnv):
-    """As :class:`CourseEnv`, with one target in an episode."""
-
-    targets = 1
+        drawn = _drawn(self)
+        return None if drawn is None else drawn[0]
 
 
 def _episodes(
     count: int, robot: str | Path | Robot | None, engine: str, render_mode: str | None, named: dict[str, Any]
 ) -> Episodes:
     if render_mode not in (None, *_RENDER_MODES):
-        raise ParameterError(
-            "there is no such render mode", field="render_mode", value=render_mode, allowed=", ".join(_RENDER_MODES)
-        )
+        allowed = ", ".join(_RENDER_MODES)
+        raise ParameterError("there is no such render mode", field="render_mode", value=render_mode, allowed=allowed)
     engine_named(engine)
     if robot is None:
         robot = _PRESETS.get(engine, _PRESETS["planar"])

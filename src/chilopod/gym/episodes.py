@@ -1,4 +1,4 @@
-"""Episodes of a batch of robots, step by step: the tasks behind the environments, without Gymnasium.
+"""Episodes of a batch of robots, step by step, without Gymnasium.
 
 A step is a gait cycle. Robots whose episode is over stand still for the next step and begin another at its end, while
 the others walk on: Gymnasium's autoreset mode ``NEXT_STEP``.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -16,54 +16,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod import memory
 from chilopod.engine import Observation, Walk, engine_named
-from chilopod.engine.arguments import as_number
 from chilopod.errors import ParameterError
 from chilopod.flows.arguments import checked_count
 from chilopod.gym.actions import Actions
 from chilopod.gym.sight import Sight
-from chilopod.record import LONGEST
+from chilopod.gym.tasks import Look, Marks, Task, task_of
+from chilopod.record import LONGEST, Array
 from chilopod.robot import Robot
-from chilopod.steering import CourseReferee, Judged, Verdict, random_course
-from chilopod.steering.course import MOST_GOALS, RANDOM_DISTANCES
+from chilopod.steering import CourseReferee, Judged, Verdict
 from chilopod.tasks.course import patience_of
-from chilopod.trials import Disturbance, Drawn, draw
-
-Array = NDArray[np.float64]
-Marks = NDArray[np.bool_]
+from chilopod.trials.disturbance import Disturbance, Drawn, conditions, draw
 
 _MOST = 1 << 20  # robots
 _A_LOOK = 2.0 * (8.0 + 1.0)  # bytes that a look's error and whether it misses take, drawn and in one array
 _SEEDS = 1 << 31  # of episodes that nobody gave one, less than this
-
-
-@dataclass(frozen=True)
-class Rewards:
-    """Reward of a step.
-
-    A robot that fails is charged as if it walked straight away from its targets until their time is over, with the
-    penalty for failing on top: walking on to the end of the time is then never worse, whatever the robot does with it.
-
-    Attributes
-    ----------
-    progress
-        For every metre that the target has come nearer.
-    arrival
-        For arriving at a target.
-    cycle
-        For every gait cycle.
-    failure
-        For a robot that falls, or bends a joint too far, besides that charge.
-    """
-
-    progress: float = 1.0
-    arrival: float = 1.0
-    cycle: float = -0.01
-    failure: float = -1.0
-
-    def __post_init__(self) -> None:
-        for each in fields(self):
-            if not np.isfinite(as_number(each.name, getattr(self, each.name))):
-                raise ParameterError("must be finite", field=each.name, value=getattr(self, each.name))
 
 
 @dataclass(frozen=True)
@@ -72,14 +38,9 @@ class Step:
 
     Attributes
     ----------
-    observation
-        See :class:`chilopod.gym.Sight`.
-    reward
-        See :class:`Rewards`; 0 for a robot whose episode has just begun.
-    terminated
-        True if the robot has arrived at its last target, or does not walk any more.
-    truncated
-        True if its time for the last target is over.
+    observation, reward, terminated, truncated
+        See :class:`chilopod.gym.Sight` and :class:`chilopod.gym.Task`; the reward of a robot whose episode has just
+        begun is 0.
     info
         ``time`` of the episode (s), ``distance`` of the target (m), ``pose`` of module 1 (m, m, rad), ``verdict`` on
         the target of which the robot is done with this step, or "", and ``arrived``: how many targets so far.
@@ -94,17 +55,8 @@ class Step:
 
 @dataclass(frozen=True)
 class Moment:
-    """Where robots of a batch are at the end of a step: what a picture shows.
-
-    Attributes
-    ----------
-    pose
-        x, y and heading of module 1, m and rad, shape (robots, 3).
-    joint_angles, leg_yaw
-        rad, shapes (robots, N-1) and (robots, 2).
-    aims
-        Places of the targets, m, shape (robots, 2).
-    """
+    """Poses of a batch at the end of a step, for pictures: x, y and heading of module 1 (m, m, rad), joint angles and
+    leg yaw (rad), and the places of the targets (m), each of shape (robots, ...)."""
 
     pose: Array
     joint_angles: Array
@@ -113,40 +65,31 @@ class Moment:
 
 
 class Episodes:
-    """Robots that walk to random targets, each in an episode of its own.
+    """Robots that walk to targets, each in an episode of its own. Raises ParameterError if there is no such robot,
+    engine or task.
 
     Parameters
     ----------
-    robot
-        All are alike.
-    count
-        Number of episodes at once.
-    engine
-        One of :data:`chilopod.engine.ENGINES`, or one's own as ``package.module:object``.
+    robot, count, engine
+        Robot, number of episodes at once, and name of the engine.
+    task, chosen
+        Task, or its name among :data:`chilopod.gym.tasks.TASKS`; attributes of it that are to be others, such as
+        ``targets`` or ``rewards``.
     springs
         Springs that actions set, see :class:`chilopod.gym.Actions`.
-    targets
-        Targets of an episode, one after the other, see :func:`chilopod.steering.random_course`.
     patience
         For each target, s; by default the engine's, see :func:`chilopod.tasks.course.patience_of`.
     disturbance
         Disturbance of the start and of bearings, as in trials.
-    rewards
-        Rewards of steps.
     remember
         True to keep :attr:`moments`.
 
     Attributes
     ----------
-    actions, sight
-        Meaning of actions and of observations.
+    actions, sight, period
+        Meaning of actions and of observations, and length of a step, s.
     moments
         Moments of the steps so far, as many as the longest episode has.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such robot, engine or task.
     """
 
     def __init__(
@@ -154,44 +97,36 @@ class Episodes:
         robot: Robot,
         count: int = 1,
         *,
+        task: str | Task = "Turn",
         engine: str = "planar",
         springs: Literal["first", "all"] = "first",
-        targets: int = 1,
         patience: float | None = None,
         disturbance: Disturbance = Disturbance(),  # noqa: B008  (frozen)
-        rewards: Rewards = Rewards(),
         remember: bool = False,
+        **chosen: Any,
     ) -> None:
-        self._targets = checked_count("targets", targets, MOST_GOALS)
-        self._count = checked_count("num_envs", count, _MOST)
-        for name, given, wanted in (("disturbance", disturbance, Disturbance), ("rewards", rewards, Rewards)):
-            if not isinstance(given, wanted):
-                raise ParameterError(f"must be a {wanted.__name__}", field=name, value=given)
+        self.task = task_of(task, chosen)
+        self.count = checked_count("num_envs", count, _MOST)
+        if not isinstance(disturbance, Disturbance):
+            raise ParameterError("must be a Disturbance", field="disturbance", value=disturbance)
         self._name, self._engine = engine, engine_named(engine)
         self._engine.common(robot)
         self.actions = Actions.of(robot, springs)
         self._patience = patience_of(engine) if patience is None else patience
-        self._disturbance, self.rewards = disturbance, rewards
-        common = random_course(0, self._patience, self._targets)
+        self._disturbance = disturbance
+        common = self.task.course(0, self._patience)
         self.sight = Sight(self.actions, common.range)
-        gait, least = robot.gait, RANDOM_DISTANCES[1] / robot.gait.speed
+        gait, least = robot.gait, self.task.farthest / robot.gait.speed
         if self._patience < least:
-            raise ParameterError(
-                "is too short for the farthest target",
-                field="patience",
-                value=f"{self._patience:g} s",
-                allowed=f"{least:g} s or more",
-            )
-        self._period = gait.period
-        self._looks = int(np.ceil(common.duration / gait.period)) + self._targets + 1
-        needed = _A_LOOK * self._looks * self._count
+            problem, allowed = "is too short for the farthest target", f"{least:g} s or more"
+            raise ParameterError(problem, field="patience", value=f"{self._patience:g} s", allowed=allowed)
+        self.period = gait.period
+        self._looks = int(np.ceil(common.duration / gait.period)) + len(common.goals) + 1
+        needed = _A_LOOK * self._looks * self.count
         if needed > memory.available():
-            raise ParameterError(
-                f"would take {memory.in_words(needed)} of memory",
-                field="num_envs * targets * patience",
-                value=f"{self._count} * {common.duration:g} s",
-                allowed=f"less, {memory.in_words(memory.available())} are free",
-            )
+            problem, asked = f"would take {memory.in_words(needed)} of memory", f"{self.count} * {common.duration:g} s"
+            allowed = f"less, {memory.in_words(memory.available())} are free"
+            raise ParameterError(problem, field="num_envs * targets * patience", value=asked, allowed=allowed)
         self.moments: deque[Moment] | None = deque(maxlen=self._looks) if remember else None
         self._walk: Walk | None = None
         self._generators: list[np.random.Generator] = []
@@ -210,77 +145,51 @@ class Episodes:
         """Robot that walks, with the actuators that actions need."""
         return self.actions.robot
 
-    @property
-    def period(self) -> float:
-        """Length of a step, s."""
-        return self._period
-
     def steps(self, robot: int) -> int:
         """Number of steps that the present episode of a robot has had so far."""
         return int(self._cycle - self._since[robot])
 
     def begin(self, generators: Sequence[np.random.Generator], seeds: Sequence[int | None]) -> Step:
-        """Begin an episode with every robot, in a new walk.
-
-        Parameters
-        ----------
-        generators
-            One a robot, of the seeds of its episodes from now on.
-        seeds
-            Seeds of its first one: that is the course and the disturbance that trials draw from this seed; None: drawn
-            too.
-        """
+        """Begin an episode with every robot, in a new walk, with the disturbance that trials draw from its seed. Where
+        that is None it is drawn from the robot's generator, as those of later episodes are."""
         self._generators = list(generators)
         return self._begin(seeds)
 
     def step(self, actions: ArrayLike) -> Step:
-        """Walk for a gait cycle.
-
-        Parameters
-        ----------
-        actions
-            Shape (robots, numbers of an action), see :class:`chilopod.gym.Actions`; those of robots whose episode was
-            over are not used.
-
-        Raises
-        ------
-        ParameterError
-            If there is no episode yet, or an action is none; nothing has changed then.
-        """
+        """Walk for a gait cycle by actions of shape (robots, numbers of an action), see :class:`chilopod.gym.Actions`;
+        those of robots whose episode was over are not used. Raises ParameterError, and changes nothing, before the
+        first episode, or if an action is none."""
         if self._walk is None:
             raise ParameterError("there is no episode yet", field="step", allowed="reset() first")
-        told, waiting, walk = self.actions.checked(actions, self._count), self._ended, self._walk
+        told, waiting, walk = self.actions.checked(actions, self.count), self._ended, self._walk
         if waiting.all():
-            return self._begin([None] * self._count)
+            return self._begin([None] * self.count)
         for phase, command in self.actions.commands(told, self._leg_yaw):
-            walk.advance((self._cycle + phase) * self._period)
+            walk.advance((self._cycle + phase) * self.period)
             walk.command(command)
         self._cycle += 1
-        walk.advance(self._cycle * self._period)
+        walk.advance(self._cycle * self.period)
         if waiting.any():
             self._restart(walk, waiting)
         return self._look(walk, waiting)
 
-    # -- inside
-    # ---------------------------------------------------------------------------------------------------------------
-
     def _begin(self, seeds: Sequence[int | None]) -> Step:
-        drawn, courses, conditions = self._drawn(np.arange(self._count), seeds)
-        self._walk = self._engine.start(self.robot, record=None, **conditions)
+        drawn, courses, start = self._drawn(np.arange(self.count), seeds)
+        self._walk = self._engine.start(self.robot, record=None, **start)
         missed = np.stack([each.missed for each in drawn])
         self._missing = bool(self._disturbance.missed)
         self._referee = CourseReferee(courses, self.robot.gait, missed if self._missing else None, keep=False)
         self._errors = np.stack([each.bearing for each in drawn])
-        self._cycle, self._since = 0, np.zeros(self._count, dtype=np.intp)
-        self._away, self._arrived = np.full(self._count, np.nan), np.zeros(self._count, dtype=np.intp)
+        self._cycle, self._since = 0, np.zeros(self.count, dtype=np.intp)
+        self._away, self._arrived = np.full(self.count, np.nan), np.zeros(self.count, dtype=np.intp)
         if self.moments is not None:
             self.moments.clear()
-        return self._look(self._walk, np.ones(self._count, dtype=np.bool_))
+        return self._look(self._walk, np.ones(self.count, dtype=np.bool_))
 
     def _restart(self, walk: Walk, which: Marks) -> None:
         ids = np.flatnonzero(which)
-        drawn, courses, conditions = self._drawn(ids, [None] * len(ids))
-        walk.restart(which, **conditions)
+        drawn, courses, start = self._drawn(ids, [None] * len(ids))
+        walk.restart(which, **start)
         missed = np.stack([each.missed for each in drawn])
         self._referee.restart(which, courses, missed if self._missing else None)
         self._errors[ids] = np.stack([each.bearing for each in drawn])
@@ -296,14 +205,8 @@ class Episodes:
         ]
         modules = self.robot.body.modules
         drawn = [draw(self._disturbance, seed, modules, self._looks) for seed in chosen]
-        angles, headings = np.stack([each.joint_angles for each in drawn]), np.array([each.heading for each in drawn])
-        noisy = self._engine.traits.noisy and self._disturbance.bearing > 0.0
-        conditions = {
-            "initial": self._engine.initial_states(self.robot, angles, headings),
-            "friction": np.stack([each.friction for each in drawn]),
-            "seeds": [each.scan_seed for each in drawn] if noisy else None,
-        }
-        return drawn, [random_course(seed, self._patience, self._targets) for seed in chosen], conditions
+        start = conditions(self._engine, self.robot, drawn, self._disturbance.bearing > 0.0)
+        return drawn, [self.task.course(seed, self._patience) for seed in chosen], start
 
     def _look(self, walk: Walk, fresh: Marks) -> Step:
         """Judge, put up the next targets, and see; at the end of a step."""
@@ -320,11 +223,11 @@ class Episodes:
                 bearing=np.where(others, again.bearing, seen.bearing),
                 distance=np.where(others, again.distance, seen.distance),
             )
-        reward = self._reward(judged, fresh, self._away - away, left)
+        look = Look(judged, busy, self._away - away, left, self.period, self.robot.gait.speed)
+        reward = np.where(fresh, 0.0, self.task.reward(look))
         self._away = np.where(others, _distance(aims, pose), away)
-        terminated = judged.gone | (judged.arrived & ~busy)
-        truncated = (judged.late | judged.unseen) & ~busy
-        if (self._cycle + 1) * self._period > LONGEST:
+        terminated, truncated = self.task.ending(look)
+        if (self._cycle + 1) * self.period > LONGEST:
             truncated |= busy  # no walk is longer; the next step begins another
         self._arrived += judged.arrived
         self._ended, self._leg_yaw = terminated | truncated, seen.leg_yaw
@@ -333,7 +236,7 @@ class Episodes:
         if self.moments is not None:
             self.moments.append(Moment(pose, seen.joint_angles, seen.leg_yaw, aims))
         info = {
-            "time": (self._cycle - self._since) * self._period,
+            "time": (self._cycle - self._since) * self.period,
             "distance": self._away.copy(),
             "pose": pose,
             "verdict": _verdicts(judged),
@@ -341,20 +244,11 @@ class Episodes:
         }
         return Step(self.sight.row(self._through(seen)), reward, terminated, truncated, info)
 
-    def _reward(self, judged: Judged, fresh: Marks, nearer: Array, left: Array) -> Array:
-        worth = self.rewards
-        # At worst a robot that walks on gains as little as this in the time that is left.
-        least = min(worth.cycle, 0.0) / self._period - abs(worth.progress) * self.robot.gait.speed
-        reward = worth.progress * np.nan_to_num(nearer) + worth.arrival * judged.arrived
-        reward += worth.cycle + np.where(judged.gone, worth.failure + least * left, 0.0)
-        reward[fresh] = 0.0
-        return np.asarray(reward)
-
     def _through(self, seen: Observation) -> Observation:
         """Observation that gets through to the robots, with noise and the view that scanners have."""
         look = self._cycle - self._since
         if not self._engine.traits.noisy:
-            bearing = seen.bearing + self._errors[np.arange(self._count), look]
+            bearing = seen.bearing + self._errors[np.arange(self.count), look]
             seen = replace(seen, bearing=(bearing + np.pi) % (2.0 * np.pi) - np.pi)
         return self._referee.through(look, seen)
 

@@ -26,15 +26,7 @@ _FONT, _MARGIN = 14.0, 0.3  # pixels; m
 
 
 class Picture:
-    """Pictures of one robot while its episodes go on.
-
-    Parameters
-    ----------
-    episodes
-        Episodes that are drawn.
-    robot
-        Number of the robot.
-    """
+    """Pictures of one robot of a batch while its episodes go on."""
 
     def __init__(self, episodes: Episodes, robot: int) -> None:
         self._episodes, self._robot = episodes, robot
@@ -69,20 +61,12 @@ class Picture:
     def _floor(self, frames: BodyFrames, aims: tuple[Aim, ...]) -> Floor:
         """The piece of floor that was shown last, if everything is on it; else a square that has room for more."""
         spine, places = frames.spine.reshape(-1, 2), np.array([each.place for each in aims]).reshape(-1, 2)
-        points = np.concatenate(
-            [spine[np.isfinite(spine).all(axis=1)], places - ARRIVAL_RADIUS, places + ARRIVAL_RADIUS]
-        )
+        spine = spine[np.isfinite(spine).all(axis=1)]
+        points = np.concatenate([spine, places - ARRIVAL_RADIUS, places + ARRIVAL_RADIUS])
         low, high = points.min(axis=0), points.max(axis=0)
         last = self._drawn[0] if self._drawn else None
         # A new episode begins where its robot is large enough to be seen.
-        if (
-            last
-            and len(frames.time) > 1
-            and low[0] > last.x0
-            and low[1] > last.y0
-            and high[0] < last.x1
-            and high[1] < last.y1
-        ):
+        if last and len(frames.time) > 1 and (low > (last.x0, last.y0)).all() and (high < (last.x1, last.y1)).all():
             return last
         middle, half = 0.5 * (low + high), 0.5 * float((high - low).max()) + _MARGIN
         return Floor(middle[0] - half, middle[0] + half, middle[1] - half, middle[1] + half, 1.0)

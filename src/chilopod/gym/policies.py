@@ -24,18 +24,11 @@ BASELINES = {name: each for name, each in ON_THE_WAY.items() if not each.needs_t
 
 @dataclass(frozen=True)
 class Steered:
-    """A controller as a policy.
+    """A controller that steers by springs and leg yaw as a policy, for episodes.
 
     At every step it is asked at all its events at once, with what is seen at the beginning of the gait cycle. In a walk
     it is asked at each event when it comes: it then sees what a policy saw up to a cycle before. Springs that the
     controller does not set stay as stiff as in the robot file, as far as actions go.
-
-    Attributes
-    ----------
-    controller
-        Controller that steers by springs and leg yaw.
-    episodes
-        Episodes that define actions and observations.
     """
 
     controller: Controller
@@ -64,19 +57,15 @@ def baseline(name: str, episodes: Episodes, engine: str = "planar") -> Steered:
 
     Parameters
     ----------
-    name
-        ``leg-yaw``: the paper's controller, the springs as they are; ``variable``: the first spring is set besides.
-    episodes
-        Episodes of the robots that are steered.
+    name, episodes
+        ``leg-yaw``: the paper's controller, the springs as they are; or ``variable``: the first spring is set besides.
     engine
         Engine of the radius law of ``variable``, see :func:`chilopod.tasks.radius_law`.
 
     Raises
     ------
-    ParameterError
-        If there is none of this name.
-    AnalysisError
-        If the robot has no radius law, and the strategy stands on it.
+    ParameterError, AnalysisError
+        If there is none of this name, or the robot has no radius law, and the strategy stands on it.
     """
     strategy = strategy_named(name, BASELINES)
     law = radius_law(episodes.robot, engine) if strategy.needs_law else None

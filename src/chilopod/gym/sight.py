@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from chilopod.engine import Observation
 from chilopod.gym.actions import Actions
-
-Array = NDArray[np.float64]
+from chilopod.record import Array
 
 _MOST_BENT = 0.5 * np.pi  # rad, of a joint of a robot that walks
 
@@ -22,14 +21,7 @@ class Sight:
     In order: whether the target is seen (0 or 1); sine and cosine of its bearing, left positive, and its distance in m,
     all 0 where it is not seen; the yaw joints, rad; the yaw of the left and of the right leg of module 1 as last
     commanded, rad; and the springs that actions set, as the action that sets them to what they are. A robot that does
-    not walk any more shows straight joints.
-
-    Attributes
-    ----------
-    actions
-        Actions of the same robot.
-    range
-        Range of its scanner, m.
+    not walk any more shows straight joints. ``range`` is that of the robot's scanner, m.
     """
 
     actions: Actions

@@ -30,10 +30,8 @@ class ActuatedAxis:
     ----------
     stiffness
         Stiffness of the springs that it works against, N*m/rad, (N-1,).
-    module_length
-        m.
-    most_bent
-        Wanted of one joint, rad.
+    module_length, most_bent
+        Length of a module, m; largest angle that is wanted of one joint, rad.
     leg_yaw
         Leg yaw of the legs of module 1.
     """
@@ -45,15 +43,7 @@ class ActuatedAxis:
 
     @classmethod
     def of(cls, robot: Robot, law: RadiusLaw) -> ActuatedAxis:
-        """Axis of a robot, which bends no tighter than its softest spring would bend it.
-
-        Parameters
-        ----------
-        robot
-            Size and springs.
-        law
-            Its radius law.
-        """
+        """Axis of a robot, which bends no tighter than its softest spring would bend it, by its radius law."""
         return cls(robot.springs.stiffness, robot.module_length, robot.module_length / law.tightest)
 
     def events(self, gait: Gait) -> Sequence[Event]:

@@ -8,17 +8,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod import units
 from chilopod.engine.arguments import as_number
 from chilopod.errors import ParameterError, UnitError, nearest_name
 from chilopod.kinematics import directions
-from chilopod.record import in_range
+from chilopod.record import Array, in_range
 from chilopod.steering.target import ARRIVAL_RADIUS, FARTHEST
 from chilopod.text_file import read_text
-
-Array = NDArray[np.float64]
 
 MOST_GOALS = 1000
 """More targets than this are a slip of the pen."""
@@ -62,12 +59,8 @@ class Goal:
         distance = round(math.hypot(self.x, self.y), _DIGITS)
         if not (ARRIVAL_RADIUS if self.relative else -1.0) < distance <= FARTHEST:
             near = f"more than the {ARRIVAL_RADIUS:g} m that count as arrived, " if self.relative else ""
-            raise ParameterError(
-                "is no way to go",
-                field="target distance",
-                value=f"{distance:g} m",
-                allowed=f"{near}at most {FARTHEST:g} m",
-            )
+            allowed = f"{near}at most {FARTHEST:g} m"
+            raise ParameterError("is no way to go", field="target distance", value=f"{distance:g} m", allowed=allowed)
 
     @classmethod
     def parse(cls, text: str) -> Goal:
@@ -95,12 +88,8 @@ class Goal:
         if fits == ["m"]:
             return cls(value, other, relative=False)
         if not abs(value) <= math.pi or other < 0.0:
-            raise ParameterError(
-                "is no direction and distance",
-                field="target",
-                value=text.strip(),
-                allowed="-180 to 180 deg, a positive distance",
-            )
+            allowed = "-180 to 180 deg, a positive distance"
+            raise ParameterError("is no direction and distance", field="target", value=text.strip(), allowed=allowed)
         return cls(other * math.cos(value), other * math.sin(value), relative=True)
 
     def __str__(self) -> str:
@@ -109,14 +98,8 @@ class Goal:
         return f"{math.degrees(math.atan2(self.y, self.x)):g} deg, {math.hypot(self.x, self.y):g} m"
 
     def place(self, poses: Array) -> Array:
-        """Where it is on the floor, m, shape (robots, 2).
-
-        Parameters
-        ----------
-        poses
-            Poses of module 1 of each robot when the goal's turn comes: x and y (m) and heading (rad), shape (robots,
-            3).
-        """
+        """Place on the floor, m, shape (robots, 2), by the poses of module 1 when the goal's turn comes: x, y (m) and
+        heading (rad), shape (robots, 3)."""
         if not self.relative:
             return np.tile([self.x, self.y], (len(poses), 1))
         ahead, left = directions(poses[:, 2])
@@ -129,15 +112,11 @@ class Course:
 
     Attributes
     ----------
-    goals
-        At least one, none where the one before is.
-    patience
-        For each goal, s; then the next has its turn.
-    view
-        Whole angle ahead of module 1 within which its scanner sees, rad; by default that of the paper's (Hokuyo
-        URG-04LX, section Robot).
-    range
-        Range of the scanner, m; by default that of the same one (its data sheet).
+    goals, patience
+        At least one goal, none where the one before is; time for each, s, then the next has its turn.
+    view, range
+        Whole angle ahead of module 1 within which its scanner sees, rad, and range of the scanner, m; by default those
+        of the paper's (Hokuyo URG-04LX).
     tightest
         Radius of the circles that the shortest path to a target is made of, m; 0 for a robot that turns on the spot.
         That of a radius law is the paper's measure, of the body axis: module 1 itself goes round in smaller circles, so
@@ -162,21 +141,16 @@ class Course:
         in_range("view", math.degrees(self.view), 360.0, "deg")
         in_range("range", self.range, FARTHEST, "m")
         if not 0.0 <= self.tightest <= FARTHEST:
-            raise ParameterError(
-                "is no radius", field="tightest", value=f"{self.tightest:g} m", allowed=f"0 to {FARTHEST:g} m"
-            )
+            allowed = f"0 to {FARTHEST:g} m"
+            raise ParameterError("is no radius", field="tightest", value=f"{self.tightest:g} m", allowed=allowed)
         if not 1 <= len(self.goals) <= MOST_GOALS:
             raise _wrong_count(len(self.goals))
         before, where = Goal(0.0, 0.0, relative=False), "where the robot starts"
         for number, goal in enumerate(self.goals, 1):
             apart = math.hypot(goal.x - before.x, goal.y - before.y)
             if not (goal.relative or before.relative or apart > ARRIVAL_RADIUS):
-                raise ParameterError(
-                    f"lies {where}",
-                    field=f"target {number}",
-                    value=str(goal),
-                    allowed=f"more than {ARRIVAL_RADIUS:g} m from it",
-                )
+                allowed = f"more than {ARRIVAL_RADIUS:g} m from it"
+                raise ParameterError(f"lies {where}", field=f"target {number}", value=str(goal), allowed=allowed)
             before, where = goal, f"where target {number} does"
 
     @property
@@ -210,17 +184,8 @@ eight   a circle of 1 m to the left and one to the right, back each time
 
 
 def random_course(seed: int, patience: float, count: int = 5) -> Course:
-    """Targets seen from module 1 at random: bearings within 75 deg of the heading, distances of 0.8 to 2 m.
-
-    Parameters
-    ----------
-    seed
-        The same seed makes the same course; 0 or more.
-    patience
-        For each target, s.
-    count
-        Number of targets.
-    """
+    """So many targets seen from module 1 at random, each with so much patience, s: bearings within 75 deg of the
+    heading, distances of 0.8 to 2 m. The same seed, 0 or more, makes the same course."""
     rng = np.random.default_rng(seed)
     bearings = rng.uniform(-_WIDEST_BEARING, _WIDEST_BEARING, count)
     distances = rng.uniform(*RANDOM_DISTANCES, count)
@@ -229,7 +194,7 @@ def random_course(seed: int, patience: float, count: int = 5) -> Course:
 
 
 def course_named(text: str, patience: float) -> Course:
-    """Read a course.
+    """Read a course with so much patience for each target, s.
 
     Parameters
     ----------
@@ -237,8 +202,6 @@ def course_named(text: str, patience: float) -> Course:
         Targets as :meth:`Goal.parse` reads them with semicolons between, ``"45 deg, 1.3 m; -60 deg, 1.5 m"``; or the
         path of a file with a target a line, ``#`` before comments; or a name of :data:`COURSES`; or ``random:SEED``.
         A file that is named like a course is reached as ``./name``.
-    patience
-        For each target, s.
 
     Raises
     ------

@@ -6,13 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.labels import Labelled
+from chilopod.record import Array
 from chilopod.steering.target import ARRIVAL_RADIUS
-
-Array = NDArray[np.float64]
 
 
 class Outcome(Labelled):
@@ -31,17 +29,12 @@ class Criteria(ReadOnlyArrays):
     Attributes
     ----------
     time
-        At which the first two are taken and up to which the third is, s.
-    distance
-        Distance of the target, m (epsilon 1).
-    angle
-        Angle of the target to the heading, unsigned, rad (epsilon 2).
-    effort
-        Integral of the squared leg yaw of both legs over time, rad^2 s (epsilon 3).
-    arrival
-        Time at which the target was first within the arrival radius, s; NaN if never.
-    nearest
-        Smallest distance of the target, m.
+        Time at which the first two are taken and up to which the third is, s.
+    distance, angle, effort
+        Distance of the target, m (epsilon 1); its angle to the heading, unsigned, rad (epsilon 2); integral of the
+        squared leg yaw of both legs, rad^2 s (epsilon 3).
+    arrival, nearest
+        Time at which the target was first within the arrival radius, s, NaN if never; its smallest distance, m.
     outcome
         Outcome of the task.
     """
@@ -62,13 +55,8 @@ def earliest_arrival(record: xr.Dataset) -> float:
 
 
 def arrivals(record: xr.Dataset) -> Array:
-    """When each walk first comes within the arrival radius, between samples by linear interpolation, s; NaN if never.
-
-    Parameters
-    ----------
-    record
-        With ``distance`` over (time, robot).
-    """
+    """Time at which each walk first comes within the arrival radius, between samples by linear interpolation, s; NaN if
+    never. The record has ``distance`` over (time, robot)."""
     distance, time = record.distance.transpose("time", "robot").values, record.time.values
     inside = distance < ARRIVAL_RADIUS
     first = inside.argmax(0)

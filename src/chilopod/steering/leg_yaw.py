@@ -26,10 +26,8 @@ class LegYawController:
 
     Attributes
     ----------
-    step
-        Largest change in a gait cycle, rad (5 deg in the paper).
-    limit
-        Largest yaw, rad (5 deg in the paper).
+    step, limit
+        Largest change in a gait cycle, and largest yaw, rad (5 deg in the paper).
     start, end
         Start and end of the ramp, as parts of the swing (0.4 and 0.8 in the paper).
     """

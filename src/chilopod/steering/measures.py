@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from chilopod.record import Array
 from chilopod.robot import Robot
-
-Array = NDArray[np.float64]
 
 _OVER = ("robot", "goal")
 _READ = ("position", "leg_yaw", "joint_angle", "stiffness", "command_torque", "seen_joint_angles")
 
 
 def of_course(record: xr.Dataset, robot: Robot, brief: bool = False) -> xr.Dataset:
-    """The record of one robot on a course, up to where it ended, with what every target came to.
+    """The record of one robot on a course, to which :class:`chilopod.steering.CourseReferee` has added, up to where it
+    ended, with what every target came to; without what is over time and over events if ``brief``.
 
     Added are, over (robot, goal), between the moment a target was put up and that at which it was done with:
 
@@ -27,15 +26,6 @@ def of_course(record: xr.Dataset, robot: Robot, brief: bool = False) -> xr.Datas
         Work of actuators on springs, 1/2 theta^2 dk where it is positive, J: they take nothing back.
     ``goal_drive_work``
         Work of joint torques, joint by joint and command by command, where it is positive, J.
-
-    Parameters
-    ----------
-    record
-        With what :class:`chilopod.steering.CourseReferee` adds, of one robot.
-    robot
-        It.
-    brief
-        True to leave out what is over time and over events.
     """
     begin, end = (record[f"goal_{name}"].values[0] for name in ("begin", "end"))
     over = float(np.nanmax(end))

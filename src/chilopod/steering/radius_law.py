@@ -25,12 +25,11 @@ class RadiusLaw(ReadOnlyArrays):
 
     Attributes
     ----------
-    values
-        Values of the parameter, rising, SI units, shape (points,); the last one is the pitchfork.
-    radii
-        m, shape (points,), infinite at the pitchfork.
+    values, radii
+        Values of the parameter, rising, SI units, the last one the pitchfork, and radii, m, infinite there, shape
+        (points,).
     unit
-        For messages: the unit that values are written in.
+        Unit of the values in messages.
     """
 
     values: Array
@@ -48,11 +47,9 @@ class RadiusLaw(ReadOnlyArrays):
 
         Parameters
         ----------
-        values, radii, stable
+        values, radii, stable, unit
             Along the branch, from the pitchfork on (itself included): the parameter in SI units, the radius in m, and
-            whether the walk is stable, shape (points,).
-        unit
-            Unit of the values.
+            whether the walk is stable, shape (points,); unit of the values in messages.
 
         Raises
         ------
@@ -65,10 +62,8 @@ class RadiusLaw(ReadOnlyArrays):
         good = stable[1:] & (np.diff(values) < 0.0) & (np.diff(curvature) > 0.0)
         count = 1 + (len(good) if good.all() else int(np.argmin(good)))
         if count < 3:
-            raise AnalysisError(
-                "the curved walks beside the pitchfork are unstable or do not tighten: there is no radius law",
-                field="branch",
-            )
+            problem = "the curved walks beside the pitchfork are unstable or do not tighten: there is no radius law"
+            raise AnalysisError(problem, field="branch")
         bent = np.concatenate([[np.inf], radii[1:count]])
         return cls(values[:count][::-1], bent[::-1], unit)
 
@@ -108,12 +103,8 @@ class RadiusLaw(ReadOnlyArrays):
         """
         if not radius >= self.tightest:
             softest = units.format(float(self.values[0]), self.unit, digits=4)
-            raise AnalysisError(
-                "no spring turns so tightly",
-                field="radius",
-                value=f"{radius:.4g} m",
-                allowed=f"{self.tightest:.4g} m (at {softest}) and more",
-            )
+            allowed = f"{self.tightest:.4g} m (at {softest}) and more"
+            raise AnalysisError("no spring turns so tightly", field="radius", value=f"{radius:.4g} m", allowed=allowed)
         if np.isinf(radius):
             return self.pitchfork
         wanted = 1.0 / radius**2

@@ -1,4 +1,4 @@
-"""Who sees to it that a course is walked: puts up one target after another, and says what became of each."""
+"""Referee of courses: it puts up one target after another, and says what became of each."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from chilopod.engine import Command, Controller, Observation, Status, Walk, event_times
 from chilopod.gait import Gait
 from chilopod.labels import Labelled
-from chilopod.record import bearing_and_distance
+from chilopod.record import Array, bearing_and_distance
 from chilopod.steering.course import Course
 from chilopod.steering.shortest import shortest_path
 from chilopod.steering.target import ARRIVAL_RADIUS
@@ -20,7 +20,6 @@ from chilopod.steering.target import ARRIVAL_RADIUS
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = NDArray[np.float64]
 
 LOOK = 0.1
 """s between two looks at where the robots are: the paper's robot goes 6 mm meanwhile."""
@@ -38,18 +37,10 @@ class Verdict(Labelled):
 
 @dataclass(frozen=True)
 class Judged:
-    """Whom a look of :class:`CourseReferee` found to be done with a target, marks of shape (robots,).
+    """Marks of the robots, shape (robots,), that a look of :class:`CourseReferee` found to be done with a target.
 
-    Attributes
-    ----------
-    arrived
-        There.
-    late, unseen
-        Out of time; and have never had it in view.
-    gone
-        No longer walking, and so done with all targets.
-    begins
-        With none before.
+    They have ``arrived``, are out of time (``late``, ``unseen`` if the target was never in view), or walk no more and
+    are done with all targets (``gone``). Others have had no target yet (``begins``).
     """
 
     arrived: NDArray[np.bool_]
@@ -73,10 +64,8 @@ class CourseReferee:
 
     Parameters
     ----------
-    courses
-        One a robot; how long they have for a target, and what they see, is the same in all.
-    gait
-        Gait of the robots.
+    courses, gait
+        One course a robot, alike in patience and view; gait of the robots.
     missed
         True if a target is missed by the scanner, by event, shape (robots, at least as many as events); None: never.
     keep
@@ -132,15 +121,8 @@ class CourseReferee:
         return judged
 
     def restart(self, which: NDArray[np.bool_], courses: Sequence[Course], missed: NDArray[np.bool_] | None) -> None:
-        """Begin anew with robots that have been put on the floor anew.
-
-        Parameters
-        ----------
-        which
-            Shape (robots,).
-        courses, missed
-            One for each of them, as at the start; no more targets than the longest course at the start.
-        """
+        """Begin anew with robots that have been put on the floor anew, by a mask of shape (robots,), each with a
+        course, no longer than the longest at the start, and with what its scanner misses."""
         for robot, course in zip(np.flatnonzero(which).tolist(), courses, strict=True):
             self._courses[robot], self._counts[robot] = course, len(course.goals)
         if self._missed is not None and missed is not None:
@@ -181,15 +163,7 @@ class CourseReferee:
         return replace(found, **{name: getattr(found, name).copy() for name in _KEPT})
 
     def add_to(self, data: xr.Dataset, walk: Walk) -> None:
-        """Add to the record of the walk what became of every target, and what the controller was shown.
-
-        Parameters
-        ----------
-        data
-            From :meth:`chilopod.engine.Walk.to_dataset`; changed in place.
-        walk
-            As it ended.
-        """
+        """Add to the record of a walk that has ended what became of every target and what the controller was shown."""
         busy = self.busy
         stopped = busy & np.array([each is not Status.WALKED for each in walk.status])
         self._judge(stopped, walk.time, Verdict.STOPPED)
@@ -251,15 +225,7 @@ _KEPT = {
 
 
 def decisions(record: xr.Dataset, controller: Controller, gait: Gait) -> list[Command]:
-    """Commands of a controller when it is shown again what the record says that it was shown.
-
-    Parameters
-    ----------
-    record
-        Record of a course.
-    controller, gait
-        Controller that steered, and gait of the robots.
-    """
+    """Commands of a controller when it is shown again what the record of a course says that it was shown."""
     shown = {name: record[f"seen_{name}"].transpose("event", "robot", ...).values for name in _KEPT}
     until = float(record.event[-1]) + gait.period
     asked = zip(event_times(controller, gait, until), range(record.sizes["event"]), strict=False)

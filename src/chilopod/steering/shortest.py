@@ -28,11 +28,9 @@ def shortest_path(place: Array, radius: float, arrival: float = ARRIVAL_RADIUS) 
     Parameters
     ----------
     place
-        Ahead and to the left, m, shape (..., 2).
-    radius
-        Radius of the tightest circle, m; 0 for what turns on the spot.
-    arrival
-        Distance that counts as arrived, m; 0 for the place itself.
+        Distances ahead and to the left, m, shape (..., 2).
+    radius, arrival
+        Radius of the tightest circle, m, 0 for what turns on the spot; distance that counts as arrived, m.
 
     Returns
     -------
@@ -45,9 +43,8 @@ def shortest_path(place: Array, radius: float, arrival: float = ARRIVAL_RADIUS) 
     """
     for name, value in (("turning radius", radius), ("arrival radius", arrival)):
         if not 0.0 <= value <= FARTHEST:
-            raise ParameterError(
-                "is out of range", field=name, value=f"{value:g} m", allowed=f"from 0, at most {FARTHEST:g} m"
-            )
+            allowed = f"from 0, at most {FARTHEST:g} m"
+            raise ParameterError("is out of range", field=name, value=f"{value:g} m", allowed=allowed)
     place = np.asarray(place, dtype=np.float64)
     x, y = place[..., 0].ravel(), np.abs(place[..., 1]).ravel()
     length = np.full(x.shape, np.nan)

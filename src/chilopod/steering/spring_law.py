@@ -39,30 +39,25 @@ class SpringLaw(ReadOnlyArrays):
 
     No bend is wanted where the target lies so far within the tightest circle that the robot would walk round it for
     ever, and the tightest where the target is not seen, to the side that the legs were last turned to: it comes into
-    view again. The legs of module 1 yaw as in the paper, and so tell a new bend its side.
-
-    The law keeps nothing in mind: what it commands follows from one observation.
+    view again. The legs of module 1 yaw as in the paper, and so tell a new bend its side. What the law commands follows
+    from one observation.
 
     Attributes
     ----------
     softest, stiffest
-        Softest and stiffest of the first spring, N*m/rad.
+        Ends of the range of the first spring, N*m/rad.
     curvatures, springs
         The inverse radius law: 1/m, rising from 0 at the pitchfork, and N*m/rad.
-    tightest
-        Radius of the tightest circle, m.
-    arm
-        (N-1) L of the paper's radius, m.
+    tightest, arm
+        Radius of the tightest circle, and (N-1) L of the paper's radius, m.
     ahead
         D, m. Two modules long: as far as the joints of the first spring and of the next reach. Half of that and half
-        as much again do as well, see the documentation; a circle all the way to a far target is too wide.
+        as much again do as well; a circle all the way to a far target is too wide.
     band
-        Part of the wanted bend by which the bend may differ and still be as wanted. Between 0.15 and 0.3 it hardly
-        matters.
-    straight
-        A wanted bend of all joints together that is left to the legs, rad.
-    most_bent
-        Most bent of one joint, rad; at a right angle modules run into each other.
+        Part of the wanted bend by which the bend may differ. Between 0.15 and 0.3 it hardly matters.
+    straight, most_bent
+        A wanted bend of all joints together that is left to the legs, and the largest bend of one joint, rad; at a
+        right angle modules run into each other.
     leg_yaw
         Leg yaw of the legs of module 1.
     """
@@ -81,17 +76,10 @@ class SpringLaw(ReadOnlyArrays):
 
     @classmethod
     def of(cls, robot: Robot, law: RadiusLaw) -> SpringLaw:
-        """The law of a robot.
+        """The law of a robot, by its size, its springs and the actuator of the first one, and by its radius law.
 
-        Its spring goes from that of the tightest walk of the radius law to the stiffest of the axis, as far as its
+        The spring goes from that of the tightest walk of the radius law to the stiffest of the axis, as far as the
         actuator allows.
-
-        Parameters
-        ----------
-        robot
-            Size, springs, and the actuator of the first one.
-        law
-            Its radius law.
 
         Raises
         ------
@@ -99,19 +87,13 @@ class SpringLaw(ReadOnlyArrays):
             If the actuator leaves no range.
         """
         own = robot.springs
-        softest, stiffest = float(law.values[0]), max(own.stiffness)
-        if own.softest is not None:
-            softest = max(softest, own.softest[0])
-        if own.stiffest is not None:
-            stiffest = min(stiffest, own.stiffest[0])
+        softest = max(float(law.values[0]), own.softest[0] if own.softest else 0.0)
+        stiffest = min(max(own.stiffness), own.stiffest[0] if own.stiffest else np.inf)
         if not softest < stiffest:
             low, high = (units.format(each, law.unit, digits=4) for each in (softest, stiffest))
-            raise ParameterError(
-                "leaves the first spring no range to steer with",
-                field="springs.softest, springs.stiffest",
-                value=f"{low} to {high}",
-                allowed="the softest below the stiffest, and below the stiffest spring of the axis",
-            )
+            problem, names = "leaves the first spring no range to steer with", "springs.softest, springs.stiffest"
+            allowed = "the softest below the stiffest, and below the stiffest spring of the axis"
+            raise ParameterError(problem, field=names, value=f"{low} to {high}", allowed=allowed)
         curvatures = np.where(np.isfinite(law.radii), 1.0 / law.radii, 0.0)
         return cls(
             softest,

@@ -16,17 +16,8 @@ from chilopod.steering.spring_law import SpringLaw
 
 
 class Prepared(NamedTuple):
-    """Robot that is ready to walk with a strategy.
-
-    Attributes
-    ----------
-    robot
-        Robot with the strategy's springs and actuators.
-    controller
-        Controller of the walk; None without one.
-    remarks
-        Remarks on both, a sentence each.
-    """
+    """Robot with a strategy's springs and actuators, controller of its walk, None without one, and remarks on both, a
+    sentence each."""
 
     robot: Robot
     controller: Controller | None
@@ -39,10 +30,8 @@ class Strategy:
 
     Attributes
     ----------
-    name
-        Name as it is typed.
-    sentence
-        Description of the strategy in a sentence.
+    name, sentence
+        Name as it is typed, and description in a sentence.
     springs
         Dotted path of the spring, or of all springs, that is chosen before the walk; None if there is none to choose.
     leg_yaw
@@ -93,10 +82,8 @@ class Strategy:
 
         Parameters
         ----------
-        robot
-            The robot.
-        law
-            Radius law of the robot, for strategies with ``needs_law``.
+        robot, law
+            Robot, and its radius law for strategies with ``needs_law``.
         spring
             Stiffness for strategies with ``springs``, N*m/rad.
         controller
@@ -130,12 +117,8 @@ class SpringOnTheWay(Strategy):
             said = "the robot file names no actuator: the first spring is taken to change as fast as it is told to"
             return robot.override("springs.adjustable[0]", True), (said,)
         if not adjustable[0]:
-            raise ParameterError(
-                f"the first spring has no actuator, and the strategy {self.name} sets it on the way",
-                field="springs.adjustable[0]",
-                value=False,
-                allowed="true",
-            )
+            problem = f"the first spring has no actuator, and the strategy {self.name} sets it on the way"
+            raise ParameterError(problem, field="springs.adjustable[0]", value=False, allowed="true")
         return robot, ()
 
     def controller(self, robot: Robot, law: RadiusLaw | None) -> tuple[Controller | None, tuple[str, ...]]:
@@ -195,11 +178,8 @@ def strategy_named(name: str, among: Mapping[str, Strategy] = STRATEGIES) -> Str
         If there is none of this name.
     """
     if name not in among:
+        nearest, allowed = nearest_name(name, among), ", ".join(among)
         raise ParameterError(
-            "there is no such strategy",
-            field="strategy",
-            value=name,
-            allowed=", ".join(among),
-            nearest=nearest_name(name, among),
+            "there is no such strategy", field="strategy", value=name, allowed=allowed, nearest=nearest
         )
     return among[name]

@@ -42,18 +42,12 @@ class Target:
 
     def __post_init__(self) -> None:
         if not abs(self.bearing) <= 0.5 * math.pi:
-            raise ParameterError(
-                "lies behind the robot",
-                field="target bearing",
-                value=f"{math.degrees(self.bearing):g} deg",
-                allowed="-90 to 90 deg",
-            )
+            value, allowed = f"{math.degrees(self.bearing):g} deg", "-90 to 90 deg"
+            raise ParameterError("lies behind the robot", field="target bearing", value=value, allowed=allowed)
         if not ARRIVAL_RADIUS < self.distance <= FARTHEST:
+            allowed = f"more than the {ARRIVAL_RADIUS:g} m that count as arrived, at most {FARTHEST:g} m"
             raise ParameterError(
-                "is no way to go",
-                field="target distance",
-                value=f"{self.distance:g} m",
-                allowed=f"more than the {ARRIVAL_RADIUS:g} m that count as arrived, at most {FARTHEST:g} m",
+                "is no way to go", field="target distance", value=f"{self.distance:g} m", allowed=allowed
             )
 
     @classmethod

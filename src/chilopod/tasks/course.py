@@ -16,16 +16,9 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import Short
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
-from chilopod.steering import (
-    Course,
-    RadiusLaw,
-    Strategy,
-    Verdict,
-    random_course,
-)
+from chilopod.steering import Course, RadiusLaw, Strategy, Verdict, random_course
 from chilopod.tasks.radius_law import radius_law
-from chilopod.tasks.runs import RunOptions, runs
-from chilopod.tasks.shown import Pathed
+from chilopod.tasks.runs import Pathed, RunOptions, runs
 from chilopod.trials import Trial, finite
 
 GRAVITY = 9.81
@@ -51,16 +44,11 @@ class Driver(Short):
 
     Attributes
     ----------
-    robot
-        With the springs of the strategy, and the actuator that it needs.
-    strategy
-        As given to :func:`driver`.
-    controller
-        Controller of the walk; None without steering.
-    law
-        The robot's radius law; None where it has none and the strategy needs none.
-    engine
-        Name of the engine that the law belongs to and that walks.
+    robot, strategy, controller
+        Robot with the springs and the actuator of the strategy; strategy; controller, None without steering.
+    law, engine
+        The robot's radius law, None where it has none and needs none; name of the engine that it belongs to and that
+        walks.
     remarks
         Remarks on the result, a sentence each.
     """
@@ -82,17 +70,8 @@ class Driver(Short):
 
 @dataclass(frozen=True)
 class Driven(Pathed):
-    """Walks along a course, and what became of its targets.
-
-    Attributes
-    ----------
-    trials
-        With all that makes each walk.
-    driver
-        Driver of the walks.
-    records
-        Records of every walk, up to where it ended, see :func:`chilopod.steering.of_course`.
-    """
+    """Walks along a course by a driver, with their trials and records, each up to where it ended, see
+    :func:`chilopod.steering.of_course`."""
 
     driver: Driver
     records: tuple[xr.Dataset, ...]
@@ -116,9 +95,8 @@ class Driven(Pathed):
     def record(self) -> xr.Dataset:
         """Record of all walks together, NaN from where each ended."""
         longest = max(self.records, key=lambda each: each.sizes.get("time", 0))
-        joined = xr.concat(
-            self.records, dim="robot", data_vars="minimal", coords="minimal", compat="override", join="outer"
-        ).assign_coords(robot=np.arange(len(self.records)))
+        how: Any = {"data_vars": "minimal", "coords": "minimal", "compat": "override", "join": "outer"}
+        joined = xr.concat(self.records, "robot", **how).assign_coords(robot=np.arange(len(self.records)))
         return joined.assign(within=longest.within) if "within" in longest else joined
 
     def _found(self) -> dict[str, Any]:
@@ -186,23 +164,21 @@ def _shown(value: float | None) -> str:
     return "-" if value is None else f"{value:.2g}"
 
 
+def _arrived(record: xr.Dataset) -> int:
+    return int((record.goal_verdict == Verdict.ARRIVED.label).sum())
+
+
 def _walk_json(robot: Robot, record: xr.Dataset) -> dict[str, Any]:
     sentences = {verdict.label: verdict.sentence for verdict in Verdict}
     goals = []
     for goal in record.goal.values:
         found = record.isel(robot=0).sel(goal=goal)
-        verdict = str(found.goal_verdict.item())
-        goals.append(
-            {
-                "verdict": verdict,
-                "sentence": sentences[verdict],
-                "place_m": [finite(each) for each in found.goal_place.values],
-                **{told: finite(found[f"goal_{name}"].item()) for name, told in _OF_GOALS.items()},
-            }
-        )
+        verdict, place = str(found.goal_verdict.item()), [finite(each) for each in found.goal_place.values]
+        told = {told: finite(found[f"goal_{name}"].item()) for name, told in _OF_GOALS.items()}
+        goals.append({"verdict": verdict, "sentence": sentences[verdict], "place_m": place, **told})
     return {
         "status": str(record.status.values[0]),
-        "arrived": int((record.goal_verdict == Verdict.ARRIVED.label).sum()),
+        "arrived": _arrived(record),
         "time_s": finite(float(np.nanmax(record.goal_end.values))),
         "spring_work_J": float(record.goal_spring_work.sum()),
         "drive_work_J": float(record.goal_drive_work.sum()),
@@ -234,29 +210,20 @@ def driver(
 
     Parameters
     ----------
-    robot
-        The robot.
-    strategy
-        One of :data:`chilopod.steering.ON_COURSES`.
+    robot, strategy
+        Robot, and one of :data:`chilopod.steering.ON_COURSES`.
     spring
         Spring with which the strategies ``pitchfork`` and ``hopf`` walk, N*m/rad.
-    engine
-        Engine of the radius law, see :func:`chilopod.tasks.radius_law`.
-    controller
-        In place of the strategy's.
-    law
-        The robot's radius law, where it is known already.
-    folder
-        Folder of the trials of the radius law.
-    progress
-        Called with the part done (0 to 1) and a few words.
+    engine, folder, progress
+        As for :func:`chilopod.tasks.radius_law`.
+    controller, law
+        Controller in place of the strategy's, and radius law, where it is known already.
 
     Raises
     ------
-    ParameterError
-        If the strategy wants a spring and has none, or has one and wants none; if the spring has no actuator.
-    AnalysisError
-        If the strategy stands on the pitchfork and the robot has none.
+    ParameterError, AnalysisError
+        If the strategy wants a spring and has none, or has one and wants none; if the spring has no actuator; if the
+        strategy stands on the pitchfork and the robot has none.
     """
     strategy.fitted(robot, spring)  # refuses before the law takes its time
     unknown: tuple[str, ...] = ()
@@ -264,32 +231,17 @@ def driver(
         law = law or radius_law(robot, engine, folder, progress)
     except AnalysisError as error:
         if strategy.needs_law and controller is None:
-            raise AnalysisError(
-                f"the strategy {strategy.name} stands on how tightly the first spring turns the robot: {error.problem}",
-                allowed="a robot that bends (narrower, softer behind, with a longer stride), or the strategy leg-yaw",
-            ) from error
+            problem = f"the strategy {strategy.name} stands on how tightly the first spring turns the robot"
+            allowed = "a robot that bends (narrower, softer behind, with a longer stride), or the strategy leg-yaw"
+            raise AnalysisError(f"{problem}: {error.problem}", allowed=allowed) from error
         unknown = (f"how tightly the robot turns is not known, so shortest paths are straight lines: {error.problem}",)
     ready = strategy.prepare(robot, law, spring, controller)
     return Driver(ready.robot, strategy, ready.controller, law, engine, (*unknown, *ready.remarks))
 
 
 def drive(driver: Driver, course: Course, **options: Unpack[RunOptions]) -> Driven:
-    """Let a robot walk a course.
-
-    Parameters
-    ----------
-    driver
-        The robot and what steers it.
-    course
-        With any radius of the tightest circle, see :meth:`Driver.trial`.
-    **options
-        See :class:`chilopod.tasks.RunOptions`.
-
-    Raises
-    ------
-    ParameterError
-        If memory cannot hold the records, or something is out of range.
-    """
+    """Let a robot walk a course, with any radius of the tightest circle, see :meth:`Driver.trial`, and with
+    :class:`chilopod.tasks.RunOptions`. Raises ParameterError if memory cannot hold the records."""
     trial = driver.trial(course, poses=engine_named(driver.engine).traits.poses)
     trials, records = runs(trial, **options)
     return Driven(trials, driver, tuple(records))

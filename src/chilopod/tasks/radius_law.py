@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from chilopod.errors import AnalysisError
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import RadiusLaw
-from chilopod.trials import AVERAGED, NONE, Trial, mean_joint_angles, run
+from chilopod.trials import AVERAGED, NONE, Trial, mean_joint_angles, run, summaries
 
 DURATION = 90.0
 """s, of every trial: beside the onset a bend takes a minute to grow."""
@@ -46,14 +47,10 @@ def radius_law(
 
     Parameters
     ----------
-    robot
-        Its first spring does not matter.
-    engine
-        Name of an engine, see :func:`chilopod.engine.engine_named`.
-    folder
-        Folder of the trials; without one nothing is kept.
-    progress
-        Called with the part done (0 to 1) and a few words.
+    robot, engine
+        Robot, whose first spring does not matter, and name of an engine.
+    folder, progress
+        As for :class:`chilopod.tasks.RunOptions`.
 
     Raises
     ------
@@ -64,20 +61,8 @@ def radius_law(
         return that_holds(radius_laws(robot, progress).axis, robot, engine)
     stiffest = units.from_si(max(robot.springs.stiffness), PAPER_UNIT)
     springs = [float(round(part * stiffest, 2)) for part in _LAW_SPRINGS]
-    joints = robot.body.modules - 1
-    bend = tuple([_LAW_BEND / joints] * joints)
-    asked = [
-        Trial(
-            robot.with_value(K1, stiffness(spring)),
-            DURATION,
-            0,
-            bend,
-            disturbance=NONE,
-            rate=10.0,
-            engine=engine,
-        )
-        for spring in springs
-    ]
+    bent = Trial(robot, DURATION, 0, (_LAW_BEND / (robot.body.modules - 1),), None, None, NONE, 10.0, engine=engine)
+    asked = [replace(bent, robot=robot.with_value(K1, stiffness(spring))) for spring in springs]
     ends = xr.concat([end_of_walk(each, robot) for each in run(asked, folder, progress)], "spring")
     curved = is_curved(ends)
     if curved.sum() < 3:
@@ -95,12 +80,7 @@ def that_holds(law: RadiusLaw, robot: Robot, engine: str = "planar") -> RadiusLa
 
     A robot bends farther on its way into a circle than on the circle, and no two feet are alike, so that a joint may
     leave its range although that of the settled walk does not. The softest spring that is left is the first at which
-    none of :data:`HELD` walks does, with the disturbance that all studies have.
-
-    Raises
-    ------
-    AnalysisError
-        If robots fail at so many springs that no law is left.
+    none of :data:`HELD` walks does, with the disturbance that all studies have. Raises AnalysisError if none is left.
     """
     for first, value in enumerate(law.values[:-2].tolist()):
         walker = robot.with_value(K1, value)
@@ -115,18 +95,16 @@ def end_of_walk(record: xr.Dataset, robot: Robot) -> xr.Dataset:
 
     Returns
     -------
-    Dataset over joint: ``mean_angle`` over the last 5 s (rad), ``bend``, the sum of their sizes (rad), ``axis_radius``
-    (m; infinite if straight), ``direction`` (left, right, straight; empty where the walk failed), ``moved``, the
-    difference from
-    that of the 10 s before (rad), ``settled``, whether that is less than :data:`SETTLED` of the bend, ``speed`` of
-    module 1 over the last 12 s (m/s), and ``status``.
+    Dataset over joint: ``mean_angle``, ``axis_radius`` (m) and ``status`` of :class:`chilopod.trials.WalkSummary`;
+    ``bend``, the sum of the sizes of the mean angles (rad); ``direction`` (left, right, straight; empty where the walk
+    failed); ``moved``, the difference of the bend from that of the 10 s before (rad), ``settled``, whether that is less
+    than :data:`SETTLED` of the bend; and ``speed`` of module 1 over the last 12 s (m/s).
     """
+    (end,) = summaries(robot, record)
     walk = record.isel(robot=0)
-    times = walk.time.values
-    last = mean_joint_angles(walk).values
+    times, last = walk.time.values, end.joint_angles
     bend = float(np.abs(last).sum())
     moved = abs(bend - float(np.abs(mean_joint_angles(walk, 10.0, before=AVERAGED)).sum()))
-    failed = walk.status.item() != Status.WALKED.label
     side = "straight" if bend < CURVED else "right" if last.sum() > 0.0 else "left"
     place = walk.position.transpose("time", "axis").values
     back = int(np.searchsorted(times, times[-1] - 12.0))
@@ -137,12 +115,12 @@ def end_of_walk(record: xr.Dataset, robot: Robot) -> xr.Dataset:
         {
             "mean_angle": ("joint", last, {"units": "rad"}),
             "bend": ((), bend, {"units": "rad"}),
-            "axis_radius": ((), float(robot.axis_radius(last)), {"units": "m"}),
-            "direction": ((), np.array("" if failed else side, dtype=object)),
+            "axis_radius": ((), end.axis_radius, {"units": "m"}),
+            "direction": ((), np.array("" if end.failed else side, dtype=object)),
             "moved": ((), moved, {"units": "rad"}),
             "settled": ((), moved <= SETTLED * bend),
             "speed": ((), float(steps.mean()), {"units": "m/s"}),
-            "status": ((), np.array(walk.status.item(), dtype=object)),
+            "status": ((), np.array(end.status, dtype=object)),
         },
         coords={"joint": walk.joint.values},
     )

@@ -5,17 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import TYPE_CHECKING, Any, TypedDict
 
 import numpy as np
 import xarray as xr
 
 from chilopod.engine import HasFootCreep, engine_named
 from chilopod.engine.named import path_of
-from chilopod.notebook import Summary
+from chilopod.notebook import Summary, axes_for, picture
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
+from chilopod.steering import ARRIVAL_RADIUS
 from chilopod.trials import NONE, Trial, run
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_MOST = 12  # walks that are drawn in a notebook
 
 
 class RunOptions(TypedDict, total=False):
@@ -23,14 +29,11 @@ class RunOptions(TypedDict, total=False):
 
     Attributes
     ----------
-    seed
-        Seed of the first walk's disturbances, the others count up from it; None (default) for no disturbance at all.
-    repeats
-        Number of walks, by default 1.
-    folder
-        Folder where all trials are kept; without one nothing is kept.
-    progress
-        Called with the part done (0 to 1) and a few words.
+    seed, repeats
+        Seed of the first walk's disturbances, the others count up from it, None (default) for no disturbance at all;
+        and number of walks, by default 1.
+    folder, progress
+        Folder where all trials are kept, if any; called with the part done (0 to 1) and a few words.
     """
 
     seed: int | None
@@ -53,13 +56,7 @@ def runs(
 
 @dataclass(frozen=True)
 class Runs(Summary):
-    """Walks that differ in nothing but their seed.
-
-    Attributes
-    ----------
-    trials
-        With all that makes each of them.
-    """
+    """Walks that differ in nothing but their seed, with all that makes each of them."""
 
     trials: tuple[Trial, ...]
 
@@ -110,3 +107,47 @@ class Runs(Summary):
 
     def _found(self) -> dict[str, Any]:
         return {}
+
+
+class Pathed(Runs):
+    """Base of walks that have a record, and are drawn as paths over the floor."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def record(self) -> xr.Dataset: ...
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the path of module 1 in every walk, the first dozen of them, and the targets."""
+        axes = axes_for(axes)
+        draw_paths(axes, self.record)
+        return axes
+
+    def _picture(self) -> str:
+        count = self.record.sizes["robot"]
+        alt = f"paths of {'a walk' if count == 1 else f'{count} walks'} from above"
+        return picture(self.plot, alt if count <= _MOST else f"{alt}, the first {_MOST} drawn")
+
+
+def draw_paths(axes: Axes, record: xr.Dataset) -> None:
+    """Draw the path of module 1 in every walk of a record, the first dozen of them, and the targets."""
+    from matplotlib.patches import Circle
+
+    drawn = record.isel(robot=slice(_MOST))
+    for way in drawn.position.transpose("robot", "time", "axis").values:
+        axes.plot(*way.T)
+    for x, y in _targets(drawn):
+        if np.isfinite(x + y):
+            axes.add_patch(Circle((x, y), ARRIVAL_RADIUS, color="C2", alpha=0.35))
+    axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
+
+
+def _targets(record: xr.Dataset) -> np.ndarray:
+    """Places on the floor, shape (targets, 2), each once."""
+    if "goal_place" in record:
+        places = record.goal_place.transpose("robot", "goal", "axis").values
+    elif "target" in record:
+        places = record.target.transpose(..., "robot", "axis").values
+    else:
+        places = np.empty((0, 2))
+    return np.unique(places.reshape(-1, 2), axis=0)

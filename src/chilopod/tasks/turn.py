@@ -9,7 +9,6 @@ from typing import Any, Unpack, cast
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from chilopod import units
 from chilopod.analysis.parameters import K1
@@ -19,16 +18,20 @@ from chilopod.progress import part, silent
 from chilopod.robot import Robot
 from chilopod.steering import Criteria, Strategy, Target, earliest_arrival, evaluate
 from chilopod.tasks.radius_law import radius_law
-from chilopod.tasks.runs import RunOptions, runs
-from chilopod.tasks.shown import Pathed
+from chilopod.tasks.runs import Pathed, RunOptions, runs
 from chilopod.trials import NONE, Trial, check_fits, finite, run, straight, together
-
-Array = NDArray[np.float64]
 
 _SOFTEST = 1.0 / 20.0  # of the stiffest spring: where a strategy without a radius law starts to look
 _ROUNDS = 2
 _LEAST = 5.0  # s
 _AS_NEAR = 1e-9  # m
+_TOLD = {
+    "arrival": "arrival_s",
+    "nearest": "nearest_m",
+    "distance": "epsilon1_m",
+    "angle": "epsilon2_rad",
+    "effort": "epsilon3_rad2_s",
+}
 
 
 @dataclass(frozen=True)
@@ -37,19 +40,15 @@ class Turn(Pathed):
 
     Attributes
     ----------
-    trials
-        With all that makes each walk: the robot has the spring that it walked with.
-    strategy
-        As given to :func:`turn`.
+    trials, strategy
+        All that makes each walk, the robot with the spring that it walked with; and the strategy.
     by_law
         The spring whose settled walk has the radius of the circle to the target, the paper's k1-hat, N*m/rad; None
         where there is no such spring or none was asked for.
     stiffness
         The spring it walked with, N*m/rad; None where the strategy leaves the springs alone.
-    record
-        Record of all repeats.
-    criteria
-        At the earliest arrival of any repeat, or at the end if none arrives.
+    record, criteria
+        Record of all repeats; criteria at the earliest arrival of any of them, or at the end if none arrives.
     """
 
     strategy: Strategy
@@ -78,14 +77,7 @@ class Turn(Pathed):
             "spring_N_m_rad": finite(self.stiffness),
             "evaluation_time_s": found.time,
             "walks": [
-                {
-                    "outcome": outcome.label,
-                    "arrival_s": finite(found.arrival[i]),
-                    "nearest_m": finite(found.nearest[i]),
-                    "epsilon1_m": finite(found.distance[i]),
-                    "epsilon2_rad": finite(found.angle[i]),
-                    "epsilon3_rad2_s": finite(found.effort[i]),
-                }
+                {"outcome": outcome.label, **{told: finite(getattr(found, name)[i]) for name, told in _TOLD.items()}}
                 for i, outcome in enumerate(found.outcome)
             ],
         }
@@ -139,12 +131,8 @@ def turn(
 
     Parameters
     ----------
-    robot
-        The robot.
-    target
-        Target of the turn.
-    strategy
-        Strategy, one of :data:`chilopod.steering.STRATEGIES`.
+    robot, target, strategy
+        Robot, target, and one of :data:`chilopod.steering.STRATEGIES`.
     spring
         Spring of the strategy, N*m/rad; or ``law``: the paper's k1-hat, from the radius law; or ``auto``: what comes
         nearest to the target in undisturbed simulated trials, which takes into account that a walk needs time to bend.
@@ -152,11 +140,8 @@ def turn(
     duration
         s; by default what the circle takes at the speed of the straight walk without slip, times the engine's haste,
         see :class:`chilopod.engine.Traits`; at least 5 s.
-    engine
-        As for :class:`chilopod.trials.Trial`. The radius law of the planar model is that of its exact branch, any
-        other's that of trials.
-    controller
-        Controller in place of the strategy's, see :class:`chilopod.trials.Trial`.
+    engine, controller
+        As for :class:`chilopod.trials.Trial`; the controller is in place of the strategy's.
     **options
         See :class:`chilopod.tasks.RunOptions`; the folder has the trials of the radius law and of the search too.
 
@@ -168,12 +153,8 @@ def turn(
     if spring not in ("auto", "law") and isinstance(spring, str):
         raise ParameterError("is no spring", field="spring", value=spring, allowed="auto, law, or a stiffness")
     if strategy.springs is None and spring != "auto":
-        raise ParameterError(
-            f"is of no use to {strategy.name}, which leaves the springs alone",
-            field="spring",
-            value=spring,
-            allowed="auto",
-        )
+        problem = f"is of no use to {strategy.name}, which leaves the springs alone"
+        raise ParameterError(problem, field="spring", value=spring, allowed="auto")
     traits = engine_named(engine).traits
     time = duration if duration is not None else _time_for(robot, target, traits.haste)
     trial = Trial(robot, time, target=target, controller=controller, engine=engine, poses=traits.poses)
@@ -192,7 +173,8 @@ def turn(
             raise AnalysisError("only the first spring has a radius law", field="spring", value=spring)
         stiffness = by_law
     else:
-        between = (float(law.values[0]), 1.5 * law.pitchfork) if law else _around(robot)
+        stiffest = max(robot.springs.stiffness)
+        between = (float(law.values[0]), 1.5 * law.pitchfork) if law else (_SOFTEST * stiffest, stiffest)
         progress(0.4, "trials with many springs")
         stiffness = _best_spring(trial, strategy, between, folder)
     options["progress"] = part(progress, 0.9, 1.0, "walk")
@@ -223,11 +205,6 @@ def _best_spring(trial: Trial, strategy: Strategy, between: tuple[float, float],
         # Of springs that do equally well the stiffest.
         best = int(np.flatnonzero(nearest <= np.nanmin(nearest) + _AS_NEAR)[-1])
     return float(values[best])
-
-
-def _around(robot: Robot) -> tuple[float, float]:
-    stiffest = max(robot.springs.stiffness)
-    return _SOFTEST * stiffest, stiffest
 
 
 def _time_for(robot: Robot, target: Target, haste: float) -> float:

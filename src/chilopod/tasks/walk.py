@@ -14,24 +14,14 @@ from chilopod.engine import Controller
 from chilopod.progress import Progress, silent
 from chilopod.record import RATE
 from chilopod.robot import Robot
-from chilopod.tasks.runs import RunOptions, Runs, runs
-from chilopod.tasks.shown import Pathed
+from chilopod.tasks.runs import Pathed, RunOptions, Runs, runs
 from chilopod.trials import Trial, WalkSummary, as_now, run_each, straight, summaries, together
 
 
 @dataclass(frozen=True)
 class Ends(Runs):
-    """Ends of walks that differ in nothing but their seed.
-
-    Attributes
-    ----------
-    trials
-        With all that makes each of them.
-    summaries
-        The end of every walk.
-    straight
-        True if none of them ever bent, see :func:`chilopod.trials.straight`.
-    """
+    """Ends of walks that differ in nothing but their seed: all that makes each, the end of each, and whether they are
+    ``straight``: none of them ever bent, see :func:`chilopod.trials.straight`."""
 
     summaries: Sequence[WalkSummary]
     straight: bool
@@ -69,15 +59,7 @@ class Ends(Runs):
 
 @dataclass(frozen=True)
 class Walks(Pathed, Ends):
-    """Walks that differ in nothing but their seed, and what they came to.
-
-    Attributes
-    ----------
-    trials, summaries, straight
-        As for :class:`Ends`.
-    record
-        Record of all walks.
-    """
+    """The same with the record of all walks."""
 
     record: xr.Dataset
 
@@ -121,16 +103,8 @@ def ends(
     told: Callable[[int, xr.Dataset], None] = lambda index, record: None,
 ) -> Ends:
     """Let robots walk and keep only what they came to: memory holds a batch of records, however many walks there are.
-
-    Parameters
-    ----------
-    trials
-        From :meth:`chilopod.trials.Trial.repeated`.
-    folder, progress
-        As for :class:`chilopod.tasks.RunOptions`.
-    told
-        Called with the number of a walk and its record as soon as that is there.
-    """
+    ``told`` is called with the number of a walk and its record as soon as that is there; for the rest see
+    :meth:`chilopod.trials.Trial.repeated` and :class:`chilopod.tasks.RunOptions`."""
     trials = tuple(as_now(trials))
     number = {trial.file_name: index for index, trial in enumerate(trials)}
     found: dict[int, WalkSummary] = {}

@@ -25,40 +25,22 @@ _MAY_LACK = ("foot_load", "command_stiffness", "command_torque", "seen_bearing",
 
 
 def check_asked(data: Any, walk: Walk, trials: Sequence[Trial], drawn: Sequence[Drawn]) -> xr.Dataset:
-    """The record that an engine gave of a batch, if it is that of these trials and of what was drawn for them.
-
-    Raises
-    ------
-    AnalysisError
-        If it is not, naming the engine and what is wrong.
-    """
-    first, wrong = trials[0], "its record is no xarray.Dataset"
-    if isinstance(data, xr.Dataset):
-        try:
-            wrong = _outline(data, walk, first, len(trials)) or _content(data, walk, trials, drawn)
-        except (LookupError, TypeError, ValueError, AttributeError) as error:
-            wrong = f"its record cannot be understood ({in_words(error)})"
+    """The record that an engine gave of a batch. Raises AnalysisError, which names the engine and what is wrong, if it
+    is not that of these trials and of what was drawn for them."""
+    if not isinstance(data, xr.Dataset):
+        raise _refused("its record is no xarray.Dataset", trials[0].engine)
+    try:
+        wrong = _outline(data, walk, trials[0], len(trials)) or _content(data, walk, trials, drawn)
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        wrong = f"its record cannot be understood ({in_words(error)})"
     if wrong:
-        raise AnalysisError(f"gave what was not asked for: {wrong}", field=f"engine {first.engine}")
-    asked: xr.Dataset = data
-    return asked
+        raise _refused(wrong, trials[0].engine)
+    return data
 
 
 def check_finite(values: Mapping[str, Any], engine: str) -> None:
-    """Make sure that a robot that walks is somewhere, and one that failed or was halted no more from some sample on.
-
-    Parameters
-    ----------
-    values
-        Variables of its record, by name, shape (times, 1, ...).
-    engine
-        Name of what gave them.
-
-    Raises
-    ------
-    AnalysisError
-        If not.
-    """
+    """Raise AnalysisError unless, in the variables of a robot's record by name, shape (times, 1, ...), a robot that
+    walks is somewhere, and one that failed or was halted no more from some sample on."""
     label, there = str(values["status"][0]), np.isfinite(values["heading"][:, 0])
     count = len(there) if label == Status.WALKED.label else np.count_nonzero(there)
     for name in MOTION:
@@ -66,8 +48,13 @@ def check_finite(values: Mapping[str, Any], engine: str) -> None:
             continue
         finite = np.isfinite(values[name][:, 0]).reshape(len(there), -1).all(axis=1)
         if not finite[:count].all() or finite[count:].any():
-            problem = f"{name} of a robot that {label} is not finite as long as it walks, or is so afterwards"
-            raise AnalysisError(f"gave what was not asked for: {problem}", field=f"engine {engine}")
+            raise _refused(
+                f"{name} of a robot that {label} is not finite as long as it walks, or is so afterwards", engine
+            )
+
+
+def _refused(wrong: str, engine: str) -> AnalysisError:
+    return AnalysisError(f"gave what was not asked for: {wrong}", field=f"engine {engine}")
 
 
 def _outline(data: xr.Dataset, walk: Walk, first: Trial, robots: int) -> str:
@@ -80,11 +67,12 @@ def _outline(data: xr.Dataset, walk: Walk, first: Trial, robots: int) -> str:
     off = 0.5 * first.robot.twin.timestep if first.robot.twin else 0.0
     if not np.all(np.abs(times - wanted) <= off + _SAME_INSTANT):
         return f"samples at other times than every {1.0 / first.rate:g} s"
-    told = event_times(first.controller, first.robot.gait, walk.time) if first.controller else ()
-    events = np.array([time for time, _ in told])
-    numbers = {"robot": np.arange(robots), "joint": np.arange(1, modules), "module": np.arange(1, modules + 1)}
-    names = {"side": np.array(["left", "right"]), "axis": np.array(["x", "y"])}
-    coords = {name: each for name, each in {**numbers, **names}.items() if name != "module" or first.forces}
+    asked = event_times(first.controller, first.robot.gait, walk.time) if first.controller else ()
+    events = np.array([time for time, _ in asked])
+    coords = {"robot": np.arange(robots), "joint": np.arange(1, modules)}
+    coords |= {"side": np.array(["left", "right"]), "axis": np.array(["x", "y"])}
+    if first.forces:
+        coords["module"] = np.arange(1, modules + 1)
     for name, values in coords.items():
         if not np.array_equal(data[name].values, values):
             return f"{name} is {data[name].values}"
@@ -92,7 +80,11 @@ def _outline(data: xr.Dataset, walk: Walk, first: Trial, robots: int) -> str:
     if found.shape != events.shape or not np.all(np.abs(found - events) <= _NEAR):
         return f"{found.size} commands instead of {events.size}, or at other times"
     sizes = {name: len(values) for name, values in coords.items()} | {"time": times.size, "event": events.size}
-    return _quantities(data, first, sizes) or _attributes(data, first, walk)
+    told = {"engine": engine_named(first.engine).traits.name, "robot": file_text(first.robot), "duration": walk.time}
+    for name, value in told.items():
+        if data.attrs.get(name) != value:
+            return f"its attribute {name} is {str(data.attrs.get(name))[:40]!r}, not {str(value)[:40]!r}"
+    return _quantities(data, first, sizes)
 
 
 def _quantities(data: xr.Dataset, first: Trial, sizes: Mapping[str, int]) -> str:
@@ -113,20 +105,11 @@ def _quantities(data: xr.Dataset, first: Trial, sizes: Mapping[str, int]) -> str
         found = data[name]
         dims = tuple(each for each in over if each in found.dims or name not in ("stiffness", "target"))
         shape = tuple(sizes.get(each, found.sizes.get(each)) for each in dims)
-        kind, units = np.dtype(np.float64), found.attrs.get("units", "")
-        kind, unit = (found.dtype if name == "status" else kind), (units if name == "pose" else unit)
+        units = found.attrs.get("units", "")
+        kind, unit = found.dtype if name == "status" else np.dtype(np.float64), units if name == "pose" else unit
         if (found.dims, found.shape, found.dtype, units) != (dims, shape, kind, unit):
             told = f"{found.dtype} over {dict(found.sizes)} in {units!r}"
             return f"{name} is {told}, not {kind} over {dict(zip(dims, shape, strict=True))} in {unit!r}"
-    return ""
-
-
-def _attributes(data: xr.Dataset, first: Trial, walk: Walk) -> str:
-    """Fault of attributes of the whole."""
-    told = {"engine": engine_named(first.engine).traits.name, "robot": file_text(first.robot), "duration": walk.time}
-    for name, value in told.items():
-        if data.attrs.get(name) != value:
-            return f"its attribute {name} is {str(data.attrs.get(name))[:40]!r}, not {str(value)[:40]!r}"
     return ""
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Hashable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from chilopod.errors import AnalysisError
 from chilopod.steering import CourseReferee, Target, of_course
 from chilopod.trials.asked import check_asked, check_finite
 from chilopod.trials.description import classes_in, file_text, is_ours, plain
-from chilopod.trials.disturbance import Drawn, draw
+from chilopod.trials.disturbance import Drawn, conditions, draw
 from chilopod.trials.trial import Trial
 
 NOT_KEPT = "not kept"
@@ -28,31 +28,16 @@ _MOST_BYTES = 256e6
 
 
 def batches(trials: Sequence[Trial], on_cores: int | None = None) -> list[list[Trial]]:
-    """Trials in groups that can walk together and take a few seconds, within so much memory.
-
-    Parameters
-    ----------
-    trials
-        In any order.
-    on_cores
-        Number of cores that a batch has for itself; by default all there are.
-    """
+    """Trials, in any order, in groups that can walk together and take a few seconds, within so much memory, on so many
+    cores each, by default all."""
     groups: dict[tuple[Any, ...], list[Trial]] = {}
     for trial in trials:
-        alike = (
-            trial.engine,
-            engine_named(trial.engine).common(trial.robot),
-            trial.robot.gait,
-            trial.robot.body.modules,
-            trial.duration,
-            trial.recording,
-            _sight(trial),
-            json.dumps(trial.steering, sort_keys=True),
-            trial.code,
-            # Whether its sensors are noisy is said once for a batch.
-            trial.disturbance.bearing > 0.0,
-            trial.brief,
-        )
+        walks = trial.engine, engine_named(trial.engine).common(trial.robot), trial.robot.gait, trial.robot.body.modules
+        course = trial.course
+        sight = (course.patience, course.view, course.range, course.tightest) if course else trial.target is None
+        asked = trial.duration, trial.recording, trial.brief, sight
+        noisy = trial.disturbance.bearing > 0.0  # said once for a batch
+        alike = walks, asked, noisy, json.dumps(trial.steering, sort_keys=True), trial.code
         groups.setdefault(alike, []).append(trial)
     split = []
     for group in groups.values():
@@ -63,22 +48,8 @@ def batches(trials: Sequence[Trial], on_cores: int | None = None) -> list[list[T
 
 
 def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
-    """Walk trials of one batch.
-
-    Parameters
-    ----------
-    trials
-        Trials of one of :func:`batches`.
-
-    Returns
-    -------
-    The record of each, with one ``robot``, and robot file and trial in the attributes.
-
-    Raises
-    ------
-    ParameterError, AnalysisError
-        If an argument is out of range, or the controller fails.
-    """
+    """Records of the trials of one of :func:`batches`, each with one ``robot``, and robot file and trial in the
+    attributes. Raises ParameterError or AnalysisError if an argument is out of range or a controller fails."""
     first = trials[0]
     # Who steers otherwise when asked the same again is found out before.
     doubts = first.code[1] or first.code[2] or _doubts(first)
@@ -92,10 +63,9 @@ def walked(trials: Sequence[Trial]) -> list[xr.Dataset]:
     if referee is not None:
         referee.add_to(data, walk)
     records = _apart(data.assign_attrs({NOT_KEPT: doubts} if doubts else {}), trials)
-    return [
-        of_course(record, trial.robot, trial.brief) if referee else record
-        for record, trial in zip(records, trials, strict=True)
-    ]
+    if referee is None:
+        return records
+    return [of_course(record, trial.robot, trial.brief) for record, trial in zip(records, trials, strict=True)]
 
 
 def _steered(trials: Sequence[Trial], until: float) -> tuple[Walk, list[Drawn], CourseReferee | None]:
@@ -106,22 +76,17 @@ def _steered(trials: Sequence[Trial], until: float) -> tuple[Walk, list[Drawn], 
     courses = [each.course for each in trials if each.course]
     asked = sum(1 for _ in event_times(first.controller, first.robot.gait, first.duration)) if first.controller else 0
     drawn = [draw(each.disturbance, each.seed, each.robot.body.modules, asked, each.joint_angles) for each in trials]
-    own_noise, noisy = engine.traits.noisy, first.target is not None and first.disturbance.bearing > 0.0
     walk = engine.start(
         [trial.robot for trial in trials],
-        initial=engine.initial_states(
-            first.robot, np.stack([each.joint_angles for each in drawn]), np.array([each.heading for each in drawn])
-        ),
-        friction=np.stack([each.friction for each in drawn]),
         target=np.stack(targets) if targets else None,
-        seeds=[each.scan_seed for each in drawn] if noisy and own_noise else None,
         record=first.recording,
         expected=first.duration,
+        **conditions(engine, first.robot, drawn, first.target is not None and first.disturbance.bearing > 0.0),
     )
     if len(walk.robots) != len(trials):
         problem = f"start gave a walk of {len(walk.robots)} robots instead of {len(trials)}"
         raise AnalysisError(problem, field=f"engine {first.engine}")
-    noise = None if own_noise or not asked else np.stack([each.bearing for each in drawn])
+    noise = None if engine.traits.noisy or not asked else np.stack([each.bearing for each in drawn])
     missed = np.stack([each.missed for each in drawn])
     referee = CourseReferee(courses, first.robot.gait, missed if missed.any() else None) if courses else None
     steer(walk, until, first.controller, bearing_noise=noise, referee=referee)
@@ -147,19 +112,9 @@ def _doubts(trial: Trial) -> str:
         # An engine may give anything.
         if not getattr(one, "identical", lambda _: True)(other):
             _KNOWN[who] = "it steers otherwise when it sees the same again (a clock, np.random, a count?)"
-        elif trial.as_now().code != trial.code:
-            _KNOWN[who] = _CHANGES
         else:
-            _KNOWN[who] = ""
+            _KNOWN[who] = _CHANGES if trial.as_now().code != trial.code else ""
     return _KNOWN[who]
-
-
-def _sight(trial: Trial) -> Hashable:
-    """Property that targets of a batch have in common."""
-    course = trial.course
-    if course is None:
-        return trial.target is None
-    return course.patience, course.view, course.range, course.tightest
 
 
 def _apart(data: xr.Dataset, trials: Sequence[Trial]) -> list[xr.Dataset]:
@@ -181,7 +136,6 @@ def _apart(data: xr.Dataset, trials: Sequence[Trial]) -> list[xr.Dataset]:
 
 def _bytes_of(trial: Trial) -> float:
     """About what a trial's record takes while it walks."""
-    modules = trial.robot.body.modules
     # A module's joint, legs and servos at every sample, as the engine has them and as they are recorded.
-    numbers = 20 * modules + (6 * modules if trial.forces else 0) + (8 * modules if trial.poses else 0)
+    numbers = (20 + 6 * trial.forces + 8 * trial.poses) * trial.robot.body.modules
     return 8.0 * numbers * (trial.duration * trial.rate + 1.0)

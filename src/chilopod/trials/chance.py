@@ -28,13 +28,7 @@ _INNER = ("LOAD_ATTR", "LOAD_METHOD", "IMPORT_FROM")
 
 
 def by_chance(value: object) -> str:
-    """The name of a function that answers otherwise every time, or of a module of such functions; empty for all else.
-
-    Parameters
-    ----------
-    value
-        Any object.
-    """
+    """The name of a function that answers otherwise every time, or of a module of such functions; else empty."""
     of, name = getattr(value, "__self__", None), getattr(value, "__name__", "")
     if isinstance(of, type) and of.__module__ == "datetime" and name in _NOW:
         return f"{of.__name__}.{name}"
@@ -58,15 +52,8 @@ def _sources(modules: tuple[str, ...]) -> dict[int, str]:
 
 
 def chance_in(code: CodeType, space: Mapping[str, object]) -> str:
-    """The name of something that code loads and that answers otherwise every time; empty if there is none.
-
-    Parameters
-    ----------
-    code
-        Instructions, with those of functions within.
-    space
-        Values of global names, and of names from outer functions.
-    """
+    """The name of something that code, functions within included, loads and that answers otherwise every time; empty if
+    there is none. ``space`` has the values of global names, and of names from outer functions."""
     local: dict[str, Any] = {}
     here: Any = None
     package: Any = None

@@ -26,18 +26,10 @@ class Claims:
     """Trials that this process walks in a folder.
 
     A claim is a lock of the operating system's on one byte of an empty file in the folder; which byte follows from the
-    trial's name. It ends with the process that has it, however that ends, so nobody has to find out who is still alive.
-    On file systems of several machines it holds for all of them, where these have locks. Where there are no such locks
-    (they are Linux's, of open files) everybody is given every claim: then work is doubled, and nothing else, for who
-    walks the same trial writes the same file.
-
-    Parameters
-    ----------
-    folder
-        Folder of the trials.
-    sweep
-        Called at the end if nobody else is there: what is in the folder now and is no whole file was left over by
-        somebody who was killed.
+    trial's name. It ends with the process that has it, however that ends. Where there are no such locks (they are
+    Linux's, of open files) everybody is given every claim: then work is doubled, and nothing else. ``sweep`` is called
+    at the end if nobody else is there: what is in the folder now and is no whole file was left over by somebody who was
+    killed.
     """
 
     def __init__(self, folder: Path, sweep: Callable[[], object]) -> None:
@@ -70,13 +62,7 @@ class Claims:
             os.close(handle)
 
     def take(self, name: str) -> bool:
-        """True if a trial may be walked here: nobody else has it, and nobody else will be given it.
-
-        Parameters
-        ----------
-        name
-            Name of its file.
-        """
+        """True if the trial of a file may be walked here: nobody else has it, and nobody else will be given it."""
         with suppress(OSError):
             return self._handle is None or _locked(self._handle, _ALONE, _byte_of(name))
         return True
@@ -106,18 +92,16 @@ class Claims:
 
 def nobody_in(folder: Path) -> bool:
     """True if no process walks in a folder now, as far as can be told."""
-    try:
-        handle = _opened(folder / NAME)
-    except FileNotFoundError:
-        return True
-    except OSError:
-        return False
-    try:
-        return _locked(handle, _ALONE, _PRESENT)
-    except OSError:
-        return False
-    finally:
-        os.close(handle)
+    with suppress(OSError):
+        try:
+            handle = _opened(folder / NAME)
+        except FileNotFoundError:
+            return True
+        try:
+            return _locked(handle, _ALONE, _PRESENT)
+        finally:
+            os.close(handle)
+    return False
 
 
 def _byte_of(name: str) -> int:

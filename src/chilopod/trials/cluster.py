@@ -7,29 +7,55 @@ Files are written by the client alone, so workers need no disk in common with it
 from __future__ import annotations
 
 import asyncio
+import logging
+import multiprocessing
 import queue
+import signal
+import sys
+import tempfile
 import time
 from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from itertools import islice
+from multiprocessing import resource_tracker
+from multiprocessing.process import BaseProcess
 from typing import TYPE_CHECKING, Any, Self
 
-from chilopod.errors import ClusterError, one_line
-from chilopod.trials.dask_client import connected
+from chilopod.cores import cores
+from chilopod.errors import ClusterError, ParameterError, one_line
+from chilopod.extras import needs
+from chilopod.process import on_leave
 from chilopod.trials.executors import Pace
-from chilopod.trials.on_worker import packed, unpacked, walked_there
+from chilopod.trials.on_worker import PACKAGES, check_versions, packed, unpacked, versions, walked_there
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from chilopod.trials.trial import Trial
 
+_Answers = queue.SimpleQueue[tuple[int, bytes | BaseException]]
 _SHARES = 8  # batches that a worker gets of a study, at least, so that all are done at about the same time
 _AHEAD = 2  # batches a worker has, with that which it walks
 _LOOK = 1.0  # s between two looks at a cluster from which nothing comes
 _ANSWER = 10.0  # s until a scheduler has to answer
 _ALONE = 60.0  # s that a cluster may have no worker
 _MOST_SEEDS = 8  # that an error names
+_MOST = 1000  # worker processes of one machine
+_CONNECT = 4.0  # s until a scheduler has to answer
+_START = 60.0  # s until workers of our own have to be there
+_STOP = 1.0  # s that workers of our own have to finish by themselves
+_LOGGERS = ("distributed", "tornado", "asyncio")
+_BLAS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+_SETTINGS = {
+    "distributed.comm.timeouts.connect": f"{_CONNECT:g}s",
+    # What dask would put there it puts into this process's environment too.
+    "distributed.nanny.pre-spawn-environ": {},
+    # Of our own scheduler: deaths of its worker until a batch is given back, to be tried alone.
+    "distributed.scheduler.allowed-failures": 1,
+    # On a busy machine a worker takes its time to be there again; dask would give its place up.
+    "distributed.deploy.lost-worker-timeout": "1h",
+}
 
 
 class Cluster:
@@ -40,27 +66,22 @@ class Cluster:
 
     Parameters
     ----------
-    where
+    where, threads
         The address of a scheduler, such as ``tcp://10.0.0.1:8786``; or how many worker processes to start on this
-        machine.
-    threads
-        Threads of each worker process that is started here; by default its share of the cores.
+        machine, and threads of each, by default its share of the cores.
 
     Raises
     ------
-    ExtraError
-        If dask is not installed.
-    ClusterError
-        If it is not there, has no workers, or has another Python, chilopod, numpy or numba.
-    ParameterError
-        If there cannot be so many workers.
+    ExtraError, ParameterError, ClusterError
+        If dask is not installed; there cannot be so many workers; it is not there, has no workers, or has another
+        Python, chilopod, numpy or numba.
     """
 
     def __init__(self, where: str | int, threads: int | None = None) -> None:
         self._where = where
         self._stack, self._pace = ExitStack(), Pace()
         try:
-            self._client: Any = connected(where, threads, self._stack)
+            self._client: Any = _connected(where, threads, self._stack)
             self._seen = time.monotonic()
             self._threads: list[int] = list(self._client.nthreads().values())
         except BaseException:
@@ -88,8 +109,7 @@ class Cluster:
         return f", {self.workers} worker{'s' * (self.workers != 1)}"
 
     def cut(self, batches: Sequence[list[Trial]]) -> Iterator[list[Trial]]:
-        """In even pieces, so small that every worker gets several and is done with one in seconds, and not smaller than
-        a worker has threads."""
+        """In even pieces: every worker gets several, is done with one in seconds, and has work for all its threads."""
         threads = max(self._threads, default=1)
         trials = sum(len(batch) for batch in batches)
         largest = -(-trials // (_SHARES * max(self.workers, 1)))
@@ -100,16 +120,9 @@ class Cluster:
                 yield from self._pace.pieces(batch[i : i + size], threads)
 
     def walk(self, batches: Iterable[Sequence[Trial]]) -> Iterator[tuple[int, list[xr.Dataset]]]:
-        """The number of a batch and its records, as they come; a batch is taken when it is sent.
-
-        Raises
-        ------
-        ClusterError
-            If the cluster goes away or has no worker for a minute, or workers have other versions; or, when all else
-            is done, for batches that kill their workers.
-        ParameterError
-            If a controller's class cannot be imported on a worker.
-        """
+        """The number of a batch and its records, as they come; a batch is taken when it is sent. Raises ClusterError if
+        the cluster goes away or has no worker for a minute, if workers have other versions and, when all else is done,
+        for batches that kill their workers; ParameterError if workers cannot import a controller."""
         suspects: list[tuple[int, Sequence[Trial]]] = []
         yield from self._walk(enumerate(batches), suspects)
         # Dask blames all that a killed worker was given. What is killed alone, too, kills.
@@ -126,7 +139,7 @@ class Cluster:
         """Batches with their numbers; those that were given up go into ``killed``."""
         from distributed import KilledWorker
 
-        arrived: queue.SimpleQueue[tuple[int, bytes | BaseException]] = queue.SimpleQueue()
+        arrived: _Answers = queue.SimpleQueue()
         under_way: dict[int, tuple[Sequence[Trial], Any]] = {}
         waiting = iter(batches)
         try:
@@ -151,9 +164,7 @@ class Cluster:
             for _, future in under_way.values():
                 future.release()
 
-    def _sent(
-        self, index: int, batch: Sequence[Trial], arrived: queue.SimpleQueue[tuple[int, bytes | BaseException]]
-    ) -> Any:
+    def _sent(self, index: int, batch: Sequence[Trial], arrived: _Answers) -> Any:
         """Give a batch to the cluster, and see to it that its answer is fetched as soon as it is there; its future."""
         client, job = self._client, packed(batch)
         try:
@@ -173,7 +184,7 @@ class Cluster:
         asyncio.run_coroutine_threadsafe(fetch(), client.loop.asyncio_loop)
         return future
 
-    def _next(self, arrived: queue.SimpleQueue[tuple[int, bytes | BaseException]]) -> tuple[int, bytes | BaseException]:
+    def _next(self, arrived: _Answers) -> tuple[int, bytes | BaseException]:
         """The next answer, from a cluster that is there."""
         self._seen = time.monotonic()
         while True:
@@ -196,9 +207,8 @@ class Cluster:
 
     def _in_words(self, error: BaseException) -> ClusterError:
         """An error of dask's own."""
-        kinds = (OSError, TimeoutError, asyncio.CancelledError)
-        gone = self._client.status != "running" or isinstance(error, kinds) or "Cancelled" in type(error).__name__
-        if gone:
+        gone = isinstance(error, (OSError, TimeoutError, asyncio.CancelledError)) or "Cancelled" in type(error).__name__
+        if gone or self._client.status != "running":
             return self._error("the scheduler went away; what is kept in a folder goes on from here")
         return self._error(one_line(f"{type(error).__name__}: {error}"))
 
@@ -211,3 +221,122 @@ def _named(batch: Sequence[Trial]) -> str:
     first = batch[0]
     seeds = [str(trial.seed) for trial in batch[:_MOST_SEEDS]] + ["..."] * (len(batch) > _MOST_SEEDS)
     return f"{first.engine}, {first.robot.name}, {first.duration:g} s, seeds {', '.join(seeds)}"
+
+
+def _connected(where: str | int, threads: int | None, stack: ExitStack) -> Any:
+    """A ``distributed.Client`` of a cluster; leaving the stack closes all that was opened for it."""
+    if isinstance(where, int) and not 1 <= where <= _MOST:
+        raise ParameterError("is no number of workers", field="cluster", value=where, allowed=f"1 to {_MOST}")
+    needs("distributed", extra="cluster")
+    import dask
+    import distributed
+
+    for name in _LOGGERS:  # what they would log is said in one line, by us
+        logger = logging.getLogger(name)
+        stack.callback(logger.setLevel, logger.level)
+        logger.setLevel(logging.CRITICAL + 1)
+    stack.enter_context(dask.config.set(_SETTINGS))
+    if isinstance(where, int):
+        needs("cryptography", extra="cluster")
+        folder = tempfile.TemporaryDirectory(prefix="chilopod-cluster-", ignore_cleanup_errors=True)
+        on_leave.append(folder.cleanup)
+        stack.callback(on_leave.remove, folder.cleanup)
+        # Of the scheduler, which has no argument for it.
+        stack.enter_context(dask.config.set({"temporary-directory": stack.enter_context(folder)}))
+        return _own(where, threads or max(1, cores() // where), distributed, stack)
+    return _there(where, distributed, stack)
+
+
+def _there(address: str, distributed: Any, stack: ExitStack) -> Any:
+    """A client of a cluster that somebody started."""
+
+    async def asked() -> None:
+        secrets = distributed.Security().get_connection_args("client")
+        async with distributed.rpc(address, connection_args=secrets, timeout=_CONNECT) as scheduler:
+            if (await asyncio.wait_for(scheduler.identity(), _CONNECT))["type"] != "Scheduler":
+                raise ValueError("is a worker, no scheduler")
+
+    try:
+        # A client that cannot be made leaves a loop, a thread and a traceback behind, so somebody else knocks first; in
+        # a thread, because a notebook has a loop in this one.
+        with ThreadPoolExecutor(1) as knocking:
+            knocking.submit(asyncio.run, asked()).result()
+    except Exception as error:  # OSError, ValueError of an address, whatever comes of bytes that are not dask's
+        reason = "does not answer" if isinstance(error, OSError) else f"is none ({type(error).__name__}: {error})"
+        allowed = "the address of a dask scheduler"
+        raise ClusterError(one_line(reason), field="cluster", value=address, allowed=allowed) from None
+    client = distributed.Client(address, timeout=_CONNECT, set_as_default=False)
+    stack.callback(_closed, client)
+    try:
+        if not client.nthreads():
+            raise ClusterError("has no workers", field="cluster", value=address)
+        for place, there in client.run(versions, PACKAGES).items():
+            check_versions(versions(PACKAGES), there, f"{address}, {place}")
+    except ClusterError:
+        raise
+    except Exception as error:  # what a scheduler answers that is no scheduler, or goes away now
+        problem = f"cannot be used: {type(error).__name__}: {error}"
+        raise ClusterError(one_line(problem), field="cluster", value=address) from error
+    return client
+
+
+def _own(workers: int, threads: int, distributed: Any, stack: ExitStack) -> Any:
+    """A client of worker processes on this machine, which die with it."""
+    # Ctrl-C goes to all processes of the terminal; workers inherit from the thread that starts them, which is made
+    # here, that it is not for them. (Whoever starts Python's resource tracker is told to listen again.)
+    if sys.platform != "win32":
+        resource_tracker.ensure_running()
+    others = multiprocessing.active_children()
+    masks = hasattr(signal, "pthread_sigmask")
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if masks else set()
+    try:
+        cluster = distributed.LocalCluster(
+            n_workers=0,
+            threads_per_worker=threads,
+            host="127.0.0.1",
+            # Whoever reaches a scheduler runs code as its user: this one talks to those alone that have its keys.
+            security=distributed.Security.temporary(),
+            # Its server of figures on itself stays, without the dashboard, but on no port that others want.
+            scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
+            silence_logs=logging.CRITICAL,
+            memory_limit=None,
+            env=dict.fromkeys(("NUMBA_NUM_THREADS", *_BLAS), str(threads)),
+            preload=["chilopod.trials.on_worker"],
+        )
+    finally:
+        if masks:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    stack.callback(_stopped, cluster, others)
+    client = distributed.Client(cluster, timeout=_START, set_as_default=False, direct_to_workers=True)
+    stack.callback(_closed, client)
+    cluster.scale(workers)
+    try:
+        client.wait_for_workers(workers, timeout=_START)
+    except TimeoutError:
+        problem = "worker processes do not start; a script has to make its cluster under `if __name__ == '__main__':`"
+        raise ClusterError(problem, field="cluster", value=workers) from None
+    return client
+
+
+def _closed(client: Any) -> None:
+    with suppress(Exception):  # there may be nothing left to say goodbye to
+        client.close(timeout=_STOP)
+
+
+def _stopped(cluster: Any, others: Sequence[BaseProcess]) -> None:
+    """Stop workers, those too that walk or have just been started; left to itself dask waits for them. What ``others``
+    started goes on."""
+
+    async def stop() -> None:
+        nannies = list(cluster.workers.values())
+        await asyncio.gather(*(nanny.close(timeout=_STOP) for nanny in nannies), return_exceptions=True)
+
+    with suppress(Exception):
+        cluster.sync(stop)
+    for child in set(multiprocessing.active_children()) - set(others):
+        child.kill()
+    with suppress(Exception):
+        cluster.close(timeout=_STOP)
+    # When Python ends dask would try again for ten seconds, and tell of processes whose end it has not noticed.
+    cluster.shutdown_on_close = False
+    logging.getLogger("distributed.process").setLevel(logging.CRITICAL + 1)

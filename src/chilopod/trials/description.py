@@ -25,29 +25,13 @@ _described: ContextVar[dict[object, tuple[str, str]] | None] = ContextVar("descr
 
 
 def plain(value: object, field: str) -> Any:
-    """A value as numbers, text, lists and tables, different for different values.
-
-    Parameters
-    ----------
-    value
-        Number, text, None, enum, array, or a tuple or frozen dataclass of these: of classes their path, of a dataclass
-        the fields that count in comparisons. What code they have is told by :func:`code_of`.
-    field
-        Name of the field where it is refused.
-
-    Raises
-    ------
-    ParameterError
-        If it is, or has, anything else, naming the field.
-    """
+    """A number, text, None, enum, array, or a tuple or frozen dataclass of these, as JSON has it, different for
+    different values: of classes their path, of a dataclass the fields that count in comparisons. Raises ParameterError
+    for anything else, naming the field."""
     kind: Any = type(value)
     if isinstance(value, enum.Enum):
         return {"enum": path_of(kind), "name": value.name}
-    if (
-        value is None
-        or kind in (bool, float, str)
-        or (isinstance(value, int) and kind is int and abs(value) < _LARGEST)
-    ):
+    if value is None or kind in (bool, float, str) or (type(value) is int and abs(value) < _LARGEST):
         return value
     if isinstance(value, np.generic) or kind is np.ndarray:
         array = np.asarray(value)
@@ -70,14 +54,8 @@ def plain(value: object, field: str) -> Any:
 
 
 def code_of(value: object) -> tuple[str, str]:
-    """A digest of everything that the code of what :func:`plain` takes can reach, as it is now, and what of that
-    answers otherwise every time; empty for our own.
-
-    Raises
-    ------
-    UnknownKindError
-        If it reaches what cannot be described.
-    """
+    """Digest of everything that the code of a controller can reach, as it is now, and what of that answers otherwise
+    every time; empty for our own. Raises UnknownKindError if it reaches what cannot be described."""
     told: list[str] = []
     chances: list[str] = []
     for each in _parts(value):
@@ -94,25 +72,21 @@ def code_of(value: object) -> tuple[str, str]:
 
 
 def sources_of(engine: str) -> str:
-    """A digest of the module of an engine of one's own, and of all its own that it imports; empty for our own.
-
-    Raises
-    ------
-    UnknownKindError
-        If their files cannot be read.
-    """
+    """Digest of the module of an engine of one's own, and of all its own that it imports; empty for our own. Raises
+    UnknownKindError if a file cannot be read."""
     module = engine.partition(":")[0] if ":" in engine else "chilopod"
     return _once(sys.modules[module], module, module)[0]
 
 
 def _once(value: object, module: str, path: str) -> tuple[str, str]:
     top, known = module.partition(".")[0], _described.get()
+    if top == "chilopod":
+        return "", ""
     known = {} if known is None else known
     if value not in known:
         reach = Reach(top)
-        if top != "chilopod":
-            reach.see(value, path)
-        known[value] = reach.digest if top != "chilopod" else "", reach.chance
+        reach.see(value, path)
+        known[value] = reach.digest, reach.chance
     return known[value]
 
 
@@ -173,10 +147,10 @@ def _declared(value: Any) -> set[str]:
     """Attributes of an object that its class tells all about."""
     if isinstance(value, enum.Enum):
         return set(vars(value))
-    cached = {
-        name for each in type(value).__mro__ for name, part in vars(each).items() if isinstance(part, cached_property)
-    }
-    return cached.union(each.name for each in dataclasses.fields(value))
+    declared = {each.name for each in dataclasses.fields(value)}
+    for kind in type(value).__mro__:
+        declared.update(name for name, part in vars(kind).items() if isinstance(part, cached_property))
+    return declared
 
 
 def _counted(value: Any) -> list[str]:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chilopod.engine import Engine
 from chilopod.errors import ParameterError
+from chilopod.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -22,21 +25,19 @@ _DEVIATIONS = ("joint_angle", "heading", "friction", "bearing")
 class Disturbance:
     """Differences from trial to trial: standard deviations of independent normal deviates.
 
-    The same for every study and engine. None of it is printed in the paper. Of joints at 0.5, 1, 2 deg and feet at 2,
-    4, 8 % the middle is the smallest spread with which the twin does what the robot did at k1 = 28 N*mm/deg: most walks
-    curve, to both sides (5, 7 and 8 of 10 after 90 s). A heading of 1 deg is careful setting up by hand; the bearing's
-    error is the scanner's step of 0.352 deg with an extended target.
+    None of it is printed in the paper. Of joints at 0.5, 1, 2 deg and feet at 2, 4, 8 % the middle is the smallest
+    spread with which the twin does what the robot did at k1 = 28 N*mm/deg: most walks curve, to both sides (5, 7 and 8
+    of 10 after 90 s). A heading of 1 deg is careful setting up by hand; the bearing's error is the scanner's step of
+    0.352 deg with an extended target.
 
     Attributes
     ----------
-    joint_angle
-        Joint angle of every yaw joint at the start, rad.
-    heading
-        Heading of module 1 at the start, rad.
+    joint_angle, heading
+        Deviation of every yaw joint, and of the heading of module 1, at the start, rad.
     friction
-        Friction of the logarithm of every foot's friction coefficient.
+        Deviation of the logarithm of every foot's friction coefficient.
     bearing
-        Bearing of every measured bearing, rad. The twin's scanner has noise of its own instead, if this is not zero.
+        Deviation of every measured bearing, rad. The twin's scanner has noise of its own instead, if this is not zero.
     missed
         Part of its looks at which the scanner misses the target, on a course.
     slick
@@ -73,18 +74,12 @@ class Drawn:
 
     Attributes
     ----------
-    joint_angles
-        At the start, rad, shape (N-1,).
-    heading
-        At the start, rad.
-    friction
-        Factors on the friction coefficients of feet, shape (N, 2).
-    bearing
-        Errors of the measured bearings, rad, shape (looks,).
-    missed
-        True if the scanner misses the target, shape (looks,).
-    scan_seed
-        Scan seed of the noise of a scanner that has its own.
+    joint_angles, heading, friction
+        Joint angles, shape (N-1,), and heading at the start, rad; factors on the friction coefficients of feet, shape
+        (N, 2).
+    bearing, missed, scan_seed
+        Errors of the measured bearings, rad, and whether the scanner misses the target, shape (looks,); seed of the
+        noise of a scanner that has its own.
     """
 
     joint_angles: Array
@@ -98,21 +93,8 @@ class Drawn:
 def draw(
     disturbance: Disturbance, seed: int, modules: int, looks: int, joint_angles: Sequence[float] | None = None
 ) -> Drawn:
-    """Draw what differs; each kind has its own stream of numbers.
-
-    Parameters
-    ----------
-    disturbance
-        Size of the disturbance.
-    seed
-        0 or more.
-    modules
-        Modules of the robot.
-    looks
-        Largest number of looks at its target.
-    joint_angles
-        About which those at the start are, rad; by default straight.
-    """
+    """Draw a disturbance for a robot of so many modules that looks at its target so often, each kind from its own
+    stream of numbers. The joint angles at the start are about ``joint_angles``, rad, by default straight."""
     streams = np.random.SeedSequence(seed).spawn(6)
     joints, heading, friction, bearing = (np.random.default_rng(each) for each in streams[:4])
     feet = np.exp(disturbance.friction * friction.standard_normal((modules, 2)))
@@ -128,3 +110,13 @@ def draw(
         missed.random(looks) < disturbance.missed,
         int(streams[4].generate_state(1)[0]),
     )
+
+
+def conditions(engine: Engine, robot: Robot, drawn: Sequence[Drawn], noisy: bool) -> dict[str, Any]:
+    """Arguments with which an engine starts walks as drawn, ``noisy`` with noise of its own sensors if it has any."""
+    angles, headings = np.stack([each.joint_angles for each in drawn]), np.array([each.heading for each in drawn])
+    return {
+        "initial": engine.initial_states(robot, angles, headings),
+        "friction": np.stack([each.friction for each in drawn]),
+        "seeds": [each.scan_seed for each in drawn] if noisy and engine.traits.noisy else None,
+    }

@@ -22,10 +22,7 @@ _LANES = 8  # robots that a core walks at once in the planar model
 
 
 class Executor(Protocol):
-    """Walks batches of trials, somewhere.
-
-    The records do not depend on where: the same trial has the same bits on every executor.
-    """
+    """Walks batches of trials, somewhere: the same trial has the same bits on every executor."""
 
     @property
     def words(self) -> str:
@@ -37,19 +34,14 @@ class Executor(Protocol):
         ...
 
     def walk(self, batches: Iterable[Sequence[Trial]]) -> Iterator[tuple[int, list[xr.Dataset]]]:
-        """The number of a batch and its records, of every batch as soon as it is done, in any order.
-
-        A batch is taken when its walk begins, not before: what nobody has begun, another process may. Whoever takes
-        records writes them; one who stops taking them stops the walks.
-        """
+        """The number of a batch and its records, of every batch as soon as it is done, in any order. A batch is taken
+        when its walk begins, not before: what nobody has begun, another process may. Who stops taking records stops the
+        walks."""
         ...
 
 
 class Pace:
-    """How many trials are a few seconds' work, by how long the last ones took.
-
-    What somebody is killed at is lost, so a batch takes no longer than that; how it is cut changes no bit.
-    """
+    """How many trials are a few seconds' work, by how long the last ones took: what somebody is killed at is lost."""
 
     def __init__(self) -> None:
         self._speeds: dict[str, float] = {}  # of engines: s of walks that a core does in a second
@@ -105,11 +97,8 @@ def current() -> Executor:
 
 @contextmanager
 def using(executor: Executor) -> Iterator[None]:
-    """Let everything that runs trials in this block, studies and tasks included, run them there.
-
-    It holds for this thread and for tasks of asyncio made in the block, not for threads started in it: these have
-    to say it again.
-    """
+    """Let everything that runs trials in this block, studies and tasks included, run them there, in this thread and in
+    tasks of asyncio made in the block, not in threads started in it."""
     token = _CURRENT.set(executor)
     try:
         yield

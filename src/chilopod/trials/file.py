@@ -28,18 +28,8 @@ class Header:
 
 
 def content_of(record: xr.Dataset) -> bytes:
-    """A record as it stands in its file.
-
-    Parameters
-    ----------
-    record
-        Floating-point numbers, integers of 32 bits, truth values and text; no dimension of length 0.
-
-    Raises
-    ------
-    OutputError
-        If it holds anything else.
-    """
+    """A record as it stands in its file. Raises OutputError if it holds anything but floating-point numbers, integers
+    of 32 bits, truth values and text, or has a dimension of length 0."""
     if not all(record.sizes.values()):
         sizes = {str(name): size for name, size in record.sizes.items()}
         raise OutputError("has a dimension of length 0 and cannot be kept", field="record", value=sizes)
@@ -69,10 +59,8 @@ def _as_stored(field: str, values: NDArray[Any]) -> tuple[NDArray[Any], dict[str
     kind = values.dtype.kind
     if kind == "f":
         return values, {}
-    if kind == "b":
-        return values.astype(np.int32), {"dtype": "bool"}
-    if kind in "iu" and np.array_equal(values.astype(np.int32), values):
-        return values.astype(np.int32), {}
+    if kind in "biu" and np.array_equal(values.astype(np.int32), values):
+        return values.astype(np.int32), {"dtype": "bool"} if kind == "b" else {}
     if kind == "U" or (kind == "O" and all(isinstance(each, str) for each in values.flat)):
         encoded = np.char.encode(values.astype(str), "utf-8")
         encoded = encoded.astype(f"S{max(1, encoded.dtype.itemsize)}")
@@ -82,22 +70,14 @@ def _as_stored(field: str, values: NDArray[Any]) -> tuple[NDArray[Any], dict[str
 
 def _describe(target: Any, field: str, attributes: Mapping[Any, Any]) -> None:
     for name, value in attributes.items():
-        if isinstance(value, bool | int | float | np.number):
-            setattr(target, str(name), np.float64(value))
-        elif isinstance(value, str):
-            setattr(target, str(name), value.encode())
-        else:
+        if not isinstance(value, str | bool | int | float | np.number):
             raise OutputError("cannot be kept in a file", field=f"{field}.attrs[{name!r}]", value=value)
+        setattr(target, str(name), value.encode() if isinstance(value, str) else np.float64(value))
 
 
 def read_record(path: Path) -> xr.Dataset:
-    """A record as it was walked: of the same types, and with nothing about the file.
-
-    Raises
-    ------
-    FileNotFoundError, UnsoundError, OutputError
-        As for :func:`chilopod.netcdf.unsealed`.
-    """
+    """A record as it was walked: of the same types, and with nothing about the file. Raises what
+    :func:`chilopod.netcdf.unsealed` does."""
     try:
         record = xr.load_dataset(io.BytesIO(unsealed(path)), engine="scipy").drop_encoding()
     except UnsoundError:
@@ -113,20 +93,8 @@ def read_record(path: Path) -> xr.Dataset:
 
 
 def read_header(path: Path, *, whole: bool = False) -> Header:
-    """Header of a record's file.
-
-    Parameters
-    ----------
-    path
-        The file.
-    whole
-        True if all of it is held against its seal; otherwise its length alone is.
-
-    Raises
-    ------
-    FileNotFoundError, UnsoundError, OutputError
-        As for :func:`chilopod.netcdf.unsealed`.
-    """
+    """Header of a record's file, all of which is held against its seal if ``whole``, otherwise its length alone. Raises
+    what :func:`chilopod.netcdf.unsealed` does."""
     if whole:
         unsealed(path)
     with sealed_file(path) as file:

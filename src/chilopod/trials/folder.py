@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from chilopod.engine import ENGINES
 from chilopod.errors import OutputError, ParameterError
@@ -26,22 +26,12 @@ _ASIDE = re.compile(_TRIAL.pattern + r"\.aside\d*")
 _UNFINISHED = ".chilopod-"
 _EVERY = 50  # files between two signs of life
 
+Wrong = list[tuple[Path, str]]  # what is wrong with each
 
-@dataclass(frozen=True)
-class Contents:
-    """The names in a folder, each in one of these.
 
-    Attributes
-    ----------
-    trials
-        Called as records of trials are.
-    aside
-        Files that stood in the place of a record and were none.
-    unfinished
-        Files that processes write, or could not finish before they were killed.
-    foreign
-        All else; chilopod did not write it.
-    """
+class Contents(NamedTuple):
+    """The names in a folder: records of trials, files that stood in the place of a record, files that processes write
+    or could not finish before they were killed, and all else, which chilopod did not write."""
 
     trials: tuple[Path, ...]
     aside: tuple[Path, ...]
@@ -49,24 +39,10 @@ class Contents:
     foreign: tuple[Path, ...]
 
 
-@dataclass(frozen=True)
-class Kept:
-    """A trial that is kept, as its file's header says.
-
-    Attributes
-    ----------
-    path
-        Path of the file.
-    size
-        Size of the file, bytes.
-    robot
-        Name of the robot.
-    told
-        The trial's text, see :attr:`chilopod.trials.Trial.text`.
-    found
-        True if this version of chilopod and of the engine takes it for what it would walk; of an engine of one's own
-        its version is not looked at.
-    """
+class Kept(NamedTuple):
+    """A trial that is kept, as its file's header says: path and size of the file (bytes), name of the robot, and
+    :attr:`chilopod.trials.Trial.text`. It is ``found`` if this version of chilopod and of the engine takes it for what
+    it would walk; of an engine of one's own its version is not looked at."""
 
     path: Path
     size: int
@@ -76,71 +52,39 @@ class Kept:
 
 
 def contents(folder: Path) -> Contents:
-    """The names in a folder, in order.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such folder, or it cannot be read.
-    """
-    trials, aside, unfinished, foreign = [], [], [], []
+    """The names in a folder, in order. Raises ParameterError if there is no such folder, or it cannot be read."""
+    trials, aside, unfinished, foreign = list[Path](), list[Path](), list[Path](), list[Path]()
     try:
         with os.scandir(folder) as entries:
             for entry in entries:
-                own = entry.is_file(follow_symlinks=False)
+                file, paths = entry.is_file(follow_symlinks=False), foreign
                 if _TRIAL.fullmatch(entry.name):
-                    trials.append(folder / entry.name)
-                elif own and _ASIDE.fullmatch(entry.name):
-                    aside.append(folder / entry.name)
-                elif own and entry.name.startswith(_UNFINISHED):
-                    unfinished.append(folder / entry.name)
-                else:
-                    foreign.append(folder / entry.name)
+                    paths = trials
+                elif file and _ASIDE.fullmatch(entry.name):
+                    paths = aside
+                elif file and entry.name.startswith(_UNFINISHED):
+                    paths = unfinished
+                paths.append(folder / entry.name)
     except OSError as error:
         raise ParameterError(f"is no folder of trials ({error.strerror})", field="folder", value=str(folder)) from None
     return Contents(*(tuple(sorted(each)) for each in (trials, aside, unfinished, foreign)))
 
 
-def kept(paths: Sequence[Path], progress: Progress = silent) -> tuple[list[Kept], list[tuple[Path, str]]]:
-    """Headers of the files that can be read, and for each of the others what is wrong with it.
-
-    Parameters
-    ----------
-    paths
-        Paths of :func:`contents`.
-    progress
-        Called with the part done (0 to 1) and a few words.
-    """
+def kept(paths: Sequence[Path], progress: Progress = silent) -> tuple[list[Kept], Wrong]:
+    """Headers of the files that can be read, and what is wrong with the others."""
     return _looked_at(paths, read_header, progress)
 
 
-def checked(paths: Sequence[Path], progress: Progress = silent) -> tuple[list[Kept], list[tuple[Path, str]]]:
+def checked(paths: Sequence[Path], progress: Progress = silent) -> tuple[list[Kept], Wrong]:
     """The same of files that are whole to the last byte, and have the name that their trial has."""
     return _looked_at(paths, partial(read_header, whole=True), progress)
 
 
-def clean(folder: Path, *, old: bool = False, dry: bool = False) -> tuple[list[Path], list[tuple[Path, str]]]:
+def clean(folder: Path, *, old: bool = False, dry: bool = False) -> tuple[list[Path], Wrong]:
     """Remove what is no trial's record and was written by chilopod: what was set aside, or left over by who was killed.
 
-    Parameters
-    ----------
-    folder
-        Folder of trials.
-    old
-        True to remove the records of other versions, too.
-    dry
-        True to remove nothing.
-
-    Returns
-    -------
-    What was (or would be) removed, and what is left for a reason.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such folder.
-    OutputError
-        If a file cannot be removed.
+    With ``old`` the records of other versions go too; with ``dry`` nothing goes. Returns what was (or would be)
+    removed, and what is left for a reason. Raises OutputError if a file cannot be removed.
     """
     found = contents(folder)
     remove = list(found.aside)
@@ -161,28 +105,9 @@ def clean(folder: Path, *, old: bool = False, dry: bool = False) -> tuple[list[P
 
 @dataclass(frozen=True)
 class Group:
-    """Trials of robots of one name that differ in nothing but the robots' numbers, their seeds, and where the
-    targets of a course are.
-
-    Attributes
-    ----------
-    robot, engine, controller
-        By name; no controller is None.
-    duration
-        s.
-    target
-        Bearing, rad, and distance, m; of a course how many targets it has; None where there is none.
-    found
-        See :class:`Kept`.
-    robots
-        Number of robots, told apart by their numbers.
-    seeds
-        Seeds of those that are disturbed, in order.
-    count
-        Count of the trials.
-    size
-        Size of all files, bytes.
-    """
+    """Trials of robots of one name that differ in nothing but the robots' numbers, their seeds, and where the targets
+    of a course are: what they share, number of robots, seeds of those that are disturbed, number of trials, and size of
+    all files, bytes. The target is bearing, rad, and distance, m, or how many a course has."""
 
     robot: str
     engine: str
@@ -200,53 +125,28 @@ def groups(trials: Sequence[Kept]) -> list[Group]:
     """Trials in groups, in order of their names."""
     alike: dict[tuple[Any, ...], list[Kept]] = {}
     for each in trials:
-        alike.setdefault(_what_groups_share(each), []).append(each)
+        # Other versions may tell less, or otherwise.
+        controller, target = each.told.get("controller"), each.told.get("target")
+        name = str(controller.get("class", "")).partition(" ")[0] if isinstance(controller, dict) else None
+        if isinstance(target, dict):
+            target = len(target.get("goals", ()))
+        goal = tuple(target) if isinstance(target, list) else target
+        shared = each.robot, each.told["engine"], name, each.told["duration"], goal, each.found
+        alike.setdefault(shared, []).append(each)
     found = []
-    for (robot, engine, controller, duration, target, is_found), group in alike.items():
-        told = [each.told for each in group]
-        found.append(
-            Group(
-                robot=robot,
-                engine=engine,
-                controller=controller,
-                duration=duration,
-                target=target,
-                found=is_found,
-                robots=len({each.get("robot") for each in told}),
-                seeds=tuple(sorted({each["seed"] for each in told if any(each.get("disturbance", {}).values())})),
-                count=len(group),
-                size=sum(each.size for each in group),
-            )
-        )
+    for shared, group in alike.items():
+        texts = [each.told for each in group]
+        robots = len({each.get("robot") for each in texts})
+        seeds = sorted({each["seed"] for each in texts if any(each.get("disturbance", {}).values())})
+        found.append(Group(*shared, robots, tuple(seeds), len(group), sum(each.size for each in group)))
     return sorted(found, key=lambda group: (group.robot, group.engine, repr(group)))
-
-
-def _what_groups_share(trial: Kept) -> tuple[Any, ...]:
-    # Other versions may tell less, or otherwise.
-    told = trial.told
-    controller = told.get("controller")
-    return (
-        trial.robot,
-        told["engine"],
-        str(controller.get("class", "")).partition(" ")[0] if isinstance(controller, dict) else None,
-        told["duration"],
-        _target_of(told),
-        trial.found,
-    )
-
-
-def _target_of(told: dict[str, Any]) -> tuple[float, ...] | int | None:
-    target = told.get("target")
-    if isinstance(target, dict):
-        return len(target.get("goals", ()))
-    return tuple(target) if isinstance(target, list) else None
 
 
 def _looked_at(
     paths: Sequence[Path], header_of: Callable[[Path], Header], progress: Progress
-) -> tuple[list[Kept], list[tuple[Path, str]]]:
+) -> tuple[list[Kept], Wrong]:
     found: list[Kept] = []
-    wrong: list[tuple[Path, str]] = []
+    wrong: Wrong = []
     for index, path in enumerate(paths):
         if index % _EVERY == 0:
             progress(index / len(paths), f"{index} of {len(paths)} trials")
@@ -271,15 +171,9 @@ def _kept(path: Path, header: Header) -> Kept:
         told = json.loads(text)
         # TOML begins with what stands in no section.
         robot = tomllib.loads(header.attributes["robot"].partition("\n[")[0])["name"]
-        here = _versions(told["engine"])
-        found = all(told.get(name) == version for name, version in here.items())
+        ours = told["engine"] in ENGINES
+        here = versions_of(told["engine"] if ours else ENGINES[0])
+        found = all(told.get(name) == here[name] for name in here if ours or name != "engine_version")
     except (LookupError, TypeError, ValueError, AttributeError):
         raise UnsoundError("is damaged or was edited") from None
     return Kept(path, header.size, robot, told, found)
-
-
-def _versions(engine: str) -> dict[str, Any]:
-    here = versions_of(engine if engine in ENGINES else ENGINES[0])
-    if engine not in ENGINES:
-        del here["engine_version"]
-    return here

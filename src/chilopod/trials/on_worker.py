@@ -6,6 +6,7 @@ Nothing here imports more than it must before it is called: the scheduler, which
 from __future__ import annotations
 
 import pickle
+import sys
 import threading
 import time
 import traceback
@@ -36,23 +37,18 @@ _PR_SET_PDEATHSIG = 1  # of prctl(2)
 
 def versions(packages: Sequence[str] = (*PACKAGES, TWIN_PACKAGE)) -> dict[str, str]:
     """Versions of what makes a record what it is, in this process."""
-    found = {_SOURCES: digest()[:_DIGITS]}
+    found = {"python": "{}.{}".format(*sys.version_info), _SOURCES: digest()[:_DIGITS]}
     for package in packages:
-        try:
-            found[package] = metadata.version(package)
-        except metadata.PackageNotFoundError:
-            found[package] = "none"
+        if package not in found:
+            try:
+                found[package] = metadata.version(package)
+            except metadata.PackageNotFoundError:
+                found[package] = "none"
     return found
 
 
 def check_versions(expected: Mapping[str, str], found: Mapping[str, str], place: str) -> None:
-    """Make sure that a worker has the versions that the client has.
-
-    Raises
-    ------
-    ClusterError
-        If one is another; says which.
-    """
+    """Raise a ClusterError that says which version is another on a worker, if one is."""
     for name, wanted in expected.items():
         there = found.get(name, "none")
         if there != wanted:
@@ -60,13 +56,8 @@ def check_versions(expected: Mapping[str, str], found: Mapping[str, str], place:
 
 
 def packed(batch: Sequence[Trial]) -> bytes:
-    """A batch as it travels to a worker: what it needs there, and its trials.
-
-    Raises
-    ------
-    ParameterError
-        If the trials cannot travel: another process could not find, or tell apart, what steers them.
-    """
+    """A batch as it travels to a worker: what it needs there, and its trials. Raises ParameterError if another process
+    could not find, or tell apart, what steers them."""
     for trial in batch:
         if trial.code[1]:
             raise ParameterError(trial.not_kept(trial.code[1]), field="cluster", allowed="to walk them on this machine")
@@ -79,10 +70,8 @@ def packed(batch: Sequence[Trial]) -> bytes:
 
 
 def walked_there(job: bytes, place: str) -> bytes:
-    """Walk a batch on the worker that this is called on; what goes back is for :func:`unpacked`.
-
-    A fault is an answer too: raised here, dask would write its traceback on the terminal.
-    """
+    """Walk a batch on the worker that this is called on; what goes back is for :func:`unpacked`, a fault too: dask
+    would write its traceback on the terminal."""
     try:
         with _ONE_AT_A_TIME:  # the batch has all threads of this worker
             answer = pickle.dumps(_walked(job, place), pickle.HIGHEST_PROTOCOL)
@@ -106,12 +95,9 @@ def unpacked(answer: bytes) -> Any:
 
 def dask_setup(worker: object) -> None:
     """Called in every worker process that a client starts on its own machine: it dies with its client, not by Ctrl-C.
-
-    Dask sees to that too, but only between two batches: a thread of Python's does it, and compiled code holds the lock.
-    """
+    (Dask sees to that too, but only between two batches: compiled code holds the lock.)"""
     import ctypes
     import signal
-    import sys
 
     with suppress(ValueError):  # only the main thread may say so
         signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -122,7 +108,7 @@ def dask_setup(worker: object) -> None:
 
 def _walked(job: bytes, place: str) -> Any:
     expected, texts, packed_trials = pickle.loads(job)
-    check_versions(expected, versions(tuple(name for name in expected if name != _SOURCES)), place)
+    check_versions(expected, versions(tuple(expected)), place)
     try:
         trials = pickle.loads(packed_trials)
     except Exception as error:  # whatever somebody else's module does when it is imported
@@ -150,10 +136,7 @@ def _walked(job: bytes, place: str) -> Any:
 
 
 def _not_importable(controller: object, error: Exception) -> ParameterError:
-    kind = type(controller)
-    return ParameterError(
-        f"cannot be imported on a worker ({one_line(f'{type(error).__name__}: {error}')})",
-        field="controller",
-        value=None if controller is None else f"{kind.__module__}:{kind.__qualname__}",
-        allowed="a class in a module that is on the path of the workers",
-    )
+    problem = f"cannot be imported on a worker ({one_line(f'{type(error).__name__}: {error}')})"
+    value = None if controller is None else path_of(type(controller))
+    allowed = "a class in a module that is on the path of the workers"
+    return ParameterError(problem, field="controller", value=value, allowed=allowed)

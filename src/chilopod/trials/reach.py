@@ -4,7 +4,7 @@ A walk over objects, from a class through its bases, attributes, functions, clos
 that functions name. Code of others (Python, installed packages, chilopod) is described by name and version, code of
 one's own down to its instructions and constants. What is looked up by names made while the code runs cannot be seen
 so: therefore every module of one's own counts as a whole too, with all modules of one's own that it imports. What is
-none of the kinds in the table below is refused. Files that code reads, clocks and networks are not code.
+none of the kinds in the table below is refused.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import hashlib
 import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from functools import lru_cache
 from importlib import import_module, metadata
 from pathlib import Path
@@ -71,18 +72,9 @@ class UnknownKindError(Exception):
 
 
 class Reach:
-    """A digest of everything that can be reached from the objects that it is shown, in order.
-
-    Parameters
-    ----------
-    own
-        Top-level package that is one's own even where it is installed.
-
-    Attributes
-    ----------
-    chance
-        First thing seen that answers otherwise every time, see :mod:`chilopod.trials.chance`; empty if nothing.
-    """
+    """A digest of everything that can be reached from the objects that it is shown, in order; ``own`` is a top-level
+    package that is one's own even where it is installed. ``chance`` is the first thing seen that answers otherwise
+    every time, see :mod:`chilopod.trials.chance`; empty if nothing."""
 
     def __init__(self, own: str = "") -> None:
         self._own, self.chance = own, ""
@@ -96,13 +88,7 @@ class Reach:
         return self._hash.hexdigest()[:16]
 
     def see(self, value: object, path: str) -> None:
-        """Add an object, reached as ``path`` says, and all that can be reached from it.
-
-        Raises
-        ------
-        UnknownKindError
-            If there is something of a kind that nobody can describe.
-        """
+        """Add an object, reached as ``path`` says, and all that can be reached from it, or raise UnknownKindError."""
         try:
             self._see(value, path)
         except UnknownKindError:
@@ -114,8 +100,7 @@ class Reach:
         kind = type(value)
         if kind in _ATOMS:
             return self._put(kind.__name__, hex(value) if isinstance(value, int) else repr(value))
-        named = self._named(value)
-        if named:
+        if named := self._named(value):
             self._found_chance(path, "" if isinstance(value, ModuleType) else by_chance(value))
             return self._put("named", named)
         if kind not in _VALUES:
@@ -151,7 +136,7 @@ class Reach:
         if isinstance(value, type):
             return self._class(value)
         if kind is np.ndarray and not value.dtype.hasobject:
-            return _array_parts(value)
+            return iter([(".dtype", str(value.dtype.descr)), (".shape", value.shape), ("[...]", value.tobytes())])
         if isinstance(value, enum.Enum):
             return _attributes("_name_", "_value_", "__class__")(value)
         if isinstance(getattr(value, "py_func", None), FunctionType):  # as numba keeps it
@@ -160,25 +145,19 @@ class Reach:
 
     def _instance(self, value: Any, kind: type, path: str) -> Parts:
         """State that pickle would keep, of classes that hide nothing from it."""
-        unknown = UnknownKindError(f"{path}: an object of type {kind.__qualname__}")
-        for each in filter(lambda each: self._is_own(each.__module__), kind.__mro__):
-            for how in vars(each).keys() & _HIDING:
-                if self._is_own(getattr(vars(each)[how], "__globals__", {}).get("__name__", "")):
-                    raise unknown
-        try:
+        own = [vars(each) for each in kind.__mro__ if self._is_own(each.__module__)]
+        hiding = [each[how] for each in own for how in each.keys() & _HIDING]
+        hides = any(self._is_own(getattr(each, "__globals__", {}).get("__name__", "")) for each in hiding)
+        found: Any = None
+        with suppress(Exception):
             reduce = copyreg.dispatch_table.get(kind)
-            found = reduce(value) if reduce else value.__reduce_ex__(4)
-        except Exception:
-            raise unknown from None
+            found = None if hides else reduce(value) if reduce else value.__reduce_ex__(4)
         if not isinstance(found, tuple):
-            raise unknown
+            raise UnknownKindError(f"{path}: an object of type {kind.__qualname__}")
         for part in (kind, *found[:3], *(list(each) for each in found[3:5] if each is not None)):
             yield "", part
         if isinstance(value, np.ndarray):  # pickle leaves out what a subclass adds
             yield ".__dict__", getattr(value, "__dict__", None)
-
-    # -- code
-    # ---------------------------------------------------------------------------------------------------------------
 
     def _function(self, function: FunctionType, path: str) -> Parts:
         if function.__globals__.get("__name__") == "functools" and hasattr(function, "registry"):
@@ -209,9 +188,9 @@ class Reach:
     def _module(self, module: ModuleType, path: str) -> Parts:
         """The text of a module of one's own, and of all those that it imports."""
         file = getattr(module, "__file__", None)
+        if file is None and hasattr(module, "__path__"):
+            return
         if file is None:
-            if hasattr(module, "__path__"):
-                return
             raise UnknownKindError(f"{path}: a module without a file")
         content = Path(file).read_bytes()
         code = _compiled(content) if file.endswith(".py") else None
@@ -264,9 +243,6 @@ class Reach:
                     found |= {part: inner} if isinstance(inner, ModuleType) else {}
         return found
 
-    # -- code of others
-    # ---------------------------------------------------------------------------------------------------------------
-
     def _named(self, value: Any) -> str:
         """Name and version of what a package of others has under its own name; empty for all else."""
         module: Any
@@ -274,8 +250,7 @@ class Reach:
         if isinstance(value, ModuleType):
             module, name = value.__name__, ""
         elif isinstance(value, np.ufunc):
-            name = value.__name__
-            module = "numpy" if hasattr(np, name) else "scipy.special"
+            module, name = "numpy" if hasattr(np, value.__name__) else "scipy.special", value.__name__
         elif callable(value) and not self._is_own(type(value).__module__):
             name = getattr(value, "__qualname__", None)
             # What wraps another has that one's module.
@@ -291,10 +266,6 @@ class Reach:
 
     def _is_own(self, module: str) -> bool:
         return module.partition(".")[0] == self._own or not _brought_by(module)
-
-
-def _array_parts(array: Any) -> Parts:
-    return iter([(".dtype", str(array.dtype.descr)), (".shape", array.shape), ("[...]", array.tobytes())])
 
 
 def _dict_parts(values: Mapping[Any, object]) -> Parts:

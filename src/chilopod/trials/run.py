@@ -1,24 +1,29 @@
-"""Running trials: in batches on all cores, each batch's records written as soon as it is done."""
+"""Running trials batch by batch, alone or with other processes that keep theirs in the same folder."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
+from chilopod.errors import AnalysisError
 from chilopod.output import check_room
 from chilopod.progress import Progress, silent
 from chilopod.record import check_memory
-from chilopod.trials.batch import batches
+from chilopod.trials.batch import NOT_KEPT, batches
 from chilopod.trials.description import meanwhile_unchanged
 from chilopod.trials.executors import Executor, current
-from chilopod.trials.sharing import alone, shared
 from chilopod.trials.store import Store
 from chilopod.trials.trial import Trial
 
+_Walked = list[tuple[Trial, xr.Dataset]]
+
 _COPIES = 2  # of a record: as the engine has it and as it is given; of many, each and all together
+_LOOK = 0.2  # s between two looks whether other processes are done
+_PATIENCE = 120.0  # s in which they have to be done with one trial; one that is stopped never is
 
 
 def run(
@@ -40,19 +45,15 @@ def run(
         Called with the part done (0 to 1) and a few words.
     executor
         Executor that walks the batches; by default what :func:`using` says, and without that all cores of this machine.
-        The records are the same to the bit.
 
     Returns
     -------
-    The record of every trial, see :func:`chilopod.planar.simulate` and :func:`chilopod.twin.simulate`, with one
-    ``robot`` and the trial in the attributes.
+    The record of every trial, with one ``robot`` and the trial in the attributes.
 
     Raises
     ------
-    ParameterError
-        If memory cannot hold the records.
-    OutputError
-        If the folder has no room for them.
+    ParameterError, OutputError
+        If memory cannot hold the records, or the folder has no room for them.
     """
     trials = as_now(trials)
     check_fits(trials)
@@ -61,13 +62,7 @@ def run(
 
 
 def check_fits(trials: Sequence[Trial]) -> None:
-    """Refuse trials whose records memory cannot hold all together.
-
-    Raises
-    ------
-    ParameterError
-        With what they would take.
-    """
+    """Raise ParameterError if memory cannot hold the records of trials all together."""
     check_memory(_COPIES * sum(trial.least_bytes for trial in trials))
 
 
@@ -77,52 +72,30 @@ def run_each(
     progress: Progress = silent,
     executor: Executor | None = None,
 ) -> Iterator[tuple[Trial, xr.Dataset]]:
-    """Run trials, or read what has been run before, and give each different one and its record as soon as it is there,
-    in any order: memory holds a batch at a time.
-
-    Parameters
-    ----------
-    trials, folder, progress, executor
-        As for :func:`run`.
-    """
+    """Run trials, or read what has been run before, as :func:`run` does, and give each different one and its record as
+    soon as it is there, in any order: memory holds a batch at a time."""
     yield from _each(as_now(trials), folder, progress, executor)
 
 
 def _each(
     trials: Sequence[Trial], folder: str | Path | None, progress: Progress, executor: Executor | None
 ) -> Iterator[tuple[Trial, xr.Dataset]]:
-    store = None if folder is None else Store(folder)
     asked = {trial.file_name: trial for trial in trials}
-    kept = [trial for trial in asked.values() if store and store.has(trial)]
-    executor, done = current() if executor is None else executor, len(kept)
-
-    def walk(missing: Sequence[Trial]) -> Iterator[tuple[Trial, xr.Dataset]]:
-        nonlocal done
-        if store:
-            check_room(store.folder, sum(trial.least_bytes for trial in missing))
-        share = batches(missing)
-        check_memory(_COPIES * max((sum(trial.least_bytes for trial in batch) for batch in share), default=0.0))
-        progress(done / max(len(asked), 1), f"{done} of {len(asked)} trials")
-        steps = shared(missing, store, executor) if store and missing else alone(executor.cut(share), executor)
-        for walked, elsewhere in steps:
-            yield from walked
-            done += len(walked)
-            words = f"{done} of {len(asked)} trials{executor.words}"
-            progress(done / len(asked), f"{words}, {elsewhere} walked by another process" if elsewhere else words)
-
+    store = None if folder is None else Store(folder)
+    kept = {name: trial for name, trial in asked.items() if store and store.has(trial)}
+    study = _Study(store, current() if executor is None else executor, progress, len(asked), len(kept))
     # What is missing comes first: a study that is killed again and again gets on however much is there to be read.
-    there = {trial.file_name for trial in kept}
-    yield from walk([trial for name, trial in asked.items() if name not in there])
+    yield from study.walk([trial for name, trial in asked.items() if name not in kept])
     damaged = []
-    for trial in kept:
+    for trial in kept.values():
         found = store.read(trial) if store else None
         if found is None:
             damaged.append(trial)
         else:
             yield trial, found
     if damaged:
-        done -= len(damaged)
-        yield from walk(damaged)
+        study.done -= len(damaged)
+        yield from study.walk(damaged)
     progress(1.0, f"{len(asked)} trials")
 
 
@@ -139,3 +112,96 @@ def together(records: Sequence[xr.Dataset]) -> xr.Dataset:
     """Records of one duration and rate as one dataset over ``robot``."""
     joined = xr.concat(records, dim="robot", data_vars="minimal", coords="minimal", compat="override", join="override")
     return joined.assign_coords(robot=np.arange(len(records)))
+
+
+class _Study:
+    """So many trials in all, some of which are done already."""
+
+    def __init__(self, store: Store | None, executor: Executor, progress: Progress, total: int, done: int) -> None:
+        self._store, self._executor, self._progress = store, executor, progress
+        self._total, self.done = total, done
+
+    def walk(self, missing: Sequence[Trial]) -> Iterator[tuple[Trial, xr.Dataset]]:
+        """Trials with their records, walked here or by others that keep theirs in the same folder."""
+        if self._store:
+            check_room(self._store.folder, sum(trial.least_bytes for trial in missing))
+        share = batches(missing)
+        check_memory(_COPIES * max((sum(trial.least_bytes for trial in batch) for batch in share), default=0.0))
+        self._progress(self.done / max(self._total, 1), f"{self.done} of {self._total} trials")
+        if self._store and missing:
+            yield from self._shared(missing, self._store)
+            return
+        for walked in self._walked(self._executor.cut(share)):
+            for _, record in walked:
+                record.attrs.pop(NOT_KEPT, None)
+            yield from self._given(walked)
+
+    def _shared(self, missing: Sequence[Trial], store: Store) -> Iterator[tuple[Trial, xr.Dataset]]:
+        with store.claims() as claims:
+            left, moved, patient = list(missing), time.monotonic(), True
+            brought, elsewhere = list[Trial](), list[Trial]()  # by other processes meanwhile; still with them
+
+            def free(batch: list[Trial]) -> list[Trial]:
+                """Those of a batch that are to be walked here; they are claimed."""
+                mine = []
+                for trial in batch:
+                    if not claims.take(trial.file_name) and patient:
+                        elsewhere.append(trial)
+                    elif store.has(trial):
+                        claims.release(trial.file_name)
+                        brought.append(trial)
+                    else:
+                        mine.append(trial)
+                return mine
+
+            while left:
+                for walked in self._walked(self._executor.cut(batches(left)), free):
+                    for trial, record in walked:
+                        store.write(trial, record)
+                    store.sync()
+                    for trial, _ in walked:
+                        claims.release(trial.file_name)
+                    yield from self._given(walked)
+                for trial in brought:
+                    found = store.read(trial)
+                    if found is None:
+                        elsewhere.append(trial)
+                    else:
+                        yield from self._given([(trial, found)])
+                yield from self._given([], len(elsewhere))
+                now = time.monotonic()
+                moved = now if len(elsewhere) < len(left) else moved
+                left, patient = elsewhere.copy(), now - moved < _PATIENCE
+                brought.clear()
+                elsewhere.clear()
+                if left and patient:
+                    time.sleep(_LOOK)
+
+    def _given(self, walked: _Walked, elsewhere: int = 0) -> Iterator[tuple[Trial, xr.Dataset]]:
+        """Trials with their records, which count as done once they have been taken."""
+        yield from walked
+        self.done += len(walked)
+        words = f"{self.done} of {self._total} trials{self._executor.words}"
+        waiting = f", {elsewhere} walked by another process" if elsewhere else ""
+        self._progress(self.done / self._total, f"{words}{waiting}")
+
+    def _walked(
+        self, share: Iterable[list[Trial]], free: Callable[[list[Trial]], list[Trial]] = list
+    ) -> Iterator[_Walked]:
+        """Batches of trials with their records; ``free`` says which of a batch are to be walked when it is begun."""
+        begun: list[list[Trial]] = []
+
+        def taken() -> Iterator[list[Trial]]:
+            for batch in share:
+                mine = free(batch)
+                if mine:
+                    begun.append(mine)
+                    yield mine
+
+        for index, records in self._executor.walk(taken()):
+            walked = list(zip(begun[index], records, strict=True))
+            for trial, record in walked:
+                if record.attrs.get("trial") != trial.text:
+                    problem = "gave the record of another trial, or one that other code walked"
+                    raise AnalysisError(problem, field=type(self._executor).__name__)
+            yield walked

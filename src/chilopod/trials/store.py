@@ -28,21 +28,11 @@ class Store:
     """A folder that keeps the records of trials, each in a netCDF-3 file of its own.
 
     Every file is there whole or not at all, has a name derived from all that makes its trial, holds that as text, and a
-    checksum over all of its bytes. Many processes may use one folder at the same time: they share the work, see
-    :class:`chilopod.trials.claims.Claims`, and whoever walks the same trial writes the same file.
+    checksum over all of its bytes. Many processes may use one folder at the same time: they share the work, and whoever
+    walks the same trial writes the same file. The folder is made with the first record where there is none. ``tell`` is
+    given a line about every file that is not what it should be; by default it is the logger of this module.
 
-    Parameters
-    ----------
-    folder
-        Made with the first record where there is none.
-    tell
-        Given a line about every file that is not what it should be; by default the logger of this module, which prints
-        it on stderr if nobody has told it otherwise.
-
-    Raises
-    ------
-    OutputError
-        If files cannot be written into the folder.
+    Raises OutputError if files cannot be written into the folder.
     """
 
     def __init__(self, folder: str | Path, tell: Callable[[str], object] = _logger.warning) -> None:
@@ -56,13 +46,8 @@ class Store:
     def read(self, trial: Trial) -> xr.Dataset | None:
         """The record of a trial; None if there is none.
 
-        A file that is damaged, was edited, or holds another trial counts as none. It is moved aside: its name gets the
-        ending ``.aside``.
-
-        Raises
-        ------
-        OutputError
-            If such a file cannot be moved, or this process has no memory to read it.
+        A file that is damaged, was edited, or holds another trial counts as none and gets the ending ``.aside``. Raises
+        OutputError if it cannot be moved, or memory to read it is missing.
         """
         path = self.folder / trial.file_name
         try:
@@ -77,28 +62,19 @@ class Store:
             return None
 
     def write(self, trial: Trial, record: xr.Dataset) -> None:
-        """Keep a record, for good once :meth:`sync` has been called; unless it says that it is not to be kept.
-
-        Raises
-        ------
-        OutputError
-            If it is another trial's record, or the file cannot be written.
-        """
+        """Keep a record, for good once :meth:`sync` has been called; unless it says that it is not to be kept. Raises
+        OutputError if it is another trial's record, or the file cannot be written."""
         if record.attrs.get("trial") != trial.text:
-            raise OutputError(
-                "is that of another trial, or was walked by other code",
-                field="record",
-                allowed=f"a record for {trial.file_name}",
-            )
+            problem = "is that of another trial, or was walked by other code"
+            raise OutputError(problem, field="record", allowed=f"a record for {trial.file_name}")
         if NOT_KEPT in record.attrs:
             words = trial.not_kept(record.attrs.pop(NOT_KEPT))
             if words not in self._said:
                 self._tell(words)
             self._said.add(words)
             return
-        content = content_of(record)
         # Whoever deletes the folder while trials walk loses what was in it, not the walks to come: it is made again.
-        write_atomic(self.folder / trial.file_name, content, durable=True, temporary=_UNFINISHED)
+        write_atomic(self.folder / trial.file_name, content_of(record), durable=True, temporary=_UNFINISHED)
 
     @contextmanager
     def claims(self) -> Iterator[Claims]:
@@ -112,8 +88,7 @@ class Store:
             sync_folder(self.folder)
 
     def _move_aside(self, path: Path, why: str) -> None:
-        aside = path.with_name(f"{path.name}.aside")
-        count = 1
+        aside, count = path.with_name(f"{path.name}.aside"), 1
         while os.path.lexists(aside):
             count += 1
             aside = path.with_name(f"{path.name}.aside{count}")
@@ -127,7 +102,5 @@ class Store:
 
     def _sweep(self) -> None:
         """Remove what somebody who was killed did not finish."""
-        with os.scandir(self.folder) as entries:
-            for entry in entries:
-                if entry.name.startswith(_UNFINISHED):
-                    os.unlink(entry)
+        for path in self.folder.glob(f"{_UNFINISHED}*"):
+            path.unlink()

@@ -8,17 +8,13 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from chilopod.engine import Status
+from chilopod.record import Array
 from chilopod.robot import Robot
-
-Array = NDArray[np.float64]
 
 AVERAGED = 5.0
 """s at the end of a walk over which the paper averages joint angles."""
-
-_SENTENCES = {status.label: status.sentence for status in Status}
 
 
 @dataclass(frozen=True)
@@ -29,12 +25,11 @@ class WalkSummary:
     ----------
     status
         A label of :class:`chilopod.engine.Status`.
-    joint_angles
-        Means over the last :data:`AVERAGED` s, rad, shape (N-1,); NaN if the walk failed.
-    axis_radius
-        Radius by these, see :meth:`chilopod.robot.Robot.axis_radius`, m: infinite if the walk is straight.
+    joint_angles, axis_radius
+        Means over the last :data:`AVERAGED` s, rad, shape (N-1,), NaN if the walk failed; and radius by these, see
+        :meth:`chilopod.robot.Robot.axis_radius`, m, infinite if the walk is straight.
     x, y
-        X and y of the centre of module 1 at the end, m.
+        Place of the centre of module 1 at the end, m.
     """
 
     status: str
@@ -51,7 +46,7 @@ class WalkSummary:
     @property
     def sentence(self) -> str:
         """The status in words."""
-        return _SENTENCES[self.status]
+        return next(each.sentence for each in Status if each.label == self.status)
 
     @property
     def joint_angles_deg(self) -> list[float]:

@@ -25,6 +25,14 @@ from chilopod.trials.reach import UnknownKindError
 
 _DIGITS = 16
 _MOST_BENT = 1.5  # rad; at a right angle modules run into each other
+_FLAG = bool | np.bool_, "True or False"
+_KINDS = {
+    "robot": (Robot, "a chilopod.Robot"),
+    "engine": (str, "its name"),
+    "target": (Target | Course | None, "a chilopod.steering.Target or Course, or None"),
+    "disturbance": (Disturbance, "a chilopod.trials.Disturbance"),
+    **dict.fromkeys(("forces", "poses", "brief"), _FLAG),
+}
 _ABOVE = ("analysis", "cli", "gym", "live", "paper", "show", "stability", "tasks")
 """Subpackages that no walk is made with: who edits these finds trials that were kept before."""
 
@@ -35,29 +43,22 @@ class Trial:
 
     Attributes
     ----------
-    robot
-        With the springs of this trial.
-    duration
-        s.
-    seed
-        Seed of its disturbances.
+    robot, duration
+        Robot with the springs of this trial; s.
+    seed, disturbance
+        Seed and size of the differences from trial to trial.
     joint_angles
-        At the start, before disturbance, rad: one a joint, front to rear, one for all, or none for straight.
+        Joint angles at the start, before disturbance, rad: one a joint, front to rear, one for all, or none for
+        straight.
     target
         Target of the robot, if any: one target, or a course of them, which ends the walk.
     controller
         Controller, if any: any frozen dataclass with ``events`` and ``act``, whose fields are plain data. Its
         fields, and everything that the code of its class can reach, are part of what the trial is.
-    disturbance
-        Size of the differences from trial to trial.
-    rate
-        Samples per second.
-    forces
-        True if the record has the force on every foot.
+    rate, forces, poses
+        See :class:`chilopod.record.Recording`.
     engine
         One of :data:`chilopod.engine.ENGINES`, or one's own as ``package.module:object``.
-    poses
-        True if the record has the positions of all joints, to be drawn, which not every engine has.
     brief
         True to keep only the outcomes of a course's targets, not its motion over time.
 
@@ -82,58 +83,45 @@ class Trial:
     brief: bool = False
 
     def __post_init__(self) -> None:
-        for name, kind, allowed in (
-            ("robot", Robot, "a chilopod.Robot"),
-            ("engine", str, "its name"),
-            ("target", Target | Course | None, "a chilopod.steering.Target or Course, or None"),
-            ("disturbance", Disturbance, "a chilopod.trials.Disturbance"),
-            ("forces", bool | np.bool_, "True or False"),
-            ("poses", bool | np.bool_, "True or False"),
-            ("brief", bool | np.bool_, "True or False"),
-        ):
+        for name, (kind, allowed) in _KINDS.items():
             if not isinstance(getattr(self, name), kind):
                 raise ParameterError("is none", field=name, value=getattr(self, name), allowed=allowed)
-        angles, joints = as_array("joint_angles", self.joint_angles), self.robot.body.modules - 1
-        if angles.shape not in ((0,), (1,), (joints,)):
-            raise ParameterError(
-                f"are {angles.size} angles",
-                field="joint_angles",
-                value=self.joint_angles,
-                allowed=f"{joints}, or one for all",
-            )
-        if not (np.abs(angles) <= _MOST_BENT).all():
-            bounds = f"{_MOST_BENT} rad (85 deg) to either side"
-            raise ParameterError("are bent too far", field="joint_angles", value=self.joint_angles, allowed=bounds)
         seeds = as_seeds([self.seed], "seed")
         # Equal trials have one text, whatever kinds of numbers they were given.
-        told = {
+        plain_values = {
             "duration": as_number("duration", self.duration),
             "seed": seeds[0] if seeds else 0,
-            "joint_angles": tuple(np.broadcast_to(angles, joints if angles.size else 0).tolist()),
+            "joint_angles": self._every_joint_angle(),
             "rate": as_number("rate", self.rate),
-            "forces": bool(self.forces),
-            "poses": bool(self.poses),
-            "brief": bool(self.brief),
+            **{name: bool(getattr(self, name)) for name in ("forces", "poses", "brief")},
         }
-        for name, value in told.items():
+        for name, value in plain_values.items():
             object.__setattr__(self, name, value)
         in_range("duration", self.duration, LONGEST, "s")
-        if self.brief and self.course is None:
+        course, engine = self.course, engine_named(self.engine)
+        if self.brief and course is None:
             raise ParameterError("is for courses", field="brief", value=True, allowed="False, or a course as target")
-        if self.course is not None and self.duration != self.course.duration:
-            raise ParameterError(
-                "is not that of the course",
-                field="duration",
-                value=self.duration,
-                allowed=f"{self.course.duration:g} s",
-            )
-        engine = engine_named(self.engine)
+        if course is not None and self.duration != course.duration:
+            allowed = f"{course.duration:g} s"
+            raise ParameterError("is not that of the course", field="duration", value=self.duration, allowed=allowed)
         engine.common(self.robot)
         if self.recording.poses and not engine.traits.poses:
             raise ParameterError("this engine has none", field="poses", value=True, allowed="False")
         if self.controller is not None:
             check_controller(self.controller)
             self.steering  # noqa: B018  (as it is now; what is in a frozen dataclass may still change)
+
+    def _every_joint_angle(self) -> tuple[float, ...]:
+        """Joint angles at the start, one a joint, or none."""
+        angles, joints = as_array("joint_angles", self.joint_angles), self.robot.body.modules - 1
+        problem, allowed = "", ""
+        if angles.shape not in ((0,), (1,), (joints,)):
+            problem, allowed = f"are {angles.size} angles", f"{joints}, or one for all"
+        elif not (np.abs(angles) <= _MOST_BENT).all():
+            problem, allowed = "are bent too far", f"{_MOST_BENT} rad (85 deg) to either side"
+        if problem:
+            raise ParameterError(problem, field="joint_angles", value=self.joint_angles, allowed=allowed)
+        return tuple(np.broadcast_to(angles, joints if angles.size else 0).tolist())
 
     def __getstate__(self) -> dict[str, Any]:
         # Another process finds out anew what it makes of a trial: its versions may be others.
@@ -152,9 +140,7 @@ class Trial:
     @property
     def least_bytes(self) -> float:
         """Least memory of its record."""
-        if self.brief:
-            return 0.0
-        return self.recording.least_bytes(self.robot.body.modules, self.duration)
+        return 0.0 if self.brief else self.recording.least_bytes(self.robot.body.modules, self.duration)
 
     @cached_property
     def steering(self) -> Any:
@@ -176,13 +162,8 @@ class Trial:
             return f"of this process {id(self.controller):x}", f"{error}, which cannot be described; {can}", ""
 
     def repeated(self, seed: int | None = None, repeats: int = 1) -> tuple[Trial, ...]:
-        """The same trial so many times, with seeds that count up; undisturbed where the seed is None.
-
-        Raises
-        ------
-        ParameterError
-            If there would be no walks, or several that are all alike.
-        """
+        """The same trial so many times, with seeds that count up; undisturbed where the seed is None. Raises
+        ParameterError if there would be no walks, or several that are all alike."""
         if repeats < 1:
             raise ParameterError("must be positive", field="repeats", value=repeats)
         if repeats > 1 and seed is None:
@@ -198,31 +179,23 @@ class Trial:
     @cached_property
     def text(self) -> str:
         """All of it as JSON; equal texts are equal trials."""
+        plain_names = ("engine", "duration", "seed", "rate", "forces", "poses", "brief")
+        target: Any = self.target
+        if isinstance(target, Target):
+            target = [float(target.bearing), float(target.distance)]
         return json.dumps(
             {
                 **versions_of(self.engine),
+                **{name: getattr(self, name) for name in plain_names},
                 "code": self.code[0],
-                "engine": self.engine,
                 "robot": robot_text(self.robot),
-                "duration": self.duration,
-                "seed": self.seed,
                 "joint_angles": list(self.joint_angles),
-                "target": self._target_text,
+                "target": asdict(target) if isinstance(target, Course) else target,
                 "controller": self.steering,
                 "disturbance": asdict(self.disturbance),
-                "rate": self.rate,
-                "forces": self.forces,
-                "poses": self.poses,
-                "brief": self.brief,
             },
             sort_keys=True,
         )
-
-    @property
-    def _target_text(self) -> Any:
-        if isinstance(self.target, Course):
-            return asdict(self.target)
-        return [float(self.target.bearing), float(self.target.distance)] if self.target else None
 
     @cached_property
     def file_name(self) -> str:

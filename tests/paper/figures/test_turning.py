@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from chilopod import load_robot
+from chilopod.paper.section import Context
 from chilopod.paper.size import Size
 from chilopod.paper.turning.figures.turning import panels
 from chilopod.paper.turning.study import turning
@@ -12,7 +12,7 @@ from chilopod.show import style, tables
 
 @pytest.fixture(scope="module")
 def drawn(kept):
-    found = turning(load_robot("aoi2022-planar"), kept, Size.TINY)
+    found = turning(Context(folder=kept, size=Size.TINY))
     return list(panels(found))
 
 

@@ -93,7 +93,7 @@ def test_replays_stand_on_their_own_and_have_frames_that_differ(tiny, name):
         packed = base64.b64decode(robot["pose"] if "pose" in robot else robot["points"])
         frames = np.frombuffer(packed, "<i2").reshape(data["time"]["count"], -1)
         moves = np.flatnonzero((np.diff(frames, axis=0) != 0).any(axis=1))
-        assert len(moves) > 10
+        assert len(moves) >= 10  # one fewer than frames
         assert len(moves) == moves[-1] + 1  # who has finished a course stands, and nobody else
 
 

@@ -1,12 +1,16 @@
 """The planar model's constants from the critical spring and its mode."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
+from chilopod.analysis.parameters import K1, stiffness
+from chilopod.analysis.straight_walk import bifurcations
 from chilopod.errors import AnalysisError
 from chilopod.paper.fit_data import critical_mode_data
 from chilopod.robot import load_robot
-from chilopod.tasks.identify import planar
+from chilopod.tasks.identify import CriticalMode, planar
 
 ROBOT = load_robot("aoi2022-planar")
 DATA = critical_mode_data()
@@ -22,3 +26,42 @@ def test_a_robot_without_a_pitchfork_is_refused(monkeypatch):
     monkeypatch.setattr(planar, "residuals", lambda robot, data: np.full(6, planar._NO_PITCHFORK))
     with pytest.raises(AnalysisError, match="has no pitchfork with any constants"):
         planar.identify_planar(ROBOT, DATA)
+
+
+def met(constants):
+    return np.abs(planar.residuals(planar.with_constants(ROBOT, constants), DATA)).max()
+
+
+def test_ranges_are_the_projection_of_what_the_tolerances_allow():
+    best = np.array([ROBOT.get(path) for path in planar.FREE])
+    ranges, cut = planar._ranges(ROBOT, DATA, best)
+    # By a program of its own, with sequential linear programming.
+    np.testing.assert_allclose(ranges, [[227.695, 259.59], [0.0622, 0.08558], [0.03524, 0.06359]], rtol=1e-3)
+    assert not cut.any()
+    # A random walk within the set stays within the ranges, and comes far along the valley.
+    rng, here, seen = np.random.default_rng(1), best, [best]
+    for _ in range(40):
+        there = here + rng.normal(size=3) * [6.0, -0.006, -0.006] * rng.uniform()
+        here = there if met(there) <= 1.0 else here
+        seen.append(here)
+    seen = np.array(seen)
+    assert (seen >= ranges[:, 0]).all()
+    assert (seen <= ranges[:, 1]).all()
+    assert np.ptp(seen[:, 0]) > 0.2 * np.ptp(ranges[0])
+
+
+def test_ranges_hold_the_constants_of_a_robot_of_another_size():
+    settings = ["body.length=0.45 m", "body.mass=2 kg", "gait.stride=1 cm", "springs.stiffness=2 N*mm/deg"]
+    robot, true = ROBOT.set_from_text(settings), np.array([90.0, 0.02, 0.012])
+    interval = (stiffness(0.1), stiffness(5.0))
+    *_, point = bifurcations(planar.with_constants(robot, true), K1, interval, normal_form=False)
+    mode = point.joint_components.real * np.sign(point.joint_components.real.sum())
+    rounded = CriticalMode(round(point.value, 2), tuple(np.round(mode, 2)), 0.005, 0.005, (0.1, 5.0))
+    ranges, _ = planar._ranges(robot, rounded, true)
+    assert ((ranges[:, 0] <= true) & (true <= ranges[:, 1])).all()
+
+
+def test_data_that_contradict_each_other_allow_nothing():
+    data = dataclasses.replace(DATA, components=DATA.components[::-1])
+    ranges, _ = planar._ranges(ROBOT, data, np.array([ROBOT.get(path) for path in planar.FREE]))
+    assert np.isnan(ranges).all()

@@ -17,14 +17,10 @@ class CriticalMode:
 
     Attributes
     ----------
-    k1
-        Critical spring, N*mm/deg.
-    components
-        Joint angles of the critical mode, front to rear, of unit norm and positive sum, shape (N-1,).
-    k1_tolerance, component_tolerance
-        Tolerance of each of them.
-    between
-        Interval in which the point is located, N*mm/deg.
+    k1, k1_tolerance, between
+        Critical spring, its tolerance, and the interval in which it is located, N*mm/deg.
+    components, component_tolerance
+        Joint angles of the critical mode, front to rear, of unit norm and positive sum, shape (N-1,), and tolerance.
     """
 
     k1: float
@@ -44,10 +40,8 @@ class BaseSeries:
     ----------
     curved, straight
         Springs at which the robot curves, and at which it walks straight.
-    radii
-        Radius of the curve (m) at some springs, in the order in which they are to be listed.
-    speeds
-        Speeds of module 1 along its way (m/s) at some springs; none if they are not known.
+    radii, speeds
+        Radius of the curve (m), and speed of module 1 along its way (m/s), at some springs.
     onset
         Spring at which curves set in, by a square-root fit to the bend of joint 1 at the springs of ``curved``.
     law, shape

@@ -1,14 +1,15 @@
 """Finding the planar model's constants that are hard to measure, from where the straight walk bends and how.
 
-Three constants are free: foot friction, half-width and forward offset. They are fitted to the critical k1 and the mode
-of a robot, every number weighted by its tolerance, so that a residual of 1 is exactly what that allows (of printed
-numbers, half their last digit). The profile over the forward offset shows how far the data determine them: at each
-offset the other two are fitted again.
+Foot friction, half-width and forward offset are fitted to the critical k1 and the mode of a robot. Every number is
+weighted by its tolerance: a residual of 1 is exactly what that allows (of printed numbers, half their last digit). The
+range of a constant is the projection of the set in which no residual exceeds 1. The profile over the forward offset
+shows the valley: at each offset the other two are fitted again.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, minimize
 
 from chilopod import units
 from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT, stiffness
@@ -24,6 +25,7 @@ from chilopod.analysis.straight_walk import bifurcations, first_loss, pitchfork
 from chilopod.errors import AnalysisError
 from chilopod.notebook import Summary, axes_for
 from chilopod.progress import Progress, silent
+from chilopod.record import Array
 from chilopod.robot import Robot
 from chilopod.stability import Kind
 from chilopod.tasks.identify.data import CriticalMode
@@ -31,15 +33,25 @@ from chilopod.tasks.identify.data import CriticalMode
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
-
 FREE = ("ground.friction", "legs.half_width", "legs.forward_offset")
 """The constants that are fitted, SI."""
 
-# Sizes of the steps of the optimiser, and rough starting points from which it is run: far from the answer on purpose.
-_SCALE = np.array([200.0, 0.07, 0.05])
-_STARTS = ((150.0, 0.05, 0.03), (350.0, 0.10, 0.07), (200.0, 0.09, 0.02))
+# Starting points of the fit, in the units of `_scale`: far from the answer on purpose.
+_STARTS = ((0.6, 0.2, 0.15), (1.5, 0.45, 0.3), (0.8, 0.4, 0.1))
+_LEAST, _MOST = np.array([0.05, 0.02, -0.6]), np.array([20.0, 3.0, 1.2])
+"""Bounds of the search, in the same units."""
+_STEP = 1e-6  # of differences, in the same units
+_MET = 1.0 + 1e-6  # residual that counts as 1
+_BESIDE = 0.25  # of the range of the offset, by which the profile goes beyond it
 _NO_PITCHFORK = 100.0
+_UNITS = {  # of the profile, N*mm/deg where none is given
+    "friction": "N*s/m",
+    "half_width": "m",
+    "largest_residual": "1",
+    "uniform_frequency": "rad/s",
+    "coefficient": "1/rad^2",
+    "verdict": "",
+}
 
 
 @dataclass(frozen=True)
@@ -48,16 +60,18 @@ class Identification(Summary):
 
     Attributes
     ----------
-    given
-        The robot as it was given.
-    best
-        The robot with the best constants.
-    residuals
-        At the best constants: critical k1 and the components of the mode, in units of their tolerance, shape (N,).
+    given, best
+        The robot as it was given, and with the best constants.
+    residuals, preset_residuals
+        Critical k1 and the components of the mode less the data, in units of their tolerance, shape (N,), at the best
+        constants and for ``given``.
     starts
         Constants reached from every starting point, shape (starts, 3), SI.
-    preset_residuals
-        The same residuals for ``given``.
+    ranges
+        Least and largest value of each constant for which every datum is met within its tolerance, shape (3, 2), SI;
+        NaN if there is none.
+    cut
+        True where a bound of the search ends a range, shape (3, 2).
     profile
         Dataset over ``forward_offset``: the fitted constants, the largest residual, and what each point predicts for
         the numbers that were not fitted.
@@ -68,25 +82,27 @@ class Identification(Summary):
     residuals: Array
     starts: Array
     preset_residuals: Array
+    ranges: Array
+    cut: NDArray[np.bool_]
     profile: xr.Dataset
 
-    def allowed(self, name: str) -> tuple[float, float] | None:
-        """Range of a constant along the profile within which every datum is met, SI; None if nowhere."""
-        values = self.profile[name].values[self.profile.largest_residual.values <= 1.0]
-        return (float(values.min()), float(values.max())) if values.size else None
+    def allowed(self, path: str) -> tuple[float, float] | None:
+        """Range of a constant of :data:`FREE` within which every datum is met, SI; None if there is none."""
+        low, high = self.ranges[FREE.index(path)].tolist()
+        return None if np.isnan(low) else (low, high)
 
     def as_json(self) -> dict[str, Any]:
         """Constants with what the tolerances allow, and the residuals, as plain numbers and text."""
         constants = {}
         for path in FREE:
-            unit, span = self.best.unit_of(path), self.allowed(path.partition(".")[2])
+            unit, span = self.best.unit_of(path), self.allowed(path)
+            edges = [units.format(edge, unit, digits=3) for edge in span or ()]
             constants[path] = {
                 "value_si": self.best.get(path),
                 "text": units.format(self.best.get(path), unit, digits=4),
                 "allowed_si": span,
-                "allowed_text": "nothing"
-                if span is None
-                else " to ".join(units.format(edge, unit, digits=3) for edge in span),
+                "allowed_text": " to ".join(edges) or "nothing",
+                "cut_by_the_search": self.cut[FREE.index(path)].tolist(),
             }
         return {
             "constants": constants,
@@ -119,9 +135,8 @@ def residuals(robot: Robot, data: CriticalMode) -> Array:
     """Computed numbers less the data, over their tolerance, shape (N,)."""
     count = len(data.components) + 1
     if robot.body.modules != count:
-        raise AnalysisError(
-            f"the mode of the data is that of {count} modules", field="body.modules", value=robot.body.modules
-        )
+        problem = f"the mode of the data is that of {count} modules"
+        raise AnalysisError(problem, field="body.modules", value=robot.body.modules)
     low, high = data.between
     try:
         points = bifurcations(robot, K1, (stiffness(low), stiffness(high)), normal_form=False)
@@ -154,10 +169,8 @@ def identify_planar(
 
     Parameters
     ----------
-    robot
-        Everything but the free constants; their values are only looked at for comparison.
-    data
-        Data that are fitted.
+    robot, data
+        Robot, whose free constants are only looked at for comparison, and the data that are fitted.
     points
         Points of the profile.
     variants
@@ -170,50 +183,119 @@ def identify_planar(
     AnalysisError
         If the robot has another number of modules than the data, or no pitchfork with any constants.
     """
-    fits = []
+    scale, fits = _scale(robot, data), []
     for index, start in enumerate(_STARTS):
-        fits.append(_fit(robot, data, np.array(start), fixed=0))
+        fits.append(_fit(robot, data, np.array(start) * scale, fixed=0))
         progress(0.3 * (index + 1) / len(_STARTS), f"fit from start {index + 1}")
     best = min(fits, key=lambda fit: float((fit[1] ** 2).sum()))
     if (best[1] == _NO_PITCHFORK).all():
-        raise AnalysisError(
-            "its straight walk has no pitchfork with any constants that were tried, so nothing can be fitted",
-            field="robot",
-            value=robot.name,
-        )
+        problem = "its straight walk has no pitchfork with any constants that were tried, so nothing can be fitted"
+        raise AnalysisError(problem, field="robot", value=robot.name)
+    ranges, cut = _ranges(robot, data, best[0])
+    progress(0.4, "ranges")
     return Identification(
         given=robot,
         best=with_constants(robot, best[0]),
         residuals=best[1],
         starts=np.array([fit[0] for fit in fits]),
         preset_residuals=residuals(robot, data),
-        profile=_profile(robot, data, best[0], points, variants, progress),
+        ranges=ranges,
+        cut=cut,
+        profile=_profile(robot, data, best[0], ranges[2], points, variants, progress),
     )
+
+
+def _scale(robot: Robot, data: CriticalMode) -> Array:
+    """Units of the constants, SI: only k/(c v duty L), half-width/L and offset/L enter the mode of a slow robot, with
+    the critical spring k, speed v and module length L. The paper's robot has the friction 1.0 in them."""
+    length, gait = robot.module_length, robot.gait
+    return np.array([4.0 * stiffness(data.k1) / (gait.speed * gait.duty * length), length, length])
+
+
+class _Residuals:
+    """Residuals and their derivatives over the constants in units of :func:`_scale`, each computed once."""
+
+    def __init__(self, robot: Robot, data: CriticalMode) -> None:
+        self._robot, self._data, self._scale = robot, data, _scale(robot, data)
+        self._values: dict[bytes, Array] = {}
+
+    def __call__(self, scaled: Array) -> Array:
+        key = scaled.tobytes()
+        if key not in self._values:
+            self._values[key] = residuals(with_constants(self._robot, scaled * self._scale), self._data)
+        return self._values[key]
+
+    def jacobian(self, scaled: Array) -> Array:
+        """Forward differences, shape (N, 3)."""
+        here = self(scaled)
+        return np.stack([(self(scaled + _STEP * each) - here) / _STEP for each in np.eye(len(FREE))], axis=1)
+
+
+def _ranges(robot: Robot, data: CriticalMode, best: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Projections of the set {max |residual| <= 1}, shape (3, 2), SI, and where a bound of the search ends them.
+
+    Each end is a minimum of one constant within the set, by sequential quadratic programming from the best constants
+    and from the ends that were found before: the set is a curved valley.
+    """
+    off, scale = _Residuals(robot, data), _scale(robot, data)
+    within = {
+        "type": "ineq",
+        "fun": lambda scaled: np.concatenate([1.0 - off(scaled), 1.0 + off(scaled)]),
+        "jac": lambda scaled: np.concatenate([-off.jacobian(scaled), off.jacobian(scaled)]),
+    }
+    bounds = list(zip(_LEAST, _MOST, strict=True))
+    ends: dict[tuple[int, int], Array] = {}
+    for constant in range(len(FREE)):
+        for side, sign in enumerate((1.0, -1.0)):
+            goal = sign * np.eye(len(FREE))[constant]
+            for start in (best / scale, *ends.values()):
+                found = minimize(
+                    lambda scaled, goal=goal: goal @ scaled, start, jac=lambda scaled, goal=goal: goal,
+                    method="SLSQP", bounds=bounds, constraints=[within], options={"maxiter": 60, "ftol": 1e-8},
+                ).x  # fmt: skip
+                known = ends.get((constant, side))
+                if np.abs(off(found)).max() <= _MET and (known is None or goal @ found < goal @ known):
+                    ends[constant, side] = found
+    ranges, cut = np.full((len(FREE), 2), np.nan), np.zeros((len(FREE), 2), dtype=np.bool_)
+    if len(ends) == ranges.size:
+        for (constant, side), found in ends.items():
+            ranges[constant, side] = found[constant] * scale[constant]
+            limit = (_LEAST, _MOST)[side][constant]
+            cut[constant, side] = abs(found[constant] - limit) <= _STEP * abs(limit)
+    return ranges, cut
 
 
 def _fit(robot: Robot, data: CriticalMode, start: Array, fixed: int) -> tuple[Array, Array]:
     """Least squares over the constants but the last ``fixed``; returns constants and residuals."""
-    free = len(start) - fixed
+    free, scale = len(start) - fixed, _scale(robot, data)
 
     def cost(scaled: Array) -> Array:
-        return residuals(with_constants(robot, np.concatenate([scaled * _SCALE[:free], start[free:]])), data)
+        return residuals(with_constants(robot, np.concatenate([scaled * scale[:free], start[free:]])), data)
 
     answer = least_squares(
         cost,
-        start[:free] / _SCALE[:free],
-        bounds=(0.05, 10.0) if fixed else ([0.05, 0.05, -2.0], [10.0, 10.0, 4.0]),
+        start[:free] / scale[:free],
+        bounds=(_LEAST[:free], _MOST[:free]),
         x_scale=0.1,
         diff_step=1e-5,
         xtol=1e-9,
     )
-    return np.concatenate([answer.x * _SCALE[:free], start[free:]]), np.asarray(answer.fun)
+    return np.concatenate([answer.x * scale[:free], start[free:]]), np.asarray(answer.fun)
 
 
 def _profile(
-    robot: Robot, data: CriticalMode, best: Array, count: int, variants: Mapping[str, Sequence[str]], progress: Progress
+    robot: Robot,
+    data: CriticalMode,
+    best: Array,
+    span: Array,
+    count: int,
+    variants: Mapping[str, Sequence[str]],
+    progress: Progress,
 ) -> xr.Dataset:
     """Fits at fixed forward offsets, outward from the best so that each starts next to its neighbour."""
-    offsets = np.linspace(0.030, 0.070, count)
+    low, high = span if np.isfinite(span).all() else best[2] + 0.1 * robot.module_length * np.array([-1.0, 1.0])
+    beside = _BESIDE * (high - low)
+    offsets = np.linspace(low - beside, high + beside, count)
     rows: dict[int, dict[str, float | str]] = {}
     middle = int(np.abs(offsets - best[2]).argmin())
     done = 0
@@ -229,24 +311,10 @@ def _profile(
                 **_predictions(with_constants(robot, constants), variants),
             }
             done += 1
-            progress(0.3 + 0.7 * done / count, f"profile, forward offset {1e3 * offsets[index]:.0f} mm")
-    unit_of = {
-        "friction": "N*s/m",
-        "half_width": "m",
-        "largest_residual": "1",
-        "uniform_frequency": "rad/s",
-        "coefficient": "1/rad^2",
-        "verdict": "",
-    }
+            progress(0.4 + 0.6 * done / count, f"profile, forward offset {1e3 * offsets[index]:.0f} mm")
+    columns = {name: np.array([rows[i][name] for i in range(count)]) for name in rows[0]}
     return xr.Dataset(
-        {
-            name: (
-                ("forward_offset",),
-                np.array([rows[i][name] for i in range(count)]),
-                {"units": unit_of.get(name, PAPER_UNIT)},
-            )
-            for name in rows[0]
-        },
+        {name: (("forward_offset",), each, {"units": _UNITS.get(name, PAPER_UNIT)}) for name, each in columns.items()},
         coords={"forward_offset": ("forward_offset", offsets, {"units": "m"})},
         attrs={"robot": robot.name, "about": "largest_residual <= 1: all data are met within their tolerance"},
     )
@@ -255,24 +323,16 @@ def _profile(
 def _predictions(robot: Robot, variants: Mapping[str, Sequence[str]]) -> dict[str, float | str]:
     """Predictions of a set of constants for numbers that were not fitted."""
 
-    def critical(setting: Sequence[str]) -> float:
-        try:
-            return pitchfork(robot.set_from_text(setting), normal_form=False).value
-        except AnalysisError:
-            return float("nan")
-
-    found: dict[str, float | str] = {"critical_k1": critical([])}
-    for name, setting in variants.items():
-        found[name] = critical(setting)
-    try:
+    found: dict[str, float | str] = dict.fromkeys(["critical_k1", *variants], np.nan)
+    found |= {"uniform": np.nan, "uniform_frequency": np.nan, "coefficient": np.nan, "verdict": ""}
+    for name, setting in {"critical_k1": (), **variants}.items():
+        with suppress(AnalysisError):
+            found[name] = pitchfork(robot.set_from_text(setting), normal_form=False).value
+    with suppress(AnalysisError):
         point = first_loss(robot, ALL, (stiffness(2.0), stiffness(75.0)), Kind.NEIMARK_SACKER, normal_form=False)
         found["uniform"], found["uniform_frequency"] = point.value, point.point.frequency
-    except AnalysisError:
-        found["uniform"], found["uniform_frequency"] = float("nan"), float("nan")
-    try:
+    with suppress(AnalysisError):
         point = pitchfork(robot)
-        found["coefficient"] = point.coefficient if point.coefficient is not None else float("nan")
+        found["coefficient"] = np.nan if point.coefficient is None else point.coefficient
         found["verdict"] = point.point.criticality.label if point.point.criticality.known else ""
-    except AnalysisError:
-        found["coefficient"], found["verdict"] = float("nan"), ""
     return found

@@ -2,14 +2,11 @@
 
 The series is walks with several first springs (:class:`chilopod.tasks.identify.BaseSeries`): which of them curve and
 which are straight, how tightly some turn, and where by a square-root fit to the bend of joint 1 the curve sets in.
-Everything else (other springs, strides and phases, uniform springs, turning) is left to predict.
-
-A few numbers and yes-or-no answers do not determine eight constants. Every constant therefore has a plausible
-range, and where the data leave it open the middle of the range is preferred: what is minimised is the misfit to the
-data plus a weak prior, by evolution strategies from several starts, with every evaluation kept. Evaluations begin near
-the bends that the data ask for, which saves the minute that a bend takes to grow; the preset is the best of
-those whose walks from straight on get there too. All others that meet the data as well say how far the data determine
-each constant, and how far to trust what is predicted.
+Everything else is left to predict. A few numbers and yes-or-no answers do not determine nine constants. Every constant
+therefore has a plausible range, and where the data leave it open its middle is preferred: the misfit to the data plus a
+weak prior is minimised by evolution strategies from several starts, with every evaluation kept. Evaluations begin near
+the bends that the data ask for, which saves the minute that a bend takes to grow; the best is that of those whose walks
+from straight on get there too. All others that meet the data as well say how far the data determine each constant.
 """
 
 from __future__ import annotations
@@ -18,13 +15,13 @@ import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from cmaes import CMA
-from numpy.typing import NDArray
 
 from chilopod import units
 from chilopod.analysis.parameters import K1, stiffness
@@ -33,16 +30,14 @@ from chilopod.errors import ChilopodError
 from chilopod.frozen import Short
 from chilopod.output import check_folder, write_atomic
 from chilopod.progress import Progress, part, silent
+from chilopod.record import Array
 from chilopod.robot import Robot
 from chilopod.tasks.identify.data import BaseSeries
-from chilopod.tasks.identify.known_fits import known_fits
 from chilopod.tasks.identify.twin_constants import FREE, parts_of, values_at, with_constants
 from chilopod.tasks.identify.twin_series import DURATION, Series, base_series, residuals
 from chilopod.tasks.radius_law import DURATION as LONG
 from chilopod.tasks.radius_law import end_of_walk
 from chilopod.trials import Trial, run
-
-Array = NDArray[np.float64]
 
 VERSION = 3
 """Goes up whenever the same constants would give other bends; evaluations of other versions are left alone."""
@@ -61,20 +56,7 @@ _MOST_CONFIRMED = 20
 
 @dataclass(frozen=True)
 class Fit:
-    """One set of constants and what comes of it.
-
-    Attributes
-    ----------
-    constants
-        SI, in the order of :data:`FREE`.
-    bends
-        Mean angle of each joint over the last 4.8 s, rad, over the springs of the series, shape (springs,
-        joints); NaN where a walk failed.
-    speeds
-        Speeds of module 1 along its way over the same time, m/s, shape (springs,).
-    residuals
-        Residuals of the data in units of their tolerance, see :func:`residuals`.
-    """
+    """One set of constants (SI, in the order of :data:`FREE`), its :class:`Series` and its :func:`residuals`."""
 
     constants: Array
     bends: Array
@@ -106,17 +88,8 @@ class Fit:
 
 @dataclass(frozen=True)
 class TwinIdentification(Short):
-    """Result of a search for the constants of the twin.
-
-    Attributes
-    ----------
-    given
-        The robot, for what is not fitted.
-    data
-        Data that were fitted.
-    fits
-        All evaluations; first the best of those that walk into the curve from straight on, then by their objective.
-    """
+    """Result of a search for the constants of the twin: robot with what is not fitted, data, and all evaluations, first
+    the best of those that walk into the curve from straight on, then by their objective."""
 
     given: Robot
     data: BaseSeries
@@ -135,10 +108,8 @@ class TwinIdentification(Short):
     def ranges(self) -> dict[str, tuple[float, float]]:
         """From the smallest to the largest value of each constant among the good fits, SI."""
         values = np.array([fit.constants for fit in self.good or self.fits[:1]])
-        return {
-            each.path: (float(low), float(high))
-            for each, low, high in zip(FREE, values.min(axis=0), values.max(axis=0), strict=True)
-        }
+        ends = zip(values.min(axis=0).tolist(), values.max(axis=0).tolist(), strict=True)
+        return {each.path: span for each, span in zip(FREE, ends, strict=True)}
 
     def as_json(self) -> dict[str, Any]:
         """Constants with the ranges of the good fits, and the best fits, as plain numbers and text."""
@@ -201,16 +172,11 @@ def search(
 
     Parameters
     ----------
-    robot
-        Robot with the constants that are not fitted.
-    data
-        Data of the robot's walks.
-    starts
-        Number of starts, spread over the ranges of the constants.
-    generations
-        Generations of ten evaluations each, from every start.
-    seed
-        Seed of starts and evolution.
+    robot, data
+        Robot with the constants that are not fitted, and data of its walks.
+    starts, generations, seed
+        Number of starts, spread over the ranges of the constants, and of generations of ten evaluations from each; seed
+        of both.
     folder
         Folder of the evaluations; a stopped search is resumed, because it asks for the same ones.
     progress
@@ -225,13 +191,8 @@ def search(
     fits: list[Fit] = []
     for number in range(starts):
         mean = np.full(len(FREE), 0.5) if number == 0 else rng.uniform(0.25, 0.75, len(FREE))
-        strategy = CMA(
-            mean=mean,
-            sigma=0.15,
-            bounds=np.tile([0.0, 1.0], (len(FREE), 1)),
-            population_size=_POPULATION,
-            seed=seed + number,
-        )
+        bounds = np.tile([0.0, 1.0], (len(FREE), 1))
+        strategy = CMA(mean=mean, sigma=0.15, bounds=bounds, population_size=_POPULATION, seed=seed + number)
         for generation in range(generations):
             told = []
             for _ in range(_POPULATION):
@@ -258,17 +219,8 @@ def unlike(fits: Sequence[Fit], count: int) -> list[Fit]:
 
 
 def damped_step(law: Array, off: Array, moved: Array | float = 0.0) -> Array:
-    """The step of damped least squares (Levenberg), in parts of the constants' ranges.
-
-    Parameters
-    ----------
-    law
-        Slopes of the residuals, shape (residuals, constants).
-    off
-        Residuals, (residuals,).
-    moved
-        Distances of the constants from their ranges, shape (constants,).
-    """
+    """Step of damped least squares (Levenberg), in parts of the constants' ranges, from the slopes of the residuals,
+    shape (residuals, constants), the residuals, and how far the constants have moved before."""
     normal = law.T @ law + np.eye(len(FREE)) / _PRIOR**2
     return np.asarray(-np.linalg.solve(normal, law.T @ off + moved / _PRIOR**2), dtype=np.float64)
 
@@ -282,23 +234,12 @@ def corrected(law: Array, step: Array, change: Array) -> Array:
 def refined(
     robot: Robot, data: BaseSeries, fits: Sequence[Fit], folder: Path | None = None, progress: Progress = silent
 ) -> list[Fit]:
-    """Go from evaluations that are near the data to where they are met, by the shortest way.
+    """Evaluations on the way from the ``fits`` that are near the data to where they are met; none if too few are near.
 
-    A search says where to look; few of its evaluations meet the data closely. From those near that are most unlike each
-    other the constants are moved by damped least squares (Levenberg), along a law of the residuals that is linear in
-    the parts of their ranges: fitted to all that are near, then corrected by what each step finds (Broyden). No step
-    knows of the middle of the ranges, so what is found lies spread along the valley that the data leave open.
-
-    Parameters
-    ----------
-    robot, data, folder, progress
-        As for :func:`search`.
-    fits
-        Evaluations, best first.
-
-    Returns
-    -------
-    The evaluations that were made on the way; none if too few of those given are near.
+    From those near that are most unlike each other the constants are moved by damped least squares (Levenberg), along a
+    law of the residuals that is linear in the parts of their ranges: fitted to all that are near, then corrected by
+    what each step finds (Broyden). No step knows of the middle of the ranges, so what is found lies spread along the
+    valley that the data leave open.
     """
     near = [fit for fit in fits if fit.misfit <= _NEAR]
     if len(near) <= 2 * len(FREE):
@@ -325,14 +266,13 @@ def refined(
 
 def known() -> list[Fit]:
     """The sets of constants that come with chilopod, best first; their residuals are those of the paper's series."""
+    text = files("chilopod.tasks.identify").joinpath("twin_fits.json").read_text(encoding="utf-8")
     return [
         Fit(
             np.array([each["constants"][free.path] for free in FREE]),
-            np.array(each["bends_rad"]),
-            np.array(each["speeds_m_s"]),
-            np.array(each["residuals"]),
+            *(np.array(each[name]) for name in ("bends_rad", "speeds_m_s", "residuals")),
         )
-        for each in known_fits()
+        for each in json.loads(text)["fits"]
     ]
 
 
@@ -364,12 +304,7 @@ def identify_twin(
     """Find the constants: the known ones first, then a :func:`search`, whose best are :func:`refined`, then the best of
     all that walk into the curve from straight on, as a robot does.
 
-    Parameters
-    ----------
-    robot, data, starts, generations, seed, folder, progress
-        As for :func:`search`.
-    fresh
-        True to begin without the known ones.
+    With ``fresh`` it begins without the known ones; else see :func:`search`.
     """
     engine_named("twin").common(robot)  # refuses a robot without a twin
     kept, fits = None if folder is None else check_folder(folder), []

@@ -6,28 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from chilopod.record import Array
 from chilopod.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Constant:
-    """One that is fitted, and where it is looked for.
-
-    Attributes
-    ----------
-    path
-        In the robot's description.
-    low, high
-        Ends of the range, SI; of its ratio to `per` if that is given.
-    logarithmic
-        True if it is its logarithm that is searched evenly.
-    per
-        Path of another constant, before it among :data:`FREE`.
-    """
+    """One that is fitted: its path in the robot's description and the ends of its range, SI, evenly searched by its
+    logarithm if ``logarithmic``; both of its ratio to another constant, before it among :data:`FREE`, if ``per`` is
+    given."""
 
     path: str
     low: float

@@ -7,18 +7,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.analysis.parameters import K1, stiffness
 from chilopod.analysis.square_root import square_root_fit
 from chilopod.engine import Walk, engine_named
 from chilopod.errors import AnalysisError
-from chilopod.record import Recording
+from chilopod.record import Array, Recording
 from chilopod.robot import Robot
 from chilopod.tasks.identify.data import BaseSeries
 from chilopod.twin.walk import TOLERANCE
-
-Array = NDArray[np.float64]
 
 DURATION = 60.0
 """s, of the walks."""
@@ -36,16 +33,9 @@ _PER_CYCLE = 10  # samples
 
 @dataclass(frozen=True)
 class Series:
-    """Measures of the walks of a series.
-
-    Attributes
-    ----------
-    before, bends
-        Mean joint angles over 4.8 s, 12 s before the end and at the end, rad, shape (springs, joints); NaN where a walk
-        failed.
-    speeds
-        Speeds of module 1 along its way, gait cycle by gait cycle, over the last 4.8 s, m/s, shape (springs,).
-    """
+    """Measures of the walks of a series, NaN where a walk failed: mean joint angles over 4.8 s, 12 s before the end and
+    at the end, rad, shape (springs, joints), and speeds of module 1 along its way, gait cycle by gait cycle, over the
+    last 4.8 s, m/s, shape (springs,)."""
 
     before: Array
     bends: Array
@@ -60,24 +50,10 @@ def base_series(
     engine: str = "twin",
     duration: float = DURATION,
 ) -> Series:
-    """Walk a series from near the bends that its data ask for.
+    """Walk a series, or other values of k1, N*mm/deg, from near the bends that its data ask for, with a tolerance of
+    the contact solver, in the twin or one that is edited, see :class:`chilopod.twin.Edited`, for a duration, s.
 
     Walks of all springs of the data that are far off after 36 s are left there.
-
-    Parameters
-    ----------
-    robot
-        Its first spring does not matter.
-    data
-        The series.
-    springs
-        Values of k1, N*mm/deg, if not those of the series.
-    tolerance
-        Tolerance of the contact solver.
-    engine
-        The twin, or one that is edited, see :class:`chilopod.twin.Edited`.
-    duration
-        s.
     """
     walks: Any = engine_named(engine)  # with arguments that only the twin knows
     robots = [robot.with_value(K1, stiffness(spring)) for spring in springs or data.springs]
@@ -105,22 +81,11 @@ def _series(walk: Walk, robot: Robot) -> Series:
 
 
 def residuals(robot: Robot, found: Series, data: BaseSeries) -> Array:
-    """Computed less the data.
+    """Residuals of a series: computed less the data, one number for each of ``data.names``.
 
-    Parameters
-    ----------
-    robot
-        For its size.
-    found
-        From :func:`base_series`.
-    data
-        The series.
-
-    Returns
-    -------
-    One for each of ``data.names``: radii, speeds and onset (each over the tolerance of it); bend where the robot is
-    straight beyond 0.1 rad in all (over 0.05 rad); what it lacks at the stiffest spring that curves of 0.3 rad (the
-    same); motion between the averages beyond 0.1 rad (over 0.1 rad).
+    These are radii, speeds and onset (each over the tolerance of it); bend where the robot is straight beyond 0.1 rad
+    in all (over 0.05 rad); what it lacks at the stiffest spring that curves of 0.3 rad (the same); motion between the
+    averages beyond 0.1 rad (over 0.1 rad).
     """
     springs = data.springs
     summed = np.abs(found.bends).sum(-1)

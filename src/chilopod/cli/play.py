@@ -1,0 +1,46 @@
+"""``chilopod play``: a page in which the planar robot walks, with nothing to install."""
+
+from __future__ import annotations
+
+import webbrowser
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from chilopod.cli.options import ForceOption, JsonOption, SetOption, free, print_json, read_robot
+from chilopod.cli.progress import progress_bar
+
+
+def play(
+    robot: Annotated[
+        str, typer.Argument(metavar="[ROBOT]", help="Robot file, or a preset: aoi2022-planar or aoi2022.")
+    ] = "aoi2022-planar",
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help="HTML file to write.")] = Path("play.html"),
+    browser: Annotated[bool, typer.Option("--open", help="Open the page in a browser too.")] = False,
+    overrides: SetOption = None,
+    force: ForceOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Write a page in which the planar robot walks in any browser: drag its first spring, click the floor.
+
+    The page is one file of some 50 kB. It computes the planar model itself, loads nothing, and opens from disk.
+
+    The address sets the first spring and the seed: play.html?k1=8&seed=2.
+
+    Example: chilopod play aoi2022-planar --out play.html
+    """
+    from chilopod.output import write_atomic
+    from chilopod.show.play import play as page
+
+    described = read_robot(robot, overrides)
+    free([out], force)
+    with progress_bar("play") as show:
+        html = page(described, lambda done, words: show("branch of curved walks", done, words))
+    write_atomic(out, html, replace=force, folders=False)
+    if as_json:
+        print_json({"robot": described.name, "file": str(out)})
+    else:
+        typer.echo(f"wrote {out}")
+    if browser:
+        webbrowser.open(out.resolve().as_uri())

@@ -1,0 +1,158 @@
+"""Tasks: the targets of an episode, its reward and its ending. A new one is a class and a line of :data:`TASKS`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.engine.arguments import as_number
+from chilopod.errors import ParameterError, nearest_name
+from chilopod.flows.arguments import checked_count
+from chilopod.record import Array
+from chilopod.steering import Course, Goal, Judged, Target, random_course
+from chilopod.steering.course import MOST_GOALS, RANDOM_DISTANCES
+
+Marks = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Rewards:
+    """Weights of the reward of a step, see :meth:`Task.reward`.
+
+    Weighed are every metre that the target has come nearer, arriving at a target, every gait cycle, and the failure of
+    a robot that falls, or bends a joint too far, besides what the time that was left is charged.
+    """
+
+    progress: float = 1.0
+    arrival: float = 1.0
+    cycle: float = -0.01
+    failure: float = -1.0
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            if not np.isfinite(as_number(each.name, getattr(self, each.name))):
+                raise ParameterError("must be finite", field=each.name, value=getattr(self, each.name))
+
+
+@dataclass(frozen=True)
+class Look:
+    """State of a batch at the end of a step, as a task judges it; arrays have the shape (robots,).
+
+    Attributes
+    ----------
+    judged, busy
+        Marks of the robots that are done with a target, and of those that have another one.
+    nearer, left, period, speed
+        Distance by which the target has come nearer, m, NaN where there is none; time left for all targets and length
+        of a step, s; speed of the straight walk without slip, m/s.
+    """
+
+    judged: Judged
+    busy: Marks
+    nearer: Array
+    left: Array
+    period: float
+    speed: float
+
+
+@dataclass(frozen=True)
+class Task:
+    """Reward and ending of an episode, with these weights of the reward; subclasses say which targets it has."""
+
+    rewards: Rewards = Rewards()
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.rewards, Rewards):
+            raise ParameterError("must be a Rewards", field="rewards", value=self.rewards)
+
+    @property
+    def farthest(self) -> float:
+        """Largest distance of a target when its turn comes, m; by default that of random courses."""
+        return RANDOM_DISTANCES[1]
+
+    def course(self, seed: int, patience: float) -> Course:
+        """Targets of the episode of a seed, each with so much time, s; as many for every seed."""
+        raise NotImplementedError
+
+    def reward(self, look: Look) -> Array:
+        """Reward of a step.
+
+        A robot that fails is charged as if it walked straight away from its targets until their time is over, with the
+        penalty for failing on top: walking on to the end of the time is then never worse, whatever the robot does.
+        """
+        worth = self.rewards
+        # At worst a robot that walks on gains as little as this in the time that is left.
+        least = min(worth.cycle, 0.0) / look.period - abs(worth.progress) * look.speed
+        reward = worth.progress * np.nan_to_num(look.nearer) + worth.arrival * look.judged.arrived
+        reward += worth.cycle + np.where(look.judged.gone, worth.failure + least * look.left, 0.0)
+        return np.asarray(reward)
+
+    def ending(self, look: Look) -> tuple[Marks, Marks]:
+        """Marks of the robots that have arrived at their last target or do not walk any more (*terminated*), and of
+        those whose time for the last target is over (*truncated*)."""
+        judged = look.judged
+        return judged.gone | (judged.arrived & ~look.busy), (judged.late | judged.unseen) & ~look.busy
+
+
+@dataclass(frozen=True)
+class RandomTargets(Task):
+    """So many random targets, one after the other, see :func:`chilopod.steering.random_course`."""
+
+    targets: int = 1
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        checked_count("targets", self.targets, MOST_GOALS)
+
+    def course(self, seed: int, patience: float) -> Course:
+        """The course ``random:SEED``."""
+        return random_course(seed, patience, self.targets)
+
+
+@dataclass(frozen=True)
+class OneTarget(Task):
+    """One target at the same place for every seed, where a robot that is not disturbed sees it."""
+
+    target: Target = field(kw_only=True)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not isinstance(self.target, Target):
+            raise ParameterError("must be a Target", field="target", value=self.target)
+
+    @property
+    def farthest(self) -> float:
+        """Distance of the target."""
+        return self.target.distance
+
+    def course(self, seed: int, patience: float) -> Course:
+        """The place of the target."""
+        x, y = self.target.position.tolist()
+        return Course((Goal(x, y, relative=False),), patience)
+
+
+TASKS: Final[Mapping[str, Task]] = {
+    "Turn": RandomTargets(),
+    "Course": RandomTargets(targets=5),
+    "TaskA": OneTarget(target=Target.parse("45 deg, 1.3 m")),
+    "TaskB": OneTarget(target=Target.parse("40 deg, 1.5 m")),
+}
+"""Tasks by name: random targets, and the two turning tasks of Aoi et al. (2022)."""
+
+
+def task_of(task: str | Task, chosen: Mapping[str, Any]) -> Task:
+    """A task, or the one of this name, with some of its attributes chosen otherwise. Raises ParameterError if there is
+    no such task, or it has no such attribute."""
+    found = TASKS.get(task) if isinstance(task, str) else task
+    if not isinstance(found, Task):
+        nearest, allowed = nearest_name(str(task), TASKS), f"{', '.join(TASKS)}, or a chilopod.gym.Task"
+        raise ParameterError("there is no such task", field="task", value=task, allowed=allowed, nearest=nearest)
+    names = [each.name for each in fields(found)]
+    for name in chosen.keys() - names:
+        problem = f"is no attribute of a {type(found).__name__}"
+        raise ParameterError(problem, field=name, value=chosen[name], allowed=", ".join(names))
+    return replace(found, **chosen)
