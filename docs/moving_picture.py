@@ -13,11 +13,10 @@ from pathlib import Path
 import av
 
 from chilopod.output import write_atomic
-from chilopod.paper.movies import together
 from chilopod.robot import load_robot
 from chilopod.show.scene.film_3d import film_3d
 from chilopod.steering import LegYawController, Target
-from chilopod.trials import Trial, run
+from chilopod.trials import Trial, run, together
 
 SPRINGS = {"41 N*mm/deg": "k1 = 41: too stiff", "21 N*mm/deg": "k1 = 21: bends"}
 SIZE, SPEED, PER_SECOND = (800, 288), 3.0, 10

@@ -49,14 +49,14 @@ def tiny(kept, tmp_path_factory) -> SimpleNamespace:
     Tests of one file run in one process, so all that need it are in one.
     """
     from chilopod.paper.page import Report
-    from chilopod.paper.section import Context
-    from chilopod.paper.sections import SECTIONS, reproduce
-    from chilopod.paper.size import Size
+    from chilopod.paper.registry import load_sections
+    from chilopod.paper.section import Context, Size, reproduce
     from helpers.texts import watched
 
     context, folder = Context(size=Size.TINY, folder=kept), tmp_path_factory.mktemp("tiny")
-    with watched() as painted, Report(SECTIONS, context, folder) as report:
-        found = reproduce(SECTIONS, context, told=lambda found, section: report.add(found, [section]))
+    sections = load_sections()
+    with watched() as painted, Report(sections, context, folder) as report:
+        found = reproduce(sections, context, told=lambda found, section: report.add(found, [section]))
     return SimpleNamespace(folder=folder, found=found, failures=report.failures, painted=painted)
 
 

@@ -3,14 +3,14 @@
 import json
 
 from chilopod.cli import main
-from chilopod.paper.sections import SECTIONS
+from chilopod.paper.registry import load_sections
 
 
 def test_the_help_lists_the_sections(capsys):
     assert main(["reproduce", "--help"]) == 0
     words = capsys.readouterr().out
     listed = words[words.index("repeated:") + len("repeated:") : words.index("--out")]
-    assert "".join(listed.split()).rstrip(".").split(",") == [section.name for section in SECTIONS]
+    assert "".join(listed.split()).rstrip(".").split(",") == [section.name for section in load_sections()]
 
 
 def test_another_robot_is_refused_in_one_line(capsys):

@@ -7,10 +7,10 @@ import numpy as np
 import xarray as xr
 
 from chilopod import load_robot
+from chilopod.paper.measures import onset_with_error, radius_at, shares
 from chilopod.paper.robot.turning import RobotTurning
 from chilopod.paper.robot.walks import SHORTER, SPRINGS, UNIFORM_SPRINGS, VARIANT_SPRINGS, RobotWalks
 from chilopod.paper.turning.trials import CRITERIA, TurningTask
-from chilopod.paper.walk_measures import onset_with_error, radius_at, shares
 from chilopod.steering import Outcome, Target
 
 ROBOT = load_robot("aoi2022")

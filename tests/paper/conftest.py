@@ -5,10 +5,8 @@ import pytest
 import xarray as xr
 
 from chilopod import load_robot
-from chilopod.paper.movies import Movie
-from chilopod.paper.section import Context, Found
-from chilopod.paper.sections import chosen, reproduce
-from chilopod.paper.size import Size
+from chilopod.paper.registry import chosen
+from chilopod.paper.section import Context, Found, Movie, Size, reproduce
 from chilopod.paper.straight.sections import EXPONENTS, IDENTIFICATION, MODE, MODULES
 from chilopod.paper.table import Result, Row, Verdict
 from chilopod.paper.turning.sections import MOVIES
@@ -43,6 +41,7 @@ def results() -> Found:
             "says": (("modules",), np.array(["supercritical", "no pitchfork", *["subcritical"] * 3], dtype=object)),
         },
         coords={"modules": np.arange(4, 9)},
+        attrs={"built": 6},
     )
     return found
 

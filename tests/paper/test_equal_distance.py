@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from chilopod.paper.equal_distance import change, law_ratio, radius_ratio
+from chilopod.paper.measures import onset, radius_at, shares
 from chilopod.paper.robot.walks import SPRINGS, VARIANT_SPRINGS
-from chilopod.paper.walk_measures import onset, radius_at, shares
 from helpers.made_up_robot import AMPLITUDE, series
 
 

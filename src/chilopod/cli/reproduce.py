@@ -23,7 +23,7 @@ from chilopod.cli.options import (
     walking_on,
 )
 from chilopod.cli.progress import progress_bar
-from chilopod.paper.registry import REGISTRY
+from chilopod.paper.registry import REGISTRY, chosen
 
 if TYPE_CHECKING:
     from chilopod.paper.table import RobotRow, Row
@@ -73,14 +73,11 @@ def reproduce(
             value=overrides[0],
             allowed="no --set; stability, bifurcation, branch, walk and turn take any robot",
         )
-    from chilopod.paper.sections import chosen
-
     sections = chosen(only, quick or tiny, paper)  # refuses an unknown section
     from chilopod.errors import OutputError, in_words
-    from chilopod.paper import sections as computed
+    from chilopod.paper import section as computed
     from chilopod.paper.page import Report, check_report
-    from chilopod.paper.section import Context, Found, Section
-    from chilopod.paper.size import Size
+    from chilopod.paper.section import Context, Found, Section, Size
 
     size = Size.TINY if tiny else Size.QUICK if quick else Size.FULL
     check_report(out, sections, size, replace=force)

@@ -16,14 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from chilopod.analysis.square_root import square_root_fit
-from chilopod.errors import AnalysisError
-from chilopod.paper.scatter import drawn_anew, mean_and_error
-from chilopod.paper.walk_measures import counted
-
-Array = NDArray[np.float64]
+from chilopod.paper.measures import counted, fitted, point_of
+from chilopod.paper.scatter import Array, drawn_anew, mean_and_error
 
 DRAWN = 200
 """Sets of trials that are drawn anew for the standard errors."""
@@ -37,10 +32,9 @@ class RadiusRatio:
     ----------
     distance, distance_error
         At equal distances from each one's own onset, with its standard error; NaN if they have no distance in common.
-    springs, springs_error
-        At equal springs, mean over those at which two trials of both curve; NaN if there is none.
-    compared
-        These springs, N*mm/deg.
+    springs, springs_error, compared
+        At equal springs, mean over those (``compared``, N*mm/deg) at which two trials of both curve; NaN if there is
+        none.
     """
 
     distance: float
@@ -51,19 +45,11 @@ class RadiusRatio:
 
 
 def radius_ratio(base: xr.Dataset, variant: xr.Dataset, drawn: int = DRAWN, seed: int = 0) -> RadiusRatio:
-    """Compare the radii of two series of trials.
+    """Compare the radii of two series of trials over spring and repeat, as
+    :func:`chilopod.tasks.radius_law.end_of_walk` has them, of which those count that
+    :func:`chilopod.paper.measures.counted` tells.
 
-    Parameters
-    ----------
-    base, variant
-        Over spring and repeat: ``axis_radius``, ``direction`` and ``settled``, as
-        :func:`chilopod.tasks.radius_law.end_of_walk` has them. What counts, see
-        :func:`chilopod.paper.walk_measures.counted`.
-    drawn
-        Number of times that trials are drawn anew at every spring for the standard errors, onsets fitted anew each
-        time; 0 for none.
-    seed
-        Seed of the drawing.
+    Trials are drawn anew at every spring for the standard errors, onsets fitted anew each time; 0 times for none.
     """
     inverse, bends = zip(*(_bends(each) for each in (base, variant)), strict=True)
     found = _ratios(inverse, bends)
@@ -86,8 +72,7 @@ def law_ratio(springs: Sequence[float], base_onset: float, onset: float) -> floa
 
 
 def onset_of_bend(data: xr.Dataset) -> float:
-    """Where the curved walks of a series set in by the square-root fit to their summed bend, N*mm/deg; NaN if they
-    determine no point."""
+    """Where the curved walks of a series set in by a fit to their summed bend, N*mm/deg; NaN if nowhere."""
     return _onset(*_bends(data))
 
 
@@ -137,17 +122,13 @@ def _ratios(inverse: Sequence[Array], bends: Sequence[Array]) -> tuple[float, fl
 
 def _squared(inverse: Array, bend: Array) -> tuple[Array, Array]:
     """Distance from the onset of these trials, rising, and the square of their mean bend; NaN if they have no onset."""
-    onset = _onset(inverse, bend)
-    if np.isnan(onset):
+    distance = inverse - 1.0 / _onset(inverse, bend)
+    if np.isnan(distance).all():
         return np.array([np.nan]), np.array([np.nan])
-    distance = inverse - 1.0 / onset
     return distance[distance > 0.0], (np.nanmean(bend, axis=1) ** 2)[distance > 0.0]
 
 
 def _onset(inverse: Array, bend: Array) -> float:
     here = np.isfinite(bend)
-    try:
-        each = np.broadcast_to(inverse[:, None], bend.shape)[here]
-        return square_root_fit(each, bend[here], resampled=0).critical
-    except AnalysisError:
-        return float("nan")
+    each = np.broadcast_to(inverse[:, None], bend.shape)[here]
+    return point_of(fitted(each, bend[here], resampled=0))[0]

@@ -17,15 +17,7 @@ from chilopod.steering import Outcome, Target
 
 @dataclass(frozen=True)
 class Said:
-    """Something that is printed.
-
-    Attributes
-    ----------
-    words
-        Statement, in words.
-    asked
-        Condition that counts as agreement, in words.
-    """
+    """Something that is printed: the statement, and what counts as agreement, in words."""
 
     words: str
     asked: str
@@ -33,13 +25,7 @@ class Said:
 
 @dataclass(frozen=True)
 class Band(Said):
-    """Something that is printed and that a number agrees with if it lies between two bounds.
-
-    Attributes
-    ----------
-    low, high
-        The bounds.
-    """
+    """Something that is printed and that a number agrees with if it lies between two bounds."""
 
     low: float
     high: float
@@ -56,15 +42,7 @@ class Band(Said):
 
 @dataclass(frozen=True)
 class Number:
-    """A number that is printed.
-
-    Attributes
-    ----------
-    value, unit
-        As printed.
-    tolerance
-        Largest deviation of a number that agrees, in the same unit.
-    """
+    """A number that is printed, its unit, and the largest deviation of one that agrees, in the same unit."""
 
     value: float
     unit: str
@@ -86,17 +64,8 @@ class Number:
 
 @dataclass(frozen=True)
 class Variant:
-    """A change of the robot.
-
-    Attributes
-    ----------
-    overrides
-        Overrides of the robot's description, as ``--set`` takes them.
-    model
-        The planar model's critical k1, over that as built.
-    onset, radius
-        Onset and radius of the robot: where curved walks set in, and their radius over that as built.
-    """
+    """A change of the robot, as ``--set`` takes it: the planar model's critical k1 over that as built, the spring at
+    which the robot's curved walks set in, and their radius over that as built."""
 
     overrides: tuple[str, ...]
     model: Band
@@ -106,23 +75,8 @@ class Variant:
 
 @dataclass(frozen=True)
 class Task:
-    """A target.
-
-    Attributes
-    ----------
-    target
-        Place of the target.
-    radius
-        Radius of the circle to it, in so many digits.
-    k_hat
-        The spring whose walk has this radius.
-    minima
-        Springs at which all three criteria are smallest.
-    outcomes
-        Outcomes of walks with some springs.
-    source
-        Section or figure of the paper.
-    """
+    """A turning task: target, radius of the circle to it, the spring whose walk has this radius, springs at which all
+    three criteria are smallest, outcomes of walks with some springs, and section or figure of the paper."""
 
     target: Target
     radius: Number
@@ -136,12 +90,8 @@ ONSETS = 0.10
 """Relative tolerance of every spring at which straight walks of the robot end."""
 
 
-def _onset(value: float) -> Number:
-    return Number(value, PAPER_UNIT, ONSETS * value)
-
-
-def _k_hat(value: float) -> Number:
-    return Number(value, PAPER_UNIT, 0.15 * value)
+def _spring(value: float, tolerance: float = ONSETS) -> Number:
+    return Number(value, PAPER_UNIT, tolerance * value)
 
 
 def _around(k_hat: float) -> Band:
@@ -171,13 +121,13 @@ LITTLE_CHANGE = Band("little change", "10 %", 0.9, 1.1)
 _UNCHANGED = Band("almost unchanged", "15 %, at equal distance", 0.85, 1.15)
 _SMALLER = Band("smaller", "not wider than as built, at equal distance", 0.0, 1.0)
 
-ONSET = _onset(34.0)
+ONSET = _spring(34.0)
 """Onset of curved walks of the robot, by a square-root fit."""
 
 VARIANTS: Mapping[str, Variant] = {
-    "k2-5 = 28 N*mm/deg": Variant(("springs.stiffness=28 N*mm/deg",), LOWER, _onset(23.0), _UNCHANGED),
-    "stride 1.8 cm": Variant(("gait.stride=1.8 cm",), LOWER, _onset(25.0), _UNCHANGED),
-    "module phase 180 deg": Variant(("gait.module_phase=180 deg",), LITTLE_CHANGE, _onset(31.0), _SMALLER),
+    "k2-5 = 28 N*mm/deg": Variant(("springs.stiffness=28 N*mm/deg",), LOWER, _spring(23.0), _UNCHANGED),
+    "stride 1.8 cm": Variant(("gait.stride=1.8 cm",), LOWER, _spring(25.0), _UNCHANGED),
+    "module phase 180 deg": Variant(("gait.module_phase=180 deg",), LITTLE_CHANGE, _spring(31.0), _SMALLER),
 }
 
 AS_BUILT = "as built"
@@ -190,7 +140,7 @@ EXPERIMENTS = "section Pitchfork bifurcation of straight walk, experimental resu
 RADII = {21.0: Number(0.88, "m", 0.088), 26.0: Number(1.2, "m", 0.12)}
 """Radii of the robot's curved walks, by k1."""
 
-UNIFORM = _onset(18.0)
+UNIFORM = _spring(18.0)
 """Hopf point of the robot with all springs alike; the planar model's own is not printed."""
 
 COMPARISON = "section Comparison with previous strategy"
@@ -212,7 +162,7 @@ TASKS: Mapping[str, Task] = {
     "A": Task(
         Target.parse("45 deg, 1.3 m"),
         Number(0.88, "m", 0.005),
-        _k_hat(21.0),
+        _spring(21.0, 0.15),
         _around(21.0),
         {Outcome.OUTSIDE: 41.0, Outcome.ARRIVED: 21.0, Outcome.INSIDE: 15.0},
         "figure Turning task",
@@ -220,7 +170,7 @@ TASKS: Mapping[str, Task] = {
     "B": Task(
         Target.parse("40 deg, 1.5 m"),
         Number(1.2, "m", 0.05),
-        _k_hat(26.0),
+        _spring(26.0, 0.15),
         _around(26.0),
         {},
         "figure Evaluation criteria for different conditions",

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
+
+from chilopod.errors import ParameterError, nearest_name
 
 if TYPE_CHECKING:
     from chilopod.paper.section import Section
@@ -32,10 +35,40 @@ REGISTRY: dict[str, str] = {
     "robot-courses": "courses.sections.ROBOT_COURSES",
     "courses-movie": "courses.sections.COURSES_FILM",
 }
-"""Module below :mod:`chilopod.paper` and constant of each section, by its name."""
+"""Module and constant of each section, by its name: the paper's own experiments, then what goes beyond them."""
 
 
 def load_sections() -> tuple[Section[Any], ...]:
     """All sections that are registered."""
     homes = (home.rpartition(".") for home in REGISTRY.values())
     return tuple(getattr(import_module(f"chilopod.paper.{module}"), name) for module, _, name in homes)
+
+
+def chosen(only: Iterable[str] | None = None, quick: bool = False, paper: bool = False) -> list[Section[Any]]:
+    """The sections asked for, by default all but those that are computed on request, in the order they are computed; a
+    quick report leaves out some that are not named, and one of the paper what goes beyond its own experiments.
+
+    Raises
+    ------
+    ParameterError
+        If one of them does not exist, or goes beyond the paper's own experiments though only these are asked for.
+    """
+    sections = {section.name: section for section in load_sections()}
+    if only is None:
+        found = [each for each in sections.values() if not each.on_request and not (quick and each.full)]
+        return [section for section in found if not (paper and section.beyond)]
+    asked = list(only)
+    for name in asked:
+        if name not in sections:
+            raise ParameterError(
+                "no such section",
+                field="only",
+                value=name,
+                allowed=", ".join(sections),
+                nearest=nearest_name(name, sections),
+            )
+    found = [section for name, section in sections.items() if name in asked]
+    for section in found:
+        if paper and section.beyond:
+            raise ParameterError("goes beyond the paper's own experiments", field="only", value=section.name)
+    return found

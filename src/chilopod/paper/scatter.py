@@ -25,13 +25,7 @@ SURE = 2.0
 
 @dataclass(frozen=True)
 class Difference:
-    """One mean less another.
-
-    Attributes
-    ----------
-    value, error
-        The difference and its standard error; the error is NaN where it is not known, as of single trials.
-    """
+    """One mean less another, and its standard error, which is NaN where it is not known, as of single trials."""
 
     value: float
     error: float
@@ -58,15 +52,10 @@ class Difference:
 
 
 def difference(one: ArrayLike, other: ArrayLike, *, paired: bool = False) -> Difference:
-    """The mean of some trials less that of others.
+    """The mean of some trials less that of others, shapes (n,) and (m,); NaN does not count.
 
-    Parameters
-    ----------
-    one, other
-        A value of every trial, shapes (n,) and (m,); NaN does not count.
-    paired
-        True if trials of equal index belong together, as those of one seed do; then the scatter of their differences
-        counts. Else the trials are independent.
+    If they are paired, trials of equal index belong together, as those of one seed do; then the scatter of their
+    differences counts. Else the trials are independent.
     """
     x, y = np.asarray(one, dtype=np.float64), np.asarray(other, dtype=np.float64)
     if paired:
@@ -88,6 +77,12 @@ def mean_and_error(values: ArrayLike) -> tuple[float, float]:
     finite = finite[np.isfinite(finite)]
     mean = float(finite.mean()) if finite.size else float("nan")
     return mean, float(finite.std(ddof=1) / np.sqrt(finite.size)) if finite.size > 1 else float("nan")
+
+
+def means(values: Array, here: NDArray[np.bool_] | bool = True) -> tuple[Array, Array]:
+    """Mean and standard error at every spring (row) of the trials chosen; the error is NaN for a single one."""
+    mean, error = np.array([mean_and_error(row) for row in np.where(here, values, np.nan)]).T
+    return mean, error
 
 
 def with_error(value: float, error: float, digits: int) -> str:

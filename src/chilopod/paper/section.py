@@ -1,22 +1,45 @@
-"""Sections of the report, and what they find."""
+"""Sections of the report, what they find, and how they are computed."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from enum import Enum
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from chilopod.paper.movies import Movie
-from chilopod.paper.size import Size
+import xarray as xr
+
+from chilopod.errors import OutputError
 from chilopod.paper.statements import ORDER
 from chilopod.paper.table import OfPlanar, OfTwin, RobotRow, Row, robot_rows
-from chilopod.progress import Progress
+from chilopod.progress import Progress, silent
 from chilopod.robot import Robot, load_robot
 from chilopod.show.panel import Panel
 
+S = TypeVar("S")
 T = TypeVar("T")
 Line = Row | OfTwin | OfPlanar
+
+SectionProgress = Callable[[str, float, str], None]
+"""Called with the section, the part of it that is done (0 to 1), and a few words."""
+
+
+class Size(Enum):
+    """Size of a report: how much of everything it computes."""
+
+    FULL = "as much as the paper"
+    QUICK = "coarser sweeps, fewer module counts, springs and repeats; what does not depend on chance is as exact"
+    TINY = "every section, but hardly anything of it: walks of the whole robot are cut before they have settled"
+
+    def of(self, full: S, quick: S, tiny: S) -> S:
+        """The one of three that is this size's."""
+        return {Size.FULL: full, Size.QUICK: quick, Size.TINY: tiny}[self]
+
+    def cut(self, usual: S, tiny: S) -> S:
+        """Value for a report that is not tiny; a tiny one has less of it."""
+        return self.of(usual, usual, tiny)
 
 
 @dataclass(frozen=True)
@@ -25,15 +48,12 @@ class Context:
 
     Attributes
     ----------
-    robot
-        Robot of the planar model; the paper's numbers are those of ``aoi2022-planar``.
-    whole
-        Whole of the sections in three dimensions, with a twin.
-    size
-        Amount of every computation.
-    folder
-        Folder of the records of trials, with which a stopped computation is resumed; without one nothing is
-        kept.
+    robot, whole
+        Robot of the planar model, and whole robot of the sections in three dimensions, with a twin; the paper's numbers
+        are those of ``aoi2022-planar`` and ``aoi2022``.
+    size, folder
+        Amount of every computation, and folder of the records of trials, with which a stopped computation is resumed;
+        without one nothing is kept.
     """
 
     robot: Robot = field(default_factory=lambda: load_robot("aoi2022-planar"))
@@ -42,50 +62,75 @@ class Context:
     folder: Path | None = None
 
 
+@dataclass(frozen=True)
+class Movie:
+    """A film of walks side by side.
+
+    Attributes
+    ----------
+    name, heading, titles
+        Name of its files, heading above all panels, and titles of these.
+    speed, stills
+        Seconds of the walks per second of the film, and moments of it that are pictured in three dimensions, s; none of
+        a film from above.
+    size
+        Width and height of a film from above, pixels; that of three panels in a row.
+    """
+
+    name: str
+    heading: str
+    titles: tuple[str, ...]
+    record: xr.Dataset
+    speed: float
+    stills: tuple[float, ...] = ()
+    size: tuple[int, int] = (1280, 320)
+
+
+def nothing(*found: object) -> Sequence[Any]:
+    """No rows, panels or films."""
+    return ()
+
+
 @dataclass(frozen=True, eq=False)
 class Section(Generic[T]):
     """A part of the report: something that is computed, its lines of the tables, its figures and films.
 
     Attributes
     ----------
-    name
-        Name on the command line.
-    chapter
-        Chapter of the page.
-    sentence
-        Description in a few words.
+    name, chapter, sentence
+        Name on the command line, chapter of the page, and description in a few words.
     compute
-        Finds it, given the context, what the sections it needs have found, and where to say how far it is.
+        Computation, given the context, where to say how far it is, and the results of what the section needs.
     rows
-        Its lines of the tables, given what it found and what the sections it needs have found.
-    panels
-        Its figures, given what it found and what the sections beside it have found.
-    films
-        Its films, given what it found.
-    needs
-        Other sections whose results it uses where they were computed; they come before it.
-    beside
-        Other sections that its figures show where they were computed; they are drawn once more when these are.
-    beyond
-        True if it goes beyond the paper's own experiments.
-    on_request
-        True if it is computed only if it is asked for by name.
-    full
-        True if it is left out of a quick report unless it is asked for by name.
+        Lines of the tables, given what was computed and the results of what the section needs.
+    panels, films
+        Figure or figures, given what was computed and the results of the sections beside it; films, given what was
+        computed.
+    needs, beside
+        Sections whose results it uses, which come before it, and sections whose results its figures show, which are
+        drawn once more when these are computed. A result that was not computed is None.
+    beyond, on_request, full
+        True if it goes beyond the paper's own experiments, if it is computed only if it is asked for by name, and if it
+        is left out of a quick report unless it is asked for by name.
     """
 
     name: str
     chapter: str
     sentence: str
-    compute: Callable[[Context, Found, Progress], T]
-    rows: Callable[[T, Found], Sequence[Line]] = lambda value, found: ()
-    panels: Callable[[T, Found], Iterable[Panel]] = lambda value, found: ()
-    films: Callable[[T], Iterable[Movie]] = lambda value: ()
+    compute: Callable[..., T]
+    rows: Callable[..., Sequence[Line]] = nothing
+    panels: Callable[..., Panel | Iterable[Panel]] = nothing
+    films: Callable[[T], Iterable[Movie]] = nothing
     needs: tuple[Section[Any], ...] = ()
     beside: tuple[Section[Any], ...] = ()
     beyond: bool = False
     on_request: bool = False
     full: bool = False
+
+    def figures(self, found: Found) -> list[Panel]:
+        """Figures of what was found."""
+        drawn = self.panels(found[self], *found.of(self.beside))
+        return [drawn] if isinstance(drawn, Panel) else list(drawn)
 
 
 @dataclass
@@ -95,11 +140,9 @@ class Found:
     Attributes
     ----------
     context
-        Robots, size and folder of the computation.
-    values, rows, seconds
-        Values, rows and seconds of the sections that were computed: result, lines of the tables, and how long it took.
-    failures
-        Errors of sections that could not be computed.
+        Ground of the computation.
+    values, rows, seconds, failures
+        Results, lines of the tables, durations (s) and errors of the sections that were computed, or could not be.
     """
 
     context: Context = field(default_factory=Context)
@@ -115,14 +158,16 @@ class Found:
         """True if it was computed, or failed."""
         return section in self.values or section in self.failures
 
-    def add(self, section: Section[T], value: T) -> None:
-        """Keep a result, and make its lines of the tables."""
-        rows = section.rows(value, self.seen_by(section.needs))
-        self.values[section], self.rows[section] = value, rows
+    def of(self, sections: Iterable[Section[Any]]) -> list[Any]:
+        """Results of some sections."""
+        return [self[section] for section in sections]
 
-    def seen_by(self, needs: Iterable[Section[Any]]) -> Found:
-        """The results of some sections; asking for others fails."""
-        return _Seen(self.context, {section: self[section] for section in needs})
+    def add(self, section: Section[T], progress: Progress = silent) -> None:
+        """Compute a section, and make its lines of the tables."""
+        needed = self.of(section.needs)
+        value = section.compute(self.context, progress, *needed)
+        rows = section.rows(value, *needed)
+        self.values[section], self.rows[section] = value, rows
 
     def copy(self) -> Found:
         """As it is now, whatever is added later."""
@@ -140,10 +185,41 @@ class Found:
         return robot_rows((row for rows in self.rows.values() for row in rows), ORDER)
 
 
-class _Seen(Found):
-    """Insists that what is used was said to be needed."""
+def reproduce(
+    sections: Sequence[Section[Any]],
+    context: Context | None = None,
+    progress: SectionProgress = lambda what, done, words: None,
+    told: Callable[[Found, Section[Any]], None] = lambda found, section: None,
+) -> Found:
+    """Compute sections of the report; one that fails does not keep the others from being computed.
 
-    def __getitem__(self, section: Section[T]) -> T | None:
-        if section not in self.values:
-            raise KeyError(f"{section.name} is not among the sections that are needed")
-        return super().__getitem__(section)
+    Parameters
+    ----------
+    sections, context
+        See :func:`chilopod.paper.registry.chosen`; by default of the paper's robots.
+    progress, told
+        Called as the work goes on, and after every section with all that is found by then, and the section.
+
+    Raises
+    ------
+    OutputError
+        If trials cannot be kept.
+    """
+    found = Found(context or Context())
+    for section in sections:
+        started = time.perf_counter()
+        progress(section.sentence, 0.0, section.sentence)
+
+        def report(done: float, words: str, section: Section[Any] = section) -> None:
+            progress(section.sentence, done, words)
+
+        try:
+            found.add(section, report)
+        except OutputError:  # where nothing can be written any more, no other section fares better
+            raise
+        except Exception as error:
+            found.failures[section] = error
+        found.seconds[section] = time.perf_counter() - started
+        progress(section.sentence, 1.0, "failed" if section in found.failures else "done")
+        told(found, section)
+    return found

@@ -38,13 +38,13 @@ def _number(quantity: str, number: Number, kind: Kind) -> Statement[Band]:
     return Statement(quantity, number.band, kind)
 
 
-def _predicted(quantity: str, words: str, asked: str) -> Statement[Said]:
-    return Statement(quantity, Said(words, asked), _PREDICTED)
+def _said(quantity: str, words: str, asked: str, kind: Kind = _PREDICTED) -> Statement[Said]:
+    return Statement(quantity, Said(words, asked), kind)
 
 
 def _duration(what: str) -> Statement[Said]:
-    said = Said("not printed how long", "the same verdict after each")
-    return Statement(f"{what}, by how long the walks last", said, _CHECKED)
+    quantity = f"{what}, by how long the walks last"
+    return _said(quantity, "not printed how long", "the same verdict after each", _CHECKED)
 
 
 def _of_task(letter: str, task: printed.Task) -> TaskStatements:
@@ -71,12 +71,11 @@ def listed(springs: Sequence[float]) -> str:
     return listing(f"{spring:g}" for spring in sorted(springs))
 
 
-STRAIGHT: Statement[Said] = Statement(
-    f"walks with k1 = {listed(printed.STRAIGHT)} {PAPER_UNIT}", Said("straight", "most trials"), _FITTED
-)
-CURVED: Statement[Said] = Statement(
+STRAIGHT = _said(f"walks with k1 = {listed(printed.STRAIGHT)} {PAPER_UNIT}", "straight", "most trials", _FITTED)
+CURVED = _said(
     f"walks with k1 = {listed(printed.CURVED)} {PAPER_UNIT}",
-    Said("curved, to both sides", "most trials at each; both sides"),
+    "curved, to both sides",
+    "most trials at each; both sides",
     _FITTED,
 )
 ONSET = _number("where curved walks set in (square-root fit)", printed.ONSET, _FITTED)
@@ -95,8 +94,8 @@ SPEED: Statement[Band] = Statement(
     ),
     _FITTED,
 )
-RISING = _predicted("angle of joint 1 over 1/k1", "increases", "from every spring to the next")
-FLUCTUATION = _predicted(
+RISING = _said("angle of joint 1 over 1/k1", "increases", "from every spring to the next")
+FLUCTUATION = _said(
     "fluctuation among trials over 1/k1, joint 1", "increases", "from the stiffest spring that curves to the softest"
 )
 VARIANTS = {
@@ -114,17 +113,17 @@ RADII_BY_DURATION = {spring: _duration(f"radius at {spring:g} {PAPER_UNIT}") for
 WALKS_BY_DURATION = {what: _duration(f"walks {what} at {spring:g} {PAPER_UNIT}") for what, spring in SLOWEST.items()}
 TASKS = {letter: _of_task(letter, task) for letter, task in printed.TASKS.items()}
 ARRIVAL = _number("task A: earliest arrival", printed.ARRIVAL, _FITTED)
-WITHOUT = _predicted(
+WITHOUT = _said(
     f"task A without leg yaw, k1 = {printed.TASKS['A'].k_hat}",
     f"many of {printed.WITHOUT_LEG_YAW} fail, with it {printed.REPEATS} of {printed.REPEATS} arrive",
     f"at most {printed.WITHOUT_LEG_YAW // 2} arrive without, all with",
 )
-HOPF = _predicted(
+HOPF = _said(
     "task A, pitchfork against Hopf: smallest criteria",
     "lower for the pitchfork, all three",
     f"all three lower, by {SURE:g} standard errors",
 )
-HOPF_SPRINGS = _predicted(
+HOPF_SPRINGS = _said(
     "task A, Hopf: springs of the smallest criteria",
     f"below the Hopf point, {printed.UNIFORM}",
     "all below where its own body undulates",

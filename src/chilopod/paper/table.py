@@ -50,10 +50,9 @@ class Result:
     ----------
     text
         Words, for what is not one number, or with more than its number; by default the number with its error and unit.
-    value, error, unit
-        The number that is compared, and its standard error or the bound of its error; NaN where there is none.
-    digits
-        Number of decimals that are shown.
+    value, error, unit, digits
+        Number that is compared, its standard error or the bound of its error (NaN where there is none), its unit, and
+        how many decimals are shown.
     """
 
     text: str = ""
@@ -79,18 +78,11 @@ class Row:
 
     Attributes
     ----------
-    quantity
-        Subject of the line.
-    paper
-        Statement of the paper, in words; it says so where the paper prints none.
-    computed
-        Result of the computation.
-    where
-        Section or figure of the paper.
-    verdict
-        Verdict of the comparison.
-    remark
-        Reason for a difference, if there is one.
+    quantity, paper, where
+        Subject of the line, statement of the paper in words (it says so where the paper prints none), and its place
+        there.
+    computed, verdict, remark
+        Result of the computation, verdict of the comparison, and reason for a difference, if there is one.
     """
 
     quantity: str
@@ -105,6 +97,12 @@ class Row:
         return {**vars(self), "computed": self.computed.words, **self.computed.data()}
 
 
+def unprinted(quantity: str, computed: Result | str, where: str, remark: str = "") -> Row:
+    """A line on something of which the paper prints nothing."""
+    result = Result(computed) if isinstance(computed, str) else computed
+    return Row(quantity, Verdict.NOT_PRINTED, result, where, Verdict.NOT_PRINTED, remark)
+
+
 class Kind(Enum):
     """Kind of a statement: fitted, predicted, or "checked", which is about the twin itself."""
 
@@ -115,17 +113,8 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Statement(Generic[S]):
-    """Something that the paper says of its robot, or that is asked of the twin besides.
-
-    Attributes
-    ----------
-    quantity
-        Subject of the statement.
-    said
-        Statement of the paper and condition on the twin, on a number if it is a :class:`Band`.
-    kind
-        True if the twin was fitted to it.
-    """
+    """Something that the paper says of its robot, or that is asked of the twin besides: subject, statement and
+    condition on the twin, on a number if it is a :class:`Band`, and whether the twin was fitted to it."""
 
     quantity: str
     said: S
@@ -134,19 +123,7 @@ class Statement(Generic[S]):
 
 @dataclass(frozen=True)
 class OfTwin:
-    """Result of the twin.
-
-    Attributes
-    ----------
-    statement
-        Statement of the paper's robot.
-    result
-        Result of the twin's walks.
-    verdict
-        Verdict of the comparison.
-    reading
-        Reading of what the paper leaves open, if the twin has several.
-    """
+    """Result of the twin, its verdict, and the reading of what the paper leaves open, if there are several."""
 
     statement: Statement[Said]
     result: Result
@@ -168,18 +145,12 @@ class RobotRow:
 
     Attributes
     ----------
-    statement
-        Statement of the paper's robot.
-    quantity, robot
-        Its subject, with the reading of it if there are several, and its words.
+    statement, quantity, robot
+        Statement of the paper's robot, its subject, with the reading of it if there are several, and its words.
     twin, planar
-        Results of both, in words and numbers with units; empty where nothing was computed.
-    kind
-        One of :class:`Kind`.
-    verdict
-        Verdict on the twin.
-    asked
-        Condition for a verdict of *within*.
+        Results of both; empty where nothing was computed.
+    kind, verdict, asked
+        One of :class:`Kind`, verdict on the twin, and condition for a verdict of *within*.
     """
 
     statement: Statement[Said]
@@ -221,7 +192,6 @@ def robot_rows(found: Iterable[Row | OfTwin | OfPlanar], order: Iterable[Stateme
             quantity = f"{each.quantity} ({twin.reading})" if twin.reading else each.quantity
             lines.append(RobotRow(each, quantity, said.words, twin.result, planar, kind, twin.verdict, said.asked))
         if planar and not twins:
-            lines.append(
-                RobotRow(each, each.quantity, said.words, None, planar, kind, Verdict.NOT_COMPUTED, said.asked)
-            )
+            none = Verdict.NOT_COMPUTED
+            lines.append(RobotRow(each, each.quantity, said.words, None, planar, kind, none, said.asked))
     return lines

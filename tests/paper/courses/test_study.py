@@ -9,8 +9,7 @@ from chilopod.engine import Observation
 from chilopod.paper.courses.robust import ablated, planar_conditions, under, whole_conditions
 from chilopod.paper.courses.steps import steps
 from chilopod.paper.courses.study import PLANAR, compared, prepared
-from chilopod.paper.section import Context
-from chilopod.paper.size import Size
+from chilopod.paper.section import Context, Size
 from chilopod.steering import ON_COURSES
 from chilopod.tasks.course import random_courses
 from chilopod.trials import Trial, walked
@@ -27,7 +26,7 @@ def variable(context):
 
 
 def test_all_strategies_walk_the_same_courses(context, variable):
-    data = compared(context.robot, variable, PLANAR[Size.TINY], Size.TINY, context.folder)
+    data = compared(context, variable, PLANAR[Size.TINY])
     assert list(data.case.values) == list(ON_COURSES)
     assert data.seconds.notnull().all()
     assert (data.seconds <= 40.0 + 1e-6).all()
@@ -77,13 +76,13 @@ def test_each_step_of_the_law_does_what_it_says(variable):
 def test_conditions_change_the_robot_and_not_its_law(context, variable):
     chosen = [each for each in planar_conditions(context.robot) if each.name in ("as usual", "a slow actuator")]
     seeds = range(2000, 2001)
-    data = under(context.robot, variable, 15.0, chosen, seeds, Size.TINY, context.folder)
+    data = under(context, variable, 15.0, chosen, seeds)
     assert dict(data.sizes) == {"condition": 2, "strategy": 2, "course": 1, "goal": 5}
     usual, slow = (data.seconds.sel(strategy="variable", condition=each.name).values for each in chosen)
     assert (usual != slow).any()
     fixed = data.seconds.sel(strategy="pitchfork").values
     assert (fixed[0] == fixed[1]).all()  # one spring for all has no actuator
-    grown = ablated(variable, seeds, Size.TINY, context.folder)
+    grown = ablated(context, variable, seeds)
     assert (grown.seconds.isel(case=-1) == data.seconds.sel(strategy="variable", condition="as usual")).all()
 
 

@@ -12,12 +12,12 @@ from chilopod.paper.curved import rows as curved_rows
 from chilopod.paper.curved import study as curved_findings
 from chilopod.paper.curved.trials import curved_trials, off_branch, on_branch
 from chilopod.paper.printed import variant_robots
-from chilopod.paper.section import Context
-from chilopod.paper.size import Size
+from chilopod.paper.section import Context, Size
 from chilopod.paper.table import OfPlanar, Row
 from chilopod.planar import PlanarModel
 from chilopod.robot import load_robot
 from chilopod.stability.returns import whole_period
+from chilopod.tasks.radius_law import is_curved
 from chilopod.trials import NONE, Disturbance, Trial, run
 
 ROBOT = load_robot("aoi2022-planar")
@@ -82,7 +82,7 @@ def test_walks_that_have_not_settled_are_told(monkeypatch):
     assert short.duration.values == pytest.approx(36.0)
     assert not short.settled.any()
     assert set(short.direction.values.ravel()) == {""}
-    assert not curved_findings.bent(short).any()
+    assert not is_curved(short).any()
 
 
 def test_a_walk_that_folds_up_is_told():

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from chilopod.paper.courses.figures import courses
-from chilopod.paper.courses.figures import robust as courses_robust
+from chilopod.paper.courses import figures as courses
 from chilopod.paper.courses.sections import Robust
 from chilopod.show import style, tables
 from helpers.made_up_courses import compared, conditions
@@ -14,8 +13,8 @@ from helpers.made_up_courses import compared, conditions
 def drawn():
     data = compared()
     robust = Robust(data.isel(case=slice(4)), conditions(worse=["one"]))
-    panels = [*courses.panels(data), courses_robust.panel(robust), courses.strategies(compared(engine="twin"))]
-    return {panel.name: panel for panel in [*panels, courses_robust.whole(conditions())]}
+    panels = [*courses.panels(data), courses.robust(robust), courses.strategies(compared(engine="twin"))]
+    return {panel.name: panel for panel in [*panels, courses.whole(conditions())]}
 
 
 @pytest.mark.parametrize("narrow", [False, True])

@@ -4,19 +4,17 @@ import numpy as np
 import pytest
 
 from chilopod.netcdf import netcdf
-from chilopod.paper.curved.figures import trials as curved_trials
-from chilopod.paper.curved.figures import variants as curved_variants
+from chilopod.paper.curved import figures
 from chilopod.paper.curved.study import curved_study
-from chilopod.paper.section import Context
-from chilopod.paper.size import Size
+from chilopod.paper.section import Context, Size
 from chilopod.show import style
 from chilopod.show.tables import csv
 
 PANELS = {
-    "walks": curved_trials.walks,
-    "joints": curved_trials.joints,
-    "onset": curved_trials.onset,
-    "variants": curved_variants.panel,
+    "walks": figures.walks,
+    "joints": figures.joints,
+    "onset": figures.onset,
+    "variants": figures.variants,
 }
 
 
@@ -37,7 +35,7 @@ def test_panels_say_what_is_drawn_and_store_it(study, name):
 
 def test_the_fork_shows_every_mean(study):
     with style.house_style():
-        axes = curved_trials.walks(study).draw(False).axes
+        axes = figures.walks(study).draw(False).axes
     (fork,) = (each for each in axes if each.get_ylabel() == "mean angle of joint 1 (deg)")
     shown = np.concatenate([line.get_ydata() for line in fork.get_lines() if line.get_marker() == "o"])
     angles = np.rad2deg(study.trials.mean_angle.sel(joint=1))

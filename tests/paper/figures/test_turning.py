@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from chilopod.paper.section import Context
-from chilopod.paper.size import Size
-from chilopod.paper.turning.figures.turning import panels
+from chilopod.paper.section import Context, Size
+from chilopod.paper.turning.figures import panels
 from chilopod.paper.turning.study import turning
 from chilopod.show import style, tables
 

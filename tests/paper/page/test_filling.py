@@ -13,11 +13,10 @@ from matplotlib.figure import Figure
 
 from chilopod.cli import main
 from chilopod.errors import OutputError
-from chilopod.paper import sections
+from chilopod.paper import registry
 from chilopod.paper.page import Report, write_report
 from chilopod.paper.page.page import Film
-from chilopod.paper.section import Context, Found, Section
-from chilopod.paper.sections import reproduce
+from chilopod.paper.section import Context, Found, Section, reproduce
 from chilopod.paper.table import Result, Row, Verdict
 from chilopod.show.panel import Panel
 from helpers.html_page import Page as PAGE
@@ -26,7 +25,7 @@ RELOAD = '<meta http-equiv="refresh"'
 CONTEXT = Context()
 
 
-def rows(value, found):
+def rows(value):
     return [Row(f"quantity {value}", "1", Result("1"), "here", Verdict.AGREES)]
 
 
@@ -36,11 +35,11 @@ def panel(name):
 
 
 def figure(name):
-    return lambda value, found: [panel(name)]
+    return lambda value: [panel(name)]
 
 
-ONE = Section("one", "First chapter", "the first", lambda context, found, report: 1, rows, figure("one"))
-TWO = Section("two", "Second chapter", "the second", lambda context, found, report: 2, rows, figure("two"))
+ONE = Section("one", "First chapter", "the first", lambda context, report: 1, rows, figure("one"))
+TWO = Section("two", "Second chapter", "the second", lambda context, report: 2, rows, figure("two"))
 
 
 def failing(*_):
@@ -68,14 +67,14 @@ def test_page_is_there_before_anything_is_computed(tmp_path):
 
 
 def test_the_first_line_says_where_the_page_is(monkeypatch, capsys, tmp_path):
-    monkeypatch.setattr(sections, "SECTIONS", (ONE,))
+    monkeypatch.setattr(registry, "load_sections", lambda: (ONE,))
     assert main(["reproduce", "--out", str(tmp_path)]) == 0
     assert capsys.readouterr().out.splitlines()[0] == f"The page is {tmp_path / 'index.html'}"
 
 
 def test_every_section_is_on_the_page_before_the_next_is_drawn(tmp_path):
     seen = []
-    two = replace(TWO, panels=lambda value, found: seen.append(text(report)) or [panel("two")])
+    two = replace(TWO, panels=lambda value: seen.append(text(report)) or [panel("two")])
     with Report([ONE, two], CONTEXT, tmp_path) as report:
         reproduce([ONE, two], CONTEXT, told=lambda found, section: report.add(found, [section]))
     (between,) = seen
@@ -89,7 +88,7 @@ def test_every_section_is_on_the_page_before_the_next_is_drawn(tmp_path):
 
 def test_what_is_shown_beside_others_is_drawn_once_more(tmp_path):
     seen = []
-    one = replace(ONE, panels=lambda value, found: seen.append(found[TWO]) or (), beside=(TWO,))
+    one = replace(ONE, panels=lambda value, two: seen.append(two) or (), beside=(TWO,))
     with Report([one, TWO], CONTEXT, tmp_path) as report:
         reproduce([one, TWO], CONTEXT, told=lambda found, section: report.add(found, [section]))
     assert seen == [None, 2]
@@ -105,12 +104,12 @@ def test_films_wait_while_there_is_anything_else_to_draw(monkeypatch, tmp_path):
         assert re.findall("Still to come:</b> (.*).</p>", text(report)) == ["the first"]
         return Film(movie, "A walk", 1.0, False)
 
-    def panels(value, found):
+    def panels(value, two):
         added.wait(60.0)
         return [panel("one")]
 
     monkeypatch.setattr("chilopod.paper.page.report.write_movie", film)
-    two = replace(TWO, panels=lambda value, found: seen.append("two") or ())
+    two = replace(TWO, panels=lambda value: seen.append("two") or ())
     one = replace(ONE, panels=panels, films=lambda value: ["film"], beside=(two,))
     with Report([one, two], CONTEXT, tmp_path) as report:
         reproduce([one, two], CONTEXT, told=lambda found, section: report.add(found, [section]))
@@ -123,8 +122,8 @@ def test_films_wait_while_there_is_anything_else_to_draw(monkeypatch, tmp_path):
 
 @pytest.mark.parametrize("what", ["computed", "drawn"])
 def test_what_fails_is_said_and_the_others_are_there(monkeypatch, capsys, tmp_path, what):
-    one = replace(ONE, rows=lambda value, found: (), **{"compute" if what == "computed" else "panels": failing})
-    monkeypatch.setattr(sections, "SECTIONS", (one, TWO))
+    one = replace(ONE, rows=lambda value: (), **{"compute" if what == "computed" else "panels": failing})
+    monkeypatch.setattr(registry, "load_sections", lambda: (one, TWO))
     assert main(["reproduce", "--out", str(tmp_path), "--json"]) == 1
     out, err = capsys.readouterr()
     assert json.loads(out)["failures"] == {"one": "ValueError: no <luck>"}
@@ -146,7 +145,7 @@ def test_a_figure_that_cannot_be_drawn_is_no_secret(tmp_path):
 def test_a_reader_may_delete_everything_meanwhile(tmp_path):
     folder = tmp_path / "report"
 
-    def delete(context, found, report):
+    def delete(context, report):
         shutil.rmtree(folder, ignore_errors=True)
         return 2
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import chilopod.paper
 from chilopod.cli import main
-from chilopod.paper import registry, sections
+from chilopod.paper import registry
 
 PAGE = (Path(__file__).parents[3] / "docs" / "new-section.md").read_text(encoding="utf-8")
 BLOCK = re.compile(r"```(?:python|text)\n(.*?)```", re.DOTALL)
@@ -22,7 +22,6 @@ def test_what_the_page_says_adds_a_section(monkeypatch, capsys, tmp_path):
     (tmp_path / "chilopod" / "paper" / "stride" / "__init__.py").write_text('"""The stride."""\n')
     monkeypatch.setattr(chilopod.paper, "__path__", [*chilopod.paper.__path__, str(tmp_path / "chilopod" / "paper")])
     monkeypatch.setattr(registry, "REGISTRY", {**registry.REGISTRY, **eval(f"{{{line}}}")})
-    monkeypatch.setattr(sections, "SECTIONS", registry.load_sections())
 
     assert main(["reproduce", "--only", "stride", "--out", str(tmp_path / "report"), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)

@@ -7,8 +7,7 @@ import pytest
 from chilopod.errors import OutputError
 from chilopod.paper.page import check_report
 from chilopod.paper.page.page import State, page
-from chilopod.paper.section import Context, Found
-from chilopod.paper.size import Size
+from chilopod.paper.section import Context, Found, Size
 from chilopod.paper.straight.sections import MODE, UNIFORM
 
 

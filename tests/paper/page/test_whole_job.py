@@ -10,7 +10,7 @@ import pytest
 
 from chilopod.cli import main
 from chilopod.paper.fit_data import critical_mode_data, variant_settings
-from chilopod.paper.sections import SECTIONS
+from chilopod.paper.registry import load_sections
 from chilopod.paper.straight.sections import IDENTIFICATION
 from chilopod.tasks.identify import planar
 from helpers.browser import CHROMIUM, Browser
@@ -44,7 +44,7 @@ def browser(tmp_path_factory):
 
 
 def test_every_section_is_computed_and_on_the_page(tiny):
-    assert list(tiny.found.values) == list(SECTIONS)
+    assert list(tiny.found.values) == list(load_sections())
     assert tiny.failures == {}
     drawn = {path.stem for path in (tiny.folder / "figures").iterdir()}
     page = PAGE((tiny.folder / "index.html").read_text(encoding="utf-8"))
@@ -144,7 +144,7 @@ def test_the_profile_passes_through_the_best_fit_and_predicts(tiny):
     best = found.best.legs.forward_offset
     cost = np.interp(best, found.profile.forward_offset, found.profile.largest_residual)
     assert cost == pytest.approx(np.abs(found.residuals).max(), abs=0.1)
-    assert found.allowed("forward_offset")[0] < best < found.allowed("forward_offset")[1]
+    assert found.allowed("legs.forward_offset")[0] < best < found.allowed("legs.forward_offset")[1]
     assert np.isfinite(found.profile.uniform).all()
     assert set(variant_settings()) < set(found.profile.data_vars)
     result = found.as_json()

@@ -14,9 +14,9 @@ from chilopod.errors import OutputError
 from chilopod.paper.page import write_report
 from chilopod.paper.page.story import summary
 from chilopod.paper.printed import Said
+from chilopod.paper.registry import load_sections
 from chilopod.paper.robot.sections import WALKS
 from chilopod.paper.section import Context, Found
-from chilopod.paper.sections import SECTIONS
 from chilopod.paper.straight.sections import IDENTIFICATION, MODE
 from chilopod.paper.table import Kind, OfPlanar, OfTwin, Result, Row, Statement, Verdict, within
 from chilopod.show import write_identification
@@ -25,8 +25,7 @@ from helpers.html_page import Page
 
 
 def figures(found):
-    drawn = [each for each in SECTIONS if each in found.values]
-    panels = [panel for each in drawn for panel in each.panels(found[each], found)]
+    panels = [panel for each in load_sections() if each in found.values for panel in each.figures(found)]
     return sorted([schematic.panel(found.context.robot), *panels], key=lambda panel: panel.letter)
 
 

@@ -11,11 +11,10 @@ from chilopod.paper import statements
 from chilopod.paper.fit_data import walking_speed
 from chilopod.paper.robot import numerics, why
 from chilopod.paper.robot import rows as rows_of_walks
-from chilopod.paper.robot.rows import duration_rows, walk_rows
-from chilopod.paper.robot.turning_rows import turning_rows
+from chilopod.paper.robot.rows import duration_rows, turning_rows, walk_rows
 from chilopod.paper.robot.walks import SPRINGS, VARIANT_SPRINGS
 from chilopod.paper.table import Kind, robot_rows
-from chilopod.paper.turning.hopf import saturated
+from chilopod.paper.turning.criteria import saturated
 from helpers.made_up_robot import AMPLITUDE, durations, series, task, turning, walks
 
 SOFT, SLOW, PHASE = "k2-5 = 28 N*mm/deg", "stride 1.8 cm", "module phase 180 deg"

@@ -5,7 +5,7 @@ import xarray as xr
 from chilopod import load_robot
 from chilopod.engine import engine_named
 from chilopod.paper.robot import structures
-from chilopod.paper.robot.figures import structures as robot_structures
+from chilopod.paper.robot.figures import trust
 from chilopod.paper.robot.spread import LOWER
 from chilopod.paper.robot.structures import STRUCTURES
 from chilopod.tasks.identify.twin_constants import FREE, constants_of, parts_of
@@ -74,7 +74,7 @@ def test_of_two_readings_the_nearer_counts():
 
 def test_the_panel_says_who_is_nearer():
     found = structures._with_chi_squared(made_up([[30.0, 25.0, 25.0, 18.0], [24.0, 25.0, 25.0, 18.0]]))
-    shown = robot_structures.panel(found)
+    shown = trust.structures(found)
     assert "less have s1" in " ".join(shown.text)
     assert "below those of springs all alike with none of those that meet it" in " ".join(shown.text)
     shown.draw(False)

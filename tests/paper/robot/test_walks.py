@@ -8,12 +8,12 @@ import xarray as xr
 
 from chilopod import load_robot
 from chilopod.paper import printed, statements
+from chilopod.paper.measures import onset, radius_at, spring_for
 from chilopod.paper.robot import walks as robot_walks
 from chilopod.paper.robot.figures import turning as turning_figures
 from chilopod.paper.robot.figures import walks as walk_figures
-from chilopod.paper.robot.rows import walk_rows
+from chilopod.paper.robot.rows import turning_rows, walk_rows
 from chilopod.paper.robot.turning import RobotTurning
-from chilopod.paper.robot.turning_rows import turning_rows
 from chilopod.paper.robot.walks import (
     RobotWalks,
     by_duration,
@@ -24,7 +24,6 @@ from chilopod.paper.robot.walks import (
 )
 from chilopod.paper.table import Kind, Verdict
 from chilopod.paper.turning.trials import turning_task, without_leg_yaw
-from chilopod.paper.walk_measures import onset, radius_at, spring_for
 from chilopod.steering import Target
 from chilopod.tasks.radius_law import is_curved
 from chilopod.trials import Disturbance

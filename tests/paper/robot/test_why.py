@@ -5,7 +5,7 @@ from chilopod import load_robot
 from chilopod.analysis.straight_walk import pitchfork
 from chilopod.paper.robot import why as ablation
 from chilopod.paper.robot.why import FACTORS, FINER, limit_point, planar_limit, sign_change, with_factors, with_grip
-from chilopod.paper.size import Size
+from chilopod.paper.section import Size
 from chilopod.twin import foot_creep
 
 ROBOT, PLANAR = load_robot("aoi2022"), load_robot("aoi2022-planar")

@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
+from chilopod.paper.section import Context, Size
 from chilopod.paper.straight import study as floquet
-from chilopod.robot import load_robot
 
-ROBOT = load_robot("aoi2022-planar")
+QUICK = Context(size=Size.QUICK)
+ROBOT = QUICK.robot
 
 
 def test_each_curve_of_the_sweep_is_one_curve():
-    data = floquet.exponent_sweep(ROBOT, 40)
+    data = floquet.exponent_sweep(QUICK)
     # The sum over all curves does not care how they are told apart; each curve has to be smooth besides.
     real = data["real"].values
     steps = np.abs(np.diff(real, axis=0)) / (1.0 + np.abs(real[:-1]))
@@ -24,7 +25,7 @@ def test_each_curve_of_the_sweep_is_one_curve():
 
 
 def test_variants_go_the_way_the_paper_says():
-    data = floquet.variants(ROBOT)
+    data = floquet.variants(QUICK)
     base, softer, slower, phase = data.critical_k1.values
     assert base == pytest.approx(11.991, abs=0.001)
     assert (softer, slower) < (base, base)
@@ -33,7 +34,7 @@ def test_variants_go_the_way_the_paper_says():
 
 
 def test_more_modules_of_the_same_size_change_little():
-    data = floquet.module_counts(ROBOT, range(6, 11))
+    data = floquet.module_counts(QUICK).sel(modules=range(6, 11))
     assert data.critical_k1.values == pytest.approx([11.99, 11.99, 11.91, 12.18, 12.40], abs=0.01)
     longer = floquet.with_modules(ROBOT, 9)
     assert longer.module_length == pytest.approx(ROBOT.module_length, rel=1e-15)
@@ -41,7 +42,7 @@ def test_more_modules_of_the_same_size_change_little():
 
 
 def test_uniform_springs():
-    data = floquet.uniform_springs(ROBOT)
+    data = floquet.uniform_springs(QUICK)
     assert data.attrs["value"] == pytest.approx(6.5359, abs=5e-5)
     assert data.attrs["frequency_rad_s"] == pytest.approx(0.5664, abs=5e-5)
     assert np.linalg.norm(data.amplitude) == pytest.approx(1.0)

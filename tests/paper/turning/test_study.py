@@ -13,10 +13,9 @@ import xarray as xr
 
 from chilopod.errors import ParameterError
 from chilopod.paper import statements
-from chilopod.paper.section import Context
-from chilopod.paper.size import Size
+from chilopod.paper.section import Context, Size
 from chilopod.paper.table import OfPlanar, Row, Verdict
-from chilopod.paper.turning.minima import minima
+from chilopod.paper.turning.criteria import minima
 from chilopod.paper.turning.rows import rows
 from chilopod.paper.turning.study import turning
 from chilopod.paper.turning.trials import CRITERIA, springs_by_outcome, turning_task

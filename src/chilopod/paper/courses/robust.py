@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
 from chilopod.paper.courses import bumps
 from chilopod.paper.courses.steps import steps
-from chilopod.paper.courses.study import Case, driven, without_setting
-from chilopod.paper.size import Size
+from chilopod.paper.courses.study import Case, driven, robot_of, without_setting
+from chilopod.paper.section import Context
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import VARIABLE, SpringLaw
@@ -22,17 +21,9 @@ from chilopod.trials import Disturbance
 USUAL = "as usual"
 """The case that others are held against."""
 
-PLANAR_COURSES: Mapping[Size, range] = {
-    Size.FULL: range(2000, 2200),
-    Size.QUICK: range(2000, 2040),
-    Size.TINY: range(2000, 2001),
-}
-WHOLE_COURSES: Mapping[Size, range] = {
-    Size.FULL: range(2000, 2020),
-    Size.QUICK: range(2000, 2005),
-    Size.TINY: range(2000, 2001),
-}
-"""Seeds."""
+PLANAR_COURSES = (range(2000, 2200), range(2000, 2040), range(2000, 2001))
+WHOLE_COURSES = (range(2000, 2020), range(2000, 2005), range(2000, 2001))
+"""Seeds, by :class:`chilopod.paper.section.Size`."""
 
 _FIXED = "pitchfork"
 _OTHER_FIT = ("ground.friction=256.5 N*s/m", "legs.half_width=72.8 mm", "legs.forward_offset=48 mm")
@@ -43,25 +34,10 @@ _ACTUATOR = ("springs.rate=20 N*mm/deg/s", "springs.lag=0.5 s")
 
 @dataclass(frozen=True, eq=False)
 class Robust:
-    """Contributions of the steps of the law, and success under disturbed conditions.
+    """Courses by the steps of the law (:func:`ablated`), or by all strategies of the whole robot
+    (:func:`chilopod.paper.courses.study.compared`), and under disturbed conditions (:func:`under`)."""
 
-    Attributes
-    ----------
-    steps
-        See :func:`ablated`.
-    conditions
-        See :func:`under`.
-    """
-
-    steps: xr.Dataset
-    conditions: xr.Dataset
-
-
-@dataclass(frozen=True, eq=False)
-class Whole:
-    """The same of the whole robot: strategies, see :func:`chilopod.paper.courses.study.compared`, and conditions."""
-
-    compared: xr.Dataset
+    courses: xr.Dataset
     conditions: xr.Dataset
 
 
@@ -71,18 +47,13 @@ class Condition:
 
     Attributes
     ----------
-    name
-        In a few words.
-    changes
-        Changes of the robot, as ``--set`` takes them; the law does not know.
-    disturbance
-        Besides what the course's seed draws.
-    engine
-        Engine of the walks.
-    own_law
-        True if the law is made for what ``changes`` say, and drives the robot as it is.
-    only_variable
-        True if it concerns the actuator of the spring alone.
+    name, changes
+        Name in a few words, and changes of the robot, as ``--set`` takes them; the law does not know.
+    disturbance, engine
+        Disturbance besides what the course's seed draws, and engine of the walks.
+    own_law, only_variable
+        True if the law is made for what ``changes`` say, and drives the robot as it is; true if the condition concerns
+        the actuator of the spring alone.
     """
 
     name: str
@@ -120,48 +91,26 @@ def whole_conditions(robot: Robot) -> list[Condition]:
     ]
 
 
-def ablated(
-    variable: Driver, seeds: Sequence[int], size: Size, folder: Path | None = None, progress: Progress = silent
-) -> xr.Dataset:
-    """Courses by the law as it grew, see :func:`chilopod.paper.courses.steps.steps`.
-
-    Parameters
-    ----------
-    variable
-        The robot with the spring that is set on the way.
-    seeds, size, folder, progress
-        As for :func:`chilopod.paper.courses.study.driven`, whose dataset this is: the cases are the steps.
-    """
+def ablated(context: Context, variable: Driver, seeds: Sequence[int], progress: Progress = silent) -> xr.Dataset:
+    """Courses by the law as it grew, see :func:`chilopod.paper.courses.steps.steps`: the cases of
+    :func:`chilopod.paper.courses.study.driven` are its steps."""
     assert isinstance(variable.controller, SpringLaw)
     cases = [Case(name, replace(variable, controller=law)) for name, law in steps(variable.controller).items()]
-    return driven(cases, seeds, size, folder, progress)
+    return driven(context, cases, seeds, progress)
 
 
 def under(
-    robot: Robot,
+    context: Context,
     variable: Driver,
     spring: float,
     conditions: Sequence[Condition],
     seeds: Sequence[int],
-    size: Size,
-    folder: Path | None = None,
     progress: Progress = silent,
 ) -> xr.Dataset:
-    """Courses under conditions that the law does not know of, by the variable spring and by one spring for all.
-
-    Parameters
-    ----------
-    robot, variable
-        As for :func:`chilopod.paper.courses.study.compared`.
-    spring
-        The one for all, N*mm/deg.
-    conditions
-        Conditions of walks whose engines have the same patience.
-    seeds, size, folder, progress
-        As for :func:`chilopod.paper.courses.study.driven`, whose dataset this is, but over (condition, strategy,
-        course, goal).
-    """
-    cases = []
+    """Courses under conditions that the law does not know of, by the variable spring and by one spring for all
+    (N*mm/deg): as of :func:`chilopod.paper.courses.study.driven`, but over (condition, strategy, course, goal). The
+    engines of all conditions have the same patience."""
+    robot, cases = robot_of(context, variable), []
     for condition in conditions:
         changed = robot.set_from_text(condition.changes)
         if condition.own_law:
@@ -171,20 +120,12 @@ def under(
         fixed = without_setting(robot if condition.only_variable else changed, variable, _FIXED, spring)
         for each in (set_on_the_way, fixed):
             cases.append(Case(condition.name, replace(each, engine=condition.engine), condition.disturbance))
-    data = driven(cases, seeds, size, folder, progress)
-    both = xr.Dataset(
-        {
-            name: (("condition", "strategy", *each.dims[1:]), each.values.reshape(-1, 2, *each.shape[1:]), each.attrs)
-            if "case" in each.dims
-            else each
-            for name, each in data.data_vars.items()
-        },
-        coords={
-            "condition": [each.name for each in conditions],
-            "strategy": [VARIABLE.name, _FIXED],
-            "course": data.course.values,
-            "goal": data.goal.values,
-        },
-        attrs=data.attrs,
-    )
-    return both.assign_attrs(spring=spring)
+    data = driven(context, cases, seeds, progress)
+    over = ("condition", "strategy", "course", "goal")
+    both = {
+        name: (over, each.values.reshape(-1, 2, *each.shape[1:]), each.attrs)
+        for name, each in data.data_vars.items()
+        if "case" in each.dims
+    }
+    names = {"condition": [each.name for each in conditions], "strategy": [VARIABLE.name, _FIXED]}
+    return xr.Dataset(both, names, {**data.attrs, "spring": spring}).merge(data.drop_dims("case"))

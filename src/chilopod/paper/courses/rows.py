@@ -7,16 +7,8 @@ import xarray as xr
 
 from chilopod.paper.courses.robust import USUAL
 from chilopod.paper.courses.statistics import Interval
-from chilopod.paper.courses.summary import (
-    Summary,
-    Verdicts,
-    share_of_courses,
-    share_of_targets,
-    summaries,
-    titled,
-    verdicts,
-)
-from chilopod.paper.table import Result, Row, Verdict
+from chilopod.paper.courses.summary import Summary, share_of_courses, share_of_targets, summaries, titled, verdicts
+from chilopod.paper.table import Row, unprinted
 from chilopod.show.words import listing
 from chilopod.steering import VARIABLE
 
@@ -38,8 +30,10 @@ def compared_rows(data: xr.Dataset) -> list[Row]:
     found, where = summaries(data), "" if data.attrs["engine"] == "planar" else ", the whole robot"
     count = f"{data.sizes['course']} courses of {data.sizes['goal']} targets{where}"
     return [
-        *(_row(f"{count}: {each.title}", _words(each), _remark(each)) for each in found.values()),
-        _row(f"{count}: the variable spring", said(verdicts(found)), "where the intervals of 95 % decide it"),
+        *(unprinted(f"{count}: {each.title}", _words(each), _WHERE, _remark(each)) for each in found.values()),
+        unprinted(
+            f"{count}: the variable spring", said(verdicts(found)), _WHERE, "where the intervals of 95 % decide it"
+        ),
     ]
 
 
@@ -54,65 +48,41 @@ def _words(found: Summary) -> str:
 
 
 def _remark(found: Summary) -> str:
-    parts = [
+    remark = (
         f"a course: springs {found.spring_work:.2f} J, joints {found.drive_work:.2f} J, "
         f"leg yaw {found.effort:.2f} rad² s; steering cost of transport {found.cost:.2g}"
-    ]
+    )
     if np.isfinite(found.detour):
-        parts.append(f"path {found.detour:.2f} of the shortest with circles as tight as the radius law knows")
-    return ", ".join(parts)
+        remark += f", path {found.detour:.2f} of the shortest with circles as tight as the radius law knows"
+    return remark
 
 
-def said(found: Verdicts) -> str:
-    """Decision of the intervals, in a sentence."""
-    groups = {
-        "reaches more targets than": found.fewer,
-        "reaches as many, for all that can be told, as": found.as_many,
-        "reaches fewer than": found.more,
-        "spends less time for every target reached than": found.slower,
-        "spends as much, for all that can be told, as": found.as_fast,
-        "spends more than": found.faster,
-        "is sooner at targets that both reach than": found.later,
-        "is there as soon, for all that can be told, as": found.as_soon,
-        "is there later than": found.sooner,
-        "does less work than": found.costlier,
-    }
-    return "; ".join(f"{words} {listing(names)}" for words, names in groups.items() if names)
+def said(found: dict[str, list[str]]) -> str:
+    """Decisions of :func:`chilopod.paper.courses.summary.verdicts`, in a sentence."""
+    return "; ".join(f"{words} {listing(names)}" for words, names in found.items() if names)
 
 
 def robust_rows(steps: xr.Dataset, conditions: xr.Dataset) -> list[Row]:
     """Rows on each step of the law, and on courses under conditions that it does not know."""
+    arrived = steps.arrived.transpose("case", "course", "goal")
     grown = "; ".join(
-        f"{name} {percent(share_of_targets(each))}"
-        for name, each in zip(steps.case.values, steps.arrived.transpose("case", "course", "goal"), strict=True)
+        f"{name} {percent(share_of_targets(each))}" for name, each in zip(steps.case.values, arrived, strict=True)
     )
-    return [
-        _row(
-            f"{steps.sizes['course']} courses, the law step by step: targets reached", grown, "each beside those before"
-        ),
-        *condition_rows(conditions),
-    ]
+    quantity = f"{steps.sizes['course']} courses, the law step by step: targets reached"
+    return [unprinted(quantity, grown, _WHERE, "each beside those before"), *condition_rows(conditions)]
 
 
 def condition_rows(data: xr.Dataset) -> list[Row]:
     """Targets and courses reached under every condition, by the variable spring and by one for all."""
     where = "" if data.attrs["engine"] == "planar" else ", the whole robot"
-    return [
-        _row(
-            f"{data.sizes['course']} courses{where}, {name}",
-            "; ".join(
-                f"{strategy} {percent(share_of_targets(one.arrived))} of targets, "
-                f"{percent(share_of_courses(one.arrived))} of courses"
-                for strategy, one in (
-                    (titled(str(each), data.attrs["spring"]), data.sel(condition=name, strategy=each))
-                    for each in data.strategy.values
-                )
-            ),
-            "" if name == USUAL else "the law does not know",
-        )
-        for name in data.condition.values
-    ]
-
-
-def _row(quantity: str, computed: str, remark: str) -> Row:
-    return Row(quantity, Verdict.NOT_PRINTED, Result(computed), _WHERE, Verdict.NOT_PRINTED, remark)
+    rows = []
+    for name in data.condition.values:
+        words = []
+        for strategy in data.strategy.values:
+            arrived = data.arrived.sel(condition=name, strategy=strategy)
+            targets, courses = percent(share_of_targets(arrived)), percent(share_of_courses(arrived))
+            title = titled(str(strategy), data.attrs["spring"])
+            words.append(f"{title} {targets} of targets, {courses} of courses")
+        remark = "" if name == USUAL else "the law does not know"
+        rows.append(unprinted(f"{data.sizes['course']} courses{where}, {name}", "; ".join(words), _WHERE, remark))
+    return rows

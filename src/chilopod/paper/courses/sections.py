@@ -4,61 +4,57 @@ from __future__ import annotations
 
 import xarray as xr
 
-from chilopod.paper.courses.figures import courses as figures
-from chilopod.paper.courses.figures import robust as robust_figures
-from chilopod.paper.courses.film import film
-from chilopod.paper.courses.robust import (
-    PLANAR_COURSES,
-    WHOLE_COURSES,
-    Robust,
-    Whole,
-    ablated,
-    planar_conditions,
-    under,
-    whole_conditions,
-)
+from chilopod.analysis.parameters import PAPER_UNIT
+from chilopod.paper.courses import figures, robust
+from chilopod.paper.courses.robust import Robust
 from chilopod.paper.courses.rows import compared_rows, condition_rows, robust_rows
-from chilopod.paper.courses.study import PLANAR, WHOLE, compared, prepared
-from chilopod.paper.movies import Movie
-from chilopod.paper.section import Context, Found, Section
+from chilopod.paper.courses.study import PLANAR, WHOLE, compared, prepared, without_setting
+from chilopod.paper.section import Context, Movie, Section
 from chilopod.progress import Progress, part
-from chilopod.steering import STRATEGIES
+from chilopod.steering import COURSES as COURSES_NAMED
+from chilopod.steering import STRATEGIES, Course
+from chilopod.tasks.course import Driven, drive, patience_of
 
 CHAPTER = "One target after another"
 
 # N*mm/deg: the best for all of a course by the search, in the planar model and in the twin; what was found counts
 # where there is something.
 _BEST, _WHOLE_BEST = 14.0, 24.0
+_FILMED = "eight"  # of the courses of chilopod.steering
 
 
-def _compared(context: Context, found: Found, report: Progress) -> xr.Dataset:
-    plan = PLANAR[context.size]
-    return compared(context.robot, prepared(context), plan, context.size, context.folder, report)
+def _compared(context: Context, report: Progress) -> xr.Dataset:
+    return compared(context, prepared(context), PLANAR[context.size], report)
 
 
-def _robust(context: Context, found: Found, report: Progress) -> Robust:
-    variable, seeds = prepared(context), PLANAR_COURSES[context.size]
-    best = best_fixed(found[COURSES], _BEST)
-    steps = ablated(variable, seeds, context.size, context.folder, part(report, 0.0, 0.2, "steps"))
-    conditions = planar_conditions(context.robot)
-    walks = under(
-        context.robot, variable, best, conditions, seeds, context.size, context.folder, part(report, 0.2, 1.0)
+def _robust(context: Context, report: Progress, found: xr.Dataset | None) -> Robust:
+    variable, seeds = prepared(context), context.size.of(*robust.PLANAR_COURSES)
+    best, conditions = best_fixed(found, _BEST), robust.planar_conditions(context.robot)
+    steps = robust.ablated(context, variable, seeds, part(report, 0.0, 0.2, "steps"))
+    return Robust(steps, robust.under(context, variable, best, conditions, seeds, part(report, 0.2, 1.0)))
+
+
+def _whole(context: Context, report: Progress) -> Robust:
+    variable, seeds = prepared(context, "twin"), context.size.of(*robust.WHOLE_COURSES)
+    data = compared(context, variable, WHOLE[context.size], part(report, 0.0, 0.7))
+    best, conditions = best_fixed(data, _WHOLE_BEST), robust.whole_conditions(context.whole)
+    return Robust(data, robust.under(context, variable, best, conditions, seeds, part(report, 0.7, 1.0)))
+
+
+def _film(context: Context, report: Progress, found: xr.Dataset | None) -> list[Movie]:
+    """A film of one course, driven with a spring that is set on the way and with the best one for all of it."""
+    variable, best, goals = prepared(context), best_fixed(found, _BEST), COURSES_NAMED[_FILMED]
+    course = Course(goals[: max(1, round(context.size.cut(1.0, 0.1) * len(goals)))], patience_of("planar"))
+    fixed = without_setting(context.robot, variable, "pitchfork", best)
+    first, second = (
+        drive(each, course, seed=0, folder=context.folder, progress=part(report, begin, begin + 0.5))
+        for each, begin in ((variable, 0.0), (fixed, 0.5))
     )
-    return Robust(steps, walks)
-
-
-def _whole(context: Context, found: Found, report: Progress) -> Whole:
-    robot, size, folder = context.whole, context.size, context.folder
-    variable = prepared(context, "twin")
-    data = compared(robot, variable, WHOLE[size], size, folder, part(report, 0.0, 0.7))
-    best, conditions = best_fixed(data, _WHOLE_BEST), whole_conditions(robot)
-    walks = under(robot, variable, best, conditions, WHOLE_COURSES[size], size, folder, part(report, 0.7, 1.0))
-    return Whole(data, walks)
-
-
-def _film(context: Context, found: Found, report: Progress) -> list[Movie]:
-    best = best_fixed(found[COURSES], _BEST)
-    return [film(context.robot, prepared(context), best, context.folder, report, shorter=context.size.cut(1.0, 0.1))]
+    both = Driven(first.trials + second.trials, variable, first.records + second.records)
+    titles = "k1 set on the way", f"k1 = {best:g} {PAPER_UNIT.replace('*', '·')}"
+    heading = f"One target after another: {_FILMED}"
+    # Two panels, higher than wide.
+    return [Movie("courses-movie", heading, titles, both.record, speed=10.0, size=(960, 640))]
 
 
 def best_fixed(data: xr.Dataset | None, otherwise: float) -> float:
@@ -71,8 +67,8 @@ COURSES: Section[xr.Dataset] = Section(
     CHAPTER,
     "random courses: a spring set on the way beside what does without",
     _compared,
-    lambda data, found: compared_rows(data),
-    lambda data, found: figures.panels(data),
+    compared_rows,
+    figures.panels,
     beyond=True,
 )
 ROBUST: Section[Robust] = Section(
@@ -80,18 +76,18 @@ ROBUST: Section[Robust] = Section(
     CHAPTER,
     "random courses: what the law owes to its steps, and what it stands",
     _robust,
-    lambda data, found: robust_rows(data.steps, data.conditions),
-    lambda data, found: [robust_figures.panel(data)],
+    lambda data, courses: robust_rows(data.courses, data.conditions),
+    figures.robust,
     needs=(COURSES,),
     beyond=True,
 )
-ROBOT_COURSES: Section[Whole] = Section(
+ROBOT_COURSES: Section[Robust] = Section(
     "robot-courses",
     CHAPTER,
     "random courses of the whole robot in 3-D",
     _whole,
-    lambda data, found: [*compared_rows(data.compared), *condition_rows(data.conditions)],
-    lambda data, found: [figures.strategies(data.compared), robust_figures.whole(data.conditions)],
+    lambda data: [*compared_rows(data.courses), *condition_rows(data.conditions)],
+    lambda data: [figures.strategies(data.courses), figures.whole(data.conditions)],
     beyond=True,
     full=True,
 )

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.stats import norm
 
 from chilopod.paper.scatter import Answer
-
-Array = NDArray[np.float64]
 
 LEVEL = 0.95
 """Level of all intervals."""
@@ -20,13 +18,7 @@ _DRAWN = 2000
 
 @dataclass(frozen=True)
 class Interval:
-    """A number and between which bounds it lies, as sure as :data:`LEVEL` says.
-
-    Attributes
-    ----------
-    value, low, high
-        NaN where nothing is known.
-    """
+    """A number and between which bounds it lies, as sure as :data:`LEVEL` says; NaN where nothing is known."""
 
     value: float
     low: float
@@ -45,13 +37,8 @@ class Interval:
 
 
 def wilson(successes: int, count: int) -> Interval:
-    """Share of successes with the interval of Wilson (1927), which holds for few trials and for shares near 0 and 1.
-
-    Parameters
-    ----------
-    successes, count
-        Number of successes, and of independent trials.
-    """
+    """Share of successes among independent trials with the interval of Wilson (1927), which holds for few trials and
+    for shares near 0 and 1."""
     if count == 0:
         return Interval(float("nan"), float("nan"), float("nan"))
     z = float(norm.ppf(0.5 + 0.5 * LEVEL))
@@ -64,13 +51,8 @@ def wilson(successes: int, count: int) -> Interval:
 def bootstrap_mean(values: ArrayLike, seed: int = 0) -> Interval:
     """Mean of what is not NaN, with the percentile interval of the bootstrap.
 
-    Parameters
-    ----------
-    values
-        Shape (groups,) or (groups, members). Groups are independent and are drawn anew as a whole; members of one, as
-        the targets of one course, need not be.
-    seed
-        Seed of what is drawn.
+    Groups, shape (groups,) or (groups, members), are independent and are drawn anew as a whole; members of one, as the
+    targets of one course, need not be.
     """
     table = np.asarray(values, dtype=np.float64)
     table = table.reshape(len(table), -1)
@@ -78,16 +60,8 @@ def bootstrap_mean(values: ArrayLike, seed: int = 0) -> Interval:
 
 
 def bootstrap_ratio(of: ArrayLike, to: ArrayLike, seed: int = 0) -> Interval:
-    """Sum over sum, with the percentile interval of the bootstrap.
-
-    Parameters
-    ----------
-    of, to
-        Sums of independent groups, which are drawn anew as a whole, shape (groups,); groups in which both are 0 count
-        for nothing.
-    seed
-        Seed of what is drawn.
-    """
+    """Sum over sum of independent groups, shape (groups,), which are drawn anew as a whole, with the percentile
+    interval of the bootstrap; groups in which both are 0 count for nothing."""
     above, below = np.asarray(of, dtype=np.float64), np.asarray(to, dtype=np.float64)
     groups = np.flatnonzero((above != 0.0) | (below != 0.0))
     if not below.any():

@@ -6,12 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chilopod.engine import Observation
+from chilopod.paper.scatter import Array
 from chilopod.steering import ARRIVAL_RADIUS, SpringLaw
-
-Array = NDArray[np.float64]
 
 _ALL_THE_WAY = 1e9  # m: to the target, however far
 
@@ -30,13 +28,8 @@ class InverseLaw(SpringLaw):
 
 @dataclass(frozen=True)
 class EarlierLaw(SpringLaw):
-    """As the law, but it never straightens for a target within its tightest circle.
-
-    Attributes
-    ----------
-    searches
-        True if a target that is not seen is looked for, else it leaves the spring as it is.
-    """
+    """As the law, but it never straightens for a target within its tightest circle; it looks for a target that is not
+    seen if it ``searches``, else that leaves the spring as it is."""
 
     searches: bool = True
 

@@ -8,41 +8,35 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from chilopod import trials
 from chilopod.analysis.parameters import PAPER_UNIT, stiffness
-from chilopod.paper.section import Context
-from chilopod.paper.size import Size
+from chilopod.paper.scatter import Array
+from chilopod.paper.section import Context, Size
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.steering import ON_COURSES, VARIABLE, Course, Goal, Verdict
 from chilopod.tasks.course import Driver, driver, random_courses, steering_cost
 from chilopod.trials import Disturbance, Trial
 
-Array = NDArray[np.float64]
-
-_SUMS = {"path": "m", "shortest": "m", "effort": "rad^2*s", "spring_work": "J", "drive_work": "J"}
+_SUMS = {
+    "goal_path": "m",
+    "goal_shortest": "m",
+    "goal_effort": "rad^2*s",
+    "goal_spring_work": "J",
+    "goal_drive_work": "J",
+}
+_UNITS = {"arrived": "1", "seconds": "s", **_SUMS}
 _TINY = Course((Goal(0.2, 0.03, relative=True),), patience=6.0)  # of the whole robot, whose walks take seconds
 
 
 @dataclass(frozen=True)
 class Plan:
-    """How much is compared.
-
-    Attributes
-    ----------
-    courses
-        Seeds of the courses that strategies are compared on.
-    others
-        Others of those on which the best spring of a strategy is found.
-    springs
-        Springs that are tried, by strategy, N*mm/deg.
-    """
+    """Amount of trials: seeds of the courses that strategies are compared on, seeds of other courses on which the best
+    spring of a strategy is found, and the springs that are tried, by strategy, N*mm/deg."""
 
     courses: range
     others: range
@@ -64,17 +58,7 @@ WHOLE: Mapping[Size, Plan] = {
 
 @dataclass(frozen=True)
 class Case:
-    """Something that drives along courses.
-
-    Attributes
-    ----------
-    name
-        Name of the case.
-    driver
-        Robot and controller.
-    disturbance
-        Besides what the course's seed draws.
-    """
+    """Something that drives along courses, under a disturbance besides what a course's seed draws."""
 
     name: str
     driver: Driver
@@ -85,23 +69,13 @@ class Case:
         return replace(self.driver.trial(course, seed, brief=True), disturbance=self.disturbance)
 
 
-def driven(
-    cases: Sequence[Case], seeds: Sequence[int], size: Size, folder: Path | None = None, progress: Progress = silent
-) -> xr.Dataset:
-    """Outcome of every target of random courses.
+def driven(context: Context, cases: Sequence[Case], seeds: Sequence[int], progress: Progress = silent) -> xr.Dataset:
+    """Outcome of every target of random courses; if tiny, courses of the whole robot have one near target.
 
     Parameters
     ----------
-    cases
-        In one engine, or in engines that have the same patience.
-    seeds
-        Seeds of the courses.
-    size
-        Courses of the whole robot have one near target if this is tiny.
-    folder
-        Folder of the trials.
-    progress
-        Called with the part done (0 to 1) and a few words.
+    cases, seeds
+        In one engine, or in engines that have the same patience, and the seeds of the courses.
 
     Returns
     -------
@@ -110,31 +84,29 @@ def driven(
     (J); over (course, goal): ``bearing`` (rad) and ``away`` (m) of the target when its turn comes.
     """
     engine = cases[0].driver.engine
-    tiny = size is Size.TINY and engine != "planar"
+    tiny = context.size is Size.TINY and engine != "planar"
     courses = [_TINY] * len(seeds) if tiny else random_courses(seeds, engine)
     asked = {
         (row, column): case.on(course, seed)
         for row, case in enumerate(cases)
         for column, (course, seed) in enumerate(zip(courses, seeds, strict=True))
     }
-    names = ("arrived", "seconds", *(f"goal_{name}" for name in _SUMS))
     shape = (len(cases), len(courses), len(courses[0].goals))
-    values = {name: np.full(shape, np.nan) for name in names}
+    values = {name: np.full(shape, np.nan) for name in _UNITS}
     where: dict[str, list[tuple[int, int]]] = {}
     for place, trial in asked.items():
         where.setdefault(trial.file_name, []).append(place)
-    for trial, record in trials.run_each(list(asked.values()), folder, progress):
+    for trial, record in trials.run_each(list(asked.values()), context.folder, progress):
         for place in where[trial.file_name]:
             values["arrived"][place] = record.goal_verdict.values[0] == Verdict.ARRIVED.label
             values["seconds"][place] = record.goal_end.values[0] - record.goal_begin.values[0]
             for name in _SUMS:
-                values[f"goal_{name}"][place] = record[f"goal_{name}"].values[0]
+                values[name][place] = record[name].values[0]
     seen = np.array([[(goal.x, goal.y) for goal in course.goals] for course in courses])
-    over, units = ("case", "course", "goal"), {"arrived": "1", "seconds": "s"}
-    units |= {f"goal_{name}": unit for name, unit in _SUMS.items()}
+    over = ("case", "course", "goal")
     return xr.Dataset(
         {
-            **{name: (over, each, {"units": units[name]}) for name, each in values.items()},
+            **{name: (over, each, {"units": _UNITS[name]}) for name, each in values.items()},
             "bearing": (over[1:], np.arctan2(seen[..., 1], seen[..., 0]), {"units": "rad"}),
             "away": (over[1:], np.hypot(seen[..., 0], seen[..., 1]), {"units": "m"}),
         },
@@ -143,26 +115,8 @@ def driven(
     )
 
 
-def compared(
-    robot: Robot,
-    variable: Driver,
-    plan: Plan,
-    size: Size = Size.FULL,
-    folder: Path | None = None,
-    progress: Progress = silent,
-) -> xr.Dataset:
-    """All strategies on the same courses.
-
-    Parameters
-    ----------
-    robot
-        The robot.
-    variable
-        It with the spring that is set on the way.
-    plan
-        Amount of trials.
-    size, folder, progress
-        As for :func:`driven`.
+def compared(context: Context, variable: Driver, plan: Plan, progress: Progress = silent) -> xr.Dataset:
+    """All strategies on the same courses; ``variable`` is the one of :func:`prepared`.
 
     Returns
     -------
@@ -171,26 +125,33 @@ def compared(
     ``tried_spring`` (N*mm/deg) of which ``tried_case`` reached which share of the targets of other courses
     (``tried_arrived``).
     """
+    robot = robot_of(context, variable)
     tried = [(name, float(spring)) for name, springs in plan.springs.items() for spring in springs]
     shares = np.full(len(tried), np.nan)
     if len(plan.others) > 0:
         asked = [Case(f"{name} {k:g}", without_setting(robot, variable, name, k)) for name, k in tried]
-        done = driven(asked, plan.others, size, folder, part(progress, 0.0, 0.3, "springs"))
+        done = driven(context, asked, plan.others, part(progress, 0.0, 0.3, "springs"))
         shares = done.arrived.mean(("course", "goal")).values
     best = {name: _best(name, tried, shares) for name in plan.springs}
-    drivers = {
-        name: variable if name == VARIABLE.name else without_setting(robot, variable, name, best.get(name))
+    cases = [
+        Case(name, variable if name == VARIABLE.name else without_setting(robot, variable, name, best.get(name)))
         for name in ON_COURSES
-    }
-    cases = [Case(name, each) for name, each in drivers.items()]
-    data = driven(cases, plan.courses, size, folder, part(progress, 0.3, 1.0))
+    ]
+    data = driven(context, cases, plan.courses, part(progress, 0.3, 1.0))
     costs = [steering_cost(case.driver.robot, data.isel(case=row)) for row, case in enumerate(cases)]
-    data["cost"] = ("case", np.array(costs), {"units": "1"})
-    data["spring"] = ("case", np.array([best.get(name, np.nan) for name in ON_COURSES]), {"units": PAPER_UNIT})
-    data["tried_case"] = ("tried", np.array([name for name, _ in tried], dtype=object))
-    data["tried_spring"] = ("tried", np.array([spring for _, spring in tried]), {"units": PAPER_UNIT})
-    data["tried_arrived"] = ("tried", shares, {"units": "1"})
-    return data
+    springs = [best.get(name, np.nan) for name in ON_COURSES]
+    return data.assign(
+        cost=("case", np.array(costs), {"units": "1"}),
+        spring=("case", np.array(springs), {"units": PAPER_UNIT}),
+        tried_case=("tried", np.array([name for name, _ in tried], dtype=object)),
+        tried_spring=("tried", np.array([spring for _, spring in tried]), {"units": PAPER_UNIT}),
+        tried_arrived=("tried", shares, {"units": "1"}),
+    )
+
+
+def robot_of(context: Context, variable: Driver) -> Robot:
+    """The robot that a driver of :func:`prepared` drives, as it is without a variable spring."""
+    return context.robot if variable.engine == "planar" else context.whole
 
 
 def prepared(context: Context, engine: str = "planar") -> Driver:

@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from chilopod.paper.courses.statistics import Interval, bootstrap_mean, bootstrap_ratio, wilson
-from chilopod.paper.scatter import Answer
+from chilopod.paper.scatter import Answer, Array
 from chilopod.steering import ON_COURSES, VARIABLE
 
-Array = NDArray[np.float64]
+# Words for yes, undecided and no.
+_REACH = ("reaches more targets than", "reaches as many, for all that can be told, as", "reaches fewer than")
+_SPENT = (
+    "spends less time for every target reached than",
+    "spends as much, for all that can be told, as",
+    "spends more than",
+)
+_LATER = (
+    "is sooner at targets that both reach than",
+    "is there as soon, for all that can be told, as",
+    "is there later than",
+)
+_WORK = ("does less work than",)
 
 
 @dataclass(frozen=True)
@@ -26,26 +37,17 @@ class Summary:
         The strategy's, and the one it walks with, N*mm/deg; NaN for none.
     targets, courses
         Shares that are reached, of courses as a whole.
-    seconds
-        For a target that is reached.
-    spent
-        On all targets, for every one that is reached, s; one that is not reached counts with its whole patience, also
-        where the robot has failed before.
-    later, course_later
-        By how much later than the variable spring, s, at targets that both reach, and of courses that both reach as a
-        whole; the mean of the differences.
-    work
-        Work of the actuators of springs and joints, J a course.
-    spring_work, drive_work
-        Its two parts, mean, J a course.
-    more_work
-        By how much more than the variable spring's it is, J a course.
-    effort
-        Effort of the leg yaw, mean, rad^2 s a course.
-    detour
-        Path over the shortest with circles of the radius law, of all targets that are reached together.
-    cost
-        Steering cost of transport.
+    seconds, spent
+        Time for a target that is reached, s, and time on all targets for every one that is reached; one that is not
+        reached counts with its whole patience, also where the robot has failed before.
+    later
+        Mean difference to the variable spring's time, s, at targets that both reach.
+    spring_work, drive_work, more_work
+        Mean work of the actuators of springs and of joints, and how much more their sum is than the variable spring's,
+        J a course.
+    effort, detour, cost
+        Mean effort of the leg yaw, rad^2 s a course; path over the shortest with circles of the radius law, of all
+        targets that are reached together; steering cost of transport.
     """
 
     name: str
@@ -55,8 +57,6 @@ class Summary:
     seconds: Interval
     spent: Interval
     later: Interval
-    course_later: Interval
-    work: Interval
     spring_work: float
     drive_work: float
     more_work: Interval
@@ -80,13 +80,7 @@ def titled(name: str, spring: float) -> str:
 
 
 def summaries(data: xr.Dataset) -> dict[str, Summary]:
-    """Summaries of all strategies, by name.
-
-    Parameters
-    ----------
-    data
-        See :func:`chilopod.paper.courses.study.compared`.
-    """
+    """Summaries of all strategies of :func:`chilopod.paper.courses.study.compared`, by name."""
     variable = data.sel(case=VARIABLE.name)
     return {str(name): _summary(data.sel(case=name), variable) for name in data.case.values}
 
@@ -102,8 +96,6 @@ def _summary(one: xr.Dataset, variable: xr.Dataset) -> Summary:
         seconds=bootstrap_mean(seconds),
         spent=bootstrap_ratio(np.where(arrived, seconds, one.attrs["patience_s"]).sum(axis=1), arrived.sum(axis=1)),
         later=bootstrap_mean(seconds - _reached(variable, "seconds")),
-        course_later=bootstrap_mean((seconds - _reached(variable, "seconds")).sum(axis=1)),
-        work=bootstrap_mean(_work(one)),
         spring_work=float(one.goal_spring_work.sum("goal").mean()),
         drive_work=float(one.goal_drive_work.sum("goal").mean()),
         more_work=bootstrap_mean(_work(one) - _work(variable)),
@@ -135,46 +127,17 @@ def _work(one: xr.Dataset) -> Array:
     return np.asarray((one.goal_spring_work + one.goal_drive_work).sum("goal").values)
 
 
-@dataclass(frozen=True)
-class Verdicts:
-    """Decisions of the intervals, each by the names of strategies that the variable spring is held against.
-
-    Attributes
-    ----------
-    fewer, as_many, more
-        Numbers of groups that reach fewer targets, that cannot be told apart, and that reach more.
-    slower, as_fast, faster
-        In the time spent for every target that is reached.
-    later, as_soon, sooner
-        At targets that both reach.
-    costlier
-        Number of groups that do more work, of those that do any.
-    """
-
-    fewer: Sequence[str]
-    as_many: Sequence[str]
-    more: Sequence[str]
-    slower: Sequence[str]
-    as_fast: Sequence[str]
-    faster: Sequence[str]
-    later: Sequence[str]
-    as_soon: Sequence[str]
-    sooner: Sequence[str]
-    costlier: Sequence[str]
-
-
-def verdicts(found: dict[str, Summary]) -> Verdicts:
-    """Decisions on the variable spring beside the others."""
+def verdicts(found: dict[str, Summary]) -> dict[str, list[str]]:
+    """Decisions of the intervals on the variable spring beside the others: names of these by the words for it."""
     ours, others = found[VARIABLE.name], [each for name, each in found.items() if name != VARIABLE.name]
-    reach = _decided(others, lambda each: ours.targets.above(each.targets))
-    spent = _decided(others, lambda each: each.spent.above(ours.spent))
-    time = _decided(others, lambda each: each.later.sign)
-    work = _decided(others, lambda each: each.more_work.sign)
-    costlier = [each.title for each in others if ON_COURSES[each.name].needs_torque and each.title in work[0]]
-    return Verdicts(*reach, *spent, *time, costlier)
-
-
-def _decided(others: Sequence[Summary], asked: Callable[[Summary], Answer]) -> tuple[list[str], list[str], list[str]]:
-    """Strategies for which the answer is yes, open, and no."""
-    yes, open_, no = ([each.title for each in others if asked(each) is answer] for answer in (True, None, False))
-    return yes, open_, no
+    answers: dict[tuple[str, ...], Callable[[Summary], Answer]] = {
+        _REACH: lambda each: ours.targets.above(each.targets),
+        _SPENT: lambda each: each.spent.above(ours.spent),
+        _LATER: lambda each: each.later.sign,
+        _WORK: lambda each: ON_COURSES[each.name].needs_torque and each.more_work.sign,
+    }
+    return {
+        word: [each.title for each in others if answer(each) is wanted]
+        for words, answer in answers.items()
+        for word, wanted in zip(words, (True, None, False), strict=False)
+    }

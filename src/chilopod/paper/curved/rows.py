@@ -6,10 +6,11 @@ import numpy as np
 
 from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.paper import printed, statements
-from chilopod.paper.curved.study import CurvedStudy, axis_radius, bend_order, bent, fluctuation
+from chilopod.paper.curved.study import CurvedStudy, axis_radius, bend_order, fluctuation
 from chilopod.paper.equal_distance import change, radius_ratio
 from chilopod.paper.scatter import INCREASES, increases
-from chilopod.paper.table import OfPlanar, Result, Row, Verdict, agreement
+from chilopod.paper.table import OfPlanar, Result, Row, Verdict, agreement, unprinted
+from chilopod.tasks.radius_law import is_curved
 
 
 def rows(study: CurvedStudy) -> list[Row | OfPlanar]:
@@ -20,19 +21,16 @@ def rows(study: CurvedStudy) -> list[Row | OfPlanar]:
 def _model_rows(study: CurvedStudy) -> list[Row]:
     trials, law = study.trials, study.law
     exact = trials.attrs["critical_k1"]
-    stiffest = trials.isel(spring=[np.flatnonzero(bent(trials).any(axis=1))[-1]])
-    order, ratios = bend_order(stiffest), np.abs(stiffest.mean_angle.values[bent(stiffest)]).mean(axis=0)
+    stiffest = trials.isel(spring=[np.flatnonzero(is_curved(trials).any(axis=1))[-1]])
+    order, bends = bend_order(stiffest), np.abs(stiffest.mean_angle.values[is_curved(stiffest)]).mean(axis=0)
+    shape = " ".join(f"{value:.2f}" for value in bends / np.linalg.norm(bends))
     below = law.sel(softest=0.99 * exact, method="nearest")
     unsettled = int((~trials.settled).sum())
     return [
         Row(
             "joints by how far they bend",
             f"{', '.join(map(str, printed.MODE_ORDER))} (mode)",
-            Result(
-                f"{', '.join(map(str, order))} (trials at {float(stiffest.spring[0]):g} N*mm/deg: "
-                + " ".join(f"{value:.2f}" for value in ratios / np.linalg.norm(ratios))
-                + ")"
-            ),
+            Result(f"{', '.join(map(str, order))} (trials at {float(stiffest.spring[0]):g} N*mm/deg: {shape})"),
             printed.ANALYSIS,
             agreement(order == printed.MODE_ORDER),
         ),
@@ -46,15 +44,11 @@ def _model_rows(study: CurvedStudy) -> list[Row]:
             printed.EXPERIMENTS,
             Verdict.NOT_PRINTED,
         ),
-        Row(
+        unprinted(
             "where trials settle",
-            Verdict.NOT_PRINTED,
-            Result(
-                f"within {float(study.agreement.max()):.0e} rad of the branch, "
-                f"{int(study.agreement.notnull().sum())} trials"
-            ),
+            f"within {float(study.agreement.max()):.0e} rad of the branch, "
+            f"{int(study.agreement.notnull().sum())} trials",
             printed.EXPERIMENTS,
-            Verdict.NOT_PRINTED,
             "with even feet: uneven ones make each trial's robot another one"
             + (f"; of uneven ones {unsettled} of {trials.settled.size} had not settled" if unsettled else ""),
         ),
@@ -62,20 +56,17 @@ def _model_rows(study: CurvedStudy) -> list[Row]:
 
 
 def _beside_robot(study: CurvedStudy) -> list[OfPlanar]:
-    trials, here = study.trials, bent(study.trials)
-    exact = trials.attrs["critical_k1"]
+    trials, here = study.trials, is_curved(study.trials)
+    exact, springs = trials.attrs["critical_k1"], trials.spring.values
     left, right = (int((trials.direction == side).sum()) for side in ("left", "right"))
-    curving = [float(k) for k, row in zip(trials.spring.values, here, strict=True) if row.any()]
-    straight = set(map(float, trials.spring.values)) - set(curving)
+    curving = here.any(axis=1)
     angles = np.where(here, np.abs(trials.mean_angle.sel(joint=1).values), np.nan)
-    rising = increases([row for row in angles if np.isfinite(row).any()][::-1])
+    rising = increases(list(angles[curving & np.isfinite(angles).any(axis=1)])[::-1])
     wider, softest, stiffest = fluctuation(trials)
+    curved = f"curved up to {max(springs[curving]):g} N*mm/deg, {left} to the left and {right} to the right"
     words = [
-        OfPlanar(statements.STRAIGHT, Result(f"straight from {min(straight):g} N*mm/deg up")),
-        OfPlanar(
-            statements.CURVED,
-            Result(f"curved up to {max(curving):g} N*mm/deg, {left} to the left and {right} to the right"),
-        ),
+        OfPlanar(statements.STRAIGHT, Result(f"straight from {min(springs[~curving]):g} N*mm/deg up")),
+        OfPlanar(statements.CURVED, Result(curved)),
         OfPlanar(statements.ONSET, _onset(study.fit.critical, exact)),
         OfPlanar(statements.RISING, Result(INCREASES[rising])),
         OfPlanar(statements.FLUCTUATION, Result(f"{wider} at {softest:g} than at {stiffest:g} N*mm/deg")),
@@ -91,18 +82,12 @@ def _variants_beside_robot(study: CurvedStudy) -> list[OfPlanar]:
     for name, statement in statements.VARIANTS.items():
         at = study.comparison.sel(variant=name)
         ratio = radius_ratio(study.variants[printed.AS_BUILT], study.variants[name])
-        words += [
-            OfPlanar(statement.onset, _onset(float(at.fitted_k1), float(at.exact_k1))),
-            OfPlanar(
-                statement.radius,
-                Result(
-                    f"{change(ratio.distance, ratio.distance_error)} at equal distance from its own onset; "
-                    f"{change(float(at.equal_spring))} at the same spring",
-                    ratio.distance,
-                    ratio.distance_error,
-                ),
-            ),
-        ]
+        text = (
+            f"{change(ratio.distance, ratio.distance_error)} at equal distance from its own onset; "
+            f"{change(float(at.equal_spring))} at the same spring"
+        )
+        words.append(OfPlanar(statement.onset, _onset(float(at.fitted_k1), float(at.exact_k1))))
+        words.append(OfPlanar(statement.radius, Result(text, ratio.distance, ratio.distance_error)))
     return words
 
 

@@ -10,29 +10,19 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from chilopod.analysis.branch import curved_walks
 from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
 from chilopod.analysis.square_root import SquareRootFit, square_root_fit
 from chilopod.paper import printed
-from chilopod.paper.curved.trials import (
-    EXAMPLES,
-    SPRINGS,
-    curved_trials,
-    off_branch,
-    on_branch,
-    variant_trials,
-)
-from chilopod.paper.scatter import Difference, spread_difference
-from chilopod.paper.section import Context
-from chilopod.paper.size import Size
-from chilopod.paper.walk_measures import example_walks
+from chilopod.paper.curved.trials import EXAMPLES, SPRINGS, curved_trials, off_branch, on_branch, variant_trials
+from chilopod.paper.measures import example_walks
+from chilopod.paper.scatter import Array, Difference, means, spread_difference
+from chilopod.paper.section import Context, Size
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
+from chilopod.tasks.radius_law import is_curved
 from chilopod.trials import Disturbance
-
-Array = NDArray[np.float64]
 
 AGREEMENT_SPRINGS = (8.0, 10.0, 11.0)
 """N*mm/deg, where trials without spread of friction are held against the branch."""
@@ -49,24 +39,15 @@ class CurvedStudy:
 
     Attributes
     ----------
-    trials
-        See :func:`chilopod.paper.curved.trials.curved_trials`.
-    examples
-        See :func:`chilopod.paper.walk_measures.example_walks`.
+    trials, examples, agreement
+        See :mod:`chilopod.paper.curved.trials`: of ``curved_trials``, and ``off_branch`` (rad) of trials without spread
+        of friction; and :func:`chilopod.paper.measures.example_walks`.
     branch
         The exact curved walks, turning right, see :func:`chilopod.analysis.branch.curved_walks`.
-    fits
-        See :func:`onset_fits`.
-    law
-        See :func:`law_along_branch`.
-    agreement
-        See :func:`chilopod.paper.curved.trials.off_branch`: rad, of trials without spread of friction.
-    variants
-        Trials by variant, "as built" first.
-    branches
-        The branch of every variant.
-    comparison
-        See :func:`compared`.
+    fits, law, comparison
+        See :func:`onset_fits`, :func:`law_along_branch` and :func:`compared`.
+    variants, branches
+        Trials and branch by variant, "as built" first.
     """
 
     trials: xr.Dataset
@@ -88,14 +69,8 @@ class CurvedStudy:
 def curved_study(context: Context, progress: Progress = silent) -> CurvedStudy:
     """Run the trials of the paper's curved walks and compare them with the exact branches.
 
-    Parameters
-    ----------
-    context
-        Robot of the planar model, the paper's, as the springs of the trials are spread about its critical one; folder
-        and size. If not full, three trials at every spring and two of the variants, in place of the paper's 10 and 5;
-        if tiny, at fewer springs.
-    progress
-        Called as the work goes on.
+    The springs of the trials are spread about the critical one of the paper's robot. If not full, there are three
+    trials at every spring and two of the variants, in place of the paper's 10 and 5; if tiny, at fewer springs.
     """
     robot, folder, size = context.robot, context.folder, context.size
     repeats, variant_repeats = (10, 5) if size is Size.FULL else (3, 2)
@@ -123,28 +98,23 @@ def curved_study(context: Context, progress: Progress = silent) -> CurvedStudy:
     return study
 
 
-def bent(trials: xr.Dataset) -> NDArray[np.bool_]:
-    """Mask of the trials that settled on a curved walk, shape (spring, repeat)."""
-    return np.isin(trials.direction.values, ("left", "right"))
-
-
 def bend_order(trials: xr.Dataset) -> tuple[int, ...]:
     """Joints by how far they bend in trials that curve, the most first."""
-    angles = np.abs(trials.mean_angle.values[bent(trials)]).mean(axis=0)
+    angles = np.abs(trials.mean_angle.values[is_curved(trials)]).mean(axis=0)
     return tuple(int(joint) + 1 for joint in np.argsort(-angles))
 
 
 def fluctuation(trials: xr.Dataset) -> tuple[Difference, float, float]:
     """How much farther the angle of joint 1 scatters among trials at the softest spring than at the stiffest that
     curves, and these springs, N*mm/deg."""
-    curved = trials.isel(spring=bent(trials).any(axis=1))
-    angles = np.where(bent(curved), np.abs(curved.mean_angle.sel(joint=1).values), np.nan)
+    curved = trials.isel(spring=is_curved(trials).any(axis=1))
+    angles = np.where(is_curved(curved), np.abs(curved.mean_angle.sel(joint=1).values), np.nan)
     return spread_difference(angles[0], angles[-1]), float(curved.spring[0]), float(curved.spring[-1])
 
 
 def fitted(trials: xr.Dataset, joint: int = 1) -> SquareRootFit:
     """The square-root law through the trials that settled on a curved walk."""
-    here = bent(trials)
+    here = is_curved(trials)
     inverse = np.broadcast_to(1.0 / trials.spring.values[:, None], here.shape)
     return square_root_fit(inverse[here], trials.mean_angle.sel(joint=joint).values[here])
 
@@ -158,23 +128,20 @@ def onset_fits(trials: xr.Dataset, branch: xr.Dataset) -> xr.Dataset:
     (see :class:`chilopod.analysis.SquareRootFit`), ``exact_walks``, what the fit gives if every trial is
     replaced by the exact walk of its spring: the part of being off that no repeating cures, and ``trials``.
     """
-    curved = trials.isel(spring=bent(trials).any(axis=1))
+    curved = trials.isel(spring=is_curved(trials).any(axis=1))
     softest, rows = curved.spring.values[:-1][::-1], []
     for low in softest:
         part = curved.isel(spring=curved.spring.values >= low)
-        here = bent(part)
+        here = is_curved(part)
         springs = np.broadcast_to(part.spring.values[:, None], here.shape)[here]
         exact = on_branch(branch, "mean_angle", springs)[:, 0]
-        found = fitted(part)
-        without = square_root_fit(1.0 / springs, exact, resampled=0).critical
-        rows.append((found.critical, found.error, found.bootstrap_error, without, found.trials))
+        found, without = fitted(part), square_root_fit(1.0 / springs, exact, resampled=0)
+        rows.append((found.critical, found.error, found.bootstrap_error, without.critical, found.trials))
+    *springs_, counts = np.array(rows, dtype=np.float64).T
     names = ("critical_k1", "error", "bootstrap_error", "exact_walks")
-    columns = np.array(rows, dtype=np.float64).T
+    columns = {name: ("softest", each, {"units": PAPER_UNIT}) for name, each in zip(names, springs_, strict=True)}
     return xr.Dataset(
-        {
-            **{name: ("softest", column, {"units": PAPER_UNIT}) for name, column in zip(names, columns, strict=False)},
-            "trials": ("softest", columns[-1].astype(int)),
-        },
+        {**columns, "trials": ("softest", counts.astype(int))},
         coords={"softest": ("softest", softest, {"units": PAPER_UNIT})},
         attrs={"robot": trials.attrs["robot"], "exact_k1": trials.attrs["critical_k1"]},
     )
@@ -220,38 +187,37 @@ def compared(variants: Mapping[str, xr.Dataset], branches: Mapping[str, xr.Datas
     ``equal_ratio``, the radius over that as built at the same ratio, mean over all ratios; ``equal_spring``, over that
     at the same k1, along the branches, at ``spring``.
     """
-    base = branches[printed.AS_BUILT]
+    base, all_branches = branches[printed.AS_BUILT], branches.values()
     exact = np.array([trials.attrs["critical_k1"] for trials in variants.values()])
     fits = [fitted(trials) for trials in variants.values()]
-    statistics = np.array([_statistics(trials) for trials in variants.values()])
-    curved = np.isfinite(statistics[:, 0]).all(axis=0)
-    ratios = variants[printed.AS_BUILT].spring.values / exact[0]
-    radius = statistics[:, 0]
-    ratio = (radius / radius[0])[:, curved]
+    statistics = [means(each.axis_radius.values, is_curved(each)) for each in variants.values()]
+    radius, error = (np.array(each) for each in zip(*statistics, strict=True))
+    radius = np.where(np.isnan(error), np.nan, radius)
+    ratio = (radius / radius[0])[:, np.isfinite(radius).all(axis=0)]
     # Every variant walks a curve there: softer than all critical springs, stiffer than where a branch ends.
     spring = float(0.9 * exact.min())
-    there = np.array([axis_radius(branch, spring) for branch in branches.values()])
+    there = np.array([axis_radius(branch, spring) for branch in all_branches])
+    springs = {
+        "fitted_k1": [fit.critical for fit in fits],
+        "error": [fit.bootstrap_error for fit in fits],
+        "exact_k1": exact,
+        "robot_k1": [printed.onset(name).value for name in variants],
+        "stiffest_k1": [float(branch.parameter.max()) for branch in all_branches],
+    }
+    kinds = np.array([branch.attrs["criticality"] for branch in all_branches], dtype=object)
     return xr.Dataset(
         {
-            "fitted_k1": ("variant", np.array([fit.critical for fit in fits]), {"units": PAPER_UNIT}),
-            "error": ("variant", np.array([fit.bootstrap_error for fit in fits]), {"units": PAPER_UNIT}),
-            "exact_k1": ("variant", exact, {"units": PAPER_UNIT}),
-            "robot_k1": ("variant", np.array([printed.onset(name).value for name in variants]), {"units": PAPER_UNIT}),
-            "stiffest_k1": (
-                "variant",
-                np.array([float(branch.parameter.max()) for branch in branches.values()]),
-                {"units": PAPER_UNIT},
-            ),
-            "criticality": (
-                "variant",
-                np.array([branch.attrs["criticality"] for branch in branches.values()], dtype=object),
-            ),
+            **{name: ("variant", np.array(values), {"units": PAPER_UNIT}) for name, values in springs.items()},
+            "criticality": ("variant", kinds),
             "radius": (("variant", "ratio"), radius, {"units": "m"}),
-            "radius_error": (("variant", "ratio"), statistics[:, 1], {"units": "m"}),
+            "radius_error": (("variant", "ratio"), error, {"units": "m"}),
             "equal_ratio": ("variant", ratio.mean(axis=1), {"units": "1"}),
             "equal_spring": ("variant", there / axis_radius(base, spring), {"units": "1"}),
         },
-        coords={"variant": np.array(list(variants), dtype=object), "ratio": ratios},
+        coords={
+            "variant": np.array(list(variants), dtype=object),
+            "ratio": variants[printed.AS_BUILT].spring.values / exact[0],
+        },
         attrs={"robot": base.attrs["robot"], "spring": spring},
     )
 
@@ -269,12 +235,3 @@ def _branch(robot: Robot, trials: xr.Dataset) -> xr.Dataset:
     """The exact curved walks over the springs of the trials; a fold lies a few per cent above the pitchfork at most."""
     lowest, highest = 0.97 * float(trials.spring.min()), 1.1 * trials.attrs["critical_k1"]
     return curved_walks(robot, K1, (stiffness(lowest), stiffness(float(highest))))
-
-
-def _statistics(trials: xr.Dataset) -> Array:
-    """Mean and standard error of the radius of curved walks at every spring, shape (2, spring)."""
-    found = np.full((2, trials.sizes["spring"]), np.nan)
-    for index, (radii, here) in enumerate(zip(trials.axis_radius.values, bent(trials), strict=True)):
-        if here.sum() > 1:
-            found[:, index] = radii[here].mean(), radii[here].std(ddof=1) / np.sqrt(here.sum())
-    return found

@@ -11,11 +11,9 @@ that at 11.5: every trial walks for a number of e-folds of it, and says whether 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from chilopod import stability
@@ -23,14 +21,14 @@ from chilopod.analysis.parameters import K1, stiffness
 from chilopod.analysis.straight_walk import pitchfork
 from chilopod.engine import Status
 from chilopod.paper import printed
-from chilopod.paper.walk_measures import by_spring
+from chilopod.paper.measures import SEEDS, Folder, by_spring, spring_walks
+from chilopod.paper.scatter import Array
 from chilopod.planar import PlanarModel
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.stability.returns import whole_period
-from chilopod.trials import AVERAGED, Disturbance, Trial, mean_joint_angles, run
-
-Array = NDArray[np.float64]
+from chilopod.tasks.radius_law import is_curved
+from chilopod.trials import AVERAGED, Disturbance, mean_joint_angles
 
 SPRINGS = (7.0, 8.0, 9.0, 10.0, 11.0, 11.5, 13.0, 15.0, 41.0)
 """k1 of the trials, N*mm/deg."""
@@ -49,7 +47,6 @@ STRAIGHT = float(np.deg2rad(0.1))
 
 _E_FOLDS = 15.0  # growth from half a degree takes some 6, and a bend settles twice as fast as it grew
 _SHORTEST, _LONGEST = 180.0, 1200.0  # s
-_SEEDS = 10_000  # between springs, so that more repeats leave the others as they are
 _ROUNDING = 1e-6  # rad; a walk straighter than this is as straight as it gets
 _SAMPLES = 6  # per period: means are then good to 0.02 deg
 
@@ -61,28 +58,13 @@ def curved_trials(
     *,
     disturbance: Disturbance | None = None,
     e_folds: float = _E_FOLDS,
-    folder: str | Path | None = None,
+    folder: Folder = None,
     progress: Progress = silent,
 ) -> xr.Dataset:
-    """Walks from straight on, several at every spring, and the bend that each ends in.
+    """Walks from straight on, several at every spring (N*mm/deg, rising), and the bend that each ends in.
 
-    Parameters
-    ----------
-    robot
-        The robot; its first spring does not matter.
-    springs
-        Values of k1, N*mm/deg, rising.
-    repeats
-        Trials at each of them, all with seeds of their own.
-    disturbance
-        By default that of all studies.
-    e_folds
-        Duration of a trial, in e-folds of the slowest motion about the straight walk, but 180 s at least and 1200 s
-        at most.
-    folder
-        Folder of the trials, see :func:`chilopod.trials.run`.
-    progress
-        Called as trials are done.
+    A trial walks for a number of e-folds of the slowest motion about the straight walk, but 180 s at least and 1200 s
+    at most. All have seeds of their own, and by default the disturbance of all studies.
 
     Returns
     -------
@@ -92,17 +74,17 @@ def curved_trials(
     settled), ``status``, ``duration`` (s) and ``end_state``, the reduced state at the end, a whole number of periods
     after the start.
     """
-    disturbance = Disturbance() if disturbance is None else disturbance
-    robots = [robot.with_value(K1, stiffness(float(value))) for value in springs]
-    durations = [_walking_time(each, e_folds) for each in robots]
-    records = run(
-        [
-            Trial(each, duration, _SEEDS * row + repeat, disturbance=disturbance, rate=_SAMPLES / robot.gait.period)
-            for row, (each, duration) in enumerate(zip(robots, durations, strict=True))
-            for repeat in range(repeats)
-        ],
-        folder,
-        progress,
+    durations = [_walking_time(robot.with_value(K1, stiffness(float(value))), e_folds) for value in springs]
+    records = spring_walks(
+        robot,
+        springs,
+        durations,
+        repeats=repeats,
+        seeds=range(0, SEEDS * len(springs), SEEDS),
+        folder=folder,
+        progress=progress,
+        disturbance=Disturbance() if disturbance is None else disturbance,
+        rate=_SAMPLES / robot.gait.period,
     )
     data = by_spring([_outcome(record, robot) for record in records], springs)
     data["duration"] = ("spring", np.array(durations), {"units": "s"})
@@ -119,17 +101,9 @@ def curved_trials(
 def off_branch(robot: Robot, trials: xr.Dataset, branch: xr.Dataset) -> xr.DataArray:
     """How far the walks ended from the periodic orbit of the branch at their very spring.
 
-    The orbit is solved anew at every spring, from the branch's points beside it; a left turn is compared with the
-    mirror image of the right one half a period later.
-
-    Parameters
-    ----------
-    robot
-        Robot of trials and branch.
-    trials
-        From :func:`curved_trials`; without spread of friction, which the branch does not have.
-    branch
-        From :func:`chilopod.analysis.branch.curved_walks` over k1, turning right.
+    The orbit is solved anew at every spring, from the points beside it of a branch that turns right; a left turn is
+    compared with the mirror image of the right one half a period later. The trials, from :func:`curved_trials`, are
+    without spread of friction, which the branch does not have.
 
     Returns
     -------
@@ -139,7 +113,7 @@ def off_branch(robot: Robot, trials: xr.Dataset, branch: xr.Dataset) -> xr.DataA
     off = np.full((trials.sizes["spring"], trials.sizes["repeat"]), np.nan)
     for row, spring in zip(off, trials.spring.values, strict=True):
         at = trials.sel(spring=spring)
-        if not np.isin(at.direction.values, ("left", "right")).any():
+        if not is_curved(at).any():
             continue
         model = PlanarModel(robot.with_value(K1, stiffness(float(spring))))
         guess = on_branch(branch, "orbit", float(spring))
@@ -148,12 +122,7 @@ def off_branch(robot: Robot, trials: xr.Dataset, branch: xr.Dataset) -> xr.DataA
         for side, expected in (("right", orbit), ("left", mirrored)):
             here = at.direction.values == side
             row[here] = np.abs(at.end_state.values[here] - expected)[:, joints].max(axis=1)
-    return xr.DataArray(
-        off,
-        dims=("spring", "repeat"),
-        coords={"spring": trials.spring, "repeat": trials.repeat},
-        attrs={"units": "rad"},
-    )
+    return xr.DataArray(off, {"spring": trials.spring, "repeat": trials.repeat}, attrs={"units": "rad"})
 
 
 def on_branch(branch: xr.Dataset, name: str, spring: float | Array) -> Array:
@@ -165,38 +134,18 @@ def on_branch(branch: xr.Dataset, name: str, spring: float | Array) -> Array:
     beyond = branch.isel(point=slice(int(branch.parameter.values.argmax()), None))
     stiffest = float(beyond.parameter.values[0])
     distance = np.sqrt(stiffest - beyond.parameter.values)
-    values: Array = PchipInterpolator(distance, beyond[name].values)(
-        np.sqrt(np.maximum(stiffest - np.asarray(spring), 0.0))
-    )
+    wanted = np.sqrt(np.maximum(stiffest - np.asarray(spring), 0.0))
+    values: Array = PchipInterpolator(distance, beyond[name].values)(wanted)
     return values
 
 
 def variant_trials(
-    robot: Robot,
-    base: xr.Dataset,
-    repeats: int = 5,
-    *,
-    folder: str | Path | None = None,
-    progress: Progress = silent,
+    robot: Robot, base: xr.Dataset, repeats: int = 5, *, folder: Folder = None, progress: Progress = silent
 ) -> dict[str, xr.Dataset]:
-    """Trials of the paper's variants at the same springs relative to each one's own pitchfork.
+    """Trials of the paper's variants, by name, at the same springs relative to each one's own pitchfork.
 
-    Parameters
-    ----------
-    robot
-        As built.
-    base
-        Its trials, from :func:`curved_trials`; their springs up to 1.2 times the critical one are used.
-    repeats
-        At every spring; of ``base`` the first so many.
-    folder
-        Folder of the trials.
-    progress
-        Called as trials are done.
-
-    Returns
-    -------
-    By variant, "as built" first, a dataset as :func:`curved_trials` gives.
+    ``base`` are trials of the robot as built, from :func:`curved_trials`, of which the first so many repeats at springs
+    up to 1.2 times the critical one are used.
     """
     ratios = base.spring.values / base.attrs["critical_k1"]
     ratios = ratios[ratios < 1.2]

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import platform
 from base64 import b64encode
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from importlib.metadata import version
 from importlib.resources import files
 from typing import Any, Final
 
-import xarray as xr
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
@@ -49,21 +48,8 @@ class Drawn:
 
 @dataclass(frozen=True)
 class Film:
-    """A film beside the page.
-
-    Attributes
-    ----------
-    name
-        Name of its files.
-    title
-        Title of the film.
-    speed
-        Seconds of the walk per second of the film.
-    encoded
-        True if there is an mp4 beside the replay.
-    pictured
-        True if there is a png with moments of it.
-    """
+    """A film beside the page: name of its files, title, seconds of the walk per second of the film, and whether there
+    is an mp4 beside the replay, and a png with moments of it."""
 
     name: str
     title: str
@@ -99,30 +85,16 @@ def page(
     robot_file: str,
     state: State = State.DONE,
 ) -> str:
-    """The page as HTML.
+    """The page as HTML, which reloads itself while it is running.
 
-    Parameters
-    ----------
-    found
-        Results computed so far.
-    sections
-        Sections that are shown in the end, in the order they are computed.
-    opening
-        Figures of the robot itself, at the beginning of the first chapter.
-    shown
-        Figures and films drawn so far, in the order they stand within its chapter; figures with a letter come first, in
-        the order of their letters.
-    failures
-        Errors of sections that could not be computed or drawn.
-    waiting
-        Sections that are still to be computed or drawn.
-    robot_file
-        Name of this robot on the command line: a preset, or the path of a file.
-    state
-        While it is running, the page reloads itself.
+    Figures of the robot itself open the first chapter; figures and films drawn so far stand in their chapters, those
+    with a letter first. Sections failed, or are waiting to be computed or drawn. Commands call this robot
+    ``robot_file``: a preset, or the path of a file.
     """
     folder = files("chilopod.paper.page")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    environment.filters["embedded"] = _embedded
+    mode = found[MODE]
     template = environment.from_string(folder.joinpath("page.html.j2").read_text(encoding="utf-8"))
     return template.render(
         title=_TITLE,
@@ -135,10 +107,11 @@ def page(
         summary=summary(found),
         facts=facts(found),
         first=_first([film for each in shown for film in each.films]),
-        tables=_tables(found),
+        tables={chapter: [_row(row) for row in rows] for chapter, rows in found.planar_rows().items()},
         robot_rows=[_row(row) for row in found.robot_rows()],
         chapters=_chapters(sections, opening, shown, failures, waiting),
-        commands=commands(robot_file, found[MODE]),
+        robot=f'"{robot_file}"' if " " in robot_file else robot_file,
+        soft=10.0 if mode is None else float(f"{0.8 * mode.attrs['value']:.2g}"),
         robots=_robots(found),
         versions=listing(
             [f"chilopod {version('chilopod')}", f"Python {platform.python_version()}"]
@@ -153,57 +126,6 @@ def _first(films: Sequence[Film]) -> Film | None:
     return next(
         (film for film in reversed(films) if film.pictured), next((film for film in films if film.encoded), None)
     )
-
-
-def commands(robot: str, mode: xr.Dataset | None) -> list[dict[str, str]]:
-    """Commands that lead on from here."""
-    soft = 10.0 if mode is None else float(f"{0.8 * mode.attrs['value']:.2g}")
-    quoted = f'"{robot}"' if " " in robot else robot
-    both = '--between "2 N*mm/deg" "75 N*mm/deg"'
-    return [
-        {
-            "why": "See every exponent and its mode just below the critical spring.",
-            "line": f'chilopod stability {quoted} --set "springs.stiffness[0]={soft:g} N*mm/deg"',
-        },
-        {
-            "why": "Find every bifurcation of the front spring, with error bounds and verdicts, as JSON.",
-            "line": f'chilopod bifurcation {quoted} --parameter "springs.stiffness[0]" {both} --json',
-        },
-        {
-            "why": "The same with all springs softened together, at a longer stride.",
-            "line": f'chilopod bifurcation {quoted} --set "gait.stride=4 cm" --parameter springs.stiffness {both}',
-        },
-        {
-            "why": "Follow the curved walks: how tightly they turn, and at what cost.",
-            "line": f"chilopod branch {quoted} --out curved",
-        },
-        {
-            "why": "Send the robot to a target of your choice, and watch it go in a browser.",
-            "line": f'chilopod turn {quoted} --target "30 deg, 2 m" --out turn',
-        },
-        {
-            "why": "Let the whole robot walk in three dimensions, and see it in a browser.",
-            "line": 'chilopod turn aoi2022 --engine twin --target "45 deg, 1.3 m" --k1 "21 N*mm/deg" --out turn-3d',
-        },
-        {
-            "why": "Take the whole robot into another simulator.",
-            "line": "chilopod robot export aoi2022 --out aoi2022.xml",
-        },
-        {
-            "why": "Fit the constants that the paper does not print once more, on their own.",
-            "line": "chilopod identify planar",
-        },
-        {
-            "why": "Describe a robot of your own, and ask the same of it.",
-            "line": "chilopod robot new my-robot.toml\nchilopod stability my-robot.toml",
-        },
-    ]
-
-
-def _tables(found: Found) -> list[dict[str, Any]]:
-    """The table paper | computed, one part a chapter."""
-    parts = found.planar_rows()
-    return [{"title": chapter, "rows": [_row(row) for row in rows]} for chapter, rows in parts.items()]
 
 
 def _chapters(
@@ -222,14 +144,14 @@ def _chapters(
             {
                 "title": title,
                 "anchor": f"chapter-{number}",
-                "figures": [_figure(drawn) for drawn in sorted(figures, key=lambda drawn: drawn.panel.letter)],
+                "figures": sorted(figures, key=lambda drawn: drawn.panel.letter),
                 "films": [film for each in here for film in each.films],
                 "coming": [each.sentence for each in planned if each in waiting],
                 "failed": {each.sentence: in_words(failures[each]) for each in planned if each in failures},
             }
         )
     for first in chapters[:1]:
-        first["figures"][:0] = [_figure(drawn) for drawn in opening]
+        first["figures"][:0] = opening
     return chapters
 
 
@@ -237,19 +159,6 @@ def _row(row: Row | RobotRow) -> dict[str, str]:
     look, mark = _LOOKS[row.verdict]
     texts = {name: typeset(text) for name, text in row.data().items() if isinstance(text, str)}
     return {**texts, "look": look, "mark": mark}
-
-
-def _figure(drawn: Drawn) -> dict[str, Any]:
-    panel = drawn.panel
-    return {
-        "name": panel.name,
-        "letter": panel.letter,
-        "title": panel.title,
-        "alt": panel.alt,
-        "text": [paragraph for paragraph in panel.text if paragraph],
-        "wide": _embedded(drawn.wide),
-        "narrow": _embedded(drawn.narrow),
-    }
 
 
 def _embedded(svg: bytes) -> str:
@@ -264,12 +173,8 @@ def _robots(results: Found) -> list[dict[str, Any]]:
     return [{"says": says, "name": robot.name, "file": file, "numbers": _numbers(robot)} for says, robot, file in found]
 
 
-def _numbers(robot: Robot) -> list[dict[str, str]]:
-    return [
-        {
-            "path": path,
-            "value": minus(units.format(robot.get(path), robot.unit_of(path), digits=6)).replace("*", "·"),
-            "origin": robot.provenance_of(path) or "not said",
-        }
-        for path in robot.parameters()
-    ]
+def _numbers(robot: Robot) -> Iterator[tuple[str, str, str]]:
+    """Path, value and origin of every number of a robot."""
+    for path in robot.parameters():
+        value = minus(units.format(robot.get(path), robot.unit_of(path), digits=6)).replace("*", "·")
+        yield path, value, robot.provenance_of(path) or "not said"

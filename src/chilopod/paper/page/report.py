@@ -1,7 +1,8 @@
-"""The page of a report, which is there at once and fills in as sections are computed."""
+"""The folder of a report: its page, which is there at once and fills in as sections are computed, and its films."""
 
 from __future__ import annotations
 
+import re
 from collections import deque
 from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -12,19 +13,24 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from chilopod.errors import OutputError
-from chilopod.output import check_folder, write_atomic
-from chilopod.paper.movies import Movie
-from chilopod.paper.page.movie import write_movie
-from chilopod.paper.page.page import Drawn, Shown, State, page
-from chilopod.paper.section import Context, Found, Section
-from chilopod.paper.sections import Progress
+from chilopod.output import check_files, check_folder, write_atomic
+from chilopod.paper.page.page import Drawn, Film, Shown, State, page
+from chilopod.paper.section import Context, Found, Movie, Section, SectionProgress, Size
 from chilopod.robot import Robot, load_robot, presets
 from chilopod.show import style
 from chilopod.show.figures import schematic
 from chilopod.show.files import panel_files
 from chilopod.show.panel import Panel
+from chilopod.show.scene.encoder import has_encoder
+from chilopod.show.scene.film import filmed
+from chilopod.show.scene.film_3d import film_3d, stills
+from chilopod.show.scene.played import replay
 
 T = TypeVar("T")
+
+_HOLDS = re.compile('<meta name="chilopod-report" content="([A-Z]+)([^"]*)">')
+_FRONT = 1000  # characters of a page, in which that stands
+_BESIDE = ("data", "figures", "movies")
 
 
 class Report:
@@ -35,18 +41,8 @@ class Report:
     each as a whole. Where films cannot be encoded, the replays are there without them.
 
     Used as a context: the page is there as soon as it is entered, and complete when it is left. What is drawn is drawn
-    in a thread beside the computation of what comes next.
-
-    Parameters
-    ----------
-    sections
-        Sections that are shown.
-    context
-        Robots, size and folder of the computation.
-    folder
-        Created where there is none.
-    progress
-        Told how much is drawn.
+    in a thread beside the computation of what comes next, and ``progress`` is told how much is. The folder is created
+    where there is none.
 
     Raises
     ------
@@ -59,7 +55,7 @@ class Report:
         sections: Sequence[Section[Any]],
         context: Context,
         folder: str | Path,
-        progress: Progress = lambda what, done, words: None,
+        progress: SectionProgress = lambda what, done, words: None,
     ) -> None:
         self.page = check_folder(folder) / "index.html"
         self.failures: dict[Section[Any], Exception] = {}
@@ -125,12 +121,10 @@ class Report:
             self.failures[section] = error
 
     def _draw(self, section: Section[Any], found: Found, new: bool) -> Shown:
-        value = found[section]
-        panels = section.panels(value, found.seen_by(section.beside))
-        figures = tuple(self._draw_panel(panel) for panel in panels)
+        figures = tuple(self._draw_panel(panel) for panel in section.figures(found))
         if not new and section in self._shown:
             return replace(self._shown[section], figures=figures)
-        self._films += ((section, movie) for movie in section.films(value))
+        self._films += ((section, movie) for movie in section.films(found[section]))
         return Shown(section, figures, ())
 
     def _film(self, section: Section[Any], movie: Movie) -> Shown:
@@ -165,18 +159,7 @@ class Report:
 
 
 def write_report(found: Found, folder: str | Path) -> Path:
-    """Draw all that was found and write its page, see :class:`Report`.
-
-    Returns
-    -------
-    Path
-        Path of the page.
-
-    Raises
-    ------
-    OutputError
-        If the folder cannot be written.
-    """
+    """Draw all that was found and write its page, see :class:`Report`; returns the path of the page."""
     sections = [*found.values, *found.failures]
     with Report(sections, found.context, folder) as report:
         report.add(found, sections)
@@ -196,3 +179,66 @@ def _again(draw: Callable[[], T]) -> T:
 
 def _is_preset(robot: Robot) -> bool:
     return robot.name in presets() and load_robot(robot.name) == robot
+
+
+def check_report(folder: Path, sections: Collection[Section[Any]], size: Size, *, replace: bool = False) -> None:
+    """Make sure, before any work is done for it, that a report of some sections and size can be written into a folder;
+    one that has no more is resumed.
+
+    Raises
+    ------
+    OutputError
+        If there is a page that is no report, a report that has more, or files beside which there is no page, unless
+        these may be replaced; or if the folder cannot be written.
+    """
+    page = folder / "index.html"
+    held = _held(page)
+    check_files([page], replace=replace or held is not None)
+    if replace:
+        return
+    if held is None:
+        for beside in _BESIDE:
+            if (folder / beside).is_dir() and any((folder / beside).iterdir()):
+                problem = "has files that are of no report and might be replaced, which takes --force"
+                raise OutputError(problem, source=str(folder / beside))
+        return
+    done, names = held
+    larger = [f"it is {done.name.lower()}"] if list(Size).index(done) < list(Size).index(size) else []
+    more = larger or sorted({*names} - {section.name for section in sections})
+    if more:
+        problem = f"is a report that has more ({', '.join(more)}) and is only replaced with --force"
+        raise OutputError(problem, source=str(page))
+
+
+def _held(page: Path) -> tuple[Size, list[str]] | None:
+    """Size and sections of a report; None if it is none."""
+    if not page.is_file():
+        return None
+    with page.open(encoding="utf-8", errors="replace") as file:
+        found = _HOLDS.search(file.read(_FRONT))
+    return (Size[found[1]], found[2].split()) if found and found[1] in Size.__members__ else None
+
+
+def write_movie(shown: Movie, folder: Path) -> Film:
+    """Write a movie as ``NAME.html``, ``NAME.mp4`` where films can be encoded and, of some moments of it in 3-D,
+    ``NAME.png`` where it can be rendered."""
+    solid = "pose" in shown.record
+    replay(shown.record, titles=shown.titles, heading=shown.heading).write(folder / f"{shown.name}.html", replace=True)
+    look: dict[str, Any] = {"titles": shown.titles, "heading": shown.heading, "speed": shown.speed}
+    file, encoded = folder / f"{shown.name}.mp4", has_encoder()
+    if encoded and not (solid and _rendered(file, lambda: film_3d(shown.record, **look))):
+        write_atomic(file, filmed(shown.record, **look, size=shown.size))
+    picture = folder / f"{shown.name}.png"
+    pictured = bool(shown.stills) and _rendered(
+        picture, lambda: stills(shown.record, shown.stills, titles=shown.titles)
+    )
+    return Film(shown.name, shown.heading, shown.speed, encoded, pictured)
+
+
+def _rendered(path: Path, render: Callable[[], bytes]) -> bool:
+    """Write what graphics here can render. The film from above needs none; `chilopod doctor` says what is missing."""
+    try:
+        write_atomic(path, render())
+    except OutputError:
+        return False
+    return True

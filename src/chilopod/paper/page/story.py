@@ -24,17 +24,8 @@ _TOLD: Final = {
 
 @dataclass(frozen=True)
 class Fact:
-    """A number that matters.
-
-    Attributes
-    ----------
-    value
-        Value that is computed here.
-    about
-        Description of the value.
-    paper
-        Value that the paper prints; empty if there is no counterpart.
-    """
+    """A number that matters: value that is computed here, its description, and the paper's value, empty if there is
+    none."""
 
     value: str
     about: str

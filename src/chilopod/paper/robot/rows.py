@@ -1,4 +1,4 @@
-"""Lines of the robot's table about its walks."""
+"""Lines of the robot's table about its walks and its turning tasks."""
 
 from __future__ import annotations
 
@@ -11,21 +11,17 @@ from numpy.typing import NDArray
 from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.paper import printed, statements
 from chilopod.paper.equal_distance import change, law_ratio, radius_ratio
-from chilopod.paper.printed import Band, Said
+from chilopod.paper.measures import onset_with_error, radius_at, shares, spring_for
+from chilopod.paper.printed import Band, Said, Task
+from chilopod.paper.robot.turning import RobotTurning
 from chilopod.paper.robot.walks import RobotWalks
-from chilopod.paper.scatter import (
-    INCREASES,
-    Answer,
-    every,
-    increases,
-    mean_and_error,
-    spread_difference,
-    with_error,
-)
+from chilopod.paper.scatter import INCREASES, Answer, every, increases, mean_and_error, spread_difference, with_error
 from chilopod.paper.statements import listed
 from chilopod.paper.table import OfTwin, Result, Statement, Verdict, of_twin, within
-from chilopod.paper.walk_measures import onset_with_error, radius_at, shares
+from chilopod.paper.turning.criteria import SCALES, all_lower, around, in_words, minima, saturation, softest_minima
+from chilopod.paper.turning.trials import LegYaw, arrivals, by_leg_yaw, outcome_words, springs_by_outcome
 from chilopod.show.words import listing
+from chilopod.steering import Outcome
 from chilopod.tasks.radius_law import in_settled_curve
 
 PAPER_SPRING = printed.TASKS["A"].k_hat.value
@@ -62,18 +58,24 @@ def _spring(statement: Statement[Band], twin: tuple[float, float], reading: str 
 
 
 def _straight(base: xr.Dataset) -> OfTwin:
-    springs = printed.STRAIGHT
-    words = f"straight: {_counts(base, 'straight', springs)}"
-    return OfTwin(statements.STRAIGHT, Result(words), within(_most(shares(base).straight, springs)))
+    words, most = _most(base, "straight", printed.STRAIGHT)
+    return OfTwin(statements.STRAIGHT, Result(words), within(most))
 
 
 def _curved(base: xr.Dataset) -> OfTwin:
-    springs = printed.CURVED
-    directions = base.direction.sel(spring=list(springs)).values
+    words, most = _most(base, "curved", printed.CURVED)
+    directions = base.direction.sel(spring=list(printed.CURVED)).values
     left, right = (int((directions == side).sum()) for side in ("left", "right"))
-    words = f"curved: {_counts(base, 'curved', springs)}; {left} to the left, {right} to the right"
-    both = min(left, right) > 0
-    return OfTwin(statements.CURVED, Result(words), within(_most(shares(base).curved, springs) and both))
+    result = Result(f"{words}; {left} to the left, {right} to the right")
+    return OfTwin(statements.CURVED, result, within(most and min(left, right) > 0))
+
+
+def _most(base: xr.Dataset, what: str, springs: tuple[float, ...]) -> tuple[str, bool]:
+    """How many walks at each of some springs are curved or straight, in words, and whether most at each are."""
+    share, repeats = shares(base)[what].sel(spring=list(springs)).values, base.sizes["repeat"]
+    pairs = zip(springs, repeats * share, strict=True)
+    counts = ", ".join(f"{count:.0f} of {repeats} at {spring:g}" for spring, count in pairs)
+    return f"{what}: {counts}", bool((share > 0.5).all())
 
 
 def _radius(base: xr.Dataset, spring: float, statement: Statement[Band]) -> OfTwin:
@@ -97,9 +99,8 @@ def _rising(base: xr.Dataset) -> OfTwin:
 def _fluctuation(base: xr.Dataset) -> OfTwin:
     several = {spring: row for spring, row in _curved_angles(base).items() if row.size > 1}
     if len(several) < 2:
-        return OfTwin(
-            statements.FLUCTUATION, Result("no two springs at which two trials curve"), Verdict.NOT_DETERMINED
-        )
+        none = Result("no two springs at which two trials curve")
+        return OfTwin(statements.FLUCTUATION, none, Verdict.NOT_DETERMINED)
     (stiff, one), *_, (soft, other) = several.items()
     wider = spread_difference(other, one)
     spreads = [f"{np.rad2deg(row.std(ddof=1)):.2f} deg at {k:g}" for k, row in ((stiff, one), (soft, other))]
@@ -108,17 +109,8 @@ def _fluctuation(base: xr.Dataset) -> OfTwin:
 
 
 def variant_rows(base: xr.Dataset, data: xr.Dataset, name: str, reading: str = "") -> list[OfTwin]:
-    """Onset and radius of a variant.
-
-    Parameters
-    ----------
-    base, data
-        Trials of the robot as built and of the variant.
-    name
-        Name of the variant, as the paper's.
-    reading
-        Reading of the variant, if there are several.
-    """
+    """Onset and radius of one of the paper's variants, from trials of the robot as built and of the variant, and the
+    reading of the variant, if there are several."""
     said = statements.VARIANTS[name]
     ratio = radius_ratio(base, data)
     law = law_ratio(ratio.compared, printed.ONSET.value, printed.onset(name).value)
@@ -137,13 +129,7 @@ def variant_rows(base: xr.Dataset, data: xr.Dataset, name: str, reading: str = "
 
 
 def duration_rows(data: xr.Dataset) -> list[OfTwin]:
-    """Quantities of the base series that would be judged otherwise if its walks were shorter.
-
-    Parameters
-    ----------
-    data
-        From :func:`chilopod.paper.robot.walks.by_duration`.
-    """
+    """Quantities of :func:`chilopod.paper.robot.walks.by_duration`, and whether they hang on how long walks last."""
     answers = [printed.ONSET.answer(*pair) for pair in zip(data.onset.values, data.onset_error.values, strict=True)]
     values = f"{_numbers(data.onset.values, 1)} {PAPER_UNIT}"
     rows = [_duration_row(data, statements.ONSET_BY_DURATION, values, answers)]
@@ -171,17 +157,56 @@ def _duration_row(data: xr.Dataset, statement: Statement[Said], values: str, ans
     )
 
 
-def _most(share: xr.DataArray, springs: tuple[float, ...]) -> bool:
-    """True if most walks at each of some springs are counted."""
-    return bool((share.sel(spring=list(springs)) > 0.5).all())
-
-
-def _counts(data: xr.Dataset, what: str, springs: tuple[float, ...]) -> str:
-    counts = data.sizes["repeat"] * shares(data)[what].sel(spring=list(springs)).values
-    return ", ".join(
-        f"{count:.0f} of {data.sizes['repeat']} at {spring:g}" for spring, count in zip(springs, counts, strict=True)
-    )
-
-
 def _numbers(values: NDArray[np.float64], digits: int) -> str:
     return ", ".join(f"{value:.{digits}f}" if np.isfinite(value) else "none" for value in values)
+
+
+def turning_rows(found: RobotTurning, walks: RobotWalks | None) -> list[OfTwin]:
+    """The turning tasks."""
+    rows: list[OfTwin] = []
+    for letter, task in found.tasks.items():
+        said = statements.TASKS[letter]
+        if walks is not None:
+            own, error = spring_for(walks.base, task.target.radius)
+            words = "" if np.isfinite(own) else "none of the springs walked"
+            rows.append(of_twin(said.k_hat, Result(words, own, error, PAPER_UNIT, 1)))
+        words = outcome_words(task.criteria, lambda springs: ", ".join(f"{k:g}" for k in springs))
+        rows.append(OfTwin(said.outcomes, Result(words), within(_became(task.criteria, printed.TASKS[letter]))))
+        low = minima(task.criteria)
+        for name, statement in said.minima.items():
+            at, (factor, unit) = low.sel(criterion=name), SCALES[name]
+            words = (
+                f"{factor * float(at['mean']):.3g} ± {factor * float(at['error']):.2g} {unit} at k1 = "
+                f"{float(at['at']):.3g} (no worse: {float(at.softest):g} to {float(at.stiffest):g})"
+            )
+            result = Result(words, float(at["at"]), unit=PAPER_UNIT)
+            rows.append(OfTwin(statement, result, within(around(at, statement.said))))
+    task = found.tasks["A"]
+    time = task.time if (task.criteria.outcome == Outcome.ARRIVED.label).any() else np.nan
+    arrival = f"{time:.1f} s, the earliest, which has no error" if np.isfinite(time) else "none arrives"
+    own = walks.uniform.attrs["critical_k"] if walks else np.nan
+    words, below = softest_minima(found.hopf, own if np.isfinite(own) else printed.UNIFORM.value)
+    compared = Result(f"{in_words(task, found.hopf)} ({saturation(task, found.hopf)})")
+    alone = by_leg_yaw(found.without)
+    return [
+        *rows,
+        of_twin(statements.ARRIVAL, Result(arrival, time, 0.0, "s")),
+        *(OfTwin(statements.WITHOUT, Result(str(each)), within(_needs_leg_yaw(each))) for each in alone),
+        OfTwin(statements.HOPF, compared, within(all_lower(task, found.hopf))),
+        OfTwin(statements.HOPF_SPRINGS, Result(words), within(below)),
+    ]
+
+
+def _became(criteria: xr.Dataset, task: Task) -> bool:
+    """True if that becomes of a task at the paper's own springs, or between two that miss to either side."""
+    outcomes, k_hat = springs_by_outcome(criteria), task.k_hat.value
+    if not task.outcomes:
+        return bool(outcomes[Outcome.OUTSIDE] and outcomes[Outcome.INSIDE]) and k_hat in outcomes[Outcome.ARRIVED]
+    met = all(spring in outcomes[outcome] for outcome, spring in task.outcomes.items())
+    return met and bool((criteria.outcome.sel(spring=k_hat) == Outcome.ARRIVED.label).all())
+
+
+def _needs_leg_yaw(walks: LegYaw) -> bool:
+    """True if many fail without leg yaw, and none with it."""
+    (few, without), (many, with_) = arrivals(walks.alone), arrivals(walks.helped)
+    return few <= without // 2 and many == with_

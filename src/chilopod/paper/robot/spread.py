@@ -7,28 +7,27 @@ and undisturbed walks.
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from chilopod import trials
-from chilopod.analysis.parameters import K1, stiffness
+from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.paper import printed
 from chilopod.paper.equal_distance import radius_ratio
 from chilopod.paper.fit_data import base_series_data
+from chilopod.paper.measures import Folder, onset_with_error, spring_walks
 from chilopod.paper.robot.turning import TASK_DURATION
 from chilopod.paper.robot.walks import UNIFORM_DURATION, lower_steps, undulations, walk_ends
-from chilopod.paper.section import Context
-from chilopod.paper.size import Size
-from chilopod.paper.walk_measures import onset_with_error
+from chilopod.paper.section import Context, Size
+from chilopod.paper.turning.trials import to_target
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
-from chilopod.steering import ARRIVAL_RADIUS, strategy_named
+from chilopod.steering import ARRIVAL_RADIUS
 from chilopod.tasks.identify.twin import known, unlike
 from chilopod.tasks.identify.twin_constants import FREE, with_constants
-from chilopod.trials import NONE, Trial
+from chilopod.trials import NONE
 
 SPRINGS = (13.0, 15.0, 17.0, 19.0, 21.0, 24.0, 28.0)
 """k1 of the variants, N*mm/deg."""
@@ -46,19 +45,15 @@ _BENT = 0.8  # rad in all, that walks begin with
 
 
 def twin_spread(context: Context, progress: Progress = silent) -> xr.Dataset:
-    """Predictions by several sets of constants.
-
-    Parameters
-    ----------
-    context, progress
-        As for :func:`chilopod.paper.robot.walks.robot_walks`; if not full, two sets, or one.
+    """Predictions by several sets of constants; if not full, by two sets, or one.
 
     Returns
     -------
-    Dataset over set (0 the preset's): the constants (SI) by path over ``constant``, ``misfit``, and predictions: over
-    variant ``onset`` (N*mm/deg, NaN where walks determine none; ``paper`` what is printed) and ``radius`` (over that as
-    built, at an equal distance from each one's own onset), ``uniform`` (N*mm/deg), and over task ``best``, the spring
-    that comes nearest to the target (N*mm/deg), and ``arrives``, whether that arrives.
+    Dataset over set (0 the preset's): the constants (SI; ``unit`` is the unit of the robot file) by path over
+    ``constant``, ``misfit``, and predictions: over variant ``onset`` (N*mm/deg, NaN where walks determine none;
+    ``paper`` what is printed) and ``radius`` (over that as built, at an equal distance from each one's own onset),
+    ``uniform`` (N*mm/deg), and over task ``best``, the spring that comes nearest to the target (N*mm/deg), and
+    ``arrives``, whether that arrives.
     """
     robot, folder, size = context.whole, context.folder, context.size
     fits = unlike(known(), size.of(COUNT, 2, 1))
@@ -68,23 +63,31 @@ def twin_spread(context: Context, progress: Progress = silent) -> xr.Dataset:
         other = with_constants(robot, fit.constants)
         rows.append({**predictions(other, folder, size=size), **nearest_springs(other, folder, size)})
     series = base_series_data()
-    numbers, answers = len(series.radii) + len(series.speeds) + 1, len(series.curved) + len(series.straight)
-    names = list(rows[0]["onset"])
-    tasks = list(rows[0]["best"])
-    data = xr.Dataset(
+    names, tasks, paths = list(rows[0]["onset"]), list(rows[0]["best"]), [each.path for each in FREE]
+
+    def table(name: str, over: str, keys: list[str]) -> tuple[tuple[str, str], np.ndarray]:
+        return ("set", over), np.array([[row[name][key] for key in keys] for row in rows])
+
+    return xr.Dataset(
         {
             "constants": (("set", "constant"), np.array([fit.constants for fit in fits])),
+            "unit": ("constant", [robot.unit_of(path) for path in paths]),
             "misfit": ("set", np.array([fit.misfit for fit in fits])),
-            "uniform": ("set", np.array([row["uniform"] for row in rows]), {"units": "N*mm/deg"}),
+            "uniform": ("set", np.array([row["uniform"] for row in rows]), {"units": PAPER_UNIT}),
+            "onset": table("onset", "variant", names),
+            "radius": table("radius", "variant", names),
+            "best": table("best", "task", tasks),
+            "paper": ("variant", [printed_number(name).value for name in names], {"units": PAPER_UNIT}),
+            "arrives": table("arrives", "task", tasks),
         },
-        coords={"set": np.arange(len(fits)), "constant": [c.path for c in FREE], "variant": names, "task": tasks},
-        attrs={"robot": robot.name, "known": len(known()), "numbers": numbers, "answers": answers},
+        coords={"set": np.arange(len(fits)), "constant": paths, "variant": names, "task": tasks},
+        attrs={
+            "robot": robot.name,
+            "known": len(known()),
+            "numbers": len(series.radii) + len(series.speeds) + 1,
+            "answers": len(series.curved) + len(series.straight),
+        },
     )
-    for name, over, keys in (("onset", "variant", names), ("radius", "variant", names), ("best", "task", tasks)):
-        data[name] = (("set", over), np.array([[row[name][key] for key in keys] for row in rows]))
-    data["paper"] = ("variant", [printed_number(name).value for name in names], {"units": "N*mm/deg"})
-    data["arrives"] = (("set", "task"), np.array([[row["arrives"][task] for task in tasks] for row in rows]))
-    return data
 
 
 def printed_number(reading: str) -> printed.Number:
@@ -92,18 +95,12 @@ def printed_number(reading: str) -> printed.Number:
     return printed.onset(reading.removesuffix(LOWER))
 
 
-def predictions(
-    robot: Robot, folder: str | Path | None = None, engine: str = "twin", size: Size = Size.FULL
-) -> dict[str, Any]:
-    """Where curved and undulating walks set in other than in the base series, and how tight they are.
+def predictions(robot: Robot, folder: Folder = None, engine: str = "twin", size: Size = Size.FULL) -> dict[str, Any]:
+    """Where curved and undulating walks set in other than in the base series, and how tight they are, by few and
+    undisturbed walks, which begin bent.
 
-    Few and undisturbed walks, which begin bent, in place of the many from straight on that
-    :func:`chilopod.paper.robot.walks.robot_walks` has.
-
-    Returns
-    -------
     By variant ``onset`` (N*mm/deg) and ``radius`` (over that as built, at an equal distance from each one's own onset),
-    NaN where walks determine none; and ``uniform`` (N*mm/deg).
+    NaN where walks determine none; and ``uniform``.
     """
     shape = np.array(printed.mode_shape(robot))
     bend = tuple(_BENT * shape / shape.sum())
@@ -113,14 +110,12 @@ def predictions(
             variants[f"{name}{LOWER}"] = lower_steps(robot, variant)
     springs, uniform_springs = size.cut((SPRINGS, UNIFORM_SPRINGS), (SPRINGS[1::4], UNIFORM_SPRINGS[::3]))
     longest, swinging = size.cut((_DURATION, UNIFORM_DURATION), (10.0, 8.0))
+    undisturbed: dict[str, Any] = {"joint_angles": bend, "disturbance": NONE, "rate": 10.0}
     series = {}
     for name, variant in variants.items():
         duration = longest * robot.gait.stride / variant.gait.stride
-        walks = [
-            Trial(variant.with_value(K1, stiffness(k)), duration, 0, bend, disturbance=NONE, rate=10.0, engine=engine)
-            for k in springs
-        ]
-        series[name] = walk_ends(trials.run(walks, folder), variant, springs)
+        walks = spring_walks(variant, springs, duration, folder=folder, engine=engine, **undisturbed)
+        series[name] = walk_ends(walks, variant, springs)
     base = next(iter(series.values()))
     uniform = undulations(robot, uniform_springs, 1, duration=swinging, folder=folder, engine=engine)
     return {
@@ -130,21 +125,14 @@ def predictions(
     }
 
 
-def nearest_springs(
-    robot: Robot, folder: str | Path | None = None, size: Size = Size.FULL
-) -> dict[str, dict[str, Any]]:
+def nearest_springs(robot: Robot, folder: Folder = None, size: Size = Size.FULL) -> dict[str, dict[str, Any]]:
     """For each of the paper's tasks the spring that comes ``best``, nearest to the target (N*mm/deg), undisturbed, and
     whether it ``arrives``."""
     found: dict[str, dict[str, Any]] = {"best": {}, "arrives": {}}
     springs, duration = size.cut((TASK_SPRINGS, TASK_DURATION), (TASK_SPRINGS[::3], 2.0))
-    plan = strategy_named("pitchfork")
+    same: dict[str, Any] = {"duration": duration, "disturbance": NONE, "rate": 20.0, "engine": "twin"}
     for letter, task in printed.TASKS.items():
-        walks = []
-        for k in springs:
-            walker, controller, _ = plan.prepare(robot, None, stiffness(k))
-            walks.append(
-                Trial(walker, duration, 0, (), task.target, controller, disturbance=NONE, rate=20.0, engine="twin")
-            )
+        walks = [to_target(robot, task.target, spring, **same) for spring in springs]
         nearest = [float(record.distance.min()) for record in trials.run(walks, folder)]
         found["best"][letter] = springs[int(np.argmin(nearest))]
         found["arrives"][letter] = bool(min(nearest) < ARRIVAL_RADIUS)

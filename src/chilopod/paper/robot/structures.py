@@ -11,23 +11,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from chilopod import twin
+from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.paper import printed
 from chilopod.paper.fit_data import base_series_data
+from chilopod.paper.measures import Folder
 from chilopod.paper.printed import CRITERION_NAMES
 from chilopod.paper.robot.spread import LOWER, predictions, printed_number
 from chilopod.paper.robot.turning import TASK_DURATION
-from chilopod.paper.section import Context
-from chilopod.paper.size import Size
-from chilopod.paper.turning.minima import minima
+from chilopod.paper.scatter import Array
+from chilopod.paper.section import Context, Size
+from chilopod.paper.turning.criteria import minima
 from chilopod.paper.turning.trials import turning_task
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
@@ -35,8 +35,6 @@ from chilopod.tasks.identify.data import BaseSeries
 from chilopod.tasks.identify.twin import corrected, damped_step
 from chilopod.tasks.identify.twin_constants import FREE, constants_of, parts_of, values_at, with_constants
 from chilopod.tasks.identify.twin_series import DURATION, base_series, residuals
-
-Array = NDArray[np.float64]
 
 PHASE, UNIFORM = "module phase 180 deg", "all springs alike"
 """Names of the variants, and of the predictions."""
@@ -111,17 +109,8 @@ HEAVY_FRONT = twin.Edited("heavy front", _heavy_front)
 
 @dataclass(frozen=True)
 class Structure:
-    """One that the robot could have.
-
-    Attributes
-    ----------
-    name, sentence
-        In a word, and what it means.
-    overrides
-        Overrides of the robot's description, as ``--set`` takes them.
-    edited
-        Name of the engine in this module, if a robot file cannot say it.
-    """
+    """Structure that the robot could have, in a word and a sentence: overrides of the robot's description, as ``--set``
+    takes them, or the name of an engine in this module, if a robot file cannot say it."""
 
     name: str
     sentence: str
@@ -154,12 +143,7 @@ STRUCTURES = (
 
 
 def structures(context: Context, progress: Progress = silent) -> xr.Dataset:
-    """Predictions by other structures, with their constants fitted anew.
-
-    Parameters
-    ----------
-    context, progress
-        As for :func:`chilopod.paper.robot.walks.robot_walks`; if tiny, one structure, whose constants are not fitted.
+    """Predictions by other structures, with their constants fitted anew; if tiny, by one, whose constants are not.
 
     Returns
     -------
@@ -180,32 +164,21 @@ def structures(context: Context, progress: Progress = silent) -> xr.Dataset:
         changed = robot.set_from_text(each.overrides)
         given, fitted, anew = _fitted(changed, data, law, each.engine, rounds, duration)
         found = predictions(anew, folder, each.engine, size)
-        rows.append(
-            {"given": given, "fitted": fitted, "robot": anew, **found, **_strategies(anew, folder, each.engine, size)}
-        )
+        criteria = _strategies(anew, folder, each.engine, size)
+        rows.append({**found, "misfit": (given, fitted), "constants": constants_of(anew), "criteria": criteria})
     variants = [name for name in rows[0]["onset"] if name != printed.AS_BUILT]
     names = [*variants, UNIFORM]
     predicted = [[*(row["onset"][name] for name in variants), row["uniform"]] for row in rows]
+    paper = [*(printed_number(name).value for name in variants), printed.UNIFORM.value]
+    misfits, constants, smallest = (np.array([row[key] for row in rows]) for key in ("misfit", "constants", "criteria"))
     return xr.Dataset(
         {
-            "misfit": (("structure", "fit"), np.array([[row["given"], row["fitted"]] for row in rows])),
-            "constants": (("structure", "constant"), np.array([constants_of(row["robot"]) for row in rows])),
-            "predicted": (
-                ("structure", "prediction"),
-                np.array(predicted),
-                {"units": "N*mm/deg"},
-            ),
-            "paper": (
-                "prediction",
-                [*(printed_number(name).value for name in variants), printed.UNIFORM.value],
-                {"units": "N*mm/deg"},
-            ),
+            "misfit": (("structure", "fit"), misfits),
+            "constants": (("structure", "constant"), constants),
+            "predicted": (("structure", "prediction"), np.array(predicted), {"units": PAPER_UNIT}),
+            "paper": ("prediction", paper, {"units": PAPER_UNIT}),
             "tighter": ("structure", np.array([row["radius"][PHASE] for row in rows])),
-            "criteria": (
-                ("structure", "strategy", "criterion"),
-                np.array([row["criteria"] for row in rows]),
-                {"units": "m, rad, rad^2*s"},
-            ),
+            "criteria": (("structure", "strategy", "criterion"), smallest, {"units": "m, rad, rad^2*s"}),
             "about": ("structure", np.array([each.sentence for each in tried], dtype=object)),
         },
         coords={
@@ -228,7 +201,7 @@ def _with_chi_squared(data: xr.Dataset) -> xr.Dataset:
     return data.assign(chi_squared=once + squared.sel(prediction=twice).min("prediction", skipna=False))
 
 
-def _strategies(robot: Robot, folder: str | Path | None, engine: str, size: Size) -> dict[str, Array]:
+def _strategies(robot: Robot, folder: Folder, engine: str, size: Size) -> Array:
     """The smallest criteria of task A, with one soft spring and with all springs alike."""
     target = printed.TASKS["A"].target
     repeats, duration = size.cut((_REPEATS, TASK_DURATION), (2, 3.0))
@@ -238,12 +211,7 @@ def _strategies(robot: Robot, folder: str | Path | None, engine: str, size: Size
         task = turning_task(robot, target, springs, repeats, strategy, time=time, **kept)
         time = task.time
         rows.append(minima(task.criteria)["mean"].sel(criterion=list(CRITERION_NAMES)).values)
-    return {"criteria": np.array(rows)}
-
-
-def _smooth(data: BaseSeries) -> int:
-    """How many residuals there are that are not zero wherever they are met."""
-    return len(data.radii) + len(data.speeds) + 1
+    return np.array(rows)
 
 
 def _law(robot: Robot, data: BaseSeries, progress: Progress) -> Array:
@@ -257,7 +225,9 @@ def _law(robot: Robot, data: BaseSeries, progress: Progress) -> Array:
 
 
 def _off(robot: Robot, data: BaseSeries, engine: str = "twin", duration: float = DURATION) -> Array:
-    return residuals(robot, base_series(robot, data, engine=engine, duration=duration), data)[: _smooth(data)]
+    """Residuals that are not zero wherever they are met."""
+    smooth = len(data.radii) + len(data.speeds) + 1
+    return residuals(robot, base_series(robot, data, engine=engine, duration=duration), data)[:smooth]
 
 
 def _fitted(

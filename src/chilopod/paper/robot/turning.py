@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import xarray as xr
 
@@ -29,19 +30,8 @@ as long again lets a robot that is as fast arrive, or pass the target."""
 
 @dataclass(frozen=True)
 class RobotTurning:
-    """Results of the tasks.
-
-    Attributes
-    ----------
-    robot
-        The robot.
-    tasks
-        The paper's two, by letter.
-    hopf
-        Task A with uniform springs.
-    without
-        Task A with and without leg yaw at the paper's spring.
-    """
+    """Results of the paper's two tasks, by letter, of task A with uniform springs, and of task A with and without leg
+    yaw at the paper's spring."""
 
     robot: Robot
     tasks: Mapping[str, TurningTask]
@@ -50,51 +40,19 @@ class RobotTurning:
 
 
 def robot_turning(context: Context, progress: Progress = silent) -> RobotTurning:
-    """All turning tasks of the paper.
-
-    Parameters
-    ----------
-    context, progress
-        As for :func:`chilopod.paper.robot.walks.robot_walks`; if not full, two repeats instead of five, and fewer
-        springs.
-    """
-    robot, folder, size = context.whole, context.folder, context.size
+    """All turning tasks of the paper by the whole robot; if not full, two repeats instead of five and fewer springs."""
+    robot, size = context.whole, context.size
     repeats, springs, duration = size.of(
         (printed.REPEATS, SPRINGS, TASK_DURATION), (2, SPRINGS[1::2], TASK_DURATION), (2, SHOWN, 6.0)
     )
     springs = tuple(sorted({*springs, *SHOWN}))
+    same: dict[str, Any] = {"duration": duration, "engine": "twin", "folder": context.folder}
     tasks = {}
     for index, (letter, task) in enumerate(printed.TASKS.items()):
-        tasks[letter] = turning_task(
-            robot,
-            task.target,
-            springs,
-            repeats,
-            duration=duration,
-            shown=SHOWN,
-            engine="twin",
-            folder=folder,
-            progress=part(progress, 0.35 * index, 0.35 * (index + 1), f"task {letter}"),
-        )
-    hopf = turning_task(
-        robot,
-        tasks["A"].target,
-        HOPF_SPRINGS,
-        repeats,
-        "hopf",
-        time=tasks["A"].time,
-        duration=duration,
-        engine="twin",
-        folder=folder,
-        progress=part(progress, 0.7, 0.9, "uniform springs"),
-    )
-    without = without_leg_yaw(
-        robot,
-        tasks["A"].target,
-        {"paper's spring": printed.TASKS["A"].k_hat.value},
-        duration=duration,
-        engine="twin",
-        folder=folder,
-        progress=part(progress, 0.9, 1.0, "without leg yaw"),
-    )
+        told = part(progress, 0.35 * index, 0.35 * (index + 1), f"task {letter}")
+        tasks[letter] = turning_task(robot, task.target, springs, repeats, shown=SHOWN, progress=told, **same)
+    first, told = tasks["A"], part(progress, 0.7, 0.9, "uniform springs")
+    hopf = turning_task(robot, first.target, HOPF_SPRINGS, repeats, "hopf", time=first.time, progress=told, **same)
+    one, told = {"paper's spring": printed.TASKS["A"].k_hat.value}, part(progress, 0.9, 1.0, "without leg yaw")
+    without = without_leg_yaw(robot, first.target, one, progress=told, **same)
     return RobotTurning(robot, tasks, hopf, without)

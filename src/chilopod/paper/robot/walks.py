@@ -9,25 +9,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from chilopod import trials
-from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT, stiffness
-from chilopod.analysis.square_root import SquareRootFit, square_root_fit
-from chilopod.errors import AnalysisError
-from chilopod.paper import printed
+from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT
+from chilopod.analysis.square_root import SquareRootFit
+from chilopod.paper import measures, printed
 from chilopod.paper.section import Context
-from chilopod.paper.walk_measures import by_spring, example_walks, onset, onset_with_error, radius_at, shares
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.tasks.radius_law import DURATION, end_of_walk
-from chilopod.trials import AVERAGED, Disturbance, Trial
-
-Array = NDArray[np.float64]
+from chilopod.trials import AVERAGED
 
 SPRINGS = (15.0, 17.0, 21.0, 26.0, 28.0, 41.0, 75.0)
 """k1 of the base series, N*mm/deg: the paper's, and 26, at which it prints a radius."""
@@ -53,7 +47,6 @@ _RATE = 50.0
 _EXAMPLES = (41.0, 15.0)
 _WINDOW = 24.0  # s, some two cycles of an undulation
 _PER_CYCLE = 6  # samples
-_SEEDS = 10_000  # between springs
 
 
 @dataclass(frozen=True)
@@ -62,21 +55,14 @@ class RobotWalks:
 
     Attributes
     ----------
-    robot
-        As built.
-    base
-        See :func:`walk_ends`.
-    durations
-        See :func:`by_duration`.
-    variants
-        As ``base``, of the paper's three variants, by name.
-    lower_steps
-        The same of those of them that change the stride, with another reading of what the paper leaves open: that a
-        shorter half ellipse of the leg tips is lower in proportion, see :func:`lower_steps`.
-    examples
-        Joint angles (rad) over time of one straight and one curved walk, over (time, spring, joint).
-    uniform
-        See :func:`undulations`.
+    robot, base, durations
+        The robot as built, and its walks, see :func:`walk_ends` and :func:`by_duration`.
+    variants, lower_steps
+        As ``base``, of the paper's three variants, by name; and of those of them that change the stride, with another
+        reading of what the paper leaves open: that a shorter half ellipse of the leg tips is lower in proportion, see
+        :func:`lower_steps`.
+    examples, uniform
+        See :func:`chilopod.paper.measures.example_walks` and :func:`undulations`.
     """
 
     robot: Robot
@@ -90,20 +76,12 @@ class RobotWalks:
     @property
     def fit(self) -> SquareRootFit | None:
         """The square-root law of the base series."""
-        return onset(self.base)
+        return measures.onset(self.base)
 
 
 def robot_walks(context: Context, progress: Progress = silent) -> RobotWalks:
-    """All walks of the paper.
-
-    Parameters
-    ----------
-    context
-        Whole robot, folder, size. If not full, two repeats of the base series, one of the variants and of uniform
-        springs, with fewer springs.
-    progress
-        Called as the work goes on.
-    """
+    """All walks of the paper by the whole robot; if not full, two repeats of the base series, one of the variants and
+    of uniform springs, with fewer springs."""
     robot, folder, size = context.whole, context.folder, context.size
     repeats, fewer, fewest = size.of((REPEATS, VARIANT_REPEATS, UNIFORM_REPEATS), (2, 1, 1), (1, 1, 1))
     springs = size.of(VARIANT_SPRINGS, VARIANT_SPRINGS[1::2], VARIANT_SPRINGS[1::4])
@@ -113,22 +91,19 @@ def robot_walks(context: Context, progress: Progress = silent) -> RobotWalks:
     records = walk_records(robot, SPRINGS, repeats, duration=duration, folder=folder, progress=told)
     base, durations = walk_ends(records, robot, SPRINGS), by_duration(records, robot, SPRINGS)
     robots = {name: each for name, each in printed.variant_robots(robot).items() if name != printed.AS_BUILT}
-    readings = {
-        name: lower_steps(robot, each) for name, each in robots.items() if each.gait.stride != robot.gait.stride
-    }
-    asked = [(robots, name) for name in robots] + [(readings, name) for name in readings]
+    strides = [name for name, each in robots.items() if each.gait.stride != robot.gait.stride]
+    asked = [*robots.items(), *((name, lower_steps(robot, robots[name])) for name in strides)]
     found: list[xr.Dataset] = []
-    for index, (of, name) in enumerate(asked):
+    for index, (name, variant) in enumerate(asked):
         shown = part(progress, 0.31 + 0.6 * index / len(asked), 0.31 + 0.6 * (index + 1) / len(asked), name)
         # Growing and settling go with the way: who makes shorter steps is given the time to walk as far.
-        longer = duration * robot.gait.stride / of[name].gait.stride
-        walked = walk_records(of[name], springs, fewer, duration=longer, folder=folder, progress=shown)
-        found.append(walk_ends(walked, of[name], springs))
-    variants, lower = dict(zip(robots, found, strict=False)), dict(zip(readings, found[len(robots) :], strict=True))
+        longer = duration * robot.gait.stride / variant.gait.stride
+        walked = walk_records(variant, springs, fewer, duration=longer, folder=folder, progress=shown)
+        found.append(walk_ends(walked, variant, springs))
+    variants, lower = dict(zip(robots, found, strict=False)), dict(zip(strides, found[len(robots) :], strict=True))
     told = part(progress, 0.91, 1.0, "uniform springs")
     uniform = undulations(robot, uniform_springs, fewest, duration=swinging, folder=folder, progress=told)
-    seeds = [int(_SEEDS * spring) for spring in _EXAMPLES]
-    examples = example_walks(robot, _EXAMPLES, duration, seeds, "twin", folder)
+    examples = measures.example_walks(robot, _EXAMPLES, duration, measures.spring_seeds(_EXAMPLES), "twin", folder)
     return RobotWalks(robot, base, durations, variants, lower, examples, uniform)
 
 
@@ -139,100 +114,49 @@ def lower_steps(robot: Robot, variant: Robot) -> Robot:
 
 
 def walk_records(
-    robot: Robot,
-    springs: Sequence[float] = SPRINGS,
-    repeats: int = REPEATS,
-    *,
-    duration: float = DURATION,
-    disturbance: Disturbance | None = None,
-    folder: str | Path | None = None,
-    progress: Progress = silent,
+    robot: Robot, springs: Sequence[float] = SPRINGS, repeats: int = REPEATS, *, duration: float = DURATION, **walk: Any
 ) -> list[xr.Dataset]:
-    """Records of walks of the twin from straight on, spring by spring.
-
-    Parameters
-    ----------
-    robot
-        With a twin; its first spring does not matter.
-    springs
-        Values of k1, N*mm/deg.
-    repeats
-        Trials at each of them, all with seeds of their own.
-    duration
-        s.
-    disturbance
-        By default that of all studies.
-    folder
-        Folder of the trials.
-    progress
-        Called as trials are done.
-    """
-    asked = [
-        Trial(
-            robot.with_value(K1, stiffness(spring)),
-            duration,
-            int(_SEEDS * spring) + repeat,
-            disturbance=disturbance or Disturbance(),
-            rate=_RATE,
-            engine="twin",
-        )
-        for spring in springs
-        for repeat in range(repeats)
-    ]
-    return trials.run(asked, folder, progress)
+    """Records of walks of the twin from straight on, all with seeds of their own."""
+    seeds = measures.spring_seeds(springs)
+    return measures.spring_walks(
+        robot, springs, duration, repeats=repeats, seeds=seeds, rate=_RATE, engine="twin", **walk
+    )
 
 
 def walk_ends(
     records: Sequence[xr.Dataset], robot: Robot, springs: Sequence[float], duration: float | None = None
 ) -> xr.Dataset:
-    """Numbers that walks come to at their ends.
-
-    Parameters
-    ----------
-    records
-        From :func:`walk_records`.
-    robot, springs
-        Those of the records.
-    duration
-        s, after which the walks are cut; by default not at all.
-
-    Returns
-    -------
-    Dataset over spring (N*mm/deg), repeat and joint: what :func:`chilopod.tasks.radius_law.end_of_walk` makes of each.
-    """
+    """Numbers that walks of :func:`walk_records` come to at their ends, or where they are cut, ``duration`` (s) after
+    the start, over spring (N*mm/deg), repeat and joint: what :func:`chilopod.tasks.radius_law.end_of_walk` makes of
+    each."""
     last = float(records[0].time[-1]) if duration is None else duration
     ends = [end_of_walk(record.sel(time=record.time <= last + 1e-9), robot) for record in records]
-    data = by_spring(ends, springs)
+    data = measures.by_spring(ends, springs)
     data.attrs = {"robot": robot.name, "varied": K1, "averaged_s": AVERAGED, "duration_s": last}
     return data
 
 
 def by_duration(records: Sequence[xr.Dataset], robot: Robot, springs: Sequence[float]) -> xr.Dataset:
-    """Numbers of the same walks, had they ended earlier.
-
-    Parameters
-    ----------
-    records, robot, springs
-        As for :func:`walk_ends`.
+    """Numbers of the walks of :func:`walk_records`, had they ended earlier.
 
     Returns
     -------
     Dataset over duration (s; those of :data:`SHORTER`, and the walks' own last): ``onset`` with ``onset_error`` (of the
-    bootstrap), N*mm/deg; over duration and spring: those of :func:`shares`, and ``axis_radius`` with
-    ``axis_radius_error`` as of :func:`radius_at`, m.
+    bootstrap), N*mm/deg; over duration and spring: those of :func:`chilopod.paper.measures.shares`, and ``axis_radius``
+    with ``axis_radius_error`` as of :func:`chilopod.paper.measures.radius_at`, m.
     """
     last = float(records[0].time[-1])
     durations = [*(each for each in SHORTER if each < last), last]
     series = [walk_ends(records, robot, springs, duration) for duration in durations]
     # Short walks have not settled: what they show is what one would take for the radius.
-    onsets = np.array([onset_with_error(each, settled=False) for each in series])
-    radii = np.array([[radius_at(each, spring, settled=False) for spring in springs] for each in series])
+    onsets = np.array([measures.onset_with_error(each, settled=False) for each in series])
+    radii = np.array([[measures.radius_at(each, spring, settled=False) for spring in springs] for each in series])
     both = ("duration", "spring")
     return xr.Dataset(
         {
             "onset": ("duration", onsets[:, 0], {"units": PAPER_UNIT}),
             "onset_error": ("duration", onsets[:, 1], {"units": PAPER_UNIT}),
-            **xr.concat([shares(each) for each in series], "duration"),
+            **xr.concat([measures.shares(each) for each in series], "duration"),
             "axis_radius": (both, radii[..., 0], {"units": "m"}),
             "axis_radius_error": (both, radii[..., 1], {"units": "m"}),
         },
@@ -248,7 +172,7 @@ def undulations(
     *,
     duration: float = UNIFORM_DURATION,
     engine: str = "twin",
-    folder: str | Path | None = None,
+    folder: measures.Folder = None,
     progress: Progress = silent,
 ) -> xr.Dataset:
     """Walks with all springs alike: how far the body swings once it has settled.
@@ -260,41 +184,32 @@ def undulations(
     fit to those at most :data:`SWINGING` the undulation sets in, and ``critical_k_error``, its standard error by the
     bootstrap; NaN if they determine no point.
     """
-    joints = robot.body.modules - 1
-    wave = tuple(np.deg2rad(4.0) * np.cos(np.arange(joints) * np.pi / 2.0))
-    rate = _PER_CYCLE / robot.gait.period
-    asked = [
-        Trial(
-            robot.with_value(ALL, stiffness(spring)),
-            duration,
-            int(_SEEDS * spring) + repeat,
-            wave,
-            engine=engine,
-            rate=rate,
-        )
-        for spring in springs
-        for repeat in range(repeats)
-    ]
-    shape = (len(springs), repeats)
-    amplitude, status = np.empty(shape), np.empty(shape, dtype=object)
-    last = round(_WINDOW / robot.gait.period)
-    for index, record in enumerate(trials.run(asked, folder, progress)):
-        angles = record.joint_angle.isel(robot=0).transpose("time", "joint").values[1:]
-        cycles = angles[: len(angles) // _PER_CYCLE * _PER_CYCLE].reshape(-1, _PER_CYCLE, joints).mean(axis=1)
-        at = np.unravel_index(index, shape)
-        amplitude[at] = np.sqrt(cycles[-last:].var(axis=0).sum())
-        status[at] = record.status.values[0]
-    both = ("spring", "repeat")
-    data = xr.Dataset(
-        {"amplitude": (both, amplitude, {"units": "rad"}), "status": (both, status)},
-        coords={"spring": ("spring", np.asarray(springs, float), {"units": PAPER_UNIT}), "repeat": np.arange(repeats)},
+    wave = tuple(np.deg2rad(4.0) * np.cos(np.arange(robot.body.modules - 1) * np.pi / 2.0))
+    records = measures.spring_walks(
+        robot,
+        springs,
+        duration,
+        repeats=repeats,
+        seeds=measures.spring_seeds(springs),
+        parameter=ALL,
+        folder=folder,
+        progress=progress,
+        joint_angles=wave,
+        engine=engine,
+        rate=_PER_CYCLE / robot.gait.period,
     )
+    shape, last, amplitudes = (len(springs), repeats), round(_WINDOW / robot.gait.period), []
+    for record in records:
+        angles = record.joint_angle.isel(robot=0).transpose("time", "joint").values[1:]
+        amplitudes.append(np.sqrt(measures.cycle_means(angles, _PER_CYCLE)[-last:].var(axis=0).sum()))
+    amplitude = np.array(amplitudes).reshape(shape)
+    status = np.array([record.status.values[0] for record in records], dtype=object).reshape(shape)
     soft = np.asarray(springs) <= SWINGING
     inverse = np.broadcast_to(1.0 / np.asarray(springs)[:, None], shape)
-    try:
-        fit = square_root_fit(inverse[soft].ravel(), amplitude[soft].ravel())
-        critical = {"critical_k": fit.critical, "critical_k_error": fit.bootstrap_error}
-    except AnalysisError:
-        critical = dict.fromkeys(("critical_k", "critical_k_error"), float("nan"))
-    data.attrs = {"robot": robot.name, **critical}
-    return data
+    critical, error = measures.point_of(measures.fitted(inverse[soft].ravel(), amplitude[soft].ravel()))
+    both = ("spring", "repeat")
+    return xr.Dataset(
+        {"amplitude": (both, amplitude, {"units": "rad"}), "status": (both, status)},
+        coords={"spring": measures.over_springs(springs), "repeat": np.arange(repeats)},
+        attrs={"robot": robot.name, "critical_k": critical, "critical_k_error": error},
+    )

@@ -14,31 +14,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
-from chilopod import trials
-from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
-from chilopod.analysis.square_root import square_root_fit
+from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.analysis.straight_walk import pitchfork
-from chilopod.errors import AnalysisError
 from chilopod.paper import printed
-from chilopod.paper.section import Context
-from chilopod.paper.size import Size
+from chilopod.paper.measures import Folder, cycle_means, fitted, point_of, spring_walks
+from chilopod.paper.scatter import Array
+from chilopod.paper.section import Context, Size
 from chilopod.paper.statements import PLANAR_LIMIT
 from chilopod.paper.table import OfPlanar, OfTwin, Result, of_twin
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot, Twin
 from chilopod.tasks.radius_law import CURVED
-from chilopod.trials import NONE, Trial
+from chilopod.trials import NONE
 from chilopod.twin.creep import foot_creep
 from chilopod.twin.legs import twin_of
-
-Array = NDArray[np.float64]
 
 SPRINGS = (7.0, 10.0, 15.0, 22.0, 33.0, 50.0)
 """k1 that is tried first, N*mm/deg."""
@@ -69,15 +63,8 @@ FINER = {
 
 @dataclass(frozen=True)
 class Factor:
-    """Assumption of the planar model that the twin does not make.
-
-    Attributes
-    ----------
-    name, sentence
-        In a word, and what it means.
-    paths
-        Numbers of the robot that go from those of the planar limit to the twin's.
-    """
+    """Assumption of the planar model that the twin does not make, in a word and a sentence, and the numbers of the
+    robot that go from those of the planar limit to the twin's."""
 
     name: str
     sentence: str
@@ -89,9 +76,7 @@ FACTORS = (
     Factor("grip", "how firmly the floor holds a foot that does not slide", ()),
     Factor("dry friction", "feet slide beyond the Coulomb limit", ("twin.sliding_friction",)),
     Factor(
-        "soft legs",
-        "servos give way under load",
-        ("twin.servo_stiffness", "twin.servo_damping", "twin.joint_inertia"),
+        "soft legs", "servos give way under load", ("twin.servo_stiffness", "twin.servo_damping", "twin.joint_inertia")
     ),
     Factor("dragging feet", "swing feet are hardly lifted and touch the floor", ("twin.clearance",)),
     Factor("joint damping", "friction in the yaw joints", ("springs.damping",)),
@@ -144,67 +129,45 @@ def with_factors(robot: Robot, planar: Robot, names: Sequence[str]) -> Robot:
     return with_grip(limit, foot_creep(robot).across if "grip" in names else planar.ground.friction)
 
 
-def growth(
-    robot: Robot, springs: Sequence[float], folder: str | Path | None = None, duration: float = _DURATION
-) -> xr.Dataset:
-    """How fast a small bend grows.
-
-    Parameters
-    ----------
-    robot
-        With a twin.
-    springs
-        Values of k1, N*mm/deg.
-    folder
-        Folder of the trials.
-    duration
-        Duration of the walks, s.
-
-    Returns
-    -------
-    Dataset over spring: ``growth`` (1/s) of the bend averaged over gait cycles, NaN where a walk failed, and
-    ``undulates``, whether it changes sides meanwhile.
-    """
+def growth(robot: Robot, springs: Sequence[float], folder: Folder = None, duration: float = _DURATION) -> Array:
+    """Growth rates of a small bend of the twin, averaged over gait cycles, with each spring (N*mm/deg), 1/s; NaN where
+    a walk failed."""
     shape = _shape(robot)
-    asked = [
-        Trial(
-            robot.with_value(K1, stiffness(spring)),
+    records = [
+        spring_walks(
+            robot,
+            springs,
             duration,
+            folder=folder,
             joint_angles=tuple(sign * _BEND * shape),
             disturbance=NONE,
             rate=_SAMPLES / robot.gait.period,
             engine="twin",
         )
-        for spring in springs
         for sign in (1.0, -1.0)
     ]
-    angles = [each.joint_angle.isel(robot=0).transpose("time", "joint").values for each in trials.run(asked, folder)]
-    rates, undulates = [], []
-    for one, other in zip(angles[::2], angles[1::2], strict=True):
-        bend = 0.5 * (one - other)
-        cycles = bend[: len(bend) // _SAMPLES * _SAMPLES].reshape(-1, _SAMPLES, bend.shape[1]).mean(axis=1)
+    rates = []
+    for pair in zip(*records, strict=True):
+        one, other = (each.joint_angle.isel(robot=0).transpose("time", "joint").values for each in pair)
+        cycles = cycle_means(0.5 * (one - other), _SAMPLES)
         times = (np.arange(len(cycles)) + 0.5) * robot.gait.period
         late = times > _SKIPPED
         rates.append(np.polyfit(times[late], np.log(np.linalg.norm(cycles[late], axis=1)), 1)[0])
-        undulates.append(bool(np.ptp(np.sign(cycles[late] @ shape)) > 0.0))
-    return xr.Dataset(
-        {"growth": ("spring", np.array(rates), {"units": "1/s"}), "undulates": ("spring", np.array(undulates))},
-        coords={"spring": ("spring", np.asarray(springs, float), {"units": PAPER_UNIT})},
-    )
+    return np.array(rates)
 
 
-def sign_change(springs: Array, growth: Array) -> float:
+def sign_change(springs: ArrayLike, growth: Array) -> float:
     """The stiffest spring below which a growth rate is positive, between values linearly in 1/k; NaN if there is
     none."""
     inverse = 1.0 / np.asarray(springs)
-    for i in range(len(springs) - 1, 0, -1):
+    for i in range(len(inverse) - 1, 0, -1):
         if growth[i] <= 0.0 < growth[i - 1]:
             part = growth[i] / (growth[i] - growth[i - 1])
             return float(1.0 / (inverse[i] + part * (inverse[i - 1] - inverse[i])))
     return float("nan")
 
 
-def onset(robot: Robot, folder: str | Path | None = None, size: Size = Size.FULL) -> float:
+def onset(robot: Robot, folder: Folder = None, size: Size = Size.FULL) -> float:
     """Where curved walks set in, N*mm/deg, by the paper's method: the square-root fit to the bend of joint 1 of walks
     that begin bent; over the three stiffest springs that curve, then over three beside the point that these give.
 
@@ -216,37 +179,38 @@ def onset(robot: Robot, folder: str | Path | None = None, size: Size = Size.FULL
     bends = _bends(robot, springs, duration, folder)
     if bends[-1] > 0.0:
         return float("inf")
-    point = _fitted(springs, bends)
+    point = _point(springs, bends)
     if size is not Size.FULL or np.isnan(point):
         return point
     finer = [round(point * part, 2) for part in _BESIDE]
-    refined = _fitted(finer, _bends(robot, finer, duration, folder))
+    refined = _point(finer, _bends(robot, finer, duration, folder))
     return refined if refined <= max(springs) else point
 
 
-def _bends(robot: Robot, springs: Sequence[float], duration: float, folder: str | Path | None) -> Array:
+def _bends(robot: Robot, springs: Sequence[float], duration: float, folder: Folder) -> Array:
     """Mean angle of joint 1 at the end of walks, rad; 0 where the body is straight, or the walk failed."""
-    bend = tuple(_BENT * _shape(robot))
-    robots = [robot.with_value(K1, stiffness(spring)) for spring in springs]
-    same: Any = {"disturbance": NONE, "rate": _PER_SECOND, "engine": "twin"}
-    asked = [Trial(each, duration, 0, bend, **same) for each in robots]
-    found = []
-    for record in trials.run(asked, folder):
-        last = np.abs(record.joint_angle.isel(robot=0).values[-round(_AVERAGED * _PER_SECOND) :].mean(axis=0))
-        found.append(last[0] if last.sum() > CURVED else 0.0)
-    return np.array(found)
+    records = spring_walks(
+        robot,
+        springs,
+        duration,
+        folder=folder,
+        joint_angles=tuple(_BENT * _shape(robot)),
+        disturbance=NONE,
+        rate=_PER_SECOND,
+        engine="twin",
+    )
+    kept = round(_AVERAGED * _PER_SECOND)
+    last = np.abs([record.joint_angle.isel(robot=0).values[-kept:].mean(axis=0) for record in records])
+    return np.where(last.sum(axis=1) > CURVED, last[:, 0], 0.0)
 
 
-def _fitted(springs: Sequence[float], bends: Array) -> float:
+def _point(springs: Sequence[float], bends: Array) -> float:
     curved = np.flatnonzero(bends > 0.0)[-3:]
     if len(curved) < 2:
         return float("nan")
     # Two springs have a point too: a third that is as straight as it gets does not move it.
     inverse = np.array([*(1.0 / springs[i] for i in curved), 1e-3])
-    try:
-        point = square_root_fit(inverse, [*bends[curved], 0.0], resampled=0).critical
-    except AnalysisError:
-        return float("nan")
+    point, _ = point_of(fitted(inverse, [*bends[curved], 0.0], resampled=0))
     # Beyond a spring at which walks are straight there is no point.
     return point if point <= max(springs) or bends[-1] > 0.0 else float("nan")
 
@@ -255,24 +219,20 @@ def limit_point(
     robot: Robot,
     planar: Robot,
     constants: Mapping[str, float] = FINER,
-    folder: str | Path | None = None,
+    folder: Folder = None,
     duration: float = _DURATION,
 ) -> float:
     """Where a small bend neither grows nor dies out in the planar limit, N*mm/deg: what the planar model calls its
     pitchfork; NaN if nowhere near that."""
     springs = [round(part * pitchfork(planar, normal_form=False).value, 2) for part in (0.95, 1.05)]
-    found = growth(planar_limit(robot, planar, constants), springs, folder, duration)
-    return sign_change(found.spring.values, found.growth.values)
+    return sign_change(springs, growth(planar_limit(robot, planar, constants), springs, folder, duration))
 
 
 def ablation(context: Context, progress: Progress = silent) -> xr.Dataset:
     """The point with factors switched on and off.
 
-    Parameters
-    ----------
-    context, progress
-        As for :func:`chilopod.paper.robot.walks.robot_walks`; the planar limit takes feet and friction from the robot
-        of the planar model. If not full, only the path from the planar limit to the twin, by fewer springs.
+    The planar limit takes feet and friction from the robot of the planar model. If not full, only the path from the
+    planar limit to the twin, by fewer springs.
 
     Returns
     -------
@@ -284,19 +244,17 @@ def ablation(context: Context, progress: Progress = silent) -> xr.Dataset:
     """
     robot, planar, folder, size = context.whole, context.robot, context.folder, context.size
     names = [factor.name for factor in FACTORS]
-    wanted: dict[str, list[list[str]]] = {"path": [names[: i + 1] for i in range(len(names))]}
+    every = frozenset(names)
+    wanted = {"path": [frozenset(names[: i + 1]) for i in range(len(names))]}
     if size is Size.FULL:
-        wanted["alone"] = [[name] for name in names]
-        wanted["without"] = [[other for other in names if other != name] for name in names]
-    sets = [frozenset(), *(frozenset(on) for rows in wanted.values() for on in rows)]
-    points: dict[frozenset[str], float] = {}
-    for on in sets:
-        if on not in points:
-            progress(len(points) / len(set(sets)), ", ".join(sorted(on)) or "planar limit")
-            points[on] = onset(with_factors(robot, planar, sorted(on)), folder, size)
+        wanted |= {"alone": [frozenset([name]) for name in names], "without": [every - {name} for name in names]}
+    points = dict.fromkeys([frozenset[str](), *(on for sets in wanted.values() for on in sets)], np.nan)
+    for index, on in enumerate(points):
+        progress(index / len(points), ", ".join(sorted(on)) or "planar limit")
+        points[on] = onset(with_factors(robot, planar, sorted(on)), folder, size)
     data = xr.Dataset(coords={"factor": names})
     for name in ("alone", "without", "path"):
-        values = [points[frozenset(on)] for on in wanted[name]] if name in wanted else [np.nan] * len(names)
+        values = [points[on] for on in wanted[name]] if name in wanted else [np.nan] * len(names)
         data[name] = ("factor", np.array(values), {"units": PAPER_UNIT})
     data["about"] = ("factor", np.array([factor.sentence for factor in FACTORS], dtype=object))
     progress(1.0, "planar limit by growth")
@@ -305,7 +263,7 @@ def ablation(context: Context, progress: Progress = silent) -> xr.Dataset:
         "vouched": limit_point(robot, planar, FINER if size is Size.FULL else PLANAR, folder, size.cut(_DURATION, 9.0)),
         "exact": pitchfork(planar, normal_form=False).value,
         "limit": points[frozenset()],
-        "twin": points[frozenset(names)],
+        "twin": points[every],
         "grip": foot_creep(robot).across,
         "viscous": planar.ground.friction,
     }

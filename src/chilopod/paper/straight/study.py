@@ -6,6 +6,8 @@ where a figure is drawn in them.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
@@ -16,13 +18,16 @@ from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT, stiffness
 from chilopod.analysis.straight_walk import WalkBifurcation, first_loss, pitchfork
 from chilopod.errors import AnalysisError
 from chilopod.paper import printed
+from chilopod.paper.fit_data import critical_mode_data, variant_settings
+from chilopod.paper.section import Context
 from chilopod.planar import PlanarModel
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import Kind
+from chilopod.tasks.identify import Identification, identify_planar
 
 
-def exponent_sweep(robot: Robot, count: int = 120, progress: Progress = silent) -> xr.Dataset:
+def exponent_sweep(context: Context, progress: Progress = silent) -> xr.Dataset:
     """Floquet exponents as k1 falls (panel B), each followed through the sweep as one curve.
 
     Returns
@@ -30,12 +35,13 @@ def exponent_sweep(robot: Robot, count: int = 120, progress: Progress = silent) 
     Dataset over (k1, exponent): ``real``, ``imaginary`` (1/s), and ``follows_critical``, whether a curve is the one
     that crosses.
     """
-    ks = np.geomspace(75.0, 2.0, count)
+    robot = context.robot
+    ks = np.geomspace(75.0, 2.0, context.size.of(160, 40, 12))
     rows: list[NDArray[np.complex128]] = []
     for index, k in enumerate(ks):
         values = stability.exponents(PlanarModel(robot.with_value(K1, stiffness(float(k))))).values
         rows.append(values if not rows else _followed(rows, values, robot.gait.period))
-        progress((index + 1) / count, f"k1 = {k:.1f} {PAPER_UNIT}")
+        progress((index + 1) / len(ks), f"k1 = {k:.1f} {PAPER_UNIT}")
     table = np.array(rows)
     # The curve that is in the left half-plane for stiff springs and in the right one for soft springs, on the real
     # axis.
@@ -66,7 +72,7 @@ def _followed(
     return values[linear_sum_assignment(cost)[1]]
 
 
-def critical_mode(robot: Robot) -> xr.Dataset:
+def critical_mode(context: Context, progress: Progress = silent) -> xr.Dataset:
     """The pitchfork in k1 and its mode beside the paper's five numbers.
 
     Returns
@@ -74,29 +80,22 @@ def critical_mode(robot: Robot) -> xr.Dataset:
     Dataset over joint: ``computed``, ``printed`` (NaN for another number of modules); the point itself in the
     attributes.
     """
-    point = pitchfork(robot)
+    point = pitchfork(context.robot)
     components = point.joint_components.real
     paper = np.array([each.value for each in printed.MODE])
     if len(components) != len(paper):
         paper = np.full(len(components), np.nan)
-    return xr.Dataset(
-        {
-            "computed": (("joint",), components),
-            "printed": (("joint",), paper),
-        },
-        coords={"joint": np.arange(1, len(components) + 1)},
-        attrs={"robot": robot.name, **_described(point)},
-    )
+    return _over_joints({"computed": ("joint", components), "printed": ("joint", paper)}, context.robot, point)
 
 
-def variants(robot: Robot, progress: Progress = silent) -> xr.Dataset:
-    """Critical k1 for the paper's variants (panel C) beside what the paper says of model and robot.
+def variants(context: Context, progress: Progress = silent) -> xr.Dataset:
+    """Critical k1 for the paper's variants (panel C) beside what the paper says of the robot.
 
     Returns
     -------
     Dataset over variant: ``critical_k1``, ``error_bound``, ``robot_printed`` (N*mm/deg).
     """
-    robots = printed.variant_robots(robot)
+    robots = printed.variant_robots(context.robot)
     found = []
     for index, (name, each) in enumerate(robots.items()):
         progress(index / len(robots), name)
@@ -106,52 +105,48 @@ def variants(robot: Robot, progress: Progress = silent) -> xr.Dataset:
     return xr.Dataset(
         {name: ("variant", each, {"units": PAPER_UNIT}) for name, each in zip(names, columns, strict=True)},
         coords={"variant": np.array(list(robots), dtype=object)},
-        attrs={"robot": robot.name},
+        attrs={"robot": context.robot.name},
     )
 
 
 def with_modules(robot: Robot, modules: int) -> Robot:
     """The robot with another number of modules of the same size and mass, the last spring repeated."""
     factor = modules / robot.body.modules
-    return (
-        robot.with_value("body.length", robot.body.length * factor)
-        .with_value("body.mass", robot.body.mass * factor)
-        .with_value("body.modules", modules)
-    )
+    sized = robot.with_value("body.length", robot.body.length * factor)
+    return sized.with_value("body.mass", robot.body.mass * factor).with_value("body.modules", modules)
 
 
-def module_counts(robot: Robot, counts: range = range(3, 21), progress: Progress = silent) -> xr.Dataset:
+def module_counts(context: Context, progress: Progress = silent) -> xr.Dataset:
     """Critical k1 over the number of modules (panel D).
 
     Returns
     -------
     Dataset over modules: ``critical_k1``, ``error_bound`` (N*mm/deg; NaN where the straight walk does not lose
-    stability through a pitchfork), ``says``.
+    stability through a pitchfork), ``says``; attribute ``built``, how many the robot has.
     """
-    values, bounds, says = [], [], []
+    counts = range(3, context.size.of(21, 11, 8))
+    found: list[tuple[float, float, str]] = []
     for index, count in enumerate(counts):
         try:
-            point = pitchfork(with_modules(robot, count))
-            values.append(point.value)
-            bounds.append(point.error_bound)
-            says.append(str(point.point.criticality.label if point.point.criticality.known else ""))
+            point = pitchfork(with_modules(context.robot, count))
+            kind = point.point.criticality
+            found.append((point.value, point.error_bound, kind.label if kind.known else ""))
         except AnalysisError as error:
-            values.append(np.nan)
-            bounds.append(np.nan)
-            says.append(error.problem)
+            found.append((np.nan, np.nan, error.problem))
         progress((index + 1) / len(counts), f"{count} modules")
+    values, bounds, says = zip(*found, strict=True)
     return xr.Dataset(
         {
-            "critical_k1": (("modules",), np.array(values), {"units": PAPER_UNIT}),
-            "error_bound": (("modules",), np.array(bounds), {"units": PAPER_UNIT}),
-            "says": (("modules",), np.array(says, dtype=object)),
+            "critical_k1": ("modules", np.array(values), {"units": PAPER_UNIT}),
+            "error_bound": ("modules", np.array(bounds), {"units": PAPER_UNIT}),
+            "says": ("modules", np.array(says, dtype=object)),
         },
         coords={"modules": np.array(list(counts))},
-        attrs={"robot": robot.name},
+        attrs={"robot": context.robot.name, "built": context.robot.body.modules},
     )
 
 
-def uniform_springs(robot: Robot) -> xr.Dataset:
+def uniform_springs(context: Context, progress: Progress = silent) -> xr.Dataset:
     """The bifurcation for uniform springs (the paper's "Hopf"): amplitudes and phases of the undulation along the body.
 
     Returns
@@ -159,31 +154,35 @@ def uniform_springs(robot: Robot) -> xr.Dataset:
     Dataset over joint: ``amplitude`` (unit norm), ``phase`` (rad, relative to joint 1, positive leads); the point in
     the attributes.
     """
+    robot = context.robot
     point = first_loss(robot, ALL, (stiffness(2.0), stiffness(75.0)), Kind.NEIMARK_SACKER)
     components = point.joint_components
     phase = np.unwrap(np.angle(components))
-    return xr.Dataset(
-        {
-            "amplitude": (("joint",), np.abs(components)),
-            "phase": (("joint",), phase - phase[0], {"units": "rad"}),
-        },
-        coords={"joint": np.arange(1, len(components) + 1)},
-        attrs={
-            "robot": robot.name,
-            **_described(point),
-            "frequency_rad_s": point.point.frequency,
-            "oscillation_period_s": 2.0 * np.pi / point.point.frequency,
-        },
+    columns = {"amplitude": ("joint", np.abs(components)), "phase": ("joint", phase - phase[0], {"units": "rad"})}
+    return _over_joints(columns, robot, point).assign_attrs(
+        frequency_rad_s=point.point.frequency,
+        oscillation_period_s=2.0 * np.pi / point.point.frequency,
+        gait_period_s=robot.gait.period,
     )
 
 
-def _described(point: WalkBifurcation) -> dict[str, object]:
-    return {
+def identified(context: Context, progress: Progress = silent) -> Identification:
+    """Constants that the paper does not print, from the numbers that it does."""
+    points = context.size.of(25, 7, 5)
+    return identify_planar(context.robot, critical_mode_data(), points, variant_settings(), progress)
+
+
+def _over_joints(columns: dict[str, Any], robot: Robot, point: WalkBifurcation) -> xr.Dataset:
+    """Columns over joint, with the point in the attributes."""
+    kind = point.point.criticality
+    attrs = {
+        "robot": robot.name,
         "kind": point.point.kind.label,
         "parameter": point.parameter,
         "value": point.value,
         "unit": point.unit,
         "error_bound": point.error_bound,
-        "criticality": point.point.criticality.label if point.point.criticality.known else "",
+        "criticality": kind.label if kind.known else "",
         "coefficient": point.coefficient if point.coefficient is not None else np.nan,
     }
+    return xr.Dataset(columns, {"joint": np.arange(1, len(point.joint_components) + 1)}, attrs)

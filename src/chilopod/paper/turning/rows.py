@@ -5,25 +5,24 @@ from __future__ import annotations
 from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.paper import printed, statements
 from chilopod.paper.printed import CRITERION_NAMES
-from chilopod.paper.table import OfPlanar, Result, Row, Verdict, agreement
-from chilopod.paper.turning import hopf
-from chilopod.paper.turning.minima import SCALES, minima
+from chilopod.paper.table import OfPlanar, Result, Row, agreement, unprinted
+from chilopod.paper.turning.criteria import SCALES, counted, minima, softest_minima
 from chilopod.paper.turning.study import ROUGH, Turning
 from chilopod.paper.turning.trials import by_leg_yaw, outcome_words, span
 
 
 def rows(found: Turning) -> list[Row | OfPlanar]:
     """Lines of both tables."""
-    beside = [words for letter in found.tasks for words in _beside_robot(found, letter)]
+    task, hopf = found.tasks["A"], found.hopf
     without = "; ".join(f"{each} (k1 = {each.spring:.3g})" for each in by_leg_yaw(found.without))
     return [
         *(_radius(found, letter) for letter in found.tasks),
         _rough(found),
-        *beside,
-        OfPlanar(statements.ARRIVAL, Result(value=found.tasks["A"].time, unit="s", digits=1)),
+        *(words for letter in found.tasks for words in _beside_robot(found, letter)),
+        OfPlanar(statements.ARRIVAL, Result(value=task.time, unit="s", digits=1)),
         OfPlanar(statements.WITHOUT, Result(without)),
-        OfPlanar(statements.HOPF, Result(hopf.counted(found.tasks["A"], found.hopf))),
-        OfPlanar(statements.HOPF_SPRINGS, Result(hopf.softest_minima(found.hopf, found.hopf_point)[0])),
+        OfPlanar(statements.HOPF, Result(counted(task, hopf))),
+        OfPlanar(statements.HOPF_SPRINGS, Result(softest_minima(hopf, found.hopf_point)[0])),
     ]
 
 
@@ -55,17 +54,14 @@ def _beside_robot(found: Turning, letter: str) -> list[OfPlanar]:
 
 
 def _rough(found: Turning) -> Row:
-    usual, rough = minima(found.tasks["A"].criteria), minima(found.rough.criteria)
+    usual, rough = minima(found.tasks["A"].criteria)["at"], minima(found.rough.criteria)["at"]
     pairs = [
-        f"{title.partition(',')[0]} {float(usual['at'].sel(criterion=name)):.1f} → "
-        f"{float(rough['at'].sel(criterion=name)):.1f}"
+        f"{title.partition(',')[0]} {float(usual.sel(criterion=name)):.1f} → {float(rough.sel(criterion=name)):.1f}"
         for name, title in CRITERION_NAMES.items()
     ]
-    return Row(
+    return unprinted(
         f"task A, disturbances {ROUGH:g} times as large: springs of the smallest criteria",
-        Verdict.NOT_PRINTED,
-        Result(", ".join(pairs) + f" {PAPER_UNIT}"),
+        f"{', '.join(pairs)} {PAPER_UNIT}",
         printed.TURNING,
-        Verdict.NOT_PRINTED,
         f"evaluated at {found.rough.time:.2f} s, the earliest arrival there",
     )

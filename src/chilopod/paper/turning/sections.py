@@ -2,35 +2,24 @@
 
 from __future__ import annotations
 
-from chilopod.analysis.parameters import stiffness
-from chilopod.paper.movies import Movie, movies
-from chilopod.paper.section import Context, Found, Section
-from chilopod.paper.turning.figures import turning as figures
+from chilopod.paper.movies import movies
+from chilopod.paper.section import Context, Movie, Section
+from chilopod.paper.turning.figures import panels
 from chilopod.paper.turning.rows import rows
 from chilopod.paper.turning.study import Turning, turning
 from chilopod.progress import Progress
 
 CHAPTER = "Turning to a target"
 
-_FILMED = (stiffness(41.0), stiffness(11.0), stiffness(8.0))  # straight, curved a little, curved a lot
 # N*mm/deg: what `chilopod turn` finds for task A; the movie takes the best of the trials where there are any.
 _BEST = 9.8
 
 
-def _movies(context: Context, found: Found, report: Progress) -> list[Movie]:
-    tasks = found[TURNING]
-    best = _BEST if tasks is None else tasks.tasks["A"].best
-    return movies(context.robot, _FILMED, stiffness(best), context.folder, report, shorter=context.size.cut(1.0, 0.1))
+def _movies(context: Context, report: Progress, tasks: Turning | None) -> list[Movie]:
+    return movies(context, report, _BEST if tasks is None else tasks.tasks["A"].best)
 
 
-TURNING: Section[Turning] = Section(
-    "turning",
-    CHAPTER,
-    "turning to targets",
-    lambda context, found, report: turning(context, report),
-    lambda tasks, found: rows(tasks),
-    lambda tasks, found: figures.panels(tasks),
-)
+TURNING: Section[Turning] = Section("turning", CHAPTER, "turning to targets", turning, rows, panels)
 MOVIES: Section[list[Movie]] = Section(
     "movies", CHAPTER, "the paper's two movies", _movies, films=lambda films: films, needs=(TURNING,)
 )

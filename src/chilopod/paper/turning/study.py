@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -16,21 +14,22 @@ from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT, stiffness
 from chilopod.analysis.radius_law import RadiusLaws, radius_laws
 from chilopod.analysis.straight_walk import first_loss
 from chilopod.paper import printed
-from chilopod.paper.section import Context
-from chilopod.paper.size import Size
+from chilopod.paper.measures import Folder, over_springs
+from chilopod.paper.section import Context, Size
 from chilopod.paper.turning.trials import (
     DURATION,
     RATE,
     SPRINGS,
     UNIFORM_SPRINGS,
     TurningTask,
+    to_target,
     turning_task,
     without_leg_yaw,
 )
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
 from chilopod.stability import Kind
-from chilopod.steering import STRATEGIES, LegYawController, Target, earliest_arrival, evaluate
+from chilopod.steering import LegYawController, Target, earliest_arrival, evaluate
 from chilopod.trials import NONE, Disturbance, Trial
 
 ROUGH = 3.0
@@ -40,11 +39,7 @@ FARTHER = (1.3, 2.0, 3.0, 4.5)
 """m: targets in the direction of task A, for the check of what a longer way changes."""
 
 FARTHER_SPRINGS = (8, 9, 10, 11, 12, 12.5, 13, 14, 15, 17, 19, 21, 24, 28, 41)
-"""N*mm/deg."""
-
 QUICK_SPRINGS = (6, 7, 8, 9, 10, 11, 12, 21)
-"""N*mm/deg."""
-
 ROUGH_SPRINGS = (6, 7, 8, 8.5, 9, 9.5, 10, 11, 12, 13, 15, 21)
 """N*mm/deg."""
 
@@ -55,22 +50,15 @@ class Turning:
 
     Attributes
     ----------
-    robot
-        The robot.
-    laws
-        Its radius laws.
-    tasks
-        The paper's two, by letter.
-    hopf, rough
-        Task A with uniform springs, and with a disturbance :data:`ROUGH` times as large.
-    hopf_point
-        The Neimark-Sacker point of uniform springs, N*mm/deg.
+    robot, laws, tasks
+        The robot, its radius laws, and the paper's two tasks, by letter.
+    hopf, rough, hopf_point
+        Task A with uniform springs, and with a disturbance :data:`ROUGH` times as large; the Neimark-Sacker point of
+        uniform springs, N*mm/deg.
     without
         Task A with and without leg yaw, at the best spring and at the law's.
-    settled
-        See :func:`settled_start`.
-    farther
-        See :func:`farther_targets`.
+    settled, farther
+        See :func:`settled_start` and :func:`farther_targets`.
     """
 
     robot: Robot
@@ -85,17 +73,8 @@ class Turning:
 
 
 def turning(context: Context, progress: Progress = silent) -> Turning:
-    """All turning studies of a robot.
-
-    Parameters
-    ----------
-    context
-        Robot of the planar model, folder, size. If not full, fewer springs and fewer, nearer targets.
-    progress
-        Called with the part done (0 to 1) and a few words.
-    """
-    robot, folder, size = context.robot, context.folder, context.size
-    quick = size is not Size.FULL
+    """All turning studies of the robot of the planar model; if not full, fewer springs and fewer, nearer targets."""
+    robot, folder, quick = context.robot, context.folder, context.size is not Size.FULL
     springs = QUICK_SPRINGS if quick else SPRINGS
     laws = radius_laws(robot)
     tasks: dict[str, TurningTask] = {}
@@ -116,18 +95,13 @@ def turning(context: Context, progress: Progress = silent) -> Turning:
         robot,
         task.target,
         QUICK_SPRINGS if quick else ROUGH_SPRINGS,
-        disturbance=Disturbance().scaled(ROUGH),
         folder=folder,
         progress=part(progress, 0.65, 0.85, "larger disturbances"),
+        disturbance=Disturbance().scaled(ROUGH),
     )
-    law, _ = laws.k_hat(task.target.radius)
-    without = without_leg_yaw(
-        robot,
-        task.target,
-        {"best spring": task.best, "spring of the law": law},
-        folder=folder,
-        progress=part(progress, 0.85, 0.9, "with and without leg yaw"),
-    )
+    springs_ = {"best spring": task.best, "spring of the law": laws.k_hat(task.target.radius)[0]}
+    told = part(progress, 0.85, 0.9, "with and without leg yaw")
+    without = without_leg_yaw(robot, task.target, springs_, folder=folder, progress=told)
     settled = settled_start(robot, laws, {letter: each.target for letter, each in tasks.items()}, folder)
     distances = FARTHER[:2] if quick else FARTHER
     farther = farther_targets(robot, laws, task.target.bearing, distances, folder=folder)
@@ -136,9 +110,7 @@ def turning(context: Context, progress: Progress = silent) -> Turning:
     return Turning(robot, laws, tasks, hopf, rough, point.value, without, settled, farther)
 
 
-def settled_start(
-    robot: Robot, laws: RadiusLaws, targets: Mapping[str, Target], folder: str | Path | None = None
-) -> xr.Dataset:
+def settled_start(robot: Robot, laws: RadiusLaws, targets: Mapping[str, Target], folder: Folder = None) -> xr.Dataset:
     """Arrival with the spring of the law, if the walk need not find its curve first.
 
     One undisturbed trial without leg yaw each, at the spring of the law by the path of module 1: from "straight", from
@@ -150,28 +122,25 @@ def settled_start(
     Dataset over (task, start): ``start_nearest`` (m); over task: ``law_spring`` (N*mm/deg) and ``slip``, the mean
     angle from heading to motion of module 1 on the settled walk (rad).
     """
-    starts = ("straight", "bent", "bent, aimed")
-    nearest, springs, slips = [], [], []
+    found = []
     for target in targets.values():
         _, spring = laws.k_hat(target.radius)
-        bent = laws.joint_angles(spring)
         walker = robot.with_value(K1, stiffness(spring))
-        model = Trial(walker, DURATION, target=target, disturbance=NONE, rate=RATE)
-        walks = [model, replace(model, joint_angles=bent)]
-        records = trials.run(walks, folder)
+        straight = Trial(walker, DURATION, target=target, disturbance=NONE, rate=RATE)
+        bent = replace(straight, joint_angles=laws.joint_angles(spring))
+        records = trials.run([straight, bent], folder)
         slip = _slip(records[1])
         aimed = Target(target.bearing + slip, target.distance)
-        records += trials.run([replace(walks[1], target=aimed)], folder)
-        nearest.append([float(record.distance.min()) for record in records])
-        springs.append(spring)
-        slips.append(slip)
+        records += trials.run([replace(bent, target=aimed)], folder)
+        found.append((*(float(record.distance.min()) for record in records), spring, slip))
+    columns = np.array(found)
     return xr.Dataset(
         {
-            "start_nearest": (("task", "start"), np.array(nearest), {"units": "m"}),
-            "law_spring": ("task", np.array(springs), {"units": PAPER_UNIT}),
-            "slip": ("task", np.array(slips), {"units": "rad"}),
+            "start_nearest": (("task", "start"), columns[:, :3], {"units": "m"}),
+            "law_spring": ("task", columns[:, 3], {"units": PAPER_UNIT}),
+            "slip": ("task", columns[:, 4], {"units": "rad"}),
         },
-        coords={"task": list(targets), "start": list(starts)},
+        coords={"task": list(targets), "start": ["straight", "bent", "bent, aimed"]},
         attrs={"robot": robot.name},
     )
 
@@ -189,7 +158,7 @@ def farther_targets(
     bearing: float,
     distances: Sequence[float] = FARTHER,
     springs: Sequence[float] = FARTHER_SPRINGS,
-    folder: str | Path | None = None,
+    folder: Folder = None,
 ) -> xr.Dataset:
     """Targets in one direction, farther and farther: what the time that a bend needs to grow makes of the task.
 
@@ -201,35 +170,24 @@ def farther_targets(
     ``effort_part`` of what legs at their limit all the time would make of it (1); over away: ``earliest`` (s),
     ``k_hat`` by the law (N*mm/deg).
     """
-    rows: dict[str, list[Any]] = {name: [] for name in ("nearest", "effort", "effort_part", "earliest", "k_hat")}
-    limit = LegYawController().limit
+    limit, both, found = LegYawController().limit, ("spring",), []
     for away in distances:
-        target = Target(bearing, away)
-        asked = []
-        for spring in springs:
-            walker, controller, _ = STRATEGIES["pitchfork"].prepare(robot, None, stiffness(float(spring)))
-            duration = DURATION * away / distances[0]
-            asked.append(Trial(walker, duration, target=target, controller=controller, disturbance=NONE, rate=RATE))
+        target, duration = Target(bearing, away), DURATION * away / distances[0]
+        asked = [to_target(robot, target, spring, duration=duration, disturbance=NONE) for spring in springs]
         record = trials.together(trials.run(asked, folder))
         earliest = earliest_arrival(record)
         result = evaluate(record, earliest)
-        rows["nearest"].append(result.nearest)
-        rows["effort"].append(result.effort)
-        rows["effort_part"].append(result.effort / (2.0 * limit**2 * earliest))
-        rows["earliest"].append(earliest)
-        rows["k_hat"].append(laws.k_hat(target.radius)[0])
-    both = ("away", "spring")
-    return xr.Dataset(
-        {
-            "nearest": (both, np.array(rows["nearest"]), {"units": "m"}),
-            "effort": (both, np.array(rows["effort"]), {"units": "rad^2*s"}),
-            "effort_part": (both, np.array(rows["effort_part"]), {"units": "1"}),
-            "earliest": ("away", np.array(rows["earliest"]), {"units": "s"}),
-            "k_hat": ("away", np.array(rows["k_hat"]), {"units": PAPER_UNIT}),
-        },
-        coords={
-            "away": ("away", np.array(distances), {"units": "m"}),
-            "spring": ("spring", np.array(springs, float), {"units": PAPER_UNIT}),
-        },
-        attrs={"robot": robot.name, "bearing_deg": math.degrees(bearing)},
-    )
+        found.append(
+            xr.Dataset(
+                {
+                    "nearest": (both, result.nearest, {"units": "m"}),
+                    "effort": (both, result.effort, {"units": "rad^2*s"}),
+                    "effort_part": (both, result.effort / (2.0 * limit**2 * earliest), {"units": "1"}),
+                    "earliest": ((), earliest, {"units": "s"}),
+                    "k_hat": ((), laws.k_hat(target.radius)[0], {"units": PAPER_UNIT}),
+                },
+                coords={"away": ((), away, {"units": "m"}), "spring": over_springs(springs)},
+                attrs={"robot": robot.name, "bearing_deg": math.degrees(bearing)},
+            )
+        )
+    return xr.concat(found, "away")

@@ -8,23 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from chilopod import trials
 from chilopod.analysis.parameters import PAPER_UNIT, stiffness
 from chilopod.paper import printed
+from chilopod.paper.measures import Folder, over_springs
+from chilopod.paper.scatter import Array
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
-from chilopod.steering import STRATEGIES, Outcome, Target, earliest_arrival, evaluate
+from chilopod.steering import Outcome, Target, earliest_arrival, evaluate
 from chilopod.steering.criteria import efforts
 from chilopod.steering.strategies import strategy_named
-from chilopod.trials import Disturbance, Trial
-
-Array = NDArray[np.float64]
+from chilopod.trials import Trial
 
 DURATION = printed.ARRIVAL.value
 """s: when the paper evaluates, and how long trials of the planar model are, which arrives well before."""
@@ -51,15 +50,12 @@ class TurningTask:
 
     Attributes
     ----------
-    target
-        Place of the target.
     criteria
         Over (instant, spring, repeat): ``distance`` (m), ``angle`` (rad) and ``effort`` (rad^2 s), epsilon 1 to 3, at
-        the ``seconds`` of the two instants "earliest arrival" and "paper" (:data:`DURATION`); means over repeats and
-        standard errors as
-        ``distance_mean``, ``distance_error`` and so on (NaN where a repeat did not walk so long). Over (spring,
-        repeat): ``effort_until_arrival`` (or until the end, rad^2 s), ``arrival`` (s, NaN if never), ``nearest`` (m),
-        ``outcome`` and ``status``.
+        the ``seconds`` of the two instants "earliest arrival" and "paper" (:data:`DURATION`); their means over repeats
+        and standard errors as ``distance_mean``, ``distance_error`` and so on (NaN where a repeat did not walk so
+        long). Over (spring, repeat): ``effort_until_arrival`` (or until the end, rad^2 s), ``arrival`` (s, NaN if
+        never), ``nearest`` (m), ``outcome`` and ``status``.
     paths
         Over (shown, repeat, time): ``x`` and ``y`` (m) of module 1, ``distance`` (m) and ``bearing`` (rad, continuous)
         of the target, of three springs: the best, and the grid's nearest to 15/21 and 41/21 of it as in the paper. The
@@ -81,6 +77,21 @@ class TurningTask:
         return _best(self.criteria)
 
 
+def to_target(
+    robot: Robot,
+    target: Target,
+    spring: float,
+    strategy: str = "pitchfork",
+    *,
+    duration: float = DURATION,
+    rate: float = RATE,
+    **walk: Any,
+) -> Trial:
+    """A walk towards a target by a strategy with its spring (N*mm/deg); ``walk`` are other fields of a trial."""
+    walker, controller, _ = strategy_named(strategy).prepare(robot, None, stiffness(float(spring)))
+    return Trial(walker, duration, target=target, controller=controller, rate=rate, **walk)
+
+
 def turning_task(
     robot: Robot,
     target: Target,
@@ -90,56 +101,27 @@ def turning_task(
     *,
     time: float | None = None,
     duration: float = DURATION,
-    disturbance: Disturbance | None = None,
     shown: Sequence[float] | None = None,
-    engine: str = "planar",
-    folder: str | Path | None = None,
+    folder: Folder = None,
     progress: Progress = silent,
+    **walk: Any,
 ) -> TurningTask:
-    """Walk towards a target with every spring, several times.
+    """Walk towards a target with every spring (N*mm/deg), several times, with the seeds 0, 1, ...
 
     Parameters
     ----------
-    robot
-        Its other springs stay.
-    target
-        Target of the walks.
-    springs
-        N*mm/deg.
-    repeats
-        Trials with each, with the seeds 0, 1, ...
-    strategy
-        One of :data:`chilopod.steering.STRATEGIES`.
     time
         Time at which epsilon 1 to 3 are taken, s; by default the earliest arrival of any of these trials, as in the
         paper, and ``duration`` if none arrives.
-    duration
-        Duration of every trial, s, at least the paper's.
-    disturbance
-        Differences from trial to trial; by default what all studies have.
-    shown
-        Springs of ``paths``, N*mm/deg.
-    engine
-        One of :data:`chilopod.engine.ENGINES`.
-    folder
-        Folder of the records, with which a stopped study is resumed.
-    progress
-        Called with the part done (0 to 1) and a few words.
+    duration, shown
+        Duration of every trial, s, at least the paper's, and springs of ``paths``, N*mm/deg.
+    walk
+        Other fields of the trials, such as their engine and disturbance.
     """
-    plan = strategy_named(strategy)
-    asked = []
+    asked: list[Trial] = []
     for spring in springs:
-        walker, controller, _ = plan.prepare(robot, None, stiffness(float(spring)))
-        walk = Trial(
-            walker,
-            duration,
-            target=target,
-            controller=controller,
-            disturbance=disturbance or Disturbance(),
-            rate=RATE,
-            engine=engine,
-        )
-        asked += [replace(walk, seed=seed) for seed in range(repeats)]
+        one = to_target(robot, target, spring, strategy, duration=duration, **walk)
+        asked += [replace(one, seed=seed) for seed in range(repeats)]
     record = trials.together(trials.run(asked, folder, progress))
     earliest = earliest_arrival(record)
     when = time if time is not None else earliest if np.isfinite(earliest) else duration
@@ -153,29 +135,30 @@ def turning_task(
         "radius_m": target.radius,
     }
     if shown is None:
-        shown = [_nearest(springs, _best(criteria) * part) for part in (15.0 / 21.0, 1.0, 41.0 / 21.0)]
+        wanted = [part / 21.0 * _best(criteria) for part in (15.0, 21.0, 41.0)]
+        shown = [springs[int(np.abs(np.log(np.asarray(springs) / each)).argmin())] for each in wanted]
     paths = _paths(record, springs, repeats, shown)
     paths.attrs = {**criteria.attrs, "target_x_m": target.position[0], "target_y_m": target.position[1]}
     return TurningTask(target, criteria, paths)
+
+
+def _best(criteria: xr.Dataset) -> float:
+    return float(criteria.spring[int(np.argmin(criteria.nearest.mean("repeat").values))])
 
 
 def _criteria(record: xr.Dataset, instants: tuple[float, float], springs: Sequence[float], repeats: int) -> xr.Dataset:
     shape = (len(springs), repeats)
     found = [evaluate(record, time) for time in instants]
     last = float(record.time[-1])
-    until = np.array(
-        [
-            efforts(record.isel(robot=[index]), arrival if np.isfinite(arrival) else last)[0]
-            for index, arrival in enumerate(found[0].arrival)
-        ]
-    )
-    data = xr.Dataset(coords={"spring": ("spring", np.asarray(springs, float), {"units": PAPER_UNIT})})
-    data = data.assign_coords(instant=["earliest arrival", "paper"], repeat=np.arange(repeats))
+    ends = np.where(np.isfinite(found[0].arrival), found[0].arrival, last).tolist()
+    until = np.array([efforts(record.isel(robot=[index]), end)[0] for index, end in enumerate(ends)])
+    both = ("spring", "repeat")
+    names = {"spring": over_springs(springs), "instant": ["earliest arrival", "paper"], "repeat": np.arange(repeats)}
+    data = xr.Dataset(coords=names)
     data["seconds"] = ("instant", np.array(instants), {"units": "s"})
     for name, unit in (("distance", "m"), ("angle", "rad"), ("effort", "rad^2*s")):
         values = np.stack([getattr(each, name).reshape(shape) for each in found])
-        data[name] = (("instant", "spring", "repeat"), values, {"units": unit})
-    both = ("spring", "repeat")
+        data[name] = (("instant", *both), values, {"units": unit})
     data["effort_until_arrival"] = (both, until.reshape(shape), {"units": "rad^2*s"})
     for name in CRITERIA:
         data[f"{name}_mean"] = data[name].mean("repeat", skipna=False, keep_attrs=True)
@@ -190,20 +173,17 @@ def _criteria(record: xr.Dataset, instants: tuple[float, float], springs: Sequen
 
 
 def _paths(record: xr.Dataset, springs: Sequence[float], repeats: int, shown: Sequence[float]) -> xr.Dataset:
-    rows = [springs.index(spring) * repeats + repeat for spring in shown for repeat in range(repeats)]
-    some = record.isel(robot=rows, time=slice(None, None, _PATH_STEP))
-
-    def split(values: Array) -> tuple[tuple[str, ...], Array]:
-        return ("shown", "repeat", "time"), values.T.reshape(len(shown), repeats, -1)
-
-    position = some.position.transpose("axis", "time", "robot").values
-    bearing = np.unwrap(some.bearing.transpose("time", "robot").values, axis=0)
+    over = ("shown", "repeat", "time")
+    rows = [[springs.index(spring) * repeats + repeat for repeat in range(repeats)] for spring in shown]
+    some = record.isel(robot=xr.DataArray(rows, dims=over[:2]), time=slice(None, None, _PATH_STEP))
+    x, y = some.position.transpose("axis", *over).values
+    bearing = np.unwrap(some.bearing.transpose(*over).values, axis=2)
     return xr.Dataset(
         {
-            "x": (*split(position[0]), {"units": "m"}),
-            "y": (*split(position[1]), {"units": "m"}),
-            "distance": (*split(some.distance.transpose("time", "robot").values), {"units": "m"}),
-            "bearing": (*split(bearing), {"units": "rad"}),
+            "x": (over, x, {"units": "m"}),
+            "y": (over, y, {"units": "m"}),
+            "distance": (over, some.distance.transpose(*over).values, {"units": "m"}),
+            "bearing": (over, bearing, {"units": "rad"}),
         },
         coords={
             "shown": ("shown", np.asarray(shown, float), {"units": PAPER_UNIT}),
@@ -211,14 +191,6 @@ def _paths(record: xr.Dataset, springs: Sequence[float], repeats: int, shown: Se
             "time": ("time", some.time.values, {"units": "s"}),
         },
     )
-
-
-def _best(criteria: xr.Dataset) -> float:
-    return float(criteria.spring[int(np.argmin(criteria.nearest.mean("repeat").values))])
-
-
-def _nearest(springs: Sequence[float], wanted: float) -> float:
-    return min(springs, key=lambda spring: abs(np.log(spring / wanted)))
 
 
 def springs_by_outcome(criteria: xr.Dataset) -> dict[Outcome, list[float]]:
@@ -244,15 +216,7 @@ def span(springs: list[float]) -> str:
 
 @dataclass(frozen=True)
 class LegYaw:
-    """Walks to a target at one spring, see :func:`without_leg_yaw`.
-
-    Attributes
-    ----------
-    name, spring
-        The spring's, N*mm/deg.
-    alone, helped
-        Walks without leg yaw and with it.
-    """
+    """Walks to a target at one spring (N*mm/deg), without leg yaw and with it, see :func:`without_leg_yaw`."""
 
     name: str
     spring: float
@@ -293,18 +257,12 @@ def without_leg_yaw(
     springs: Mapping[str, float],
     *,
     duration: float = DURATION,
-    engine: str = "planar",
-    folder: str | Path | None = None,
+    folder: Folder = None,
     progress: Progress = silent,
+    **walk: Any,
 ) -> xr.Dataset:
-    """The same task with and without leg yaw (Fig. "without": five trials and nine).
-
-    Parameters
-    ----------
-    robot, target, duration, engine, folder, progress
-        As for :func:`turning_task`.
-    springs
-        k1 by name, N*mm/deg.
+    """The task of :func:`turning_task` with and without leg yaw (Fig. "without": five trials and nine), at values of k1
+    (N*mm/deg) by name.
 
     Returns
     -------
@@ -314,20 +272,16 @@ def without_leg_yaw(
     """
     cases, most = [], printed.WITHOUT_LEG_YAW
     for index, ((name, spring), leg_yaw) in enumerate((item, with_) for item in springs.items() for with_ in (0, 1)):
-        strategy = "pitchfork" if leg_yaw else "open-loop"
-        walker, controller, _ = STRATEGIES[strategy].prepare(robot, None, stiffness(spring))
-        asked = [
-            Trial(walker, duration, seed, target=target, controller=controller, rate=RATE, engine=engine)
-            for seed in range(printed.REPEATS if leg_yaw else most)
-        ]
+        one = to_target(robot, target, spring, "pitchfork" if leg_yaw else "open-loop", duration=duration, **walk)
+        asked = [replace(one, seed=seed) for seed in range(printed.REPEATS if leg_yaw else most)]
         record = trials.together(trials.run(asked, folder))
         result = evaluate(record, duration)
         some = record.isel(time=slice(None, None, _PATH_STEP))
-        over = ("trial", "time")
+        place = some.position.transpose("axis", "robot", "time")
         case = xr.Dataset(
             {
-                "x": (over, some.position.sel(axis="x").transpose("robot", "time").values, {"units": "m"}),
-                "y": (over, some.position.sel(axis="y").transpose("robot", "time").values, {"units": "m"}),
+                "x": (("trial", "time"), place.sel(axis="x").values, {"units": "m"}),
+                "y": (("trial", "time"), place.sel(axis="y").values, {"units": "m"}),
                 "arrived": ("trial", np.isfinite(result.arrival).astype(float), {"units": "1"}),
                 "nearest": ("trial", result.nearest, {"units": "m"}),
                 "turned": ("trial", _last(record.heading), {"units": "rad"}),

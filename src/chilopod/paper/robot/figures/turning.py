@@ -7,15 +7,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from chilopod.paper import printed
+from chilopod.paper.measures import spring_for
 from chilopod.paper.robot.turning import RobotTurning
 from chilopod.paper.robot.walks import RobotWalks
 from chilopod.paper.scatter import SURE
 from chilopod.paper.statements import listed
-from chilopod.paper.turning import hopf
-from chilopod.paper.turning.figures.criteria import both_strategies, draw_comparison, draw_criteria, places
-from chilopod.paper.turning.figures.turning import became, draw_turning, draw_without, sides
+from chilopod.paper.turning import figures as planar
+from chilopod.paper.turning.criteria import in_words, saturation
 from chilopod.paper.turning.trials import arrivals, by_leg_yaw, outcome_words
-from chilopod.paper.walk_measures import spring_for
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, k, listing, number, typeset
 
@@ -39,13 +38,13 @@ def turning(found: RobotTurning) -> Panel:
     return Panel(
         name="robot-turning",
         title="The robot in three dimensions: turning task A",
-        draw=lambda narrow: draw_turning(found.robot, task, narrow),
+        draw=lambda narrow: planar.draw_turning(found.robot, task, narrow),
         alt="The circle to the target; paths, distance and angle of the target over time with three springs.",
         text=(
             "The twin sees the target with its scanner, as the robot does, and yaws the legs of module 1 towards it; "
             f"nothing of this was fitted but the walking speed. {task.criteria.sizes['repeat']} walks with each of "
-            f"three springs: {became(task)}. The paper's robot {listing(paper)}\u00a0{SPRING_UNIT}. The earliest "
-            f"arrival, when the criteria are taken, is at {number(task.time)}\u00a0s; the robot took "
+            f"three springs: {planar.became(task)}. The paper's robot {listing(paper)}\u00a0{SPRING_UNIT}. The "
+            f"earliest arrival, when the criteria are taken, is at {number(task.time)}\u00a0s; the robot took "
             f"{typeset(str(printed.ARRIVAL))}.",
         ),
         data=task.paths,
@@ -60,11 +59,11 @@ def criteria(found: RobotTurning, letter: str, walks: RobotWalks | None) -> Pane
     return Panel(
         name=f"robot-criteria-{letter.lower()}",
         title=f"The robot in three dimensions: the three criteria, task {letter}",
-        draw=lambda narrow: draw_criteria(task, k_hat, narrow, _TOP),
-        alt=f"Distance, angle and leg yaw over 1/{k(1)}: {places(task)}.",
+        draw=lambda narrow: planar.draw_criteria({planar.walks_of(task): task}, narrow, _TOP, k_hat=k_hat),
+        alt=f"Distance, angle and leg yaw over 1/{k(1)}: {planar.places(task)}.",
         text=(
             f"Means and standard errors of {task.criteria.sizes['repeat']} walks at {number(task.time)}\u00a0s. "
-            f"Most walks with each spring: {outcome_words(task.criteria, listed)}. The minima: {places(task)}"
+            f"Most walks with each spring: {outcome_words(task.criteria, listed)}. The minima: {planar.places(task)}"
             f"\u00a0{SPRING_UNIT}; the paper has all three around {paper:g}. The dashed line is the spring whose "
             f"settled walk has the radius of the circle, {number(k_hat, 3)}\u00a0{SPRING_UNIT}"
             + (", by the twin's own walks." if np.isfinite(own) else ", by the paper.")
@@ -81,12 +80,12 @@ def without(found: RobotTurning) -> Panel:
     return Panel(
         name="robot-without",
         title="The robot in three dimensions: with and without leg yaw",
-        draw=lambda narrow: draw_without(data, narrow),
+        draw=lambda narrow: planar.draw_without(data, narrow),
         alt="Paths of module 1 with and without leg yaw.",
         text=(
             f"Task A with {k(1)} = {case.spring:g}\u00a0{SPRING_UNIT}. Without leg yaw {few} of {walks} arrive, "
-            f"{sides(case)}: the bend takes its time, and chance has the side. With it {many} of {with_} arrive. The "
-            "paper's robot: many of nine fail, all of five do not.",
+            f"{planar.sides(case)}: the bend takes its time, and chance has the side. With it {many} of {with_} "
+            "arrive. The paper's robot: many of nine fail, all of five do not.",
         ),
         data=data,
     )
@@ -98,13 +97,13 @@ def comparison(found: RobotTurning) -> Panel:
     return Panel(
         name="robot-hopf",
         title="The robot in three dimensions: pitchfork against Hopf",
-        draw=lambda narrow: draw_comparison(task, found.hopf, narrow, _TOP_HOPF),
+        draw=lambda narrow: planar.draw_comparison(task, found.hopf, narrow, _TOP_HOPF),
         alt="The three criteria over the spring for the two strategies.",
         text=(
             "Task A with all springs alike, the paper's five values, at the same time and with the same disturbances. "
-            f"At best, pitchfork against Hopf: {typeset(hopf.words(task, found.hopf))}. In the paper all three are "
+            f"At best, pitchfork against Hopf: {typeset(in_words(task, found.hopf))}. In the paper all three are "
             f"lower for the pitchfork. {SURE:g} standard errors of the difference, seed by seed, decide here. The "
-            f"third says little where it is nearly saturated: {typeset(hopf.saturation(task, found.hopf))}.",
+            f"third says little where it is nearly saturated: {typeset(saturation(task, found.hopf))}.",
         ),
-        data=both_strategies(task, found.hopf),
+        data=planar.both_strategies(task, found.hopf),
     )

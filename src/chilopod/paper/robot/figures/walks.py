@@ -1,4 +1,4 @@
-"""The whole robot's walks as the paper arranges them: its Fig. "curved", "absolute" and "different"."""
+"""Walks of the whole robot as the paper arranges them (Fig. "curved", "absolute", "different"), and their duration."""
 
 from __future__ import annotations
 
@@ -8,27 +8,27 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from chilopod.paper import printed
-from chilopod.paper.compliance import INVERSE_UNIT, draw_asked, draw_times, errorbars, means, over_compliance
+from chilopod.paper import printed, shapes, statements
 from chilopod.paper.equal_distance import onset_of_bend
-from chilopod.paper.robot.figures import durations as robot_durations
+from chilopod.paper.measures import onset_with_error, radius_at
+from chilopod.paper.robot.rows import duration_rows
 from chilopod.paper.robot.walks import RobotWalks
-from chilopod.paper.walk_measures import onset_with_error, radius_at
+from chilopod.paper.scatter import means
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import SPRING_UNIT, k, listing, number, typeset
 from chilopod.tasks.radius_law import in_settled_curve, is_curved
 
-Array = NDArray[np.float64]
-
-_WALKS = (style.Layout("AB;CD", 7.4), style.Layout("A;B;C;D", 13.6))
-_ONE = (style.Layout("A", 4.0), style.Layout("A", 4.4))
 _THREE = (style.Layout("AB;CC", 7.6), style.Layout("A;B;C", 12.6))
+_DURATIONS = (style.Layout("ABC", 3.6), style.Layout("A;B;C", 9.6))
 _VARIANTS = tuple(zip((style.BLACK, style.BLUE, style.GREEN, style.ORANGE, style.GREY), "os^Dv", strict=True))
-_MARKED = (75.0, 41.0, 28.0, 21.0, 17.0, 15.0)
-_DASHED = (0, (4, 2))
+_SPRINGS = tuple(zip((style.BLUE, style.VERMILLION, style.GREEN, style.ORANGE), "os^D", strict=True))
+_SIDES = {
+    "left": (style.BLUE, "o", "to the left"),
+    "right": (style.BLUE, "s", "to the right"),
+    "straight": (style.GREY, "D", "straight"),
+}
 
 
 def panels(found: RobotWalks) -> Iterator[Panel]:
@@ -36,7 +36,7 @@ def panels(found: RobotWalks) -> Iterator[Panel]:
     yield walks(found)
     yield joints(found)
     yield different(found)
-    yield robot_durations.panel(found.durations)
+    yield durations(found.durations)
 
 
 def walks(found: RobotWalks) -> Panel:
@@ -46,7 +46,7 @@ def walks(found: RobotWalks) -> Panel:
     lefts, rights = (int((base.direction == side).sum()) for side in ("left", "right"))
     unsettled = int((base.moved.values > 0.1).sum())
     said = f"{number(fit.critical, 3)} ± {number(fit.bootstrap_error, 1)}" if fit else "no point"
-    straight, curved = (float(value) for value in found.examples.spring.values)
+    straight, curved = found.examples.spring.values
     return Panel(
         name="robot-walks",
         title="The robot in three dimensions: curved walks below the critical spring",
@@ -138,87 +138,53 @@ def _all(found: RobotWalks) -> dict[str, xr.Dataset]:
     return {"as built": found.base, **{title: data for title, (_, data) in _variants(found).items()}}
 
 
+def durations(data: xr.Dataset) -> Panel:
+    """Onset, radii and shares of curved walks over the duration of the walks."""
+    times = listing(f"{each:g}" for each in data.duration.values)
+    said = "; ".join(f"{row.statement.quantity.partition(',')[0]} {row.result.words}" for row in duration_rows(data))
+    return Panel(
+        name="robot-durations",
+        title="The robot in three dimensions: what if its walks had been shorter",
+        draw=lambda narrow: _draw_durations(data, narrow),
+        alt=f"A: where curved walks set in, by walks of {times} s. B: the two radii that the paper prints. C: the "
+        "share of walks that curve at some springs.",
+        text=(
+            "The paper does not say how long its robot walked before the angles were averaged. These are the walks of "
+            f"the base series, {data.attrs['repeats']} at each spring, cut after {times}\u00a0s and judged as before; "
+            f"a bend takes its time, the longer the closer {k(1)} is to the onset.",
+            f"What the table asks, and whether it is met: {typeset(said)}.",
+        ),
+        data=data,
+    )
+
+
 def _draw_walks(found: RobotWalks, narrow: bool) -> Figure:
-    figure, axes = style.figure(*_WALKS, narrow)
-    examples = found.examples
-    straight, curved = (float(value) for value in examples.spring.values)
-    high = 1.05 * float(np.rad2deg(np.abs(examples.joint_angle)).max())
-    for letter, spring, what in (("A", straight, "Straight"), ("B", curved, "Curved")):
-        draw_times(axes[letter], examples.sel(spring=spring))
-        axes[letter].set(ylim=(-high, high), title=f"{letter}  {what}, {k(1)} = {spring:g} {SPRING_UNIT}")
-    axes["A"].legend(loc="upper left", ncols=2 if narrow else 3)
-    _draw_fork(axes["C"], found)
-    _draw_radius(axes["D"], found)
+    figure, axes = style.figure(*shapes.WALKS, narrow)
+    shapes.draw_examples(axes, found.examples, narrow)
+    base, fit, paper = found.base, found.fit, printed.ONSET.value
+    inverse = 1.0 / base.spring.values
+    axes["C"].axvline(1.0 / paper, color=style.ORANGE, lw=1.4, label=f"robot's onset, {paper:g}")
+    law = (style.VERMILLION, f"square root from {number(fit.critical, 3)}" if fit else "")
+    shapes.draw_fork(axes["C"], base, _SIDES, fit, law)
+    axes["C"].set_xlim(0.0, 1.06 * inverse.max())
+    shapes.over_compliance(axes["C"], (75.0, 41.0, 28.0, 21.0, 15.0))
+    radius, error = means(base.axis_radius.values, in_settled_curve(base))
+    shapes.errorbars(axes["D"], inverse, radius, error, style.BLUE, "o", "twin")
+    shapes.draw_robot_radii(axes["D"], [1.0 / spring for spring in printed.RADII])
+    highest = np.nanmax([*(radius + np.nan_to_num(error)), *(each.value for each in printed.RADII.values())])
+    axes["D"].set(ylim=(0.0, 1.1 * highest), xlim=(0.02, 1.06 * inverse.max()))
+    shapes.over_compliance(axes["D"], (41.0, 28.0, 21.0, 17.0, 15.0))
     return figure
 
 
-def _draw_fork(axes: Axes, found: RobotWalks) -> None:
-    base, fit = found.base, found.fit
-    inverse = 1.0 / base.spring.values
-    angles = np.rad2deg(base.mean_angle.sel(joint=1).values)
-    for side, sign, marker in (("left", -1.0, "o"), ("right", 1.0, "s")):
-        here = base.direction.values == side
-        mean, error = means(angles, here)
-        errorbars(axes, inverse, mean, error, style.BLUE, marker, f"to the {side}")
-        if fit:
-            grid = np.linspace(1.0 / fit.critical, inverse.max(), 200)
-            label = f"square root from {number(fit.critical, 3)}" if sign > 0.0 else None
-            axes.plot(
-                grid, sign * np.rad2deg(fit.angle(grid)), color=style.VERMILLION, linestyle=_DASHED, lw=1.3, label=label
-            )
-    here = base.direction.values == "straight"
-    mean, error = means(angles, here)
-    errorbars(axes, inverse, mean, error, style.GREY, "D", "straight")
-    onset_ = printed.ONSET.value
-    axes.axvline(1.0 / onset_, color=style.ORANGE, lw=1.4, label=f"robot's onset, {onset_:g}")
-    axes.set_xlim(0.0, 1.06 * inverse.max())
-    over_compliance(axes, (75.0, 41.0, 28.0, 21.0, 15.0))
-    axes.set(ylabel="mean angle of joint 1 (deg)", title="C  Joint 1")
-    axes.legend(loc="upper left")
-    style.grid(axes)
-
-
-def _draw_radius(axes: Axes, found: RobotWalks) -> None:
-    base = found.base
-    inverse = 1.0 / base.spring.values
-    radius, error = means(base.axis_radius.values, in_settled_curve(base))
-    errorbars(axes, inverse, radius, error, style.BLUE, "o", "twin")
-    wanted = {spring: radius.value for spring, radius in printed.RADII.items()}
-    axes.plot(
-        [1.0 / key for key in wanted],
-        list(wanted.values()),
-        "D",
-        color=style.ORANGE,
-        markerfacecolor="none",
-        markeredgewidth=1.8,
-        markersize=11,
-        label="robot, paper",
-        zorder=5,
-    )
-    axes.set(
-        ylim=(0.0, 1.1 * np.nanmax([*(radius + np.nan_to_num(error)), *wanted.values()])),
-        xlim=(0.02, 1.06 * inverse.max()),
-    )
-    over_compliance(axes, (41.0, 28.0, 21.0, 17.0, 15.0))
-    axes.set(ylabel="radius of the body axis (m)", title="D  Radius")
-    axes.legend(loc="upper right")
-    style.grid(axes)
-
-
 def _draw_joints(found: RobotWalks, narrow: bool) -> Figure:
-    figure, by_letter = style.figure(*_ONE, narrow)
-    axes, base = by_letter["A"], found.base
-    inverse = 1.0 / base.spring.values
-    for joint, (color, marker) in zip(base.joint.values, style.joint_styles(base.sizes["joint"]), strict=True):
-        mean, error = means(np.abs(np.rad2deg(base.mean_angle.sel(joint=joint).values)))
-        errorbars(axes, inverse, mean, error, color, marker, f"joint {joint}")
-        axes.plot(inverse, mean, color=color, lw=1.0)
-    axes.set_xlim(0.0, 1.06 * inverse.max())
-    axes.set_ylim(bottom=0.0)
-    over_compliance(axes, _MARKED)
-    axes.set_ylabel("mean absolute angle (deg)")
-    axes.legend(loc="upper left")
-    style.grid(axes)
+    figure, axes = style.figure(*shapes.JOINTS, narrow)
+    inverse = 1.0 / found.base.spring.values
+    angles = np.rad2deg(np.abs(found.base.mean_angle).mean("repeat").transpose("spring", "joint").values)
+    shapes.draw_joints(axes["A"], found.base, True, inverse, angles)
+    axes["A"].set_xlim(0.0, 1.06 * inverse.max())
+    axes["A"].set_ylim(bottom=0.0)
+    shapes.over_compliance(axes["A"], (75.0, 41.0, 28.0, 21.0, 17.0, 15.0))
     return figure
 
 
@@ -229,17 +195,15 @@ def _draw_different(found: RobotWalks, narrow: bool) -> Figure:
         radius, error = np.array([radius_at(data, float(spring)) for spring in data.spring.values]).T
         away = inverse - 1.0 / onset_of_bend(data)
         for letter, place, shown in (("A", inverse, inverse > 0.0), ("B", away, away > 0.0)):
-            errorbars(axes[letter], place[shown], radius[shown], error[shown], color, marker, typeset(name))
-            axes[letter].plot(place[shown], radius[shown], color=color, lw=1.0)
+            points = place[shown], radius[shown], error[shown]
+            shapes.errorbars(axes[letter], *points, color, marker, typeset(name), joined=True)
     for letter in "AB":
-        axes[letter].set(ylim=(0.0, 3.0), ylabel="radius of the body axis (m)")
-        style.grid(axes[letter])
-    over_compliance(axes["A"], (34.0, 28.0, 21.0, 17.0, 15.0, 12.0))
+        shapes.finish(axes[letter], ylim=(0.0, 3.0), ylabel="radius of the body axis (m)")
+    shapes.over_compliance(axes["A"], (34.0, 28.0, 21.0, 17.0, 15.0, 12.0))
     axes["A"].set_title("A  Radius over the spring")
     axes["B"].set_xlim(left=0.0)
-    axes["B"].set(xlabel=f"1/{k(1)} − 1/{k(1)}* ({INVERSE_UNIT})", title="B  Radius, like with like")
-    handles, labels = axes["A"].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=2 if narrow else 5)
+    axes["B"].set(xlabel=f"1/{k(1)} − 1/{k(1)}* ({shapes.INVERSE_UNIT})", title="B  Radius, like with like")
+    shapes.legend_below(figure, axes["A"], 2 if narrow else 5)
     _draw_onsets(axes["C"], found)
     return figure
 
@@ -250,8 +214,34 @@ def _draw_onsets(axes: Axes, found: RobotWalks) -> None:
         *((title, printed.onset(name), onset_with_error(data)[0]) for title, (name, data) in _variants(found).items()),
         ("all springs alike", printed.UNIFORM, found.uniform.attrs["critical_k"]),
     ]
-    draw_asked(axes, [(title, paper.value, paper.band) for title, paper, _ in found_at])
+    shapes.draw_asked(axes, [(title, paper.value, paper.band) for title, paper, _ in found_at])
     twin = [at for *_, at in found_at]
     axes.plot(twin, range(len(twin)), "o", color=style.BLUE, markersize=7, label="twin")
     axes.set(xlim=(0.0, 45.0), xlabel=f"onset ({SPRING_UNIT})", title="C  Onset of curved walks")
     axes.legend(loc="upper left")
+
+
+def _draw_durations(data: xr.Dataset, narrow: bool) -> Figure:
+    figure, axes = style.figure(*_DURATIONS, narrow)
+    times = data.duration.values
+    axes["A"].axhspan(printed.ONSET.band.low, printed.ONSET.band.high, color=style.PALE, zorder=0)
+    shapes.errorbars(axes["A"], times, data.onset.values, data.onset_error.values, style.BLUE, "o", joined=True)
+    axes["A"].set(ylabel=f"onset ({SPRING_UNIT})", title="A  Where curved walks set in")
+    for (spring, radius), (color, marker) in zip(printed.RADII.items(), _SPRINGS, strict=False):
+        at, label = data.sel(spring=spring), f"{k(1)} = {spring:g}"
+        axes["B"].axhspan(radius.band.low, radius.band.high, color=style.PALE, zorder=0)
+        radii, errors = at.axis_radius.values, at.axis_radius_error.values
+        shapes.errorbars(axes["B"], times, radii, errors, color, marker, label, joined=True)
+    axes["B"].set(ylabel="radius of the body axis (m)", title="B  Radius")
+    springs = sorted({*printed.RADII, *statements.SLOWEST.values()})
+    for spring, (color, marker) in zip(springs, _SPRINGS, strict=False):
+        share = 100.0 * data.curved.sel(spring=spring).values
+        axes["C"].plot(times, share, color=color, marker=marker, lw=1.0, label=f"{k(1)} = {spring:g}")
+    axes["C"].set(ylabel="walks that curve (%)", title="C  Share that curves")
+    for letter, each in axes.items():
+        shapes.finish(
+            each, legend=None if letter == "A" else "best", xlabel="walks last (s)", xlim=(0.0, 1.05 * times.max())
+        )
+        each.set_ylim(0.0, 1.1 * max(each.dataLim.y1, np.nextafter(0.0, 1.0)))
+    axes["C"].set_ylim(-4.0, 104.0)
+    return figure

@@ -1,4 +1,5 @@
-"""Courses: how many targets strategies reach, how soon, at what cost, and where targets are missed."""
+"""Courses: how many targets strategies reach, how soon, at what cost, where targets are missed, what each step of the
+spring law brings, and what the variable spring stands."""
 
 from __future__ import annotations
 
@@ -8,17 +9,17 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from chilopod.paper.courses.robust import USUAL, Robust
 from chilopod.paper.courses.rows import percent, said
 from chilopod.paper.courses.statistics import Interval
-from chilopod.paper.courses.summary import Summary, summaries, verdicts
+from chilopod.paper.courses.summary import Summary, share_of_courses, share_of_targets, summaries, verdicts
+from chilopod.paper.scatter import Array
+from chilopod.paper.shapes import finish, legend_below
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.words import listing, number, spring
 from chilopod.steering import STRATEGIES, VARIABLE
-
-Array = NDArray[np.float64]
 
 _STRATEGIES = (style.Layout("ABC", 3.4, widths=(1.2, 1.0, 1.0)), style.Layout("A;B;C", 8.6))
 _WHERE = (style.Layout("AB", 3.9), style.Layout("A;B", 7.4))
@@ -32,6 +33,15 @@ _TITLES = {
 _BEARINGS = np.linspace(-75.0, 75.0, 11)  # deg
 _AWAY = np.linspace(0.8, 2.0, 7)  # m
 _FEWEST = 0.1  # of the targets of a field that are missed where the map's text speaks of it
+_BOTH = (style.Layout("AB", 4.0, widths=(0.8, 1.0)), style.Layout("A;B", 8.4, heights=(0.6, 1.0)))
+_ONE = (style.Layout("A", 2.8), style.Layout("A", 3.4))
+_STEP_TITLES = (
+    "spring of\nthe circle",
+    "+ the bend\nthere is",
+    "+ looking for\nwhat is lost",
+    "+ straightening\nfor what is near",
+    "+ a place ahead",
+)
 
 
 def panels(data: xr.Dataset) -> Iterator[Panel]:
@@ -71,30 +81,35 @@ def _draw(found: dict[str, Summary], narrow: bool) -> Figure:
     each = list(found.values())
     rows = np.arange(len(each), dtype=np.float64)
     titles = [_TITLES[one.name] + ("" if np.isnan(one.spring) else f" = {one.spring:g}") for one in each]
-    intervals(axes["A"], [one.targets for one in each], rows - 0.12, style.BLUE, "o", "targets", 100.0)
-    intervals(axes["A"], [one.courses for one in each], rows + 0.12, style.ORANGE, "s", "whole courses", 100.0)
-    axes["A"].set(xlim=(-3.0, 103.0), xlabel="reached (%)", title="A  Reached")
+    _reached(axes["A"], [one.targets for one in each], [one.courses for one in each], "A  Reached")
     axes["A"].legend(loc="best")
     intervals(axes["B"], [one.seconds for one in each], rows - 0.12, style.BLUE, "o", "on it")
     intervals(axes["B"], [one.spent for one in each], rows + 0.12, style.ORANGE, "s", "on it and those missed")
-    axes["B"].set(xlabel="time for a target reached (s)", title="B  Time")
-    axes["B"].legend(loc="upper right")
+    finish(axes["B"], "x", "upper right", xlabel="time for a target reached (s)", title="B  Time")
     left = np.zeros(len(each))
-    for values, color, name in (
-        ([one.spring_work for one in each], style.BLUE, "springs"),
-        ([one.drive_work for one in each], style.ORANGE, "joints"),
-    ):
-        axes["C"].barh(rows, values, 0.5, left=left, color=color, label=name)
-        left += np.array(values)
-    axes["C"].set(xlabel="work a course (J)", title="C  Work of the actuators")
-    axes["C"].legend(loc="best")
+    for name, color in (("spring", style.BLUE), ("drive", style.ORANGE)):
+        work = np.array([getattr(one, f"{name}_work") for one in each])
+        axes["C"].barh(rows, work, 0.5, left=left, color=color, label="springs" if name == "spring" else "joints")
+        left += work
+    finish(axes["C"], "x", "best", xlabel="work a course (J)", title="C  Work of the actuators")
     for letter, one in axes.items():
         one.set_yticks(rows, titles if narrow or letter == "A" else [""] * len(rows))
         one.set_ylim(len(rows) - 0.5, -0.5)
         if letter != "A":
             one.set_xlim(left=0.0)
-        style.grid(one, "x")
     return figure
+
+
+def _reached(axes: Axes, targets: Sequence[Interval], courses: Sequence[Interval], title: str) -> None:
+    """Shares of targets and of whole courses, a row each."""
+    rows = np.arange(len(targets), dtype=np.float64)
+    intervals(axes, targets, rows - 0.12, style.BLUE, "o", "targets", 100.0)
+    intervals(axes, courses, rows + 0.12, style.ORANGE, "s", "whole courses", 100.0)
+    _scaled(axes, len(rows), title)
+
+
+def _scaled(axes: Axes, rows: int, title: str) -> None:
+    finish(axes, "x", xlim=(-3.0, 103.0), ylim=(rows - 0.5, -0.5), xlabel="reached (%)", title=title)
 
 
 def intervals(
@@ -146,13 +161,7 @@ def where(data: xr.Dataset) -> Panel:
             ),
         ),
         data=xr.Dataset(
-            {
-                "reached": (
-                    ("strategy", "away", "bearing"),
-                    np.stack(list(maps.values())),
-                    {"units": "1"},
-                )
-            },
+            {"reached": (("strategy", "away", "bearing"), np.stack(list(maps.values())), {"units": "1"})},
             coords={
                 "strategy": list(shown),
                 "away": ("away", 0.5 * (_AWAY[1:] + _AWAY[:-1]), {"units": "m"}),
@@ -189,12 +198,102 @@ def _draw_where(maps: dict[str, Array], narrow: bool) -> Figure:
     figure, axes = style.figure(*_WHERE, narrow)
     for letter, (name, share) in zip("AB", maps.items(), strict=True):
         mesh = axes[letter].pcolormesh(_BEARINGS, _AWAY, 100.0 * share, vmin=0.0, vmax=100.0, cmap="viridis")
-        axes[letter].set(
-            xlabel="angle of the target (deg)",
-            ylabel="distance (m)",
-            title=f"{letter}  {_TITLES[name]}",
-        )
+        title = f"{letter}  {_TITLES[name]}"
+        axes[letter].set(xlabel="angle of the target (deg)", ylabel="distance (m)", title=title)
         axes[letter].set_xticks([-75, -45, -15, 15, 45, 75])
         axes[letter].invert_xaxis()  # left is left
     figure.colorbar(mesh, ax=list(axes.values()), label="targets reached (%)", shrink=0.8)
     return figure
+
+
+def robust(found: Robust) -> Panel:
+    """Steps of the law, and conditions that it does not know of, in the planar model."""
+    steps, conditions = found.courses, found.conditions
+    grown = listing(f"{name} {percent(share_of_targets(steps.arrived.sel(case=name)))}" for name in steps.case.values)
+    return Panel(
+        name="courses-robust",
+        title="What the spring law owes to its steps, and what it stands",
+        draw=lambda narrow: _draw_robust(found, narrow),
+        alt="A: targets and courses reached by the law as it grew. B: the same under conditions that the law does not "
+        "know of, beside one spring for all of a course.",
+        text=(
+            f"A: targets reached on {steps.sizes['course']} courses by the law step by step, each with what those "
+            f"before have: {grown}.",
+            f"B: the finished law on {conditions.sizes['course']} courses whose conditions it does not know of. "
+            + _decided(conditions),
+        ),
+        data=conditions,
+    )
+
+
+def whole(conditions: xr.Dataset) -> Panel:
+    """Conditions of the whole robot."""
+    return Panel(
+        name="robot-courses-robust",
+        title="What the spring that is set on the way stands: the robot in three dimensions",
+        draw=lambda narrow: _draw_whole(conditions, narrow),
+        alt="Targets and courses reached under several conditions, with the spring that is set on the way and with one "
+        "for all.",
+        text=(f"{conditions.sizes['course']} courses under each condition. " + _decided(conditions),),
+        data=conditions,
+    )
+
+
+def _decided(data: xr.Dataset) -> str:
+    """Decisions of the intervals on every condition."""
+    ours = data.sel(strategy=VARIABLE.name)
+    usual = share_of_targets(ours.sel(condition=USUAL).arrived)
+    worse, better = [], []
+    for name in data.condition.values:
+        share = share_of_targets(ours.sel(condition=name).arrived)
+        if usual.above(share) is True:
+            worse.append(f"{name} ({percent(share)})")
+        (other,) = (each for each in data.strategy.values if each != VARIABLE.name)
+        if share.above(share_of_targets(data.sel(condition=name, strategy=other).arrived)) is True:
+            better.append(str(name))
+    fixed = spring(data.attrs["spring"], 2)
+    return (
+        f"As usual it reaches {percent(usual)} of targets; "
+        + (f"clearly fewer with {listing(worse)}" if worse else "clearly fewer under none of these conditions")
+        + f". It reaches more than {fixed} all along "
+        + (
+            "under every one of them."
+            if len(better) == data.sizes["condition"]
+            else f"beyond doubt under these: {listing(better)}."
+            if better
+            else "beyond doubt under none."
+        )
+    )
+
+
+def _draw_robust(found: Robust, narrow: bool) -> Figure:
+    figure, axes = style.figure(*_BOTH, narrow)
+    arrived = [found.courses.arrived.isel(case=row) for row in range(found.courses.sizes["case"])]
+    targets, courses = ([share(each) for each in arrived] for share in (share_of_targets, share_of_courses))
+    _reached(axes["A"], targets, courses, "A  The law, step by step")
+    axes["A"].set_yticks(range(len(arrived)), list(_STEP_TITLES[: len(arrived)]))
+    _conditions(axes["B"], found.conditions, "B  Under other conditions")
+    legend_below(figure, axes["B"], 1 if narrow else 4)
+    return figure
+
+
+def _draw_whole(data: xr.Dataset, narrow: bool) -> Figure:
+    figure, axes = style.figure(*_ONE, narrow)
+    _conditions(axes["A"], data, "")
+    legend_below(figure, axes["A"], 1 if narrow else 4)
+    return figure
+
+
+def _conditions(axes: Axes, data: xr.Dataset, title: str) -> None:
+    rows = np.arange(data.sizes["condition"], dtype=np.float64)
+    for strategy, fill, shift in zip(data.strategy.values, (1.0, 0.45), (-0.15, 0.15), strict=True):
+        arrived = [data.arrived.sel(strategy=strategy, condition=each) for each in data.condition.values]
+        label = "k₁ set on the way" if strategy == VARIABLE.name else f"k₁ = {data.attrs['spring']:g}"
+        for share, color, marker, what in (
+            (share_of_targets, style.BLUE, "o", "targets"),
+            (share_of_courses, style.ORANGE, "s", "courses"),
+        ):
+            shares = [share(each) for each in arrived]
+            intervals(axes, shares, rows + shift, color, marker, f"{label}, {what}", 100.0, fill)
+    axes.set_yticks(rows, [str(each) for each in data.condition.values])
+    _scaled(axes, len(rows), title)

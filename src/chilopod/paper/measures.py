@@ -1,0 +1,173 @@
+"""Series of walks with several springs, and the paper's measures on them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike, NDArray
+
+from chilopod import trials
+from chilopod.analysis.parameters import K1, PAPER_UNIT, stiffness
+from chilopod.analysis.square_root import RESAMPLED, SquareRootFit, square_root_fit
+from chilopod.errors import AnalysisError
+from chilopod.paper.scatter import Array, drawn_anew, mean_and_error
+from chilopod.progress import Progress, silent
+from chilopod.robot import Robot
+from chilopod.tasks.radius_law import in_settled_curve, is_curved
+from chilopod.trials import Trial
+
+Folder = str | Path | None
+
+SEEDS = 10_000
+"""Seeds between springs, so that more repeats leave the other trials as they are."""
+
+_RATE = 50.0  # Hz
+
+
+def spring_walks(
+    robot: Robot,
+    springs: Sequence[float],
+    duration: float | Sequence[float],
+    *,
+    repeats: int = 1,
+    seeds: Sequence[int] | None = None,
+    parameter: str = K1,
+    folder: Folder = None,
+    progress: Progress = silent,
+    **walk: Any,
+) -> list[xr.Dataset]:
+    """Records of walks with some springs, one spring after the other.
+
+    Parameters
+    ----------
+    springs, parameter
+        Values of a stiffness, N*mm/deg, and its path.
+    duration
+        Duration of all walks, or of those with each spring, s.
+    repeats, seeds
+        Number of walks with each spring, and seed of the first of them, from which the others count up; by default 0.
+    walk
+        Other fields of :class:`chilopod.trials.Trial`.
+    """
+    durations = np.broadcast_to(duration, len(springs)).tolist()
+    asked = [
+        Trial(robot.with_value(parameter, stiffness(float(spring))), seconds, seed + repeat, **walk)
+        for spring, seconds, seed in zip(springs, durations, seeds or [0] * len(springs), strict=True)
+        for repeat in range(repeats)
+    ]
+    return trials.run(asked, folder, progress)
+
+
+def spring_seeds(springs: Sequence[float]) -> list[int]:
+    """First seed of the walks with each spring."""
+    return [int(SEEDS * spring) for spring in springs]
+
+
+def by_spring(walks: Sequence[xr.Dataset], springs: Sequence[float]) -> xr.Dataset:
+    """Measures of walks, over spring (N*mm/deg) and repeat; of each spring as many, one after the other."""
+    repeats = len(walks) // len(springs)
+    rows = [xr.concat(walks[i : i + repeats], "repeat") for i in range(0, len(walks), repeats)]
+    return xr.concat(rows, "spring").assign_coords(spring=over_springs(springs), repeat=np.arange(repeats))
+
+
+def over_springs(springs: Sequence[float]) -> tuple[str, Array, dict[str, str]]:
+    """Coordinate of springs, N*mm/deg."""
+    return "spring", np.asarray(springs, dtype=np.float64), {"units": PAPER_UNIT}
+
+
+def example_walks(
+    robot: Robot,
+    springs: Sequence[float],
+    duration: float,
+    seeds: Sequence[int],
+    engine: str = "planar",
+    folder: Folder = None,
+) -> xr.Dataset:
+    """Joint angles of one walk with each of some springs, over (time, spring, joint): ``joint_angle`` (rad)."""
+    records = spring_walks(robot, springs, duration, seeds=seeds, folder=folder, rate=_RATE, engine=engine)
+    angles = [record.joint_angle.isel(robot=0, drop=True) for record in records]
+    data = xr.concat(angles, dim="spring").transpose("time", "spring", "joint").to_dataset(name="joint_angle")
+    data.attrs = {"robot": robot.name, "varied": K1, "about": "yaw joint angles over time"}
+    return data.assign_coords(spring=over_springs(springs))
+
+
+def shares(data: xr.Dataset) -> xr.Dataset:
+    """Shares of the walks that are ``curved`` and ``straight``, over spring."""
+    found = {"curved": is_curved(data), "straight": (data.direction == "straight").values}
+    return xr.Dataset(
+        {name: ("spring", here.mean(axis=1), {"units": "1"}) for name, here in found.items()},
+        coords={"spring": data.spring},
+    )
+
+
+def counted(data: xr.Dataset, settled: bool = True) -> NDArray[np.bool_]:
+    """Mask of the trials with an angle and a radius that count: curved ones that have settled (or not, as they say), at
+    springs at which most curve; shape (springs, repeats)."""
+    most = is_curved(data).mean(axis=1) > 0.5
+    return (in_settled_curve(data) if settled else is_curved(data)) & most[:, None]
+
+
+def fitted(inverse: ArrayLike, bends: ArrayLike, resampled: int = RESAMPLED) -> SquareRootFit | None:
+    """The square-root law of bends over 1/k, as of :func:`square_root_fit`; None if they do not determine a point."""
+    try:
+        return square_root_fit(inverse, bends, resampled)
+    except AnalysisError:
+        return None
+
+
+def point_of(fit: SquareRootFit | None) -> tuple[float, float]:
+    """Point of a fit and its standard error by the bootstrap, N*mm/deg; NaN if there is none."""
+    return (fit.critical, fit.bootstrap_error) if fit else (float("nan"), float("nan"))
+
+
+def onset(data: xr.Dataset, joint: int = 1, settled: bool = True) -> SquareRootFit | None:
+    """Where curved walks set in by the paper's method: the square-root fit to the trials that are :func:`counted`."""
+    here = counted(data, settled)
+    inverse = np.broadcast_to(1.0 / data.spring.values[:, None], here.shape)
+    return fitted(inverse[here], data.mean_angle.sel(joint=joint).values[here])
+
+
+def onset_with_error(data: xr.Dataset, settled: bool = True) -> tuple[float, float]:
+    """:func:`onset` and its standard error, as of :func:`point_of`."""
+    return point_of(onset(data, settled=settled))
+
+
+def radius_at(data: xr.Dataset, spring: float, settled: bool = True) -> tuple[float, float]:
+    """Mean radius of the trials at a spring that curve and have settled (or not, as they say), and its standard error,
+    m; NaN if there are fewer than two."""
+    at = data.sel(spring=spring)
+    radii = at.axis_radius.values[in_settled_curve(at) if settled else is_curved(at)]
+    return mean_and_error(radii) if len(radii) > 1 else (float("nan"), float("nan"))
+
+
+def spring_for(data: xr.Dataset, radius: float) -> tuple[float, float]:
+    """The paper's k1-hat: the spring whose walks have a radius, between trials, N*mm/deg; NaN outside of them.
+
+    The squared curvature is interpolated in 1/k1, in which it is linear by the square-root law. With its standard error
+    from drawing trials anew at every spring.
+    """
+    here = counted(data)
+    curved = here.any(axis=1)
+    curvature = np.where(here, 1.0 / data.axis_radius.values, np.nan)[curved]
+    inverse, wanted = 1.0 / data.spring.values[curved], radius**-2
+
+    def found(curvature: Array) -> float:
+        squared = np.nanmean(curvature, axis=1) ** 2
+        order = np.argsort(squared)
+        return 1.0 / float(np.interp(wanted, squared[order], inverse[order], left=np.nan, right=np.nan))
+
+    if not curved.any():
+        return float("nan"), float("nan")
+    rng = np.random.default_rng(0)
+    again = [found(drawn_anew(curvature, rng)) for _ in range(RESAMPLED)]
+    single = (np.isfinite(curvature).sum(axis=1) < 2).all()  # nobody knows how it scatters
+    return found(curvature), float("nan") if single else float(np.std(again, ddof=1))
+
+
+def cycle_means(angles: Array, samples: int) -> Array:
+    """Means of joint angles over gait cycles of so many samples, shape (cycles, joints)."""
+    return angles[: len(angles) // samples * samples].reshape(-1, samples, angles.shape[1]).mean(axis=1)

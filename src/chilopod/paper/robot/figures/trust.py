@@ -1,0 +1,248 @@
+"""Why the robot bends earlier than the planar model says, how far to trust what the twin predicts, and what other
+structures of the robot predict."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from chilopod import units
+from chilopod.paper import printed
+from chilopod.paper.robot.spread import printed_number
+from chilopod.paper.robot.structures import TOLERANCE
+from chilopod.paper.robot.walks import SPRINGS
+from chilopod.paper.robot.why import SPRINGS as TRIED
+from chilopod.paper.shapes import DASHED, draw_asked, finish, legend_below
+from chilopod.show import style
+from chilopod.show.panel import Panel
+from chilopod.show.words import SPRING_UNIT, listing, number, typeset
+from chilopod.tasks.identify.twin_constants import FREE, parts_of
+
+_WHY = (style.Layout("AB", 4.6, widths=(1.2, 1.0)), style.Layout("A;B", 9.0))
+_SPREAD = (style.Layout("AB", 4.2, widths=(1.0, 1.1)), style.Layout("A;B", 8.2))
+_STRUCTURES = (style.Layout("AB", 5.4, widths=(0.7, 1.0)), style.Layout("A;B", 10.0))
+_BEYOND = 60.0  # N*mm/deg, where bars that have no end are cut off
+_MET = 1.0  # misfit at which the base series is met
+_FARTHEST = 60.0  # per cent, where predictions are cut off
+_MOST = 100.0  # chi squared, where bars are cut off
+_MARKERS = "osD^v"
+_SETS = (style.BLUE, *style.CURVES[1:])
+
+
+def why(data: xr.Dataset) -> Panel:
+    """The point with the planar model's assumptions taken back."""
+    limit, twin = data.attrs["limit"], data.attrs["twin"]
+    steps = [limit, *(float(value) for value in data.path.values)]
+    moves = np.diff([min(value, _BEYOND) if not np.isnan(value) else 0.0 for value in steps])
+    largest = [str(data.factor.values[i]) for i in np.argsort(-np.abs(moves))[:2]]
+    return Panel(
+        name="robot-why",
+        title=f"Why {printed.ONSET.value:g} and not {printed.CRITICAL_K1.value:g}: from the planar model to the robot",
+        draw=lambda narrow: _draw_why(data, narrow),
+        alt="A: where curved walks set in, from the planar limit to the twin, one assumption after the other. B: each "
+        "of them alone, and the twin without each.",
+        text=(
+            "With stiff legs that lift their feet high and a floor that holds feet as a viscous one does, the twin is "
+            f"the planar model in another engine: it loses the straight walk at {_spring(data.attrs['vouched'], 4)}, "
+            f"the planar model at {_spring(data.attrs['exact'], 4)}. By the paper's method, a square-root fit to "
+            f"walks, curved ones set in at {_spring(limit)} there, and with everything at {_spring(twin)}.",
+            "In A the planar model's assumptions are taken back one after the other, from the top down: "
+            + "; ".join(
+                f"{name} ({about}): {_spring(float(value))}"
+                for name, about, value in zip(data.factor.values, data.about.values, data.path.values, strict=True)
+            )
+            + f". The largest steps are {listing(largest)}. They are no independent contributions: B shows each "
+            "alone in the planar limit and the twin without each. Where a bar runs out of the picture, walks "
+            f"curve at every spring tried, up to {max(TRIED):g}; where there is none, their bends determine no point.",
+            f"The viscous coefficient of the planar model's feet is {number(data.attrs['viscous'], 4)}\u00a0N·s/m. A "
+            f"foot of the twin that does not slide creeps like one of {number(data.attrs['grip'], 2)}\u00a0N·s/m: it "
+            "is held, and lets go only beyond the Coulomb limit.",
+        ),
+        data=data,
+    )
+
+
+def _spring(value: float, digits: int = 3) -> str:
+    if np.isinf(value):
+        return "beyond all springs tried"
+    return "none" if np.isnan(value) else f"{number(value, digits)}\u00a0{SPRING_UNIT}"
+
+
+def _draw_why(data: xr.Dataset, narrow: bool) -> Figure:
+    figure, axes = style.figure(*_WHY, narrow)
+    names = ["planar limit", *(f"+ {name}" for name in data.factor.values)]
+    values = np.array([data.attrs["limit"], *data.path.values])
+    colors = [style.GREY, *([style.BLUE] * (len(values) - 1))]
+    _bars(axes["A"], np.arange(len(values)), values, colors, 0.6)
+    axes["A"].set_yticks(range(len(names)), names)
+    axes["A"].set_title("A  One after the other")
+    rows = np.arange(data.sizes["factor"])
+    _bars(axes["B"], rows - 0.19, data.alone.values, [style.SKY] * len(rows), 0.34)
+    _bars(axes["B"], rows + 0.19, data.without.values, [style.ORANGE] * len(rows), 0.34)
+    axes["B"].set_yticks(rows, [str(name) for name in data.factor.values])
+    axes["B"].set_title("B  Each by itself")
+    for letter in "AB":
+        for value, color, name in (
+            (data.attrs["exact"], style.GREY, "planar model"),
+            (printed.ONSET.value, style.VERMILLION, "robot, paper"),
+        ):
+            label = f"{name}, {number(value, 2)}"
+            axes[letter].axvline(value, color=color, lw=1.2, linestyle=DASHED, label=label)
+        axes[letter].invert_yaxis()
+        finish(axes[letter], "x", xlim=(0.0, _BEYOND), xlabel=f"point ({SPRING_UNIT})")
+    handles, labels = axes["B"].get_legend_handles_labels()
+    handles += [Patch(color=style.SKY), Patch(color=style.ORANGE)]
+    labels += ["planar limit and this alone", "twin without this"]
+    figure.legend(handles, labels, loc="outside lower center", ncols=1 if narrow else 4)
+    return figure
+
+
+def _bars(axes: Axes, rows: np.ndarray, values: np.ndarray, colors: list[str], height: float) -> None:
+    for row, value, color in zip(rows, values, colors, strict=True):
+        if np.isnan(value):
+            continue
+        axes.barh(row, min(value, _BEYOND), height, color=color)
+        text, at = "all springs tried" if np.isinf(value) else number(value, 3), (min(value, _BEYOND), row)
+        away, side, ink = (-4, "right", "white") if value > 0.8 * _BEYOND else (4, "left", style.BLACK)
+        style.note(axes, text, at, (away, 0), va="center", ha=side, color=ink)
+
+
+def spread(data: xr.Dataset) -> Panel:
+    """Predictions by sets of constants that fit as well."""
+    ranges = []
+    for path, unit in zip(data.constant.values, data.unit.values, strict=True):
+        values = data.constants.sel(constant=path)
+        low, high = (units.format(float(each), str(unit), digits=2) for each in (values.min(), values.max()))
+        ranges.append(f"{path} {low} to {high}".replace("*", "·"))
+    points = {str(name): data.onset.sel(variant=name).values for name in data.variant.values}
+    predicted = [
+        f"{name} {number(float(np.nanmin(values)), 3)} to {number(float(np.nanmax(values)), 3)}"
+        for name, values in (points | {"all springs alike": data.uniform.values}).items()
+        if np.isfinite(values).any()
+    ]
+    tasks = listing(
+        f"task {task} with {listing(sorted({f'{float(each):g}' for each in data.best.sel(task=task)}))}"
+        for task in data.task.values
+    )
+    return Panel(
+        name="robot-spread",
+        title="How far to trust the predictions: other constants that fit as well",
+        draw=lambda narrow: _draw_spread(data, narrow),
+        alt="A: the constants of several fits, in parts of their ranges. B: what each predicts, beside the robot.",
+        text=(
+            f"{data.attrs['numbers']} printed numbers and {data.attrs['answers']} yes-or-no answers do not determine "
+            f"{data.sizes['constant']} constants. {data.attrs['known']} sets that the search found meet them within "
+            "5 %; shown are the preset (filled) and "
+            f"those that are most unlike it and each other. What the data leave open (A): {listing(ranges)}.",
+            f"What they predict (B), with few and undisturbed walks, in {SPRING_UNIT}: "
+            f"{listing(predicted) or 'no point'}. They come nearest to the target in {tasks}\u00a0{SPRING_UNIT}.",
+        ),
+        data=data,
+    )
+
+
+def _draw_spread(data: xr.Dataset, narrow: bool) -> Figure:
+    figure, axes = style.figure(*_SPREAD, narrow)
+    for index in data.set.values[::-1]:
+        parts = parts_of(data.constants.values[index])
+        axes["A"].plot(parts, np.arange(len(FREE)), "o", **_marked(int(index)))
+    axes["A"].set_yticks(range(len(FREE)), [each.path.partition(".")[2].replace("_", " ") for each in FREE])
+    axes["A"].invert_yaxis()
+    finish(axes["A"], xlim=(-0.03, 1.03), xlabel="part of the range searched", title="A  Constants")
+
+    names = [str(name) for name in data.variant.values[1:]]
+    asked = [("base series (fitted)", printed.ONSET), *((name, printed_number(name)) for name in names)]
+    rows = [(name, paper.value, paper.band) for name, paper in (*asked, ("all springs alike", printed.UNIFORM))]
+    for task in map(str, data.task.values):
+        rows.append((f"best spring, task {task}", printed.TASKS[task].k_hat.value, printed.TASKS[task].minima))
+    draw_asked(axes["B"], rows)
+    for row, values in enumerate([*data.onset.values.T, data.uniform.values, *data.best.values.T]):
+        for index, value in enumerate(values):
+            place, label = row + 0.12 * (index - 0.5 * (len(values) - 1)), "preset" if row == index == 0 else None
+            axes["B"].plot(value, place, "o", **_marked(index), label=label)
+    axes["B"].set(xlim=(10.0, max(45.0, *SPRINGS[:-1])), xlabel=SPRING_UNIT, title="B  Predictions")
+    axes["B"].legend(loc="upper left")
+    return figure
+
+
+def _marked(index: int) -> dict[str, Any]:
+    """Look of one set of constants: that of the preset is filled."""
+    fill, size = ("none", 6.0) if index else (_SETS[0], 8.0)
+    color = _SETS[index % len(_SETS)]
+    return {"color": color, "markerfacecolor": fill, "markersize": size, "markeredgewidth": 1.6}
+
+
+def structures(data: xr.Dataset) -> Panel:
+    """Predictions of other structures."""
+    fitted = data.misfit.sel(fit="fitted").values
+    met = fitted <= _MET
+    squared = data.chi_squared.values
+    better = [
+        f"{name} ({_squares(value)})"
+        for name, value, good in zip(data.structure.values[1:], squared[1:], met[1:], strict=True)
+        if good and value < squared[0]
+    ]
+    missed = [str(name) for name, good in zip(data.structure.values, met, strict=True) if not good]
+    ratio = data.criteria.sel(strategy="pitchfork") / data.criteria.sel(strategy="hopf")
+    below = (ratio < 1.0).all("criterion").values
+    lower = [str(name) for name, yes in zip(data.structure.values, below & met, strict=True) if yes]
+    return Panel(
+        name="robot-structures",
+        title="What else the robot could be made of",
+        draw=lambda narrow: _draw_structures(data, narrow),
+        alt="A: how far each structure's predictions are from the paper's. B: predictions, relative to the paper's.",
+        text=(
+            f"Each of these structures was given to the preset, and its {len(FREE)} constants moved until it meets the "
+            "base series again, from few and undisturbed walks: "
+            + "; ".join(
+                f"{name} ({about})" for name, about in zip(data.structure.values, data.about.values, strict=True)
+            )
+            + ".",
+            f"A adds up the squares of how far its predictions are from the paper's, over {100.0 * TOLERANCE:g} %: the "
+            f"preset has {_squares(squared[0])}, "
+            + (f"less have {listing(better)}." if better else "none has less.")
+            + (f" Pale: {listing(missed)}, which did not meet the base series within its tolerance." if missed else "")
+            + " For the shorter stride the nearer of its two readings counts.",
+            "In task A the smallest criteria of one soft spring are all three below those of springs all alike with "
+            + (listing(lower) if lower else "none of those that meet it")
+            + ".",
+        ),
+        data=data,
+    )
+
+
+def _squares(value: float) -> str:
+    if np.isnan(value):
+        return "a prediction without a point"
+    return f"{value:.0f}" if value >= 10.0 else f"{value:.1f}"
+
+
+def _draw_structures(data: xr.Dataset, narrow: bool) -> Figure:
+    figure, axes = style.figure(*_STRUCTURES, narrow)
+    rows = np.arange(data.sizes["structure"])
+    met = data.misfit.sel(fit="fitted").values <= _MET
+    names = [str(name) for name in data.structure.values]
+    values = np.clip(np.nan_to_num(data.chi_squared.values, nan=0.0), 0.0, _MOST)
+    axes["A"].barh(rows, values, 0.6, color=[style.BLUE if good else style.PALE for good in met])
+    for row, value, end in zip(rows, data.chi_squared.values, values, strict=True):
+        style.note(axes["A"], _squares(value), (end, float(row)), (4, 0), va="center")
+    axes["A"].set_yticks(rows, names)
+    axes["A"].set(xlim=(0.0, 1.2 * _MOST), title="A  From the paper's")
+    off = 100.0 * (data.predicted / data.paper - 1.0)
+    axes["B"].axvspan(-100.0 * printed.ONSETS, 100.0 * printed.ONSETS, color=style.PALE, zorder=0)
+    for column, name in enumerate(data.prediction.values):
+        values = np.clip(off.values[:, column], -_FARTHEST, _FARTHEST)
+        marker, color = _MARKERS[column % len(_MARKERS)], style.CURVES[column % len(style.CURVES)]
+        axes["B"].plot(values, rows, marker, color=color, markersize=6, label=typeset(str(name)))
+    axes["B"].set_yticks(rows, names if narrow else [""] * len(names))
+    axes["B"].set(xlim=(-_FARTHEST - 3.0, _FARTHEST + 3.0), title="B  Predictions")
+    for letter, label in (("A", "chi squared"), ("B", "onset relative to the paper's (%)")):
+        axes[letter].invert_yaxis()
+        finish(axes[letter], "x", xlabel=label)
+    legend_below(figure, axes["B"], 1 if narrow else 3)
+    return figure

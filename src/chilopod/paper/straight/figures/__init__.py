@@ -1,1 +1,0 @@
-"""Figures of the straight walk and where it bends."""

@@ -1,1 +1,0 @@
-"""Figures of turning to a target."""
