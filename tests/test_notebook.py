@@ -91,15 +91,18 @@ def test_robots_of_any_length_fit(modules):
 def test_straight_walk():
     found = straight_walk(ROBOT)
     assert "the straight walk is stable" in said(found._repr_html_())
+    assert read(found._repr_html_()).find(f"{SVG}svg") is not None
+    assert len(str(found).splitlines()) == 15  # and no more of a chain of any length
     assert float(cells(found._repr_html_())[1][0]) == pytest.approx(found.moduli[0], abs=1e-6)
 
 
 def test_point():
     point = pitchfork(ROBOT)
     html = point._repr_html_()
-    assert "pitchfork at springs.stiffness[0] = 11.99142966 N·mm/deg" in said(html)
+    assert "pitchfork at springs.stiffness[0] = 11.99142966" in said(html)
     assert "Supercritical: " in said(html)
-    assert [float(row[1]) for row in cells(html)[1:]] == pytest.approx(point.joint_components.real, abs=1e-3)
+    assert len(point.plot(Figure().add_subplot()).patches) == 5
+    assert [float(angle) for angle in cells(html)[1][1:]] == pytest.approx(point.joint_components.real, abs=1e-3)
 
 
 def duffing(force):
@@ -148,6 +151,7 @@ def test_walks():
     assert [line.get_xydata().tolist() for line in axes.lines] == walks.record.position.transpose(
         "robot", "time", "axis"
     ).values.tolist()
+    assert [line.get_xydata().shape for line in walks.plot(Figure().add_subplot()).lines] == [(21, 2)] * 2
     assert "straight" in said(ends(Trial(ROBOT, 1.0).repeated())._repr_html_())
 
 
@@ -164,6 +168,6 @@ def test_course():
     done = drive(ready, course_named("0 deg, 0.4 m; 170 deg, 1 m", patience=4.0))
     html = done._repr_html_()
     assert NASTY in said(html)
-    assert cells(html)[1][:2] == ["-", "1 of 2"]
+    assert [row[:2] for row in cells(html)[1:]] == [["1", "arrived"], ["2", "out of reach"]]
     assert 0.25 / ROBOT.gait.speed <= float(cells(html)[1][2]) < 4.0
     assert len(targets(done.record)) == 2

@@ -1,4 +1,4 @@
-"""How results show themselves in notebooks: HTML and SVG that need nothing but themselves.
+"""How results show themselves: as lines of text, as a drawing, and in notebooks as HTML and SVG that load nothing.
 
 What is drawn is in colours that are told apart on a white page as on a black one; text beside it has those of the page.
 """
@@ -6,9 +6,14 @@ What is drawn is in colours that are told apart on a white page as on a black on
 from __future__ import annotations
 
 import io
+import itertools
+import textwrap
 from collections.abc import Callable, Iterable, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
+
+from chilopod.errors import ParameterError
+from chilopod.frozen import Short
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,6 +25,8 @@ COLORS = ("#3a8fd0", "#e69f00", "#00a67a", "#d679a8", "#b07d4f", "#8a7fd0")
 """Colours of what is to be told apart."""
 
 _SMALL = 11  # px, of text
+_WIDEST = 110  # characters of a line
+_LINES = 15  # of a result
 _STYLE: Any = {
     **dict.fromkeys(("text.color", "axes.edgecolor", "axes.labelcolor", "xtick.color", "ytick.color"), INK),
     "savefig.transparent": True,
@@ -27,6 +34,82 @@ _STYLE: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "chilopod",
 }
+
+
+class Shown(Short):
+    """Base of results that print as a heading and a few lines, and show the same in notebooks."""
+
+    def _lines(self) -> list[str]:
+        raise NotImplementedError
+
+    def __str__(self) -> str:
+        wrapped = (textwrap.wrap(line, _WIDEST, subsequent_indent="    ") for line in self._lines())
+        lines = list(itertools.chain.from_iterable(wrapped))
+        if len(lines) > _LINES:
+            lines[_LINES - 1 :] = [f"  and {len(lines) - _LINES + 1} more lines"]
+        return "\n".join(lines)
+
+    def _picture(self) -> str:
+        return ""
+
+    def _repr_html_(self) -> str:
+        heading, _, text = str(self).partition("\n")
+        return block(heading, self._picture(), f"<pre>{escape(text)}</pre>")
+
+
+class Summary(Shown):
+    """Base of results that are summed up by a title, a table with a head, and sentences above and below it."""
+
+    @property
+    def title(self) -> str:
+        """Heading of the result."""
+        raise NotImplementedError
+
+    def _told(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
+        """Sentences, table, sentences."""
+        raise NotImplementedError
+
+    def lines(self) -> list[str]:
+        """All that there is to say, as lines of text."""
+        above, cells, below = self._told()
+        return [self.title, *(f"  {line}" for line in (*above, *aligned(cells), *below))]
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the result on axes of matplotlib, those of a new figure by default, and return them."""
+        raise NotImplementedError
+
+    def _lines(self) -> list[str]:
+        title, *lines = self.lines()
+        return [f"{type(self).__name__}: {title}", *lines]
+
+    def _picture(self) -> str:
+        return picture(self.plot, self.title)
+
+    def _repr_html_(self) -> str:
+        above, cells, below = self._told()
+        shown = table(cells[0], cells[1:]) if cells else ""
+        return block(self.title, self._picture(), *map(words, above), shown, *map(words, below))
+
+
+def aligned(cells: Iterable[Sequence[str]], most: int | None = None) -> list[str]:
+    """Lines of a table, the columns below one another; at most so many, and how many more there are."""
+    cells = list(cells)
+    widths = [max(map(len, column)) for column in zip(*cells[:most], strict=True)]
+    lines = ["  ".join(map(str.ljust, row, widths)).rstrip() for row in cells[:most]]
+    return lines if most is None or len(cells) <= most else [*lines, f"and {len(cells) - most} more"]
+
+
+def axes_for(axes: Axes | None) -> Axes:
+    """The axes of matplotlib, or those of a new figure if there are none."""
+    from matplotlib.axes import Axes
+
+    if axes is None:
+        from matplotlib import pyplot
+
+        return pyplot.figure(layout="constrained").add_subplot()
+    if not isinstance(axes, Axes):
+        raise ParameterError("is not what is drawn on", field="axes", value=axes, allowed="axes of matplotlib, or None")
+    return axes
 
 
 def block(heading: str, *parts: str) -> str:

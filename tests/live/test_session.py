@@ -10,9 +10,9 @@ from chilopod.analysis.parameters import stiffness
 from chilopod.engine import Status
 from chilopod.errors import ParameterError
 from chilopod.live import Session, wishes
-from chilopod.live.state import STRIDES
+from chilopod.live.sliders import STRIDES
 from chilopod.robot import load_robot
-from chilopod.show.scene.replay import replay
+from chilopod.show import replay
 
 PLANAR = load_robot("aoi2022-planar")
 SOFT = wishes.Spring(0, stiffness(8.0))
@@ -154,7 +154,7 @@ def test_a_recording_is_of_one_floor_and_can_be_played():
     assert "stride = 0.025" in second.attrs["robot"].replace('"', "") or "2.5 cm" in second.attrs["robot"]
     gap = second.position.values[0] - first.position.values[-1]
     assert np.abs(gap).max() < 0.02
-    assert "<html" in replay(second, titles=["it"], heading="recorded")
+    assert "<html" in replay(second, titles=["it"], heading="recorded").html
 
 
 def test_a_recording_begun_again_at_once_is_another():
@@ -184,8 +184,11 @@ def test_a_robot_that_fails_stays_until_it_begins_anew():
 @pytest.mark.parametrize(
     ("asked", "part"),
     [
-        (wishes.Spring(0, float("nan")), "stiffness = nan: is no number"),
+        (wishes.Spring(0, float("nan")), "stiffness[0] = nan: is no number"),
         (wishes.Spring(None, -1.0), "springs.stiffness"),
+        (wishes.Spring(0, stiffness(99.0)), "springs.stiffness[0] = "),
+        (wishes.Spring(17, stiffness(9.0)), "there is no such slider"),
+        (wishes.Set("frictoin", 1.0), "did you mean 'friction'"),
         (wishes.Friction(float("inf")), "friction = inf"),
         (wishes.Friction(7.0), "0.3 to 3"),
         (wishes.Stride(0.0), f"{STRIDES[0] * PLANAR.gait.stride:g} to"),
@@ -211,6 +214,20 @@ def test_what_cannot_be_is_said_in_a_line_and_changes_nothing(asked, part):
     assert walking.settings == before
     walking.walk_on(1.0)
     assert walking.seen().status is Status.WALKED
+
+
+def test_a_slider_is_one_row_of_a_table():
+    begun = session()
+    before = begun.settings
+    for name, row in begun.sliders.items():
+        low, high = row.limits
+        assert low <= row.read(before) <= high
+        assert row.from_page(row.at_page(high)) == pytest.approx(high, rel=1e-8)
+        wish(begun, wishes.Set(name, 0.5 * (low + high)))
+        assert row.read(begun.settings) == pytest.approx(0.5 * (low + high))
+    assert not begun.said()
+    begun.walk_on(1.5)
+    assert begun.seen().status is Status.WALKED
 
 
 def test_a_flood_of_wishes_takes_no_room_and_the_last_counts():

@@ -67,7 +67,9 @@ def fit() -> Identification:
         coords={"forward_offset": ("forward_offset", offsets, {"units": "m"})},
     )
     robot = load_robot("aoi2022-planar")
-    return Identification(robot, robot, np.full(6, 0.5), np.zeros((1, 3)), np.full(6, -1.02), profile)
+    ranges = np.array([[231.0, 250.0], [0.06, 0.085], [0.04, 0.06]])
+    off, given = np.full(6, 0.5), np.full(6, -1.02)
+    return Identification(robot, robot, off, np.zeros((1, 3)), given, ranges, np.zeros((3, 2), dtype=bool), profile)
 
 
 @pytest.fixture(scope="session")

@@ -1,7 +1,6 @@
 """The picture and the replay of a course: what they say is what the record has."""
 
 import json
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,8 +13,6 @@ from chilopod.show.walked import files_of_walks, write_walks
 from chilopod.steering import STRATEGIES
 from helpers.html_page import Page
 from helpers.walks import on_course, walk
-
-_TESTS = Path(__file__).parents[1]
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ import re
 import numpy as np
 import pytest
 
-from chilopod.errors import ParameterError
+from chilopod.errors import OutputError, ParameterError
+from chilopod.show import replay
 from chilopod.show.scene.frames import body_frames
-from chilopod.show.scene.replay import replay
 from helpers.html_page import Page
 from helpers.walks import walk
 
@@ -32,7 +32,7 @@ def record():
 
 @pytest.fixture(scope="module")
 def html(record) -> str:
-    return replay(record, titles=["a <b> & c", "soft", "k₁", "d"], heading="Four </script> walks")
+    return replay(record, titles=["a <b> & c", "soft", "k₁", "d"], heading="Four </script> walks").html
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +86,7 @@ def test_outcomes_and_targets(data, record):
     assert kinds == ["arrived", "stopped", "ended", "stopped"]
     assert [aim["place"] for robot in data["robots"] for aim in robot["aims"]] == record.target.values.tolist()
     assert data["arrivalRadius"] == 0.15
-    straight = replay(walk(0.0), titles=["a"], heading="h")
+    straight = replay(walk(0.0), titles=["a"], heading="h").html
     assert "reached within" not in straight
     assert json.loads(Page(straight).data)["robots"][0]["aims"] == []
 
@@ -94,16 +94,40 @@ def test_outcomes_and_targets(data, record):
 def test_positions_beyond_all_bounds(record):
     wild = record.copy(deep=True)
     wild["position"][90:99, 1] = 1e300
-    points, _ = unpacked(json.loads(Page(replay(wild, titles="abcd", heading="h")).data), 1)
+    points, _ = unpacked(json.loads(Page(replay(wild, titles="abcd", heading="h").html).data), 1)
     assert np.isfinite(points).all()
     assert np.abs(points).max() < 100.0
 
 
 def test_page_is_small():
-    html = replay(walk(0.0, 0.5, -0.5, duration=25.0, step=0.01), titles="abc", heading="h")
+    html = replay(walk(0.0, 0.5, -0.5, duration=25.0, step=0.01), titles="abc", heading="h").html
     assert len(html.encode()) < 300_000
 
 
 def test_every_robot_needs_a_title(record):
     with pytest.raises(ParameterError, match="titles"):
         replay(record, titles=["only one"], heading="h")
+
+
+def test_notebook_plays_the_page():
+    shown = replay(walk(0.0, 0.6, duration=1.0), titles=['a "<b>"', "c"], heading='"Two" & <more>')
+    ((tag, frame),) = Page(shown._repr_html_()).tags
+    assert tag == "iframe"
+    assert frame["srcdoc"] == shown.html
+    assert frame["title"] == '"Two" & <more>'
+    assert frame["sandbox"] == "allow-scripts"
+
+
+def test_untitled_walks_are_numbered_and_few():
+    shown = replay(walk(*[0.1] * 8, duration=1.0))
+    assert shown.heading == "aoi2022-planar"
+    assert "walk 6" in shown.html
+    assert "walk 7" not in shown.html
+
+
+def test_written_page_is_not_replaced_unasked(tmp_path):
+    shown = replay(walk(0.0, duration=1.0))
+    shown.write(tmp_path / "walk.html")
+    assert (tmp_path / "walk.html").read_text(encoding="utf-8") == shown.html
+    with pytest.raises(OutputError):
+        shown.write(tmp_path / "walk.html")

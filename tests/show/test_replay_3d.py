@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from chilopod import load_robot
 from chilopod.errors import ParameterError
-from chilopod.show.scene.replay_3d import replay_3d
+from chilopod.show import replay
 from chilopod.steering import LegYawController
 from chilopod.twin import initial_states, simulate
 from chilopod.twin.model import compiled
@@ -39,7 +39,7 @@ def record():
 
 @pytest.fixture(scope="module")
 def html(record) -> str:
-    return replay_3d(record, titles=["a <b>", "k₁", "c"], heading="Three </script> walks")
+    return replay(record, titles=["a <b>", "k₁", "c"], heading="Three </script> walks").html
 
 
 @pytest.fixture(scope="module")
@@ -178,7 +178,7 @@ def test_robots_that_never_started_or_blew_up(record):
     for name in ("position", "heading", "joint_angle", "leg_yaw", "pose"):
         wild[name][:, 2] = np.nan
     wild["pose"][40:, 1] = 1e300
-    found = json.loads(Page(replay_3d(wild, titles="abc", heading="h")).data)
+    found = json.loads(Page(replay(wild, titles="abc", heading="h").html).data)
     assert np.isnan(coordinates(found, 2)).all()
     assert np.abs(coordinates(found, 1)).max() < 30.0
 
@@ -186,18 +186,16 @@ def test_robots_that_never_started_or_blew_up(record):
 def test_page_is_small():
     data = simulate([ROBOT] * 3, 1.0, poses=True)
     data = data.isel(time=np.tile(np.arange(100), 23)).assign_coords(time=0.01 * np.arange(2300))
-    assert len(replay_3d(data, titles="abc", heading="h").encode()) < 300_000
+    assert len(replay(data, titles="abc", heading="h").html.encode()) < 300_000
 
 
 def test_wrong_records(record):
-    with pytest.raises(ParameterError, match=r"poses=True") as caught:
-        replay_3d(record.drop_vars("pose"), titles="abc", heading="h")
+    with pytest.raises(ParameterError, match="allowed: 38") as caught:
+        replay(record.isel(coordinate=slice(30)), titles="abc", heading="h")
     assert "\n" not in str(caught.value)
-    with pytest.raises(ParameterError, match="allowed: 38"):
-        replay_3d(record.isel(coordinate=slice(30)), titles="abc", heading="h")
     with pytest.raises(ParameterError, match="titles"):
-        replay_3d(record, titles="a", heading="h")
+        replay(record, titles="a", heading="h")
     planar = record.copy()
     planar.attrs["robot"] = load_robot("aoi2022-planar").to_toml()
     with pytest.raises(ParameterError, match="twin"):
-        replay_3d(planar, titles="abc", heading="h")
+        replay(planar, titles="abc", heading="h")

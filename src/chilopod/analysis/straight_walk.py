@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +14,14 @@ from chilopod import stability, units
 from chilopod.analysis.parameters import K1, stiffness
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import ReadOnlyArrays, read_only
-from chilopod.notebook import block, table, words
+from chilopod.notebook import Summary, axes_for
 from chilopod.planar import PlanarModel
 from chilopod.robot import Robot
 from chilopod.stability import Kind
 from chilopod.stability.spectrum.errors import VERDICTS
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 ComplexArray = NDArray[np.complex128]
 
@@ -29,7 +32,7 @@ _LONGEST = 3600.0  # s
 
 
 @dataclass(frozen=True)
-class StraightWalk(ReadOnlyArrays):
+class StraightWalk(Summary, ReadOnlyArrays):
     """Stability of the straight walk.
 
     Attributes
@@ -78,20 +81,28 @@ class StraightWalk(ReadOnlyArrays):
             ],
         }
 
-    def _repr_html_(self) -> str:
-        rows = [
-            (f"{modulus:.6f}", f"{exponent.real:.5g}", f"{abs(exponent.imag):.5g}")
-            for modulus, exponent in zip(self.moduli, self.exponents.values, strict=True)
-        ]
-        return block(
-            f"{self.robot.name}: the straight walk is {self.verdict}",
-            words(f"The largest multipliers of {len(rows)}; the walk is stable if all are smaller than 1 in size."),
-            table(("size of the multiplier", "grows by (1/s)", "turns by (rad/s)"), rows, most=6),
-        )
+    @property
+    def title(self) -> str:
+        """Verdict in words."""
+        period = f"{self.robot.gait.period:g} s"
+        return f"{self.robot.name}: the straight walk is {self.verdict} (period {period})"
+
+    def _told(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
+        rows: list[Sequence[str]] = [("|multiplier|", "exponent (1/s)", "joint angles of the mode, front to rear")]
+        for modulus, exponent, components in zip(
+            self.moduli, self.exponents.values, self.joint_components, strict=True
+        ):
+            rows.append((f"{modulus:.6g}", _in_words(exponent, 6), "  ".join(map(_in_words, components))))
+        nearer = "; the largest is nearer to 1 than that" if self.stable is None else ""
+        return [], rows, [f"multipliers are within {self.exponents.multipliers.error_bound:.1e}{nearer}"]
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the multipliers beside the unit circle, see :meth:`chilopod.stability.Multipliers.plot`."""
+        return self.exponents.multipliers.plot(axes)
 
 
 @dataclass(frozen=True)
-class WalkBifurcation(ReadOnlyArrays):
+class WalkBifurcation(Summary, ReadOnlyArrays):
     """A bifurcation of the straight walk as one parameter of the robot changes.
 
     Attributes
@@ -137,20 +148,35 @@ class WalkBifurcation(ReadOnlyArrays):
             "coefficient": self.coefficient,
         }
 
-    def _repr_html_(self) -> str:
-        point, unit = self.point, self.unit.replace("*", "·")
-        said = [point.sentences]
+    @property
+    def title(self) -> str:
+        """Kind and place in words."""
+        unit = self.unit.replace("*", "·")
+        return f"{self.point.kind.label} at {self.parameter} = {self.value:.12g} {unit} (± {self.error_bound:.1e})"
+
+    def _told(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
+        point, above = self.point, [f"{self.point.kind.sentence}."]
+        if point.criticality.known:
+            above.append(f"{point.criticality.label}: {point.criticality.sentence}.")
+        above = [each[0].upper() + each[1:] for each in above]
         if self.coefficient is not None:
-            said.append(f"Cubic coefficient of the normal form: {self.coefficient:.5g} /rad².")
+            above.append(f"Cubic coefficient of the normal form: {self.coefficient:.6g} /rad².")
         if point.frequency:
-            said.append(f"The mode turns at {point.frequency:.5g} rad/s.")
-        mode = self.joint_components
-        joints = enumerate((f"{each:.3g}" for each in (mode.real if _is_real(mode) else mode)), start=1)
-        return block(
-            f"{point.kind.label} at {self.parameter} = {self.value:.10g} {unit} (± {self.error_bound:.1e})",
-            words(" ".join(said)),
-            table(("joint, front to rear", "angle in the critical mode"), joints),
-        )
+            cycle = 2.0 * math.pi / point.frequency
+            above.append(f"The mode turns at {point.frequency:.6g} rad/s, a cycle of {cycle:.4g} s.")
+        joints = [str(joint + 1) for joint in range(len(self.joint_components))]
+        angles = map(_in_words, self.joint_components)
+        return above, [("joint, front to rear", *joints), ("angle in the critical mode", *angles)], []
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the joint angles of the critical mode, front to rear."""
+        axes, joints = axes_for(axes), np.arange(1, len(self.joint_components) + 1)
+        axes.bar(joints, self.joint_components.real, 0.4, label="real part")
+        if not _is_real(self.joint_components):
+            axes.bar(joints + 0.4, self.joint_components.imag, 0.4, label="imaginary part")
+            axes.legend()
+        axes.set(xlabel="joint, front to rear", ylabel="angle in the critical mode", title=self.title)
+        return axes
 
 
 def straight_walk(robot: Robot, longest: float = _LONGEST) -> StraightWalk:
@@ -310,3 +336,8 @@ def _numbers(values: ComplexArray) -> list[Any]:
 
 def _is_real(values: ComplexArray) -> bool:
     return bool(np.abs(values.imag).max() < 1e-9)
+
+
+def _in_words(value: complex, digits: int = 3) -> str:
+    imaginary = "" if abs(value.imag) < 1e-9 else f"{value.imag:+.{digits}g}i"
+    return f"{value.real:.{digits}g}{imaginary}"

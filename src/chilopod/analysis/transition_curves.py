@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 from chilopod import units
 from chilopod.analysis.straight_walk import bifurcations
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.frozen import Short
-from chilopod.notebook import block, picture, table
+from chilopod.notebook import Summary, axes_for
 from chilopod.planar import PlanarModel
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.stability import Curve2, Kind, follow2
-from chilopod.stability.shown import axes_for, bounded, mark
+from chilopod.stability.shown import bounded, mark
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,7 +28,7 @@ Box = tuple[tuple[float, float], tuple[float, float]]
 
 
 @dataclass(frozen=True)
-class TransitionCurve(Short):
+class TransitionCurve(Summary):
     """A curve of bifurcations of the straight walk in the plane of two parameters, in SI units, with the dotted paths
     of the parameters and the units that they are shown in."""
 
@@ -59,13 +58,17 @@ class TransitionCurve(Short):
         pairs = zip(self.parameters, self.units, strict=True)
         return [f"{path} ({unit.replace('*', '·')})" for path, unit in pairs]
 
-    def _repr_html_(self) -> str:
-        heading = f"{self.curve.kind.label} in two parameters: {len(self.curve.points)} points"
+    @property
+    def title(self) -> str:
+        """Kind and number of points in words."""
+        return f"{self.curve.kind.label} in two parameters: {len(self.curve.points)} points"
+
+    def _told(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
         rows = [
             (each.kind.label, *map(bounded, self.shown(each.values), np.abs(self.shown(each.error_bound))))
             for each in self.curve.special
         ]
-        return block(heading, picture(self.plot, heading), table(("on it", *self._names), rows) if rows else "")
+        return [], [("on it", *self._names), *rows] if rows else [], []
 
 
 def family2(robot: Robot, parameters: tuple[str, str]) -> Callable[[float, float], PlanarModel]:

@@ -28,17 +28,17 @@ _COMPLETION = "_CHILOPOD_COMPLETE"  # variable by which a shell asks for complet
 app = new_app("Many-legged robots that turn by bifurcation: simulate, analyse and steer them.", completion=True)
 app.command("reproduce", short_help="Repeat the paper, and write a report beside its numbers.")(reproduce.reproduce)
 app.add_typer(robot.app, name="robot")
-app.command("stability", short_help="Does the straight walk hold? Its Floquet exponents.")(stability.stability)
-app.command("bifurcation", short_help="Where does the straight walk give way, and how?")(stability.bifurcation)
-app.command("branch", short_help="Follow the curved walks beyond: how tightly they turn.")(branch.branch)
-app.command("walk", short_help="Let a robot walk, and say where it gets to.")(walk.walk)
+app.command("stability", short_help="Stability of the straight walk: its Floquet exponents.")(stability.stability)
+app.command("bifurcation", short_help="Points at which the straight walk gives way, and how.")(stability.bifurcation)
+app.command("branch", short_help="Curved walks beyond that point: how tightly they turn.")(branch.branch)
+app.command("walk", short_help="Let a robot walk, and report where it gets to.")(walk.walk)
 app.command("turn", short_help="Pick the spring that leads to a target, and walk there.")(turn.turn)
-app.command("course", short_help="Walk from target to target, and say what became of each.")(course.course)
-app.command("live", short_help="Watch a robot walk in the browser, and change it meanwhile.")(live.live)
+app.command("course", short_help="Walk from target to target, and report on each.")(course.course)
+app.command("live", short_help="Watch a robot walk in the browser, and change it.")(live.live)
 app.command("play", short_help="Write a page in which the planar robot walks in any browser.")(play.play)
 app.add_typer(reproduce.identify_app, name="identify")
 app.add_typer(trials.app, name="trials")
-app.command("doctor", short_help="Is all here that chilopod needs, and what mends it?")(doctor.doctor)
+app.command("doctor", short_help="Check that all is here that chilopod needs, and mend it.")(doctor.doctor)
 
 
 @app.callback(invoke_without_command=True)
@@ -65,18 +65,10 @@ def _check_completion() -> None:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line.
+    """Run the command line on arguments, by default those of this process, and return its exit code.
 
-    Parameters
-    ----------
-    argv
-        Arguments after the program's name; by default those of this process.
-
-    Returns
-    -------
-    int
-        Exit code: 0, or 2 for anything the user can put right, 1 for a fault of chilopod, 3 where ``doctor`` finds that
-        something essential is missing, 130 when interrupted.
+    That is 0, or 2 for anything the user can put right, 1 for a fault of chilopod, 3 where ``doctor`` finds that
+    something essential is missing, 130 when interrupted.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     logging.getLogger("chilopod").disabled = True  # the progress bar says it

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -24,21 +25,29 @@ if TYPE_CHECKING:
 
 _BETWEEN = ("7.5 N*mm/deg", "20 N*mm/deg")
 
+BetweenOption = Annotated[
+    tuple[str, str] | None,
+    typer.Option(
+        metavar="LOW HIGH",
+        help='Interval; by default "7.5 N*mm/deg" "20 N*mm/deg", or that of the branch that is resumed.',
+    ),
+]
+PointsOption = Annotated[
+    int,
+    typer.Option(metavar="N", min=1, max=10_000, help="Largest number of points; with --resume, of further points."),
+]
+ResumeOption = Annotated[
+    Path | None,
+    typer.Option(metavar="FOLDER", help="Folder of a saved branch to go on with; without --out it grows there."),
+]
+
 
 @with_options
 def branch(
     options: RobotOptions,
     parameter: ParameterOption = "springs.stiffness[0]",
-    between: Annotated[
-        tuple[str, str] | None,
-        typer.Option(
-            metavar="LOW HIGH",
-            help='The interval; by default "7.5 N*mm/deg" "20 N*mm/deg", or that of the branch that is resumed.',
-        ),
-    ] = None,
-    points: Annotated[
-        int, typer.Option(metavar="N", min=1, max=10_000, help="How many points at most; with --resume, how many more.")
-    ] = 60,
+    between: BetweenOption = None,
+    points: PointsOption = 60,
     longest: Annotated[
         float,
         typer.Option(
@@ -49,21 +58,17 @@ def branch(
         ),
     ] = 0.15,
     left: Annotated[
-        bool, typer.Option("--left", help="Follow the left turn; it is the mirror image of the right.")
+        bool, typer.Option("--left", help="Follow the left turn, the mirror image of the right one.")
     ] = False,
     out: OutOption = None,
-    resume: Annotated[
-        Path | None,
-        typer.Option(metavar="FOLDER", help="Go on with the branch saved there; without --out it grows in its place."),
-    ] = None,
+    resume: ResumeOption = None,
 ) -> None:
     """Follow the curved walks from the pitchfork at which the straight walk gives way: how tightly they turn, how
-    fast and stable they are, folds and what else happens on the way.
+    fast and stable they are, folds and other points on the way.
 
-    The axis radius is that of the arc into which the body is bent, as in the paper; the path radius that of the circle
-    on the floor; the cost of transport is leg power over weight times speed.
-
-    Where a joint bends by more than a right angle, walks end: such points are out of range.
+    The axis radius is that of the arc of the body, as in the paper; the path radius that of the circle on the floor;
+    the cost of transport is leg power over weight times speed. Points at which a joint bends by more than a right
+    angle, where walks end, are out of range.
 
     With --out, draws the branch (unstable parts dashed, those out of range dotted) and writes it as netCDF and CSV;
     --resume goes on with it.
@@ -83,11 +88,7 @@ def branch(
 
         free(files_of("branch", folder), replace)
     with progress_bar("branch") as show:
-
-        def progress(done: float, words: str) -> None:
-            show("branch", done, words)
-
-        how: dict[str, Any] = {"points": points, "longest": longest, "progress": progress}
+        how: dict[str, Any] = {"points": points, "longest": longest, "progress": partial(show, "branch")}
         if saved is None:
             assert limits is not None
             data = curved_walks(described, parameter, limits, side=-1 if left else 1, **how)
@@ -99,22 +100,32 @@ def branch(
 
         return write_branch(data, folder, replace=replace) if folder else []
 
-    deliver(write, lambda: print_json(plain(data)) if options.as_json else _print(data))
+    deliver(write, lambda: print_json(plain(data)) if options.as_json else typer.echo("\n".join(_lines(data))))
 
 
-def _print(data: xr.Dataset) -> None:
+def _lines(data: xr.Dataset) -> list[str]:
+    from chilopod.notebook import aligned
+
     unit, about = data.parameter.attrs["units"], data.attrs
-    typer.echo(f"{about['robot']}: curved walks over {about['varied']}; the branch ends: {about['ending']}")
-    verdict = about["criticality"]
     agrees = "confirms" if about["direction_confirms"] == "yes" else "does not confirm"
-    typer.echo(f"  the normal form says {verdict}; the direction in which the branch leaves {agrees} it")
-    typer.echo(f"  {unit:<12} axis radius (m)  path radius (m)  speed (m/s)  cost of transport  stability")
+    cells = [(unit, "axis radius (m)", "path radius (m)", "speed (m/s)", "cost of transport", "stability")]
     for i in range(data.sizes["point"]):
         at = data.isel(point=i)
         special, verdict = str(at.special.values), str(at.verdict.values)
         # At a special point a multiplier is 1, and nothing else is to be said of stability.
         shown = special if special and verdict == "undecided" else ", ".join(filter(None, (special, verdict)))
-        typer.echo(
-            f"  {float(at.parameter):<12.6g} {float(at.axis_radius):<15.4g}  {float(at.path_radius):<15.4g}  "
-            f"{float(at.speed):<11.4g}  {float(at.cost_of_transport):<17.3g}  {shown}"
+        radii = f"{float(at.axis_radius):.4g}", f"{float(at.path_radius):.4g}"
+        cells.append(
+            (
+                f"{float(at.parameter):.6g}",
+                *radii,
+                f"{float(at.speed):.4g}",
+                f"{float(at.cost_of_transport):.3g}",
+                shown,
+            )
         )
+    return [
+        f"{about['robot']}: curved walks over {about['varied']}; the branch ends: {about['ending']}",
+        f"  the normal form says {about['criticality']}; the direction in which the branch leaves {agrees} it",
+        *(f"  {line}" for line in aligned(cells)),
+    ]

@@ -7,21 +7,19 @@ import platform
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 import typer
 
 from chilopod.cli.options import JsonOption, print_json
 from chilopod.cli.progress import progress_bar
+from chilopod.errors import OutputError, briefly
 
 _PACKAGES = {
-    "numpy": "numpy",
-    "scipy": "scipy",
-    "numba": "numba",
+    **{name: name for name in ("numpy", "scipy", "numba")},
     "mujoco": "mujoco-core",
-    "xarray": "xarray",
-    "matplotlib": "matplotlib",
-    "av": "av",
+    **{name: name for name in ("xarray", "matplotlib", "av")},
 }
 """Packages that are imported, and their names where they come from."""
 
@@ -31,21 +29,7 @@ BROKEN = 3
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at.
-
-    Attributes
-    ----------
-    name
-        Name of the check.
-    says
-        Result of the check.
-    mend
-        The line that mends it; empty if nothing is missing.
-    essential
-        True if nothing works without it.
-    looked
-        True if it could be looked at.
-    """
+    """Result of a check, and the line that mends what is missing; it is essential if nothing works without it."""
 
     name: str
     says: str
@@ -55,34 +39,26 @@ class Finding:
 
     @property
     def mark(self) -> str:
-        """For those who skim."""
+        """Sign for readers who skim."""
         return "✗" if self.mend else "✓" if self.looked else "?"
+
+    def as_json(self) -> dict[str, object]:
+        """Plain values; null for what was not found, and where nothing is to be mended."""
+        found, mend = self.says if self.looked else None, self.mend or None
+        return {"name": self.name, "found": found, "mend": mend, "essential": self.essential}
 
 
 def doctor(as_json: JsonOption = False) -> None:
-    """Say what is here that chilopod needs, and of everything that is missing the one line that mends it.
+    """Check that everything is here that chilopod needs, and show the line that mends what is missing.
 
     The exit code is 0, or 3 if something is missing that nothing works without. Without OpenGL or an encoder all but
     films and pictures in 3-D works.
     """
     with progress_bar("doctor"):
-        found = [
-            finding
-            for look in (_versions, _processor, _cores, _cache, _drawing, _encoder, _fonts)
-            for finding in look()
-        ]
+        found = [*_versions(), *(_guarded(name, look) for name, look in _LOOKS.items())]
     broken = any(each.mend and each.essential for each in found)
     if as_json:
-        findings = [
-            {
-                "name": each.name,
-                "found": each.says if each.looked else None,
-                "mend": each.mend or None,
-                "essential": each.essential,
-            }
-            for each in found
-        ]
-        print_json({"healthy": not broken, "findings": findings})
+        print_json({"healthy": not broken, "findings": [each.as_json() for each in found]})
     else:
         width = max(len(each.name) for each in found)
         for each in found:
@@ -128,10 +104,6 @@ def _version(package: str) -> str:
 
 def _fault(module: str) -> str:
     """Why a package cannot be imported; empty if it can."""
-    from importlib import import_module
-
-    from chilopod.errors import briefly
-
     try:
         import_module(module)
     except Exception as error:  # packages with compiled parts fail in many ways
@@ -139,101 +111,81 @@ def _fault(module: str) -> str:
     return ""
 
 
-def _processor() -> list[Finding]:
-    from chilopod.processor import blas_kernels, compiled_for, processor
+def _kernels() -> tuple[str, ...]:
+    from chilopod.processor import blas_kernels
 
-    def kernels() -> Finding:
-        return Finding("BLAS kernels", ", ".join(f"{blas_kernels(name)} ({name})" for name in ("numpy", "scipy")))
-
-    for_what = _guarded("compiled for", lambda: Finding("compiled for", compiled_for()))
-    return [Finding("processor", processor()), for_what, _guarded("BLAS kernels", kernels)]
+    return (", ".join(f"{blas_kernels(name)} ({name})" for name in ("numpy", "scipy")),)
 
 
-def _cores() -> list[Finding]:
-    from chilopod.cores import cores
-
-    found = [Finding("cores", f"{cores()} to be used")]
-
-    def threads() -> Finding:
-        import numba
-
-        return Finding("numba threads", str(numba.get_num_threads()))
-
-    return [*found, _guarded("numba threads", threads)]
-
-
-def _cache() -> list[Finding]:
-    def cache() -> Finding:
-        from chilopod.planar.linear import propagate_batch
-
-        folder, mend = propagate_batch.stats.cache_path, "set NUMBA_CACHE_DIR to a folder that can be written"
-        if folder is None:
-            return Finding("compile cache", "no folder can be written, so every start compiles anew", mend)
-        try:
-            return Finding("compile cache", str(check_folder(folder)))
-        except OutputError as error:
-            return Finding("compile cache", f"{error}, so every start compiles anew", mend)
-
-    from chilopod.errors import OutputError
+def _cache() -> tuple[str, ...]:
     from chilopod.output import check_folder
+    from chilopod.planar.linear import propagate_batch
 
-    return [_guarded("compile cache", cache)]
-
-
-def _drawing() -> list[Finding]:
-    def drawing() -> Finding:
-        from chilopod.twin import gl
-
-        found = gl.find()
-        if found.backend is None:
-            return Finding("OpenGL", f"{found.missing}; all but films and stills in 3-D works", found.mend)
-        return Finding("OpenGL", f"{found.backend}: {found.renderer}")
-
-    return [_guarded("OpenGL", drawing)]
+    folder, problem = propagate_batch.stats.cache_path, "no folder can be written"
+    try:
+        if folder is not None:
+            return (str(check_folder(folder)),)
+    except OutputError as error:
+        problem = str(error)
+    return f"{problem}, so every start compiles anew", "set NUMBA_CACHE_DIR to a folder that can be written"
 
 
-def _encoder() -> list[Finding]:
-    def encoder() -> Finding:
-        from chilopod.show.scene.encoder import has_encoder
+def _drawing() -> tuple[str, ...]:
+    from chilopod.twin import gl
 
-        if not has_encoder():
-            return Finding("mp4 encoder", "PyAV has no H.264; all but mp4 films works", _again("av"))
-        return Finding("mp4 encoder", "H.264")
-
-    return [_guarded("mp4 encoder", encoder)]
+    found = gl.find()
+    if found.backend is None:
+        return f"{found.missing}; all but films and stills in 3-D works", found.mend
+    return (f"{found.backend}: {found.renderer}",)
 
 
-def _fonts() -> list[Finding]:
-    def fonts() -> Finding:
-        import matplotlib as mpl
-        from matplotlib.font_manager import FontProperties, findfont
+def _encoder() -> tuple[str, ...]:
+    from chilopod.show.scene.encoder import has_encoder
 
-        from chilopod.show.style import house_style
+    return ("H.264",) if has_encoder() else ("PyAV has no H.264; all but mp4 films works", _again("av"))
 
-        with house_style():
-            families = list(mpl.rcParams["font.family"])
-        missing = []
-        for family in families:
-            try:
-                findfont(FontProperties(family=[family]), fallback_to_default=False)
-            except ValueError:
-                missing.append(family)
-        if missing:
-            return Finding("fonts", f"no {', '.join(missing)}; figures take another", _again("matplotlib"))
-        return Finding("fonts", ", ".join(families))
 
-    return [_guarded("fonts", fonts)]
+def _fonts() -> tuple[str, ...]:
+    import matplotlib as mpl
+    from matplotlib.font_manager import FontProperties, findfont
+
+    from chilopod.show.style import house_style
+
+    with house_style():
+        families = list(mpl.rcParams["font.family"])
+    missing = []
+    for family in families:
+        try:
+            findfont(FontProperties(family=[family]), fallback_to_default=False)
+        except ValueError:
+            missing.append(family)
+    if missing:
+        return f"no {', '.join(missing)}; figures take another", _again("matplotlib")
+    return (", ".join(families),)
+
+
+_LOOKS: dict[str, Callable[[], tuple[str, ...]]] = {
+    "processor": lambda: (import_module("chilopod.processor").processor(),),
+    "compiled for": lambda: (import_module("chilopod.processor").compiled_for(),),
+    "BLAS kernels": _kernels,
+    "cores": lambda: (f"{import_module('chilopod.cores').cores()} to be used",),
+    "numba threads": lambda: (str(import_module("numba").get_num_threads()),),
+    "compile cache": _cache,
+    "OpenGL": _drawing,
+    "mp4 encoder": _encoder,
+    "fonts": _fonts,
+}
+"""Further checks: what is found, and, where something is missing, what mends it."""
 
 
 def _again(package: str) -> str:
     return f"{Path(sys.executable).name or 'python'} -m pip install --force-reinstall {package}"
 
 
-def _guarded(name: str, look: Callable[[], Finding]) -> Finding:
+def _guarded(name: str, look: Callable[[], tuple[str, ...]]) -> Finding:
     """Finding of a check, even where a package that it takes is not there."""
-    from chilopod.errors import briefly
-
     try:
-        return look()
+        says, *mend = look()
+        return Finding(name, says, "".join(mend))
     except Exception as error:  # said once more, among the versions, with what mends it
         return Finding(name, f"cannot be looked at: {briefly(error)}", looked=False)

@@ -24,51 +24,56 @@ def _strategies() -> list[str]:
     return list(ON_THE_WAY)
 
 
+StrategyOption = Annotated[
+    str,
+    typer.Option(
+        metavar="variable|leg-yaw|actuated",
+        help="Strategy on the way to a target; the page can change it.",
+        autocompletion=_strategies,
+    ),
+]
+HostOption = Annotated[
+    str,
+    typer.Option(
+        metavar="ADDRESS",
+        help="Address to listen at, by default for this machine only. At any other address, such as 0.0.0.0 (all), "
+        "a browser needs the token in the printed link.",
+    ),
+]
+TokenOption = Annotated[
+    bool, typer.Option("--token", help="Require the token on this machine too, where others use it as well.")
+]
+
+
 def live(
     robot: Annotated[
-        str, typer.Argument(metavar="[ROBOT]", help="A robot file, or one of the presets aoi2022 and aoi2022-planar.")
+        str, typer.Argument(metavar="[ROBOT]", help="Robot file, or one of the presets aoi2022 and aoi2022-planar.")
     ] = "aoi2022-planar",
     engine: EngineOption = "planar",
-    strategy: Annotated[
-        str,
-        typer.Option(
-            metavar="variable|leg-yaw|actuated",
-            help="How it goes to a target; the page can change it.",
-            autocompletion=_strategies,
-        ),
-    ] = "variable",
+    strategy: StrategyOption = "variable",
     seed: Annotated[
         int,
         typer.Option(metavar="N", min=0, max=LARGEST_SEED, help="Seed of the start and of the nudges of the floor."),
     ] = 1,
-    host: Annotated[
-        str,
-        typer.Option(
-            metavar="ADDRESS",
-            help="Address to listen at: by default for this machine only. At any other address, such as 0.0.0.0 (all), "
-            "a browser needs the token in the link that is printed.",
-        ),
-    ] = "127.0.0.1",
+    host: HostOption = "127.0.0.1",
     port: Annotated[int, typer.Option(metavar="N", help="Port to listen at; 0 for any that is free.")] = 8080,
-    token: Annotated[
-        bool, typer.Option("--token", help="Want the token on this machine too, for one that others use as well.")
-    ] = False,
+    token: TokenOption = False,
     duration: Annotated[
-        str | None, typer.Option(metavar="TIME", help='End by itself after so long, such as "10 min".')
+        str | None, typer.Option(metavar="TIME", help='Time after which the page ends by itself, such as "10 min".')
     ] = None,
-    browser: Annotated[bool, typer.Option("--open", help="Open it in a browser too.")] = False,
+    browser: Annotated[bool, typer.Option("--open", help="Open the page in a browser too.")] = False,
     overrides: SetOption = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="FOLDER", help="Keep recordings here too, besides the downloads of the browser."),
+        typer.Option("--out", metavar="FOLDER", help="Folder for recordings, besides the downloads of the browser."),
     ] = None,
     force: ForceOption = False,
 ) -> None:
-    """A robot that walks in the browser, while you change it.
+    """Show a robot that walks in the browser while you change it.
 
-    Drag the first spring below the pitchfork and watch it bend; click on the floor, and it goes there; drag a joint.
-    Only the page itself can do so: what comes from other web sites is refused. Ctrl-C ends it, and keeps what is being
-    recorded. Needs: pip install "chilopod[live]".
+    Drag the first spring below the pitchfork and the robot bends; click on the floor and it goes there; drag a joint.
+    Requests of other web sites are refused. Ctrl-C ends the page and keeps a recording that is under way. Needs: pip
+    install "chilopod[live]".
     """
     from chilopod import units
     from chilopod.errors import ParameterError

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from chilopod.tasks.runs import Runs
 
 Found = TypeVar("Found", bound="Runs")
-STAYS_STRAIGHT = "nothing disturbed it, so nothing bends it, even where the straight walk is unstable"
-
 
 _TYPED_AS = {"joint_angles": "initial_joints", "spring": "k1"}
 """Options that are called otherwise than the argument of the function that they are for."""
@@ -45,15 +43,15 @@ def _strategies() -> list[str]:
 
 
 RobotArg = Annotated[
-    str, typer.Argument(metavar="ROBOT", help="A robot file, or one of the presets aoi2022 and aoi2022-planar.")
+    str, typer.Argument(metavar="ROBOT", help="Robot file, or one of the presets aoi2022 and aoi2022-planar.")
 ]
 SetOption = Annotated[
     list[str] | None,
     typer.Option(
         "--set",
         metavar="PATH=VALUE",
-        help='Change a number of the robot, such as "springs.stiffness[0]=12 N*mm/deg"; may be repeated. '
-        "`chilopod robot show` lists them all.",
+        help='Other value of a number of the robot, such as "springs.stiffness[0]=12 N*mm/deg"; may be repeated. '
+        "`chilopod robot show` lists all numbers.",
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout instead of text.")]
@@ -61,16 +59,18 @@ ParameterOption = Annotated[
     str,
     typer.Option(
         metavar="PATH",
-        help="Which number of the robot to vary, such as springs.stiffness[0], the first yaw spring (the paper's k1), "
-        "or springs.stiffness, all of them together.",
+        help="Number of the robot that varies, such as springs.stiffness[0], the first yaw spring (the paper's k1), or "
+        "springs.stiffness, all springs together.",
     ),
 ]
 BetweenOption = Annotated[
     tuple[str, str],
-    typer.Option(metavar="LOW HIGH", help='Between which values, with their unit, such as "2 N*mm/deg" "75 N*mm/deg".'),
+    typer.Option(
+        metavar="LOW HIGH", help='Interval of its values, with their unit, such as "2 N*mm/deg" "75 N*mm/deg".'
+    ),
 ]
 OutOption = Annotated[
-    Path | None, typer.Option("--out", metavar="FOLDER", help="Write the results into this folder too.")
+    Path | None, typer.Option("--out", metavar="FOLDER", help="Folder for the results, besides the text.")
 ]
 ForceOption = Annotated[bool, typer.Option("--force", help="Replace files that are already there.")]
 SeedOption = Annotated[
@@ -78,16 +78,16 @@ SeedOption = Annotated[
     typer.Option(
         metavar="N",
         min=0,
-        help="Disturb start, feet and sensor a little, at random; the same seed disturbs in the same way. Without it "
-        "nothing is disturbed.",
+        help="Seed of small random disturbances of start, feet and sensor; the same seed gives the same walk. Without "
+        "it nothing is disturbed.",
     ),
 ]
 EngineOption = Annotated[
     str,
     typer.Option(
         metavar="planar|twin|MODULE:OBJECT",
-        help="What computes the walk: the paper's planar model, the whole robot in three dimensions (MuJoCo; a robot "
-        "with a [twin] section, such as aoi2022), or an engine of your own.",
+        help="Engine that computes the walk. planar: the paper's model; twin: the whole robot in three dimensions, by "
+        "MuJoCo (needs a [twin] section, as in aoi2022); or an engine of your own.",
         autocompletion=_engines,
     ),
 ]
@@ -95,28 +95,32 @@ StrategyOption = Annotated[
     str,
     typer.Option(
         metavar="pitchfork|hopf|leg-yaw|open-loop",
-        help="How it turns. pitchfork: a soft first spring, and the legs of module 1 yaw towards the target; hopf: all "
-        "springs alike and soft, with leg yaw; leg-yaw: leg yaw alone; open-loop: a soft first spring alone.",
+        help="Strategy of turning. pitchfork: soft first spring, and legs of module 1 that yaw towards the target; "
+        "hopf: all springs alike and soft, with leg yaw; leg-yaw: leg yaw alone; open-loop: soft first spring alone.",
         autocompletion=_strategies,
     ),
 ]
 ControllerOption = Annotated[
     str | None,
-    typer.Option(metavar="MODULE:CLASS", help="A controller of your own, from this folder or an installed package."),
+    typer.Option(metavar="MODULE:CLASS", help="Controller of your own, from this folder or an installed package."),
 ]
 TrialsOption = Annotated[
     Path | None,
-    typer.Option("--trials", metavar="FOLDER", help="Keep all trials here, and walk none that is there already."),
+    typer.Option(
+        "--trials",
+        metavar="FOLDER",
+        help="Folder that keeps all trials; a trial that is there already is not walked again.",
+    ),
 ]
 RepeatsOption = Annotated[
-    int, typer.Option(metavar="N", min=1, max=100_000, help="How many walks, with seeds counting up from --seed.")
+    int, typer.Option(metavar="N", min=1, max=100_000, help="Number of walks; their seeds count up from --seed.")
 ]
 ClusterOption = Annotated[
     str | None,
     typer.Option(
         "--cluster",
         metavar="ADDRESS|N",
-        help="Trials walk on a dask cluster: the address of its scheduler, or N worker processes on this machine.",
+        help="Dask cluster on which trials walk: address of its scheduler, or number of worker processes here.",
     ),
 ]
 
@@ -162,15 +166,7 @@ class _App(typer.Typer):
 
 
 def new_app(help_text: str, *, completion: bool = False) -> typer.Typer:
-    """Return an empty group of commands with the settings all groups share.
-
-    Parameters
-    ----------
-    help_text
-        Help text of the command.
-    completion
-        True if it has the options that make a shell complete its commands; only the outermost can.
-    """
+    """An empty group of commands with the settings all groups share; only the outermost can complete commands."""
     # Help without rich: importing it costs a third of what --help may take. Tracebacks are the business of `main`.
     app = _App(
         help=help_text,
@@ -233,12 +229,15 @@ class RobotOptions:
         free(files, self.force)
         return files
 
-    def deliver_json(self, files: Sequence[Path], result: dict[str, Any], show: Callable[[], None]) -> None:
-        """Write a result into these files as JSON, and print it."""
+    def deliver_json(self, files: Sequence[Path], result: dict[str, Any], lines: Iterable[str]) -> None:
+        """Write a result into these files as JSON, and print it as that or as lines of text."""
         from chilopod.output import write_all
 
         texts = [(file, json_text(result) + "\n") for file in files]
-        deliver(lambda: write_all(texts, replace=self.force), lambda: print_json(result) if self.as_json else show())
+        deliver(
+            lambda: write_all(texts, replace=self.force),
+            lambda: print_json(result) if self.as_json else typer.echo("\n".join(lines)),
+        )
 
 
 @dataclass(frozen=True)
@@ -274,13 +273,7 @@ class WalkOptions(RobotOptions):
         with progress_bar(what) as show, own_code(show), walking_on(self.cluster):
             yield lambda title: partial(show, title)
 
-    def walk_into(
-        self,
-        out: Path | None,
-        what: str,
-        walk: Callable[[Callable[[str], Progress]], Found],
-        show: Callable[[Found], None],
-    ) -> None:
+    def walk_into(self, out: Path | None, what: str, walk: Callable[[Callable[[str], Progress]], Found]) -> None:
         """Walk a ``turn`` or a ``course``, write its files into the folder, if there is one, and print it."""
         if out:
             from chilopod.show.walked import files_of_walks
@@ -292,12 +285,13 @@ class WalkOptions(RobotOptions):
         def write() -> Iterable[Path]:
             from chilopod.show.walked import write_walks
 
-            return write_walks(what, done, out, replace=self.force) if out else ()
+            return write_walks(what, done, out or "", replace=self.force)
 
-        self.deliver(write, done, show)
+        self.deliver(write if out else list, done)
 
-    def deliver(self, write: Callable[[], Iterable[Path]], done: Found, show: Callable[[Found], None]) -> None:
-        """Write the files of walks, and print what they came to, as JSON where that was asked for."""
+    def deliver(self, write: Callable[[], Iterable[Path]], done: Found, hint: str = "--seed 1") -> None:
+        """Write the files of walks, and print what they came to, as JSON where that was asked for; of walks that
+        nothing bends the hint says which options do."""
 
         def printed() -> None:
             with progress_bar("creep of the feet"):  # may take as long as the walk
@@ -305,7 +299,9 @@ class WalkOptions(RobotOptions):
             if self.as_json:
                 print_json(done.as_json())
                 return
-            show(done)
+            typer.echo("\n".join(done.lines()))
+            if getattr(done, "straight", False):
+                typer.echo(f"  nothing disturbed it, so nothing bends it, even where it is unstable: try {hint}")
             if creeps is not None:
                 typer.echo(f"  standing feet creep like viscous ones of {creeps:.0f} N*s/m")
 
@@ -350,15 +346,6 @@ def json_text(result: dict[str, Any]) -> str:
     return json.dumps(result, indent=2, allow_nan=False)
 
 
-def print_table(rows: Iterable[Sequence[str]], indent: str = "") -> None:
-    """Print rows in columns, the first of them as headings."""
-    table = list(rows)
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    for line in table:
-        cells = (f"{cell:<{width}}" for cell, width in zip(line, widths, strict=True))
-        typer.echo(f"{indent}{'  '.join(cells)}".rstrip())
-
-
 def free(paths: Iterable[Path], force: bool) -> None:
     """Make sure, before any work is done for them, that files can be written and replace none without ``--force``."""
     from chilopod.output import check_files
@@ -367,15 +354,7 @@ def free(paths: Iterable[Path], force: bool) -> None:
 
 
 def deliver(write: Callable[[], Iterable[Path]], show: Callable[[], None]) -> None:
-    """Write the files of a result, say so on stderr, and print the result, also where a file cannot be written.
-
-    Parameters
-    ----------
-    write
-        Gives what it wrote.
-    show
-        Prints.
-    """
+    """Write the files of a result, name them on stderr, and print the result, also where a file cannot be written."""
     from chilopod.errors import OutputError
 
     failure = None

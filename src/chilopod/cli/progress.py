@@ -21,18 +21,8 @@ _Told = dict[str, tuple[float, str]]
 
 @contextmanager
 def progress_bar(doing: str) -> Iterator[Callable[[str, float, str], None]]:
-    """Show progress on stderr while the block runs, if that takes a moment.
-
-    Parameters
-    ----------
-    doing
-        Description of the work, shown until the work reports its own.
-
-    Yields
-    ------
-    A function of a title, the part done (0 to 1), and a few words about the current step. Between two of its calls it
-    is shown that the work goes on.
-    """
+    """Show progress on stderr while the block runs, if that takes a moment: what is done until the work calls the
+    function it gets with a title, the part done (0 to 1), and a few words about the current step."""
     told: _Told = {}
     over = threading.Event()
 

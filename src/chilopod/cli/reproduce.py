@@ -189,11 +189,7 @@ def planar(
         if as_json:
             print_json(result)
             return
-        for name, value in result["constants"].items():
-            typer.echo(f"{name} = {value['text']}  (rounding of the printed numbers allows {value['allowed_text']})")
-        residual = result["largest_residual"]
-        typer.echo(f"largest residual {residual:.2f}: 1 is what rounding of the printed numbers allows")
-        typer.echo(f"profile, figure and robot file are in {out}")
+        typer.echo("\n".join([*found.lines(), f"profile, figure and robot file are in {out}"]))
 
     deliver(write, show)
 

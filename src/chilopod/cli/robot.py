@@ -7,16 +7,7 @@ from typing import Annotated
 
 import typer
 
-from chilopod.cli.options import (
-    ForceOption,
-    JsonOption,
-    RobotArg,
-    SetOption,
-    new_app,
-    print_json,
-    read_robot,
-    reading,
-)
+from chilopod.cli.options import ForceOption, JsonOption, RobotArg, SetOption, new_app, print_json, read_robot, reading
 
 _PLANAR, _WHOLE = "aoi2022-planar", "aoi2022"
 
@@ -25,26 +16,27 @@ app = new_app("Make, show, check and export robot files.")
 
 @app.command()
 def new(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="The robot file to write, such as my.toml.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Robot file to write, such as my.toml.")],
     modules: Annotated[
         str | None,
         typer.Option(
-            metavar="N", help="Number of modules; length and mass stay those of the whole, the last spring is repeated."
+            metavar="N",
+            help="Number of modules; the whole robot keeps its length and mass, the last spring is repeated.",
         ),
     ] = None,
     preset: Annotated[
         str | None,
         typer.Option(
             metavar="ROBOT",
-            help=f"The robot to start from, a preset or a file; by default {_PLANAR}, with --twin {_WHOLE}.",
+            help=f"Robot to start from, a preset or a file; by default {_PLANAR}, with --twin {_WHOLE}.",
         ),
     ] = None,
     twin: Annotated[
         bool,
         typer.Option(
             "--twin",
-            help="With a [twin] section, so that it walks in three dimensions too; where the robot to start from has "
-            f"none, that of {_WHOLE}.",
+            help="Write a [twin] section, so that the robot walks in three dimensions too; that of "
+            f"{_WHOLE} where the robot to start from has none.",
         ),
     ] = False,
     overrides: SetOption = None,
@@ -71,6 +63,7 @@ def new(
 def show(robot: RobotArg, overrides: SetOption = None, as_json: JsonOption = False) -> None:
     """Print every number of a robot, its unit, and where it comes from."""
     from chilopod import units
+    from chilopod.notebook import aligned
 
     described = read_robot(robot, overrides)
     derived = {
@@ -102,10 +95,7 @@ def show(robot: RobotArg, overrides: SetOption = None, as_json: JsonOption = Fal
         return
     rows = described.listed()
     rows += [(name, units.format(value, unit, digits=6), "derived") for name, (value, unit) in derived.items()]
-    widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
-    typer.echo(described.name)
-    for name, quantity, origin in rows:
-        typer.echo(f"  {name:<{widths[0]}}  {quantity:<{widths[1]}}  {origin}".rstrip())
+    typer.echo("\n  ".join([described.name, *aligned(rows)]))
 
 
 @app.command()
@@ -127,7 +117,7 @@ def check(robot: RobotArg, overrides: SetOption = None, as_json: JsonOption = Fa
 def export(
     robot: RobotArg,
     out: Annotated[
-        Path, typer.Option("--out", metavar="FILE", help="The file to write: .xml for MJCF (MuJoCo), .urdf for URDF.")
+        Path, typer.Option("--out", metavar="FILE", help="File to write: .xml for MJCF (MuJoCo), .urdf for URDF.")
     ],
     overrides: SetOption = None,
     force: ForceOption = False,

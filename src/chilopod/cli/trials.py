@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from chilopod.cli.options import JsonOption, new_app, print_json, print_table
+from chilopod.cli.options import JsonOption, new_app, print_json
 from chilopod.cli.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -24,19 +24,20 @@ app = new_app("List, check and clean a folder in which trials are kept.")
 FolderArg = Annotated[
     Path,
     typer.Argument(
-        metavar="FOLDER", help="What --trials was given; of a report the folder trials in it, such as report/trials."
+        metavar="FOLDER", help="Folder that --trials named; of a report its folder trials, such as report/trials."
     ),
 ]
 
 
 @app.command("list")
 def listed(folder: FolderArg, as_json: JsonOption = False) -> None:
-    """Say which trials are kept in a folder: of which robots, how long, with which seeds.
+    """List the trials in a folder: robots, durations, targets and seeds.
 
-    Only the front of every file is read, ten thousand in some seconds; `chilopod trials check` reads all of it. Robots
-    of one name that differ in their numbers are counted.
+    Only the front of every file is read; `chilopod trials check` reads all of it. The column robots counts robots of
+    one name that differ in their numbers.
     """
     from chilopod.memory import in_words
+    from chilopod.notebook import aligned
     from chilopod.trials.folder import contents, groups, kept
 
     there = contents(folder)
@@ -45,89 +46,71 @@ def listed(folder: FolderArg, as_json: JsonOption = False) -> None:
     rows, size = groups(trials), sum(each.size for each in trials)
     others = sum(not each.found for each in trials)
     if as_json:
-        print_json(
-            {
-                "folder": str(folder),
-                "trials": len(trials),
-                "bytes": size,
-                "of_other_versions": others,
-                "unreadable": [path.name for path, _ in wrong],
-                "set_aside": [path.name for path in there.aside],
-                "unfinished": [path.name for path in there.unfinished],
-                "foreign": [path.name for path in there.foreign],
-                "groups": [
-                    {
-                        "robot": row.robot,
-                        "robots": row.robots,
-                        "engine": row.engine,
-                        "controller": row.controller,
-                        "duration_s": row.duration,
-                        **_target_json(row),
-                        "seeds": _ranges(row.seeds),
-                        "trials": row.count,
-                        "bytes": row.size,
-                        "of_this_version": row.found,
-                    }
-                    for row in rows
-                ],
-            }
-        )
+        found = {"trials": len(trials), "bytes": size, "of_other_versions": others}
+        files = {
+            "unreadable": [path.name for path, _ in wrong],
+            "set_aside": [path.name for path in there.aside],
+            "unfinished": [path.name for path in there.unfinished],
+            "foreign": [path.name for path in there.foreign],
+        }
+        print_json({"folder": str(folder), **found, **files, "groups": [_as_json(row) for row in rows]})
         return
-    _print_table(rows)
+    if rows:
+        head = ("robot", "engine", "walk", "target", "controller", "robots", "seeds", "trials", "size")
+        typer.echo("\n".join(aligned([head, *map(_cells, rows)])))
     typer.echo(f"{_trials(len(trials))}, {in_words(size)}")
     if others:
         typer.echo(f"{_trials(others)} of another version: this one does not find them (clean --old removes them)")
     for paths, words in (
-        ([path for path, _ in wrong], "not to be read (chilopod trials check says why)"),
+        ([path for path, _ in wrong], "that cannot be read (chilopod trials check says why)"),
         (there.aside, "set aside, because they were not what they should be (chilopod trials clean removes them)"),
-        (there.unfinished, "being written, or left over by who was killed (chilopod trials clean removes the latter)"),
+        (
+            there.unfinished,
+            "being written, or left over by a killed process (chilopod trials clean removes the latter)",
+        ),
         (there.foreign, "not written by chilopod"),
     ):
         if paths:
             typer.echo(f"{len(paths)} file{'s' * (len(paths) > 1)} {words}")
 
 
-def _print_table(rows: Sequence[Group]) -> None:
+def _as_json(row: Group) -> dict[str, Any]:
+    """A group of trials; of several targets there is only their number."""
+    one = row.target if isinstance(row.target, tuple) else None
+    return {
+        "robot": row.robot,
+        "robots": row.robots,
+        "engine": row.engine,
+        "controller": row.controller,
+        "duration_s": row.duration,
+        "target": {"bearing_rad": one[0], "distance_m": one[1]} if one else None,
+        "targets": 1 if one else row.target or 0,
+        "seeds": _ranges(row.seeds),
+        "trials": row.count,
+        "bytes": row.size,
+        "of_this_version": row.found,
+    }
+
+
+def _cells(row: Group) -> tuple[str, ...]:
     from chilopod.memory import in_words
 
-    table = [("robot", "engine", "walk", "target", "controller", "robots", "seeds", "trials", "size")]
-    for row in rows:
-        table.append(
-            (
-                row.robot,
-                row.engine,
-                f"{row.duration:g} s",
-                _target(row),
-                row.controller.rpartition(":")[2] if row.controller else "-",
-                str(row.robots),
-                _ranges(row.seeds) or "-",
-                str(row.count),
-                f"{in_words(row.size)}{'' if row.found else ', another version'}",
-            )
-        )
-    print_table(table if rows else ())
-
-
-def _target(row: Group) -> str:
+    target = f"course of {row.target}" if row.target else "-"
     if isinstance(row.target, tuple):
-        return f"{math.degrees(row.target[0]):.4g} deg, {row.target[1]:g} m"
-    return f"course of {row.target}" if row.target else "-"
-
-
-def _target_json(row: Group) -> dict[str, Any]:
-    """One target, or how many there are one after another."""
-    if isinstance(row.target, tuple):
-        return {"target": {"bearing_rad": row.target[0], "distance_m": row.target[1]}, "targets": 1}
-    return {"target": None, "targets": row.target or 0}
+        target = f"{math.degrees(row.target[0]):.4g} deg, {row.target[1]:g} m"
+    controller = row.controller.rpartition(":")[2] if row.controller else "-"
+    numbers = str(row.robots), _ranges(row.seeds) or "-", str(row.count)
+    size = f"{in_words(row.size)}{'' if row.found else ', another version'}"
+    return row.robot, row.engine, f"{row.duration:g} s", target, controller, *numbers, size
 
 
 @app.command()
 def check(folder: FolderArg, as_json: JsonOption = False) -> None:
-    """Say whether every trial in a folder is whole: its checksum, and whether its name is that of what it holds.
+    """Check that every trial in a folder is whole: its checksum, and that its name belongs to its content.
 
-    All of every file is read. A line for each that is not what it should be; the exit code is 0, or 2 if there is one.
-    Who walks finds such a file too, sets it aside and walks the trial again. Trials of another version of chilopod, or
-    of MuJoCo where that walked, are counted: they are whole, but walk again too.
+    All of every file is read. Each damaged file is a line; the exit code is 0, or 2 if there is one. A command that
+    walks sets such a file aside and walks the trial again. Trials of another version of chilopod or MuJoCo are counted:
+    they are whole, but walk again too.
     """
     from chilopod.trials.folder import checked, contents
 
@@ -155,13 +138,13 @@ def check(folder: FolderArg, as_json: JsonOption = False) -> None:
 @app.command()
 def clean(
     folder: FolderArg,
-    old: Annotated[bool, typer.Option("--old", help="Remove the trials of other versions, too.")] = False,
-    dry: Annotated[bool, typer.Option("--dry-run", help="Say what would be removed, and remove nothing.")] = False,
+    old: Annotated[bool, typer.Option("--old", help="Remove trials of other versions too.")] = False,
+    dry: Annotated[bool, typer.Option("--dry-run", help="List what would be removed, and remove nothing.")] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Remove what is of no use in a folder of trials: what was set aside, and what killed processes left unfinished.
+    """Remove useless files from a folder of trials: those set aside, and those that killed processes left unfinished.
 
-    What chilopod has not written stays and is listed, and so does what a process that walks there is just writing.
+    Files that chilopod has not written, and those that a process is writing, stay and are listed.
     """
     from chilopod.trials.folder import clean as cleaned
 

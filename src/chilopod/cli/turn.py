@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chilopod.cli.options import STAYS_STRAIGHT, OutOption, StrategyOption, WalkOptions, reading, with_options
+from chilopod.cli.options import OutOption, StrategyOption, WalkOptions, reading, with_options
 
 if TYPE_CHECKING:
     from chilopod.progress import Progress
@@ -21,7 +20,7 @@ def turn(
     target: Annotated[
         str,
         typer.Option(
-            metavar="BEARING, DISTANCE", help='Where to, such as "45 deg, 1.3 m"; a positive bearing is to the left.'
+            metavar="BEARING, DISTANCE", help='Target, such as "45 deg, 1.3 m"; a positive bearing is to the left.'
         ),
     ],
     k1: Annotated[
@@ -29,9 +28,9 @@ def turn(
         typer.Option(
             "--k1",
             metavar="auto|law|VALUE",
-            help="Stiffness of the springs that the strategy softens. auto: what comes nearest to the target in "
-            "undisturbed trials; law: what bends the settled walk into the circle to the target (the paper's k1-hat); "
-            'or a value such as "10 N*mm/deg".',
+            help="Stiffness of the springs that the strategy softens. auto: nearest to the target in undisturbed "
+            "trials; law: the settled walk is the circle to the target (the paper's k1-hat); or a value such as "
+            '"10 N*mm/deg".',
         ),
     ] = "auto",
     strategy: StrategyOption = "pitchfork",
@@ -39,8 +38,8 @@ def turn(
         str | None,
         typer.Option(
             metavar="TIME",
-            help='How long, such as "30 s"; by default 1.6 (planar) or 2.8 (twin) times what the circle to the target '
-            "takes at the speed of the straight walk, 5 s at least.",
+            help='Time to walk, such as "30 s"; by default 1.6 (planar) or 2.8 (twin) times what the circle to the '
+            "target takes at the speed of the straight walk, 5 s at least.",
         ),
     ] = None,
     out: OutOption = None,
@@ -68,31 +67,4 @@ def turn(
         how = {"duration": seconds, **options.steering}
         return walk_there(described, goal, chosen, spring, **how, **options.runs(told("turn")))
 
-    options.walk_into(out, "turn", walked, _print)
-
-
-def _print(done: Turn) -> None:
-    from chilopod import units
-
-    def shown(value: float) -> str:
-        return units.format(value, "N*mm/deg", digits=4)
-
-    found = done.criteria
-    typer.echo(f"{done.who}, {done.strategy.name}: {done.strategy.sentence}")
-    typer.echo(f"  target {done.target}: a circle of {done.target.radius:.3f} m")
-    if done.by_law is not None:
-        typer.echo(f"  spring by the settled radius (the paper's k1-hat): {shown(done.by_law)}")
-    if done.stiffness is not None:
-        typer.echo(f"  spring walked with: {shown(done.stiffness)}")
-    typer.echo(
-        f"  distance left, angle and effort (the paper's epsilon 1 to 3) at {found.time:.2f} s; nearest at any time"
-    )
-    typer.echo("  seed    outcome         arrival (s)  nearest (m)  left (m)  angle (deg)  effort (rad2 s)")
-    for i, outcome in enumerate(found.outcome):
-        arrival = f"{found.arrival[i]:.2f}" if math.isfinite(found.arrival[i]) else "never"
-        typer.echo(
-            f"  {done.labels[i]:<6}  {outcome.label:<14}  {arrival:<11}  {found.nearest[i]:<11.4f}  "
-            f"{found.distance[i]:<8.3f}  {math.degrees(found.angle[i]):<11.2f}  {found.effort[i]:.4f}"
-        )
-    if done.straight:
-        typer.echo(f"  {STAYS_STRAIGHT}: try --seed 1")
+    options.walk_into(out, "turn", walked)

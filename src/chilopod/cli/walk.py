@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -10,11 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from chilopod.cli.options import STAYS_STRAIGHT, WalkOptions, free, reading, with_options
+from chilopod.cli.options import WalkOptions, free, reading, with_options
 
 if TYPE_CHECKING:
     from chilopod.record_file import RecordFile
-    from chilopod.tasks import Ends
     from chilopod.trials import Trial
 
 _MUCH = 1e9  # bytes
@@ -23,19 +21,19 @@ _MUCH = 1e9  # bytes
 @with_options
 def walk(
     options: WalkOptions,
-    duration: Annotated[str, typer.Option(metavar="TIME", help='How long, such as "60 s" or "2 min".')] = "60 s",
+    duration: Annotated[str, typer.Option(metavar="TIME", help='Time to walk, such as "60 s" or "2 min".')] = "60 s",
     initial_joints: Annotated[
         str | None,
         typer.Option(
             metavar="ANGLES",
-            help='How the body is bent at the start, joint by joint from the front: "2,0,0,0,0 deg"; one angle is that '
-            "of all joints. Without it the robot starts straight.",
+            help='Joint angles at the start, from the front: "2,0,0,0,0 deg"; one angle is for all joints. By default '
+            "the robot starts straight.",
         ),
     ] = None,
     rate: Annotated[float | None, typer.Option(metavar="HZ", help="Samples per second, by default 100.")] = None,
     forces: Annotated[bool, typer.Option("--forces", help="Record the force on every foot.")] = False,
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE.nc", help="Write everything over time into this netCDF file.")
+        Path | None, typer.Option("--out", metavar="FILE.nc", help="NetCDF file for everything over time.")
     ] = None,
 ) -> None:
     """Let a robot walk, once or many times, and say where it gets to.
@@ -64,7 +62,8 @@ def walk(
             file = stack.enter_context(_record_file(out, trials)) if out else None
             add = file.add if file else lambda index, record: None
             done = ends(trials, options.trials, told("walk"), add)
-        options.deliver(lambda: file.write(replace=options.force) if file else [], done, _print)
+        hint = '--seed 1, or --initial-joints "2 deg"'
+        options.deliver(lambda: file.write(replace=options.force) if file else [], done, hint)
 
 
 def _record_file(path: Path, walks: Sequence[Trial]) -> RecordFile:
@@ -77,20 +76,6 @@ def _record_file(path: Path, walks: Sequence[Trial]) -> RecordFile:
     if size > _MUCH:
         typer.echo(f"{path} will have {in_words(size)} or more", err=True)
     return file
-
-
-def _print(done: Ends) -> None:
-    typer.echo(done.title)
-    typer.echo("  seed    x (m)     y (m)     radius (m)  joint angles, mean of the last 5 s (deg)")
-    for label, end in zip(done.labels, done.summaries, strict=True):
-        if end.failed:
-            typer.echo(f"  {label:<6}  {end.sentence}")
-            continue
-        bends = "  ".join(f"{angle:+7.2f}" for angle in end.joint_angles_deg)
-        radius = f"{end.axis_radius:.4g}" if math.isfinite(end.axis_radius) else "straight"
-        typer.echo(f"  {label:<6}  {end.x:<8.3f}  {end.y:<8.3f}  {radius:<10}  {bends}")
-    if done.straight:
-        typer.echo(f'  {STAYS_STRAIGHT}: try --seed 1, or --initial-joints "2 deg"')
 
 
 def joint_angles(text: str | None) -> tuple[float, ...]:

@@ -22,17 +22,8 @@ cylinders of the yaw joints, front to rear."""
 
 @dataclass(frozen=True)
 class Placed:
-    """All parts of a kind.
-
-    Attributes
-    ----------
-    centres
-        m, (n, 3).
-    turns
-        Quaternions, the real part first, (n, 4).
-    scales
-        Sizes along the part's own axes, m, (n, 3).
-    """
+    """All n parts of a kind: centres (n, 3), m, turns as quaternions (n, 4), the real part first, and sizes along the
+    own axes of each (n, 3), m."""
 
     centres: Array
     turns: Array

@@ -20,13 +20,7 @@ _KINDS = {"box": "box", "capsule": "rod", "cylinder": "rod", "sphere": "ball"}
 
 
 class SolidBody:
-    """The twin, as its model has it; see :class:`chilopod.live.body.Body`.
-
-    Parameters
-    ----------
-    robot
-        With a twin.
-    """
+    """Body of a robot with a twin, as its model has it; see :class:`chilopod.live.body.Body`."""
 
     def __init__(self, robot: Robot) -> None:
         plan = compiled(without_springs(robot))

@@ -28,15 +28,7 @@ _BETWEEN = 4  # dots from one point of the branch to the next
 
 
 class Plots:
-    """Three plots of a walk; nothing is created as it goes on.
-
-    Parameters
-    ----------
-    gui
-        Panel in which the plots are put.
-    joints
-        Number of yaw joints.
-    """
+    """Three plots of a walk of a robot with so many yaw joints; nothing is created as it goes on."""
 
     def __init__(self, gui: viser.GuiApi, joints: int) -> None:
         self._times: deque[float] = deque(maxlen=_POINTS)

@@ -42,17 +42,7 @@ _FRONT = _lit(VERMILLION)
 
 
 class View:
-    """View in three dimensions.
-
-    Parameters
-    ----------
-    server
-        Server of the page.
-    placed
-        The robot's parts at the start.
-    length
-        Length of the robot, m.
-    """
+    """View in three dimensions of a robot of some length (m), whose parts are placed somewhere at the start."""
 
     def __init__(self, server: viser.ViserServer, placed: Mapping[str, Placed], length: float) -> None:
         scene = server.scene
@@ -64,6 +54,7 @@ class View:
         self._floor = scene.add_line_segments(
             f"{WORLD}/floor", _lines(self._step, _FLOOR_LINES), (205, 205, 205), thickness=1.0, thickness_units="screen"
         )
+        plain: dict[str, Any] = {"lod": "off", "cast_shadow": False, "receive_shadow": False}
         self._batches = {
             kind: scene.add_batched_meshes_simple(
                 f"{WORLD}/{kind}",
@@ -72,10 +63,8 @@ class View:
                 placed[kind].centres,
                 batched_scales=placed[kind].scales,
                 batched_colors=_colors(kind, len(placed[kind].centres)),
-                lod="off",
                 flat_shading=kind == "box",
-                cast_shadow=False,
-                receive_shadow=False,
+                **plain,
             )
             for kind in KINDS
         }
@@ -92,10 +81,8 @@ class View:
             batched_scales=np.array([[ARRIVAL_RADIUS, ARRIVAL_RADIUS, 0.002], [0.01, 0.01, 0.3]]),
             batched_colors=np.tile(_FRONT, (2, 1)),
             opacity=0.6,
-            lod="off",
-            cast_shadow=False,
-            receive_shadow=False,
             visible=False,
+            **plain,
         )
         self._centre = np.zeros(3)
         server.initial_camera.position = (-0.9 * length, -1.0 * length, 0.9 * length)
@@ -145,15 +132,7 @@ class View:
 
 
 def floor_place(origin: Array, start: tuple[float, ...], direction: tuple[float, ...]) -> tuple[float, float] | None:
-    """Where a ray of sight meets the floor, m; None if it looks up.
-
-    Parameters
-    ----------
-    origin
-        Origin of the floor, as seen, m, (3,).
-    start, direction
-        Start and direction of the ray.
-    """
+    """Place where a ray of sight meets the floor with this origin, m; None if the ray does not go down."""
     if not direction[2] < 0.0:
         return None
     reach = (origin[2] - start[2]) / direction[2]

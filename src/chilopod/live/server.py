@@ -22,8 +22,9 @@ from chilopod.extras import needs
 from chilopod.live import wishes
 from chilopod.live.body import Body, FlatBody, Placed
 from chilopod.live.session import Session
+from chilopod.live.state import but_springs
 from chilopod.live.theory import Beside, Growth, Theory
-from chilopod.live.words import described, sentences
+from chilopod.live.words import sentences
 from chilopod.netcdf import netcdf
 from chilopod.robot import Robot
 
@@ -44,39 +45,31 @@ _ALONE = 0.1  # s from one look to the next while no browser watches
 
 
 class Live:
-    """A page with a walking robot.
-
-    One thread owns the walk; what is done at the page only leaves wishes for it. While no browser watches, the robot
-    stands still.
+    """A page with a walking robot, which stands still while no browser watches.
 
     Parameters
     ----------
     robot, engine, seed, strategy
         As for :class:`chilopod.live.Session`.
-    host
-        Address to listen at; by default this machine only. At others a browser needs the token in :attr:`address`.
-    port
-        Port to listen at; 0 for any that is free.
+    host, port
+        Address and port to listen at; 0 for any port that is free. At other addresses than this machine's own a browser
+        needs the token in :attr:`address`.
     token
-        True if a browser needs a token on this machine too, where others use it.
+        True if a browser needs a token on this machine too.
     kept
-        Called with the name of a recording and its two files, netCDF and HTML, besides the download in the browser.
-        What it raises of :mod:`chilopod.errors` is shown at the page.
+        Function of the name of a recording and its two files, netCDF and HTML, besides the download in the browser; its
+        errors are shown at the page.
 
     Attributes
     ----------
     address
         Link to open in a browser, with the token if one is needed.
     gate
-        Look at every request and message; counts what it refused.
+        Checks of requests and messages; counts those that it refused.
     undelivered
-        Names and files of recordings that nobody took: neither ``kept`` nor a browser, or while the page ended.
-    seen
-        The last frame.
-    frames
-        Number of frames that were shown.
-    busy
-        s that the thread of the walk was at work.
+        Names and files of recordings that neither ``kept`` nor a browser took.
+    seen, frames, busy
+        The last frame, the number of frames that were shown, and the time for which the walk's thread worked, s.
     failure
         Error that ended the thread, if one did.
 
@@ -121,7 +114,7 @@ class Live:
         try:
             # The first steps ever are compiled, which takes a while: better before anybody looks.
             Session(robot, engine).walk_on(1.5 * robot.gait.period)
-            self._build(described(robot, engine))
+            self._build(f"{robot.name}, {robot.body.modules} modules, {engine}")
         except BaseException:
             self.close()
             raise
@@ -146,18 +139,12 @@ class Live:
         server.on_client_connect(self._send_undelivered)
 
     def wish(self, wish: wishes.Wish) -> None:
-        """Want something of the walk, from any thread, as if somebody had done it at the page."""
+        """Leave a wish, from any thread, as if somebody had done it at the page."""
         self._session.box.put(wish)
         self._told = True
 
     def wait(self, seconds: float | None = None) -> None:
-        """So long, or until the thread of the walk ends, which it does not by itself unless it fails.
-
-        Raises
-        ------
-        RuntimeError
-            If it failed.
-        """
+        """Wait so long, or until the thread of the walk fails, and raise its error then."""
         end = math.inf if seconds is None else time.monotonic() + seconds
         # Not by joining the thread: Ctrl-C within a join that has a limit leaves a thread that counts as ended.
         while not self._ended.wait(min(0.5, max(0.0, end - time.monotonic()))) and time.monotonic() < end:
@@ -240,7 +227,7 @@ class Live:
                 self._plots.show(self.seen, self._theory)
 
     def _obey(self) -> bool:
-        """Wishes, and what has come of questions; whether there were any of the former."""
+        """Grant wishes and take answers; True if there was a wish."""
         session, before = self._session, self._session.settings
         told, self._told = self._told, False
         obeyed = session.obey()
@@ -272,7 +259,9 @@ class Live:
         robot = self._session.settings.robot
         if engine_named(self._session.engine).traits.exact:
             self._beside.ask_growth(robot)
-        if before is None or _but_first_spring(robot) != _but_first_spring(before):
+        # The theory is of any first spring.
+        parts = [(each.springs.stiffness[1:], *but_springs(each)) for each in (robot, before) if each is not None]
+        if before is None or parts[0] != parts[1]:
             self._theory = Theory(remark="it is being computed")
             self._session.law = None
             self._beside.ask(robot)
@@ -350,7 +339,7 @@ class Live:
 
 
 class _Rate:
-    """How many seconds were walked a second, of late."""
+    """Seconds walked a second, of late."""
 
     def __init__(self) -> None:
         self.value = 0.0
@@ -372,11 +361,6 @@ def _body(robot: Robot, engine: str) -> Body:
     return SolidBody(robot)
 
 
-def _but_first_spring(robot: Robot) -> tuple[object, ...]:
-    """Numbers of a robot that its theory depends on, whatever its first spring."""
-    return robot.springs.stiffness[1:], robot.gait, robot.ground, robot.twin
-
-
 def _quiet() -> contextlib.AbstractContextManager[object]:
     """Silence of viser, which would print where it listens and that it ends."""
     return contextlib.redirect_stdout(io.StringIO())
@@ -394,7 +378,8 @@ def _free_port(host: str, port: int) -> int:
             free: int = trial.getsockname()[1]
             return free
     except (socket.gaierror, UnicodeError) as error:
-        raise ParameterError("is no address of this machine", field="host", value=host) from error
+        allowed = "an address or a name of this machine, or 0.0.0.0 for all of them"
+        raise ParameterError("is no address of this machine", field="host", value=host, allowed=allowed) from error
     except OSError as error:
         raise ParameterError(
             f"cannot be listened at: {error.strerror}", field="port", value=port, allowed="another --port, or 0"

@@ -13,18 +13,10 @@ from numpy.typing import NDArray
 
 from chilopod.analysis.parameters import ALL
 from chilopod.engine import Command, Controller, Status, Walk, engine_named, steer
-from chilopod.errors import ChilopodError, ParameterError
+from chilopod.errors import ChilopodError, ParameterError, nearest_name
 from chilopod.live import wishes
-from chilopod.live.state import (
-    FRICTIONS,
-    SPEEDS,
-    STRIDES,
-    Seen,
-    Settings,
-    as_finite,
-    as_seed,
-    as_within,
-)
+from chilopod.live.sliders import sliders_of
+from chilopod.live.state import Seen, Settings, as_finite, as_seed, as_within, but_springs
 from chilopod.record import Recording
 from chilopod.robot import Robot
 from chilopod.steering import (
@@ -57,11 +49,11 @@ _MOST_WORDS = 4
 
 
 class Session:
-    """One robot that walks, and obeys wishes. To be used by one thread; but :attr:`box` takes wishes from any.
+    """One robot that walks, and obeys wishes; for one thread, but :attr:`box` takes wishes from any.
 
-    Without a word the walk is the same to the bit however it is cut into frames. Once a gait cycle every joint is
-    nudged at random, as a floor that is not quite even would: half a degree against its spring, about. A straight walk
-    that nothing disturbs stays straight, unstable as it may be.
+    Without a wish the walk is the same to the bit however it is cut into frames. Once a gait cycle every joint is
+    nudged at random, by about half a degree against its spring, as an uneven floor would: a straight walk that nothing
+    disturbs stays straight even where it is unstable.
 
     Springs and pulls change at once (or as fast as the actuators of the robot file allow), the floor and the steps at
     the beginning of the next gait cycle.
@@ -77,6 +69,19 @@ class Session:
     strategy
         Name of one of :data:`chilopod.steering.ON_THE_WAY`.
 
+    Attributes
+    ----------
+    box
+        Box for wishes, from any thread.
+    settings
+        Wishes that were granted.
+    sliders
+        Sliders of this robot by name.
+    file
+        The robot as it was given, with springs that can all be changed.
+    law
+        Radius law of the springs, which strategies need; None while it is not known.
+
     Raises
     ------
     ParameterError
@@ -84,21 +89,12 @@ class Session:
     """
 
     def __init__(self, robot: Robot, engine: str = "planar", *, seed: int = 1, strategy: str = VARIABLE.name) -> None:
-        self.box = wishes.Box()
-        self._engine = engine_named(engine)
-        self._engine_name = engine
-        self._file = robot.override("springs.adjustable", True)
-        self._engine.common(self._file)
-        self._settings = Settings(
-            self._file,
-            1.0,
-            robot.gait.stride,
-            strategy_named(strategy, ON_THE_WAY).name,
-            _SPEED,
-            False,
-            as_seed(seed),
-            False,
-        )
+        self.box, self.engine, self._engine = wishes.Box(), engine, engine_named(engine)
+        self.file = robot.override("springs.adjustable", True)
+        self._engine.common(self.file)
+        strategy = strategy_named(strategy, ON_THE_WAY).name
+        self.settings = Settings(self.file, 1.0, strategy, _SPEED, False, as_seed(seed), False)
+        self.sliders = sliders_of(self.file)
         self.law: RadiusLaw | None = None
         self._records: list[xr.Dataset] = []
         self._recorded, self._bytes = 0, 0
@@ -108,23 +104,8 @@ class Session:
     # -- what there is
     # ---------------------------------------------------------------------------------------------------------------
 
-    @property
-    def settings(self) -> Settings:
-        """How everything is set."""
-        return self._settings
-
-    @property
-    def file(self) -> Robot:
-        """The robot as it was given, with springs that can all be changed."""
-        return self._file
-
-    @property
-    def engine(self) -> str:
-        """Name of what computes the walk."""
-        return self._engine_name
-
     def seen(self) -> Seen:
-        """State of the walk that there is to see now."""
+        """State of the walk now."""
         looked = self._walk.observe()
         means = np.array(self._looks).mean(axis=0)
         return Seen(
@@ -145,14 +126,13 @@ class Session:
         )
 
     def said(self) -> list[str]:
-        """Sentences on what happened since this was asked last."""
+        """Sentences on what happened since the last call."""
         sentences = list(self._said)
         self._said.clear()
         return sentences
 
     def records(self) -> list[xr.Dataset]:
-        """Records written since this was asked last, see :func:`chilopod.record.walk_record`: one record for
-        every stretch of a walk with one floor and one gait."""
+        """Records since the last call, see :func:`chilopod.record.walk_record`: one for every floor and gait."""
         records, self._records = self._records, []
         return records
 
@@ -160,7 +140,7 @@ class Session:
     # ---------------------------------------------------------------------------------------------------------------
 
     def obey(self) -> bool:
-        """Do what is wished for; what cannot be is said. Tells whether there was anything."""
+        """Grant all wishes, or say why not; True if there was one."""
         waiting = self.box.take()
         for wish in waiting:
             try:
@@ -187,7 +167,7 @@ class Session:
 
     def stop_recording(self) -> None:
         """End what is being written down, if anything is."""
-        self._settings = replace(self._settings, recording=False)
+        self.settings = replace(self.settings, recording=False)
         self._keep_record()
 
     # -- inside
@@ -203,8 +183,8 @@ class Session:
 
     def _begin(self) -> None:
         """Put the robot on the floor anew."""
-        robot, joints = self._settings.robot, self._settings.robot.body.modules - 1
-        self._random = np.random.default_rng(self._settings.seed)
+        robot, joints = self.settings.robot, self.settings.robot.body.modules - 1
+        self._random = np.random.default_rng(self.settings.seed)
         states = self._engine.initial_states(
             robot, self._random.normal(0.0, _START.joint_angle, joints), self._random.normal(0.0, _START.heading)
         )
@@ -218,14 +198,14 @@ class Session:
         self._bends: deque[float] = deque(maxlen=LOOKS + 1)
 
     def _start(self, robot: Robot, states: Array) -> None:
-        if self._settings.recording and not self._may_record:
-            self._settings = replace(self._settings, recording=False)
+        if self.settings.recording and not self._may_record:
+            self.settings = replace(self.settings, recording=False)
             self._said.append(f"recording has ended: there is room for no more than the {self._recorded} so far")
-        self._written = self._has_record = self._settings.recording
+        self._written = self._has_record = self.settings.recording
         self._walk: Walk = self._engine.start(
             [robot],
             initial=states,
-            seeds=[self._settings.seed] if self._engine.traits.noisy else None,
+            seeds=[self.settings.seed] if self._engine.traits.noisy else None,
             record=Recording(_RATE, poses=self._engine.traits.poses) if self._has_record else None,
         )
         self._look_next = 1
@@ -258,11 +238,11 @@ class Session:
         if self._written and self._walk.time > _LONGEST:
             self._said.append(f"the recording ended by itself, after {_LONGEST / 60.0:g} minutes")
             self.stop_recording()
-        wanted, here = self._settings, self._walk.robots[0]
-        as_wanted = (wanted.robot.gait, wanted.robot.ground, wanted.robot.twin) == (here.gait, here.ground, here.twin)
+        wanted = self.settings
+        as_wanted = but_springs(wanted.robot) == but_springs(self._walk.robots[0])
         if not as_wanted or {wanted.recording} != {self._written, self._has_record}:
             self._continue(wanted.robot)
-        self._nudge = np.array(self._file.springs.stiffness) * self._random.normal(0.0, _NUDGE, len(self._nudge))
+        self._nudge = np.array(self.file.springs.stiffness) * self._random.normal(0.0, _NUDGE, len(self._nudge))
         self._push()
 
     def _continue(self, robot: Robot) -> None:
@@ -299,7 +279,7 @@ class Session:
         return isinstance(self._controller, SpringLaw)
 
     def _set_springs(self) -> None:
-        self._walk.command(Command(stiffness=[self._settings.robot.springs.stiffness]))
+        self._walk.command(Command(stiffness=[self.settings.robot.springs.stiffness]))
 
     def _let_go(self) -> None:
         """Walk nowhere in particular, with the springs as they are set and straight legs."""
@@ -311,60 +291,47 @@ class Session:
 
     def _obey(self, wish: wishes.Wish) -> None:
         match wish:
-            case wishes.Spring(joint, stiffness):
-                self._spring(joint, stiffness)
-            case wishes.Friction(factor):
-                self._other(friction=as_within("friction", factor, FRICTIONS, "times that of the file"))
-            case wishes.Stride(length):
-                own = self._file.gait.stride
-                low, high = (part * own for part in STRIDES)
-                self._other(stride=as_within("stride", length, (low, high), "m"))
+            case wishes.Set(slider, value):
+                self._set(slider, value)
             case wishes.Target(place):
                 self._aim(place)
             case wishes.Steering(strategy):
-                self._settings = replace(self._settings, strategy=strategy_named(strategy, ON_THE_WAY).name)
+                self.settings = replace(self.settings, strategy=strategy_named(strategy, ON_THE_WAY).name)
                 if self._target is not None:
                     self._aim(self._target)
             case wishes.Pull(joint, torque, time):
                 self._pull_at(joint, torque, time)
-            case wishes.Speed(times):
-                self._settings = replace(self._settings, speed=as_within("speed", times, SPEEDS, "times real time"))
             case wishes.Pause(paused):
-                self._settings = replace(self._settings, paused=bool(paused))
+                self.settings = replace(self.settings, paused=bool(paused))
             case wishes.Step(cycles):
                 seconds = as_within("step", cycles, (0.0, 10.0), "gait cycles") * self._period
-                self._settings = replace(self._settings, paused=True)
+                self.settings = replace(self.settings, paused=True)
                 self.walk_on(seconds)
             case wishes.Reset(seed):
                 self._keep_record()
-                self._settings = replace(self._settings, seed=as_seed(seed))
+                self.settings = replace(self.settings, seed=as_seed(seed))
                 self._begin()
             case wishes.Record(on):
                 if on:
-                    self._settings = replace(self._settings, recording=True)
+                    self.settings = replace(self.settings, recording=True)
                 else:
                     self.stop_recording()
 
-    def _spring(self, joint: int | None, stiffness: float) -> None:
-        robot = self._settings.robot
-        path = ALL if joint is None else f"{ALL}[{joint}]"
-        self._settings = replace(self._settings, robot=robot.with_value(path, as_finite("stiffness", stiffness)))
+    def _set(self, name: str, value: object) -> None:
+        slider = self.sliders.get(name)
+        if slider is None:
+            near, allowed = nearest_name(name, self.sliders), ", ".join(self.sliders)
+            raise ParameterError("there is no such slider", field="slider", value=name, allowed=allowed, nearest=near)
+        number, before = as_within(name, value, slider.limits, slider.si), self.settings.robot
+        settings = slider.apply(self.settings, number)
+        self._engine.common(settings.robot)
+        self.settings = settings
+        if settings.robot.springs == before.springs:
+            return
         if self._steers_springs:
-            self._said.append("the springs are as you set them again when the target is reached")
+            self._said.append("your springs are back when the target is reached")
         else:
             self._set_springs()
-
-    def _other(self, friction: float | None = None, stride: float | None = None) -> None:
-        """Another floor or other steps, from the next gait cycle on."""
-        friction = self._settings.friction if friction is None else friction
-        stride = self._settings.stride if stride is None else stride
-        robot = self._file.with_value("gait.stride", stride)
-        robot = robot.with_value("ground.friction", friction * self._file.ground.friction)
-        if self._file.twin is not None:
-            robot = robot.with_value("twin.sliding_friction", friction * self._file.twin.sliding_friction)
-        self._engine.common(robot)
-        robot = _with_springs(robot, self._settings.robot.springs.stiffness)
-        self._settings = replace(self._settings, robot=robot, friction=friction, stride=stride)
 
     def _aim(self, place: tuple[float, float] | None) -> None:
         if place is None:
@@ -373,11 +340,11 @@ class Session:
             return
         x, y = (as_finite("target", each) for each in place)
         as_within("target", math.hypot(x, y), (0.0, FARTHEST), "m from where the walk began")
-        strategy = ON_THE_WAY[self._settings.strategy]
+        strategy = ON_THE_WAY[self.settings.strategy]
         if strategy.needs_law and self.law is None:
-            self._said.append(f"how tightly it turns is not known (yet), so leg yaw alone steers, not {strategy.name}")
+            self._said.append(f"the radius law is not known (yet): leg yaw alone steers, not {strategy.name}")
             strategy = LEG_YAW
-        controller, steering = strategy.prepare(self._settings.robot, self.law).controller, strategy.name
+        controller, steering = strategy.prepare(self.settings.robot, self.law).controller, strategy.name
         if self._target is not None:
             self._let_go()
         self._target, self._controller, self._steering = (x, y), controller, steering
@@ -385,7 +352,7 @@ class Session:
         self._walk.aim(self._target)
 
     def _pull_at(self, joint: int, torque: float, time: float) -> None:
-        own = self._file.springs.stiffness
+        own = self.file.springs.stiffness
         if joint not in range(len(own)):
             raise ParameterError("there is no such joint", field="joint", value=joint + 1, allowed=f"1 to {len(own)}")
         strongest = _STRONGEST * own[joint]
@@ -393,7 +360,7 @@ class Session:
         self._pulled_until[joint] = self._before + self._walk.time + time
         self._push()
         if isinstance(self._controller, ActuatedAxis):
-            self._said.append("the strategy actuated drives the joints itself: nobody else can pull them")
+            self._said.append("the strategy actuated drives the joints, so they cannot be pulled")
 
 
 def _with_springs(robot: Robot, stiffness: Sequence[float]) -> Robot:

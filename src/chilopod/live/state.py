@@ -1,4 +1,4 @@
-"""States of a live walk that can be seen, its settings, and their limits."""
+"""States of a live walk that can be seen, its settings, and checks of numbers that somebody wishes."""
 
 from __future__ import annotations
 
@@ -15,15 +15,6 @@ from chilopod.robot import Robot
 
 Array = NDArray[np.float64]
 
-SPEEDS = (1.0, 20.0)
-"""Slowest and fastest, times real time."""
-
-FRICTIONS = (0.3, 3.0)
-"""Range of the friction, relative to the robot file."""
-
-STRIDES = (0.2, 1.5)
-"""Range of the stride, relative to the robot file."""
-
 
 @dataclass(frozen=True)
 class Seen:
@@ -31,24 +22,22 @@ class Seen:
 
     Attributes
     ----------
-    time
-        Since the last reset, s.
-    clock
-        To which the gait steps, s: at 0 it was at phase 0.
+    time, clock
+        Time since the last reset, and time of the gait, which is at phase 0 at 0; s.
     robot
         Robot that walks, with its floor and steps; its springs may have changed since.
     status
-        ``WALKED`` while it walks.
+        Status of the walk, ``WALKED`` while it goes on.
     pose
         x, y (m) and heading (rad) of module 1.
     joint_angles, stiffness
-        Joint angles and stiffness of the yaw joints, now: rad and N*m/rad, (N-1,).
+        Joint angles (rad) and stiffness (N*m/rad) of the yaw joints, (N-1,).
     leg_yaw
         Leg yaw of the legs of module 1, rad, (2,).
     mean_angles
         Mean angles of the joints over the last gait cycle, rad, (N-1,).
     turning
-        By how much the sum of their sizes grows, rad/s.
+        Rate at which the sum of their sizes grows, rad/s.
     pulled
         Torques by which somebody pulls at joints, N*m, (N-1,).
     target
@@ -56,7 +45,7 @@ class Seen:
     steering
         Name of the strategy that steers there, which is leg yaw while those of springs are not known; else empty.
     state
-        As ``initial`` of the engine's ``start`` takes it, (n,).
+        State as ``initial`` of the engine's ``start`` takes it, (n,).
     """
 
     time: float
@@ -82,23 +71,22 @@ class Seen:
 
 @dataclass(frozen=True)
 class Settings:
-    """How everything is set.
+    """Wishes that were granted.
 
     Attributes
     ----------
     robot
-        As it is to walk: with the springs, the floor and the steps that were asked for.
-    friction, stride
-        Factor on the floor of the file; m.
+        Robot with the springs, floor and steps that it is to walk with.
+    friction
+        Friction of the floor, relative to that of the file.
     strategy, speed, paused, seed
-        As asked for.
+        Name of the strategy, seconds of walking a second, True if it stands still, and seed of start and nudges.
     recording
-        True if the walk is being written down, or about to be.
+        True if the walk is being recorded, or about to be.
     """
 
     robot: Robot
     friction: float
-    stride: float
     strategy: str
     speed: float
     paused: bool
@@ -106,14 +94,13 @@ class Settings:
     recording: bool
 
 
-def as_seed(seed: object) -> int:
-    """A whole number, 0 to :data:`chilopod.live.wishes.LARGEST_SEED`, typed as it may be.
+def but_springs(robot: Robot) -> tuple[object, ...]:
+    """Numbers of a robot that change between two gait cycles only."""
+    return robot.body, robot.legs, robot.gait, robot.ground, robot.twin
 
-    Raises
-    ------
-    ParameterError
-        If it is not.
-    """
+
+def as_seed(seed: object) -> int:
+    """A whole number, 0 to :data:`chilopod.live.wishes.LARGEST_SEED`; a ParameterError if it is not."""
     number = as_finite("seed", seed)
     if number != int(number) or not 0 <= number <= LARGEST_SEED:
         allowed = f"a whole number, 0 to {LARGEST_SEED}"
@@ -122,13 +109,7 @@ def as_seed(seed: object) -> int:
 
 
 def as_finite(field: str, value: object) -> float:
-    """A finite number.
-
-    Raises
-    ------
-    ParameterError
-        If it is not, naming the field.
-    """
+    """A finite number; a ParameterError with the name of the field if it is not."""
     try:
         number = math.nan if isinstance(value, bool) or not isinstance(value, int | float) else float(value)
     except OverflowError:  # an int may have any number of digits
@@ -139,16 +120,9 @@ def as_finite(field: str, value: object) -> float:
 
 
 def as_within(field: str, value: object, limits: tuple[float, float], unit: str) -> float:
-    """A number between two others.
-
-    Raises
-    ------
-    ParameterError
-        If it is not, naming the field and what is allowed.
-    """
-    number = as_finite(field, value)
-    low, high = limits
+    """A number between two others; a ParameterError that names the field and what is allowed if it is not."""
+    number, (low, high) = as_finite(field, value), limits
     # The ends of a slider are those of its range up to round-off.
     if not low * (1.0 - 1e-9) <= number <= high * (1.0 + 1e-9):
-        raise ParameterError("is out of range", field=field, value=value, allowed=f"{low:g} to {high:g} {unit}")
+        raise ParameterError("is out of range", field=field, value=value, allowed=f"{low:g} to {high:g} {unit}".strip())
     return number

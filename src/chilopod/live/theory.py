@@ -1,7 +1,6 @@
 """Where the walk gives way and how tightly it then turns, computed beside the walk by a process of its own.
 
-A question that is no longer of interest is dropped where it stands: the page asks anew whenever springs, floor or steps
-change, and only the last question is answered.
+The page asks anew whenever springs, floor or steps change; only the last question is answered.
 """
 
 from __future__ import annotations
@@ -14,7 +13,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,20 +32,18 @@ _GROWTH = 30.0  # s that a short question may take
 
 @dataclass(frozen=True)
 class Theory:
-    """Theory of a robot with any first spring.
+    """Theory of a robot with any first spring; None where something is not known, with a remark that says why.
 
     Attributes
     ----------
     robot
-        Robot of which it is known; None: of none.
+        The robot.
     pitchfork
-        First spring below which the straight walk gives way, N*m/rad; None where it is not known.
+        First spring below which the straight walk gives way, N*m/rad.
     springs, radii, stable
-        The curved walks from there on: first spring (N*m/rad), radius (m) and whether the walk is stable, (points,).
+        Curved walks from there on: first spring (N*m/rad), radius (m) and True if the walk is stable, (points,).
     law
-        Radius law of the springs, for strategies; None where there is none.
-    remark
-        Reason why something is not known, or progress of the search; empty when there is nothing to say.
+        Radius law of the springs, for strategies.
     """
 
     robot: Robot | None = None
@@ -72,15 +68,7 @@ class Theory:
 
 @dataclass(frozen=True)
 class Growth:
-    """How fast a small bend of the straight walk grows.
-
-    Attributes
-    ----------
-    robot
-        With the spring it is of.
-    rate
-        Largest real part of all exponents, 1/s; negative where the straight walk is stable.
-    """
+    """Rate (1/s) at which a small bend of a robot's straight walk grows: the largest real part of all exponents."""
 
     robot: Robot
     rate: float
@@ -95,16 +83,9 @@ def growth_of(robot: Robot) -> Growth:
 
 
 def theory_of(robot: Robot, engine: str, told: Callable[[Theory], None]) -> None:
-    """Find out what there is to know, and tell it piece by piece.
+    """Compute the theory of a robot, and call a function with what is known so far; what that raises ends the work.
 
-    Parameters
-    ----------
-    robot
-        Its first spring does not matter.
-    engine
-        Name of the engine that it walks in: where its walks are not those of the planar theory, some are walked.
-    told
-        Called with what is known so far; what it raises ends the work.
+    In an engine whose walks are not those of the planar theory, some are walked. The first spring does not matter.
     """
     known = Theory(robot)
     try:
@@ -173,13 +154,7 @@ def _share(done: float, what: str) -> str:
 
 
 class Beside:
-    """A process that answers questions about robots, the last one of each kind only.
-
-    Parameters
-    ----------
-    engine
-        Name of the engine that the robots walk in.
-    """
+    """A process that answers questions about robots that walk in an engine, the last question of each kind only."""
 
     def __init__(self, engine: str) -> None:
         context = multiprocessing.get_context("spawn")
@@ -190,15 +165,15 @@ class Beside:
         there.close()
 
     def ask(self, robot: Robot) -> None:
-        """Want to know everything of a robot."""
+        """Ask for the theory of a robot."""
         self._send("theory", robot)
 
     def ask_growth(self, robot: Robot) -> None:
-        """Want to know how fast small bends of its straight walk grow."""
+        """Ask for the growth of small bends of its straight walk."""
         self._send("growth", robot)
 
     def answers(self) -> list[Theory | Growth]:
-        """Answers that came since this was asked last; never waits."""
+        """Answers since the last call; never waits."""
         found: list[Theory | Growth] = []
         with suppress(EOFError, OSError):
             while self._here.poll():
@@ -206,7 +181,7 @@ class Beside:
         return found
 
     def close(self) -> None:
-        """End it; what it was at is lost."""
+        """End the process; unfinished work is lost."""
         self._here.close()
         self._process.terminate()
         self._process.join(timeout=5.0)
@@ -233,59 +208,36 @@ class _Stale(Exception):
     """Another question has come."""
 
 
-class _Desk:
-    """The end of the pipe at which questions arrive."""
-
-    def __init__(self, pipe: Connection) -> None:
-        self._pipe = pipe
-        self._waiting: dict[str, Robot] = {}
-
-    def wait(self) -> None:
-        """Until there is a question."""
-        while not self._waiting:
-            self._take()
-
-    def next(self) -> tuple[str, Robot]:
-        """The question that is quickest to answer."""
-        what = "growth" if "growth" in self._waiting else "theory"
-        return what, self._waiting.pop(what)
-
-    def tell(self, answer: Any) -> None:
-        """Answer, unless another question of that kind has come meanwhile."""
-        while self._pipe.poll():
-            self._take()
-        if isinstance(answer, Theory) and "theory" in self._waiting:
-            raise _Stale
-        self._pipe.send(answer)
-        # While the long question is at work, a short one is answered in between.
-        if isinstance(answer, Theory) and "growth" in self._waiting:
-            self.growth(self._waiting.pop("growth"))
-
-    def growth(self, robot: Robot) -> None:
-        with suppress(ChilopodError):  # where there is no straight walk to speak of
-            self._pipe.send(growth_of(robot))
-
-    def _take(self) -> None:
-        what, robot = self._pipe.recv()
-        self._waiting[what] = robot
-
-
 def _answer(pipe: Connection, engine: str) -> None:
-    """The process."""
+    """Work of the process: the last question of each kind, the quick one first, also while the long one is at work."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # as it is from the start, unless a thread of the page started it
     if hasattr(os, "nice"):
         os.nice(_NICE)
-    desk = _Desk(pipe)
-    try:
+    waiting: dict[str, Robot] = {}
+
+    def take() -> None:
+        what, robot = pipe.recv()
+        waiting[what] = robot
+
+    def growth() -> None:
+        with suppress(ChilopodError):  # where there is no straight walk to speak of
+            pipe.send(growth_of(waiting.pop("growth")))
+
+    def tell(known: Theory) -> None:
+        while pipe.poll():
+            take()
+        if "theory" in waiting:
+            raise _Stale
+        pipe.send(known)
+        if "growth" in waiting:
+            growth()
+
+    with suppress(EOFError, OSError):  # the page is gone
         while True:
-            desk.wait()
-            what, robot = desk.next()
-            if what == "growth":
-                desk.growth(robot)
+            while not waiting or pipe.poll():
+                take()
+            if "growth" in waiting:
+                growth()
                 continue
-            try:
-                theory_of(robot, engine, desk.tell)
-            except _Stale:
-                continue
-    except (EOFError, OSError):
-        return  # the page is gone
+            with suppress(_Stale):
+                theory_of(waiting.pop("theory"), engine, tell)

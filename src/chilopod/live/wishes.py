@@ -13,44 +13,50 @@ LARGEST_SEED = 2**53 - 1
 
 @dataclass(frozen=True)
 class Wish:
-    """Something that is wanted; of those that are alike only the last counts."""
+    """Something that is wanted; of several of the same kind only the last counts."""
 
     @property
     def kind(self) -> Hashable:
-        """Alike are wishes of the same kind."""
+        """Kind of the wish."""
         return type(self).__name__
 
 
 @dataclass(frozen=True)
-class Spring(Wish):
-    """Another stiffness of one spring, counted from 0 at the front, or of all (None), N*m/rad."""
+class Set(Wish):
+    """Another value (SI) of a slider, by its name in :func:`chilopod.live.sliders.sliders_of`."""
 
-    joint: int | None
-    stiffness: float
+    slider: str
+    value: float
 
     @property
     def kind(self) -> Hashable:
-        """Every spring has its own."""
-        return "Spring", self.joint
+        """Kind of the wish: every slider has its own."""
+        return self.slider
 
 
-@dataclass(frozen=True)
-class Friction(Wish):
+def Spring(joint: int | None, stiffness: float) -> Set:
+    """Another stiffness (N*m/rad) of one spring, counted from 0 at the front, or of all (None)."""
+    return Set("springs.stiffness" if joint is None else f"springs.stiffness[{joint}]", stiffness)
+
+
+def Friction(factor: float) -> Set:
     """Another floor: friction as a factor on that of the robot file."""
+    return Set("friction", factor)
 
-    factor: float
 
-
-@dataclass(frozen=True)
-class Stride(Wish):
+def Stride(length: float) -> Set:
     """Longer or shorter steps, m."""
+    return Set("gait.stride", length)
 
-    length: float
+
+def Speed(times: float) -> Set:
+    """Another number of seconds of walking that one second shows."""
+    return Set("speed", times)
 
 
 @dataclass(frozen=True)
 class Target(Wish):
-    """A place on the floor to go to, m; None: none any more."""
+    """A place on the floor to go to, m; None to go nowhere in particular."""
 
     place: tuple[float, float] | None
 
@@ -64,19 +70,12 @@ class Steering(Wish):
 
 @dataclass(frozen=True)
 class Pull(Wish):
-    """A torque on a yaw joint, N*m, positive where it turns what is behind it to the left; for some time (s), or until
-    another one."""
+    """A torque on a yaw joint, N*m, positive where it turns what is behind the joint to the left; for some time (s), or
+    until another pull."""
 
     joint: int
     torque: float
     time: float = math.inf
-
-
-@dataclass(frozen=True)
-class Speed(Wish):
-    """How many seconds of walking a second shows."""
-
-    times: float
 
 
 @dataclass(frozen=True)
@@ -88,28 +87,27 @@ class Pause(Wish):
 
 @dataclass(frozen=True)
 class Step(Wish):
-    """Walk on by a part of a gait cycle, and pause."""
+    """Walk on by a number of gait cycles, and pause."""
 
     cycles: float
 
 
 @dataclass(frozen=True)
 class Reset(Wish):
-    """Begin anew with a seed; springs, floor and steps stay as they were set."""
+    """Begin anew with a seed; springs, floor and steps stay as they are set."""
 
     seed: int
 
 
 @dataclass(frozen=True)
 class Record(Wish):
-    """Begin or end to write the walk down."""
+    """Begin or end a recording."""
 
     on: bool
 
 
 class Box:
-    """Where wishes wait: any thread puts them in, one takes them out. A flood of them takes no more room than one of
-    each kind."""
+    """Box of wishes that any thread fills and one empties; it holds one wish of each kind at most."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -124,15 +122,15 @@ class Box:
         self._any.set()
 
     def wait(self, seconds: float) -> bool:
-        """Until there is a wish, or somebody wakes, which it tells; but so long at most."""
+        """Wait until there is a wish or :meth:`wake` is called, some seconds at most; True if either came."""
         return self._any.wait(seconds)
 
     def wake(self) -> None:
-        """Let the one who waits go on, as if there were a wish."""
+        """Let the thread that waits go on, as if there were a wish."""
         self._any.set()
 
     def take(self) -> list[Wish]:
-        """All wishes in the order in which they came, and none is left."""
+        """Take all wishes out, in the order in which they came."""
         with self._lock:
             self._any.clear()
             wishes = list(self._waiting.values())

@@ -11,7 +11,6 @@ from chilopod.analysis.parameters import PAPER_UNIT
 from chilopod.engine import Status
 from chilopod.live.state import Seen, Settings
 from chilopod.live.theory import Growth, Theory
-from chilopod.robot import Robot
 
 _STRAIGHT = 0.15  # rad of bend in all that nudges alone may make
 _SETTLED = 0.1  # of the branch's radius
@@ -29,15 +28,7 @@ def radius_of(seen: Seen) -> float:
 
 
 def sentences(seen: Seen, settings: Settings, theory: Theory, growth: Growth | None) -> list[str]:
-    """Sentences on a walk now, the most important first.
-
-    Parameters
-    ----------
-    seen, settings
-        The walk and how everything is set.
-    theory, growth
-        Theory of this robot, and growth of its bend; not valid for another robot.
-    """
+    """Sentences on a walk now, the most important first; theory and growth are those of this robot."""
     if seen.status is not Status.WALKED:
         return [f"It has stopped: {seen.status.sentence}. Press R to begin anew."]
     said = []
@@ -49,8 +40,8 @@ def sentences(seen: Seen, settings: Settings, theory: Theory, growth: Growth | N
         said.append(f"On its way to the target, {away:.2f} m off, with the strategy {seen.steering}.")
         said += _held(seen, settings)
     if seen.pulled.any():
-        joints = ", ".join(str(joint + 1) for joint in np.flatnonzero(seen.pulled))
-        who = f"Joint {joints} is" if len(joints) == 1 else f"Joints {joints} are"
+        pulled = [str(joint + 1) for joint in np.flatnonzero(seen.pulled)]
+        who = f"Joint {pulled[0]} is" if len(pulled) == 1 else f"Joints {', '.join(pulled)} are"
         return [*said, f"{who} pulled aside, and it walks {_arc(seen)} as long as that lasts."]
     if seen.target is not None:
         # Who steers makes the curve, not the spring: what the straight or the curved walk would do is not to be seen.
@@ -114,8 +105,3 @@ def _arc(seen: Seen) -> str:
 def _percent(growth: Growth) -> str:
     """By how much a disturbance changes in a second."""
     return f"{100.0 * abs(math.expm1(growth.rate)):.0f} %"
-
-
-def described(robot: Robot, engine: str) -> str:
-    """Line that describes the robot that walks."""
-    return f"{robot.name}, {robot.body.modules} modules, {engine}"

@@ -32,28 +32,8 @@ def identification_files(found: Identification, folder: str | Path) -> Iterator[
 
 
 def write_branch(data: xr.Dataset, folder: str | Path, *, replace: bool = True) -> list[Path]:
-    """Write a branch of curved walks as ``branch`` with ``.png``, ``.svg``, ``.csv`` and ``.nc``.
-
-    The netCDF file holds all that the branch goes on from, the table what a reader wants.
-
-    Parameters
-    ----------
-    data
-        From :mod:`chilopod.analysis.branch`.
-    folder
-        Created where there is none.
-    replace
-        True if files that are already there may be replaced.
-
-    Returns
-    -------
-    The files.
-
-    Raises
-    ------
-    OutputError
-        If a file cannot be written; it says where it is kept instead.
-    """
+    """Write a branch from :mod:`chilopod.analysis.branch` as ``branch`` with ``.png``, ``.svg``, ``.csv`` (what a
+    reader wants) and ``.nc`` (all that it goes on from); files and errors as of :func:`chilopod.output.write_all`."""
     return _write_alone(branch.panel(data), folder, replace, branch.table(data), sealed(netcdf(data)))
 
 
@@ -65,20 +45,9 @@ def write_undulation(data: xr.Dataset, folder: str | Path, *, replace: bool = Tr
 def panel_files(
     panel: Panel, figures: Path, data: Path, table: xr.Dataset | None = None, stored: bytes | None = None
 ) -> Iterator[tuple[Path, bytes]]:
-    """The files of a figure: the data behind it as ``.nc`` and ``.csv``, then, as ``.svg`` and ``.png``, what is drawn
-    when these are asked for.
-
-    Parameters
-    ----------
-    panel
-        The figure.
-    figures, data
-        Folders.
-    table
-        For the ``.csv``, in place of the data.
-    stored
-        For the ``.nc``, in place of the data.
-    """
+    """Files of a figure: the data behind it as ``.nc`` and ``.csv``, then, as ``.svg`` and ``.png``, what is drawn
+    when these are asked for, into two folders; ``table`` takes the place of the data in the ``.csv``, ``stored`` in the
+    ``.nc``."""
     yield data / f"{panel.name}.nc", netcdf(panel.data) if stored is None else stored
     yield data / f"{panel.name}.csv", tables.csv(panel.data if table is None else table).encode()
     with style.house_style():

@@ -11,24 +11,19 @@ from matplotlib.figure import Figure
 
 @dataclass(frozen=True)
 class Panel:
-    """A figure with what is said about it.
+    """A figure with the words about it.
 
     Attributes
     ----------
-    name
-        Name of its files.
-    title
-        Its heading.
+    name, title, letter
+        Name of its files, its heading, and the letter before that, if any.
     draw
-        Makes the figure, in the narrow layout if told so; call it within :func:`chilopod.show.style.house_style`.
-    alt
-        Description of the picture for those who cannot see it.
-    text
-        Paragraphs beside it.
+        Function that draws it, in the narrow layout if told so; for use within
+        :func:`chilopod.show.style.house_style`.
+    alt, text
+        Description for readers who cannot see it, and the paragraphs beside it.
     data
         Data that are drawn.
-    letter
-        Before its heading, if it has one; A to D are those of the paper's figure.
     """
 
     name: str

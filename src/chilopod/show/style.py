@@ -26,6 +26,17 @@ PALE: Final = "#e8e8e8"
 CURVES: Final = (BLUE, GREEN, PURPLE, ORANGE, SKY, GREY)
 """For curves that are only to be told apart; :data:`VERMILLION` is kept for what loses stability."""
 
+SCENE: Final = {
+    "ink": BLACK,
+    "grid": "#d4d4d4",
+    "body": SKY,
+    "edge": BLUE,
+    "air": GREY,
+    "path": ORANGE,
+    "target": GREEN,
+}
+"""For what films and replays show."""
+
 SMALL: Final = 9.0
 """Size of the smallest text, pt."""
 
@@ -60,17 +71,8 @@ _RC: Final[Any] = {
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the axes of a figure go.
-
-    Attributes
-    ----------
-    mosaic
-        As :meth:`matplotlib.figure.Figure.subplot_mosaic` takes it, such as ``"AB;CC"``.
-    height
-        Inches.
-    heights, widths
-        Heights and widths of rows and columns, relative; equal if empty.
-    """
+    """Axes of a figure: mosaic such as ``"AB;CC"``, height in inches, and relative heights and widths of rows and
+    columns, equal if empty."""
 
     mosaic: str
     height: float
@@ -128,6 +130,11 @@ def bare(axes: Axes) -> None:
 def note(axes: Axes, text: str, at: tuple[float, float], away: tuple[float, float], **look: Any) -> None:
     """Small text beside a point, so many points of a printer away from it; `look` as for an annotation."""
     axes.annotate(text, at, away, textcoords="offset points", fontsize=SMALL, **look)
+
+
+def arrow(axes: Axes, start: tuple[float, float], end: tuple[float, float], **look: Any) -> None:
+    """An arrow from a point to another; `look` as for an arrow's patch."""
+    axes.annotate("", end, start, zorder=7, arrowprops={"arrowstyle": "-|>", "shrinkA": 0, "shrinkB": 0, **look})
 
 
 def joint_styles(count: int) -> list[tuple[Any, str]]:

@@ -28,17 +28,7 @@ def files_of_walks(what: str, folder: str | Path) -> list[Path]:
 
 def write_walks(what: str, done: Any, folder: str | Path, *, replace: bool = True) -> list[Path]:
     """Write a ``turn`` or a ``course`` as a picture (``.png``, ``.svg``), record (``.nc``), replay (``.html``) and, of
-    a course, film (``.mp4``).
-
-    Parameters
-    ----------
-    what
-        Kind of the result, ``turn`` or ``course``.
-    done
-        From :func:`chilopod.tasks.turn` or :func:`chilopod.tasks.course.drive`.
-    folder, replace
-        As for :func:`chilopod.show.write_branch`, as what is returned and raised.
-    """
+    a course, film (``.mp4``); files and errors as of :func:`chilopod.output.write_all`."""
     files = files_of_walks(what, folder)
     write_all(_contents(import_module(f"chilopod.show.figures.{what}"), done, files), replace=replace)
     return files

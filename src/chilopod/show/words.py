@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Sequence
 
@@ -15,6 +16,12 @@ def number(value: float, digits: int = 3) -> str:
     """A number with so many significant digits, trailing zeros and all, and a true minus sign."""
     text = f"{value:#.{digits}g}".rstrip(".")
     return minus(text if "e" not in text else f"{value:.{digits - 1}e}")
+
+
+def round_down(value: float) -> float:
+    """The largest of 1, 2 and 5 times a power of ten that is no larger than a positive number."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return max(step * power for step in (1, 2, 5) if step * power <= value * (1.0 + 1e-9))
 
 
 def signed(value: float, digits: int = 0) -> str:

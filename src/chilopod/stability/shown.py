@@ -1,22 +1,19 @@
-"""How results show themselves: as a few lines of text, as a drawing, and as a table."""
+"""Results about any periodic system as tables, and the words and marks that they share."""
 
 from __future__ import annotations
 
 import csv
 import io
-import itertools
-import textwrap
 from collections.abc import Iterable, Sequence
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chilopod.errors import ParameterError
-from chilopod.frozen import Short
 from chilopod.labels import Labelled
-from chilopod.notebook import block, picture
+from chilopod.notebook import Shown as Shown
+from chilopod.notebook import aligned, picture
+from chilopod.notebook import axes_for as axes_for
 from chilopod.output import write_atomic
 
 if TYPE_CHECKING:
@@ -46,27 +43,8 @@ _COLUMNS: dict[str, tuple[Any, ...]] = {
     "error_bounds": (float, "bound on the error of the multipliers", "1"),
 }
 
-_WIDEST = 110  # characters of a line
 _MOST = 6  # rows of a table, and remarks
 _MARKERS = "osD^vP*X"
-
-
-class Shown(Short):
-    """Base of results that print as a heading and a few lines, and show the same in notebooks."""
-
-    def _lines(self) -> list[str]:
-        raise NotImplementedError
-
-    def __str__(self) -> str:
-        wrapped = (textwrap.wrap(line, _WIDEST, subsequent_indent="    ") for line in self._lines())
-        return "\n".join(itertools.chain.from_iterable(wrapped))
-
-    def _picture(self) -> str:
-        return ""
-
-    def _repr_html_(self) -> str:
-        heading, _, text = str(self).partition("\n")
-        return block(heading, self._picture(), f"<pre>{escape(text)}</pre>")
 
 
 class Result(Shown):
@@ -124,29 +102,13 @@ def bounded(value: float, bound: float) -> str:
 
 def rows(cells: Iterable[Sequence[str]]) -> list[str]:
     """Lines of a table, the columns below one another; of many rows the first ones."""
-    cells = list(cells)
-    widths = [max(map(len, column)) for column in zip(*cells[:_MOST], strict=True)]
-    lines = ["  " + "  ".join(map(str.ljust, row, widths)).rstrip() for row in cells[:_MOST]]
-    return lines + [f"  and {len(cells) - _MOST} more"] * (len(cells) > _MOST)
+    return [f"  {line}" for line in aligned(cells, _MOST)]
 
 
 def said(remarks: Sequence[str]) -> list[str]:
     """Lines of remarks."""
     more = [f"and {len(remarks) - _MOST} more remarks"] if len(remarks) > _MOST else []
     return [f"remark: {each}" for each in remarks[:_MOST]] + more
-
-
-def axes_for(axes: Axes | None) -> Axes:
-    """The axes of matplotlib, or those of a new figure if there are none."""
-    from matplotlib.axes import Axes
-
-    if axes is None:
-        from matplotlib import pyplot
-
-        return pyplot.figure(layout="constrained").add_subplot()
-    if not isinstance(axes, Axes):
-        raise ParameterError("is not what is drawn on", field="axes", value=axes, allowed="axes of matplotlib, or None")
-    return axes
 
 
 def mark(axes: Axes, points: Iterable[tuple[str, float, float]]) -> None:

@@ -14,12 +14,11 @@ import xarray as xr
 from chilopod.engine import Controller, engine_named
 from chilopod.errors import AnalysisError
 from chilopod.frozen import Short
-from chilopod.notebook import block, table, words
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import Course, RadiusLaw, Strategy, Verdict, random_course
 from chilopod.tasks.radius_law import radius_law
-from chilopod.tasks.runs import RunOptions, Runs, paths, runs
+from chilopod.tasks.runs import Pathed, RunOptions, runs
 from chilopod.trials import Trial, finite
 
 GRAVITY = 9.81
@@ -70,7 +69,7 @@ class Driver(Short):
 
 
 @dataclass(frozen=True)
-class Driven(Runs):
+class Driven(Pathed):
     """Walks along a course by a driver, with their trials and records, each up to where it ended, see
     :func:`chilopod.steering.of_course`."""
 
@@ -111,19 +110,58 @@ class Driven(Runs):
             "walks": [{"seed": seed, **_walk_json(trial.robot, record)} for trial, seed, record in walks],
         }
 
-    def _repr_html_(self) -> str:
-        goals = self.record.sizes["goal"]
-        rows = []
-        for label, record in zip(self.labels, self.records, strict=True):
-            ends = record.goal_end.values
-            last = f"{np.nanmax(ends):.1f}" if np.isfinite(ends).any() else "-"
-            rows.append((label, f"{_arrived(record)} of {goals}", last))
-        return block(
-            f"{self.who}: a course of {goals} targets by {self.strategy.name}",
-            paths(self.record),
-            *(words(remark) for remark in self.driver.remarks),
-            table(("seed", "targets reached", "after (s)"), rows),
-        )
+    @property
+    def title(self) -> str:
+        """Robot, engine and strategy in words."""
+        return f"{self.who}, {self.strategy.name}: {self.strategy.sentence}"
+
+    def _told(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
+        walks, goals = self._found()["walks"], len(self.course.goals)
+        above = [f"{goals} target{'s' * (goals > 1)}, {self.course.patience:g} s for each", *self.driver.remarks]
+        missed = {each["verdict"]: each["sentence"] for walk in walks for each in walk["targets"]}
+        below = [f"{verdict}: {words}" for verdict, words in missed.items() if verdict != Verdict.ARRIVED.label]
+        if len(walks) == 1:
+            (walk,) = walks
+            below.append(
+                f"{walk['arrived']} of {goals} targets in {walk['time_s']:.1f} s; work {walk['spring_work_J']:.3g} J "
+                f"on springs, {walk['drive_work_J']:.3g} J by drives; steering's part of the cost of transport "
+                f"{_shown(walk['steering_cost_of_transport'])}"
+            )
+            return above, _of_targets(walk["targets"]), below
+        reached = [walk["arrived"] for walk in walks]
+        whole = f"{reached.count(goals)} of {len(walks)} courses whole"
+        below.append(f"{sum(reached)} of {len(walks) * goals} targets, {whole}")
+        return above, _of_walks(walks, goals), below
+
+
+def _of_targets(goals: list[dict[str, Any]]) -> list[Sequence[str]]:
+    rows: list[Sequence[str]] = [
+        ("target", "verdict", "time (s)", "path / shortest", "leg yaw (rad2 s)", "springs (J)", "drives (J)")
+    ]
+    for number, goal in enumerate(goals, 1):
+        told = ["-"] * 5  # of one that had no turn
+        if goal["path_m"]:
+            told = [f"{goal['end_s'] - goal['begin_s']:.1f}", f"{goal['path_m']:.2f} / {goal['shortest_m']:.2f} m"]
+            told.append(f"{goal['leg_yaw_effort_rad2_s']:.4f}")
+            told += [f"{goal[f'{which}_work_J']:.3f}" for which in ("spring", "drive")]
+        rows.append((str(number), goal["verdict"], *told))
+    return rows
+
+
+def _of_walks(walks: list[dict[str, Any]], goals: int) -> list[Sequence[str]]:
+    rows: list[Sequence[str]] = [
+        ("seed", "targets", "time (s)", "springs (J)", "drives (J)", "cost of transport", "status")
+    ]
+    for walk in walks:
+        seed = "-" if walk["seed"] is None else str(walk["seed"])
+        works = [f"{walk[f'{which}_work_J']:.3f}" for which in ("spring", "drive")]
+        cost = _shown(walk["steering_cost_of_transport"])
+        rows.append((seed, f"{walk['arrived']} of {goals}", f"{walk['time_s']:.1f}", *works, cost, walk["status"]))
+    return rows
+
+
+def _shown(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2g}"
 
 
 def _arrived(record: xr.Dataset) -> int:

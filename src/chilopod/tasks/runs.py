@@ -12,8 +12,7 @@ import xarray as xr
 
 from chilopod.engine import HasFootCreep, engine_named
 from chilopod.engine.named import path_of
-from chilopod.frozen import Short
-from chilopod.notebook import picture
+from chilopod.notebook import Summary, axes_for, picture
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.steering import ARRIVAL_RADIUS
@@ -56,7 +55,7 @@ def runs(
 
 
 @dataclass(frozen=True)
-class Runs(Short):
+class Runs(Summary):
     """Walks that differ in nothing but their seed, with all that makes each of them."""
 
     trials: tuple[Trial, ...]
@@ -110,13 +109,24 @@ class Runs(Short):
         return {}
 
 
-def paths(record: xr.Dataset) -> str:
-    """SVG of the paths of the walks in a record."""
-    count = record.sizes["robot"]
-    alt = f"paths of {'a walk' if count == 1 else f'{count} walks'} from above"
-    if count > _MOST:
-        alt += f", the first {_MOST} drawn"
-    return picture(lambda axes: draw_paths(axes, record), alt)
+class Pathed(Runs):
+    """Base of walks that have a record, and are drawn as paths over the floor."""
+
+    if TYPE_CHECKING:
+
+        @property
+        def record(self) -> xr.Dataset: ...
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the path of module 1 in every walk, the first dozen of them, and the targets."""
+        axes = axes_for(axes)
+        draw_paths(axes, self.record)
+        return axes
+
+    def _picture(self) -> str:
+        count = self.record.sizes["robot"]
+        alt = f"paths of {'a walk' if count == 1 else f'{count} walks'} from above"
+        return picture(self.plot, alt if count <= _MOST else f"{alt}, the first {_MOST} drawn")
 
 
 def draw_paths(axes: Axes, record: xr.Dataset) -> None:

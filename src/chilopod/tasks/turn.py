@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Unpack, cast
@@ -13,12 +14,11 @@ from chilopod import units
 from chilopod.analysis.parameters import K1
 from chilopod.engine import Controller, engine_named
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.notebook import block, table, words
 from chilopod.progress import part, silent
 from chilopod.robot import Robot
 from chilopod.steering import Criteria, Strategy, Target, earliest_arrival, evaluate
 from chilopod.tasks.radius_law import radius_law
-from chilopod.tasks.runs import RunOptions, Runs, paths, runs
+from chilopod.tasks.runs import Pathed, RunOptions, runs
 from chilopod.trials import NONE, Trial, check_fits, finite, run, straight, together
 
 _SOFTEST = 1.0 / 20.0  # of the stiffest spring: where a strategy without a radius law starts to look
@@ -35,7 +35,7 @@ _TOLD = {
 
 
 @dataclass(frozen=True)
-class Turn(Runs):
+class Turn(Pathed):
     """A turning task and how it went.
 
     Attributes
@@ -82,18 +82,38 @@ class Turn(Runs):
             ],
         }
 
-    def _repr_html_(self) -> str:
-        said = f"The circle to it has a radius of {self.target.radius:.3g} m."
-        for name, spring in (("settles on it", self.by_law), ("was walked with", self.stiffness)):
-            if spring is not None:
-                said += f" The spring that {name}: {units.from_si(spring, 'N*mm/deg'):.4g} N·mm/deg."
+    @property
+    def title(self) -> str:
+        """Robot, engine, target and strategy in words."""
+        return f"{self.who}: turn to {self.target} by {self.strategy.name}"
+
+    def _told(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
         found = self.criteria
-        rows = [
-            (outcome.label, f"{arrival:.2f}" if np.isfinite(arrival) else "-", f"{nearest:.3f}")
-            for outcome, arrival, nearest in zip(found.outcome, found.arrival, found.nearest, strict=True)
+        above = [
+            f"{self.strategy.name}: {self.strategy.sentence}",
+            f"the circle to the target has a radius of {self.target.radius:.3f} m",
         ]
-        title = f"{self.who}: turn to {self.target} by {self.strategy.name}"
-        return block(title, paths(self.record), words(said), table(("outcome", "arrival (s)", "nearest (m)"), rows))
+        for name, spring in (
+            ("by the settled radius (the paper's k1-hat)", self.by_law),
+            ("walked with", self.stiffness),
+        ):
+            if spring is not None:
+                above.append(f"spring {name}: {units.format(spring, 'N*mm/deg', digits=4)}")
+        above.append(
+            f"distance left, angle and effort (the paper's epsilon 1 to 3) at {found.time:.2f} s; nearest at any time"
+        )
+        rows: list[Sequence[str]] = [
+            ("seed", "outcome", "arrival (s)", "nearest (m)", "left (m)", "angle (deg)", "effort (rad2 s)")
+        ]
+        for i, (label, outcome) in enumerate(zip(self.labels, found.outcome, strict=True)):
+            arrival = f"{found.arrival[i]:.2f}" if np.isfinite(found.arrival[i]) else "never"
+            nearest, left, angle = (
+                f"{found.nearest[i]:.4f}",
+                f"{found.distance[i]:.3f}",
+                f"{np.degrees(found.angle[i]):.2f}",
+            )
+            rows.append((label, outcome.label, arrival, nearest, left, angle, f"{found.effort[i]:.4f}"))
+        return above, rows, []
 
 
 def turn(

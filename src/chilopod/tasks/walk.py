@@ -11,11 +11,10 @@ import numpy as np
 import xarray as xr
 
 from chilopod.engine import Controller
-from chilopod.notebook import block, table
 from chilopod.progress import Progress, silent
 from chilopod.record import RATE
 from chilopod.robot import Robot
-from chilopod.tasks.runs import RunOptions, Runs, paths, runs
+from chilopod.tasks.runs import Pathed, RunOptions, Runs, runs
 from chilopod.trials import Trial, WalkSummary, as_now, run_each, straight, summaries, together
 
 
@@ -41,26 +40,28 @@ class Ends(Runs):
             "walks": [{"seed": trial.seed, **end.as_json()} for trial, end in ends],
         }
 
-    def _repr_html_(self) -> str:
-        return block(self.title, self._table)
-
-    @property
-    def _table(self) -> str:
-        rows = []
+    def _told(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
+        rows: list[Sequence[str]] = [
+            ("seed", "x (m)", "y (m)", "radius (m)", "joint angles, mean of the last 5 s (deg)")
+        ]
         for label, end in zip(self.labels, self.summaries, strict=True):
+            if end.failed:
+                rows.append((label, "-", "-", "-", end.sentence))
+                continue
+            bends = "  ".join(f"{angle:+7.2f}" for angle in end.joint_angles_deg)
             radius = f"{end.axis_radius:.4g}" if np.isfinite(end.axis_radius) else "straight"
-            rows.append((label, end.sentence, f"{end.x:.3f}", f"{end.y:.3f}", radius))
-        return table(("seed", "", "x (m)", "y (m)", "radius (m)"), rows)
+            rows.append((label, f"{end.x:.3f}", f"{end.y:.3f}", radius, bends))
+        return [], rows, []
+
+    def _picture(self) -> str:
+        return ""
 
 
 @dataclass(frozen=True)
-class Walks(Ends):
+class Walks(Pathed, Ends):
     """The same with the record of all walks."""
 
     record: xr.Dataset
-
-    def _repr_html_(self) -> str:
-        return block(self.title, paths(self.record), self._table)
 
 
 def walk(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from chilopod import units
 from chilopod.show import style
 from chilopod.show.scene.frames import body_frames
+from chilopod.show.scene.outline import draw_spines
 from chilopod.steering import ARRIVAL_RADIUS, Verdict
 from chilopod.tasks.course import Driven
 
@@ -104,7 +105,10 @@ def _floor(axes: Axes, record: xr.Dataset) -> None:
     if missed and record.sizes["robot"] > 1:
         missed = f"walk 1: {missed}"
     style.note(axes, missed, (0.0, 0.0), (4, 4), xycoords="axes fraction", color=style.VERMILLION, bbox=_ON_WHITE)
-    _bodies(axes, record.isel(robot=[0]))
+    first = record.isel(robot=[0])
+    ends, walked = first.goal_end.values[0], first.time.values[np.isfinite(first.heading.values[:, 0])]
+    moments = np.unique(np.clip([0.0, *ends[np.isfinite(ends)]], walked[0], walked[-1]))
+    draw_spines(axes, body_frames(first, moments).spine[:, 0])
     axes.set(xlabel="x (m)", ylabel="y (m)")
     style.grid(axes)
 
@@ -133,12 +137,3 @@ def _missed(walk: xr.Dataset) -> str:
         if verdict not in (_ARRIVED, ""):
             numbers.setdefault(str(verdict), []).append(str(number))
     return "; ".join(f"{', '.join(each)} {verdict}" for verdict, each in numbers.items())
-
-
-def _bodies(axes: Axes, record: xr.Dataset) -> None:
-    ends = record.goal_end.values[0]
-    walked = record.time.values[np.isfinite(record.heading.values[:, 0])]
-    moments = np.unique(np.clip([0.0, *ends[np.isfinite(ends)]], walked[0], walked[-1]))
-    for spine in body_frames(record, moments).spine[:, 0]:
-        axes.plot(spine[:, 0], spine[:, 1], "-o", color=style.BLACK, alpha=0.35, linewidth=2.5, markersize=3, zorder=2)
-        axes.plot(*spine[0], "o", color=style.BLACK, markersize=4.5, zorder=4)

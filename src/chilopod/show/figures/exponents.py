@@ -92,11 +92,7 @@ def _joined(data: xr.Dataset) -> tuple[Array, Array, Array]:
 
     Where a complex pair becomes two real exponents or the other way round, the mean of the two and the square of half
     their difference still change smoothly with k1; between two values of the sweep these are drawn as straight lines.
-    Without that the curves would cut the corner.
-
-    Returns
-    -------
-    k1, real and imaginary parts, with more values of k1 where needed.
+    Without that the curves would cut the corner. Returns k1, real and imaginary parts, with more values where needed.
     """
     values = data["real"].values + 1j * data["imaginary"].values
     logs = np.log(data.k1.values)
@@ -228,17 +224,7 @@ def _all(axes: Axes, real: Array, imaginary: Array, colors: list[str], ks: Array
 
 
 def over_k1(axes: Axes, data: xr.Dataset, crossing: float | None) -> None:
-    """Draw the real parts of the slow exponents over k1.
-
-    Parameters
-    ----------
-    axes
-        Empty.
-    data
-        Section "exponents".
-    crossing
-        Point at which stability is lost, if it was located; otherwise it is read off the curve.
-    """
+    """Draw the real parts of the slow exponents over k1; the crossing, if it was not located, is read off the curve."""
     ks, real, _ = _joined(data)
     critical, colors = _critical(data), _colors(data)
     lead = critical if critical is not None else 0
@@ -285,10 +271,5 @@ def _arrow(axes: Axes, x: Array, y: Array, share: float, color: str) -> None:
     if not inside or length[-1] < 0.1:
         return
     index = int(np.searchsorted(length, share * length[-1]))
-    axes.annotate(
-        "",
-        (x[index], y[index]),
-        (x[index - 1], y[index - 1]),
-        zorder=7,
-        arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.8, "mutation_scale": 15, "shrinkA": 0, "shrinkB": 0},
-    )
+    start, end = (x[index - 1], y[index - 1]), (x[index], y[index])
+    style.arrow(axes, start, end, color=color, lw=1.8, mutation_scale=15)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -14,9 +16,10 @@ from chilopod.robot import Robot
 from chilopod.show import style
 from chilopod.show.panel import Panel
 from chilopod.show.scene.outline import SLIMNESS, draw_modules
-from chilopod.show.words import SPRING_UNIT, k, minus, number
+from chilopod.show.words import SPRING_UNIT, k, minus, number, round_down
 
 _SIDES = ("left", "right")
+_GUIDE: Any = {"color": style.GREY, "lw": 0.7, "linestyle": ":"}
 _COLORS = (style.BLUE, style.ORANGE)
 _WIDE = style.Layout("AA;BC", 6.0, heights=(1.0, 1.55), widths=(1.0, 1.15))
 _NARROW = style.Layout("A;B;C", 8.6, heights=(0.9, 1.5, 1.7))
@@ -108,24 +111,13 @@ def _whole(axes: Axes, robot: Robot, data: xr.Dataset, narrow: bool) -> None:
         x = -joint * length
         _spring(axes, x, 0.0, size)
         if few or joint in (1, n - 1):
-            axes.annotate(
-                k(joint),
-                (x, 0.25 * reach),
-                (x, 1.45 * reach),
-                ha="center",
-                va="bottom",
-                fontsize=10,
-                arrowprops={"arrowstyle": "-", "color": style.GREY, "lw": 0.7, "shrinkA": 0, "shrinkB": 2},
-            )
+            line = {"arrowstyle": "-", "color": style.GREY, "lw": 0.7, "shrinkA": 0, "shrinkB": 2}
+            look: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": 10, "arrowprops": line}
+            axes.annotate(k(joint), (x, 0.25 * reach), (x, 1.45 * reach), **look)
     end = 0.05 * robot.body.length
-    axes.annotate(
-        "",
-        (0.45 * end + end, 0.0),
-        (0.25 * end, 0.0),
-        arrowprops={"arrowstyle": "-|>", "color": style.BLACK, "lw": 1.8, "shrinkA": 0, "shrinkB": 0},
-    )
+    style.arrow(axes, (0.25 * end, 0.0), (1.45 * end, 0.0), color=style.BLACK, lw=1.8)
     y = -1.7 * reach
-    bar = _round(0.15 * robot.body.length)
+    bar = round_down(0.15 * robot.body.length)
     axes.plot([-robot.body.length, -robot.body.length + bar], [y, y], color=style.BLACK, lw=3, solid_capstyle="butt")
     axes.text(-robot.body.length + 1.15 * bar, y, f"{number(100 * bar, 2)} cm", va="center", fontsize=style.SMALL)
     axes.text(0.0, y, "walks this way →", ha="right", va="center", fontsize=style.SMALL)
@@ -151,14 +143,10 @@ def _foot(axes: Axes, robot: Robot, centre: float, foot: float, sign: float, col
     """A leg with its stroke; the foot itself only while it stands."""
     middle, half, y = centre + robot.legs.forward_offset, 0.5 * robot.gait.stride, sign * robot.legs.half_width
     standing = not np.isnan(foot)
-    axes.plot(
-        [middle - half, middle + half],
-        [y, y],
-        color=color if standing else style.GREY,
-        lw=2.2 if standing else 1.2,
-        linestyle="-" if standing else (0, (1.5, 1.5)),
-        solid_capstyle="butt",
-    )
+    look: dict[str, Any] = {"color": style.GREY, "lw": 1.2, "linestyle": (0, (1.5, 1.5))}
+    if standing:
+        look = {"color": color, "lw": 2.2}
+    axes.plot([middle - half, middle + half], [y, y], solid_capstyle="butt", **look)
     if standing:
         root = sign * 0.5 * SLIMNESS * robot.module_length
         axes.plot([middle, foot], [root, y], color=color, lw=1.2)
@@ -189,42 +177,24 @@ def _one_module(axes: Axes, robot: Robot) -> None:
         axes.plot([x0, x0], [sign * 0.5 * SLIMNESS * length, y], color=color, lw=1.2)
         axes.plot([x0 - 0.5 * stride, x0 + 0.5 * stride], [y, y], color=color, lw=3, solid_capstyle="butt")
         axes.plot([x0 - 0.5 * stride, x0 + 0.5 * stride], [y, y], "|", color=color, markersize=10, markeredgewidth=2)
-    axes.text(
-        x0 - 0.7 * stride,
-        b,
-        "PEP",
-        ha="right",
-        va="center",
-        fontsize=style.SMALL,
-        bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
-    )
-    axes.text(x0 + 0.7 * stride, b, "AEP", ha="left", va="center", fontsize=style.SMALL)
+    look: dict[str, Any] = {"va": "center", "fontsize": style.SMALL}
+    behind = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
+    axes.text(x0 - 0.7 * stride, b, "PEP", ha="right", bbox=behind, **look)
+    axes.text(x0 + 0.7 * stride, b, "AEP", ha="left", **look)
     top = reach + step
     _measure(axes, (x0 - 0.5 * stride, top), (x0 + 0.5 * stride, top), f"stride {_mm(stride)}", (x0, top + 0.3 * step))
     low = -reach - step
     if x0 != 0.0:
         _measure(axes, (0.0, low), (x0, low), f"forward offset {_mm(x0)}", (0.5 * x0, low - 0.35 * step), below=True)
-    axes.plot([0.0, 0.0], [0.0, low], color=style.GREY, lw=0.7, linestyle=":")
-    axes.plot([x0, x0], [-b, low], color=style.GREY, lw=0.7, linestyle=":")
+    axes.plot([0.0, 0.0], [0.0, low], **_GUIDE)
+    axes.plot([x0, x0], [-b, low], **_GUIDE)
     low -= 2.0 * step
-    _measure(
-        axes,
-        (-0.5 * length, low),
-        (0.5 * length, low),
-        f"module length {_mm(length)}",
-        (0.0, low - 0.2 * step),
-        below=True,
-    )
+    words = f"module length {_mm(length)}"
+    _measure(axes, (-0.5 * length, low), (0.5 * length, low), words, (0.0, low - 0.2 * step), below=True)
     side = -0.28 * length
-    _measure(
-        axes,
-        (side, 0.0),
-        (side, b),
-        f"half-width\n{_mm(b)}",
-        (side - 0.03 * length, 0.5 * (b + 0.5 * SLIMNESS * length)),
-        left=True,
-    )
-    axes.plot([side, x0 - 0.5 * stride], [b, b], color=style.GREY, lw=0.7, linestyle=":", zorder=0)
+    at = (side - 0.03 * length, 0.5 * (b + 0.5 * SLIMNESS * length))
+    _measure(axes, (side, 0.0), (side, b), f"half-width\n{_mm(b)}", at, left=True)
+    axes.plot([side, x0 - 0.5 * stride], [b, b], zorder=0, **_GUIDE)
     axes.set(xlim=(-0.66 * length, 0.66 * length), ylim=(low - 1.6 * step, top + 1.6 * step))
 
 
@@ -237,25 +207,9 @@ def _measure(
     below: bool = False,
     left: bool = False,
 ) -> None:
-    axes.annotate(
-        "",
-        end,
-        start,
-        arrowprops={
-            "arrowstyle": "|-|, widthA=0.25, widthB=0.25",
-            "color": style.BLACK,
-            "lw": 1.0,
-            "shrinkA": 0,
-            "shrinkB": 0,
-        },
-    )
-    axes.text(
-        *at,
-        label,
-        ha="right" if left else "center",
-        va="center" if left else "top" if below else "bottom",
-        fontsize=style.SMALL,
-    )
+    style.arrow(axes, start, end, arrowstyle="|-|, widthA=0.25, widthB=0.25", color=style.BLACK, lw=1.0)
+    ha, va = ("right", "center") if left else ("center", "top" if below else "bottom")
+    axes.text(*at, label, ha=ha, va=va, fontsize=style.SMALL)
 
 
 def _gait(axes: Axes, robot: Robot, data: xr.Dataset) -> None:
@@ -282,9 +236,3 @@ def _gait(axes: Axes, robot: Robot, data: xr.Dataset) -> None:
 
 def _mm(value: float) -> str:
     return minus(f"{1e3 * value:.4g} mm")
-
-
-def _round(value: float) -> float:
-    """The largest of 1, 2, 5 times a power of ten that is no larger."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(max(step * power for step in (1, 2, 5) if step * power <= value * (1 + 1e-9)))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
@@ -11,6 +10,7 @@ from matplotlib.patches import Circle
 from chilopod import units
 from chilopod.show import style
 from chilopod.show.scene.frames import body_frames
+from chilopod.show.scene.outline import draw_spines
 from chilopod.steering import ARRIVAL_RADIUS
 from chilopod.tasks import Turn
 
@@ -74,7 +74,10 @@ def _floor(axes: Axes, done: Turn) -> None:
         place = walk.position.transpose("time", "axis").values
         name = "path of module 1" if robot == 0 else None
         axes.plot(place[:, 0], place[:, 1], color=style.CURVES[robot % len(style.CURVES)], label=name, zorder=3)
-    _bodies(axes, record.isel(robot=[0]), float(done.criteria.arrival[0]))
+    end = float(done.criteria.arrival[0])
+    if not np.isfinite(end):
+        end = float(record.time[np.isfinite(record.heading.values[:, 0])][-1])
+    draw_spines(axes, body_frames(record.isel(robot=[0]), np.linspace(0.0, end, _STILLS)).spine[:, 0])
     axes.add_patch(
         Circle((float(target[0]), float(target[1])), ARRIVAL_RADIUS, fill=False, ec=style.VERMILLION, lw=1.5)
     )
@@ -82,11 +85,3 @@ def _floor(axes: Axes, done: Turn) -> None:
     axes.set(xlabel="x (m)", ylabel="y (m)")
     axes.legend(loc="best")
     style.grid(axes)
-
-
-def _bodies(axes: Axes, record: xr.Dataset, arrival: float) -> None:
-    end = arrival if np.isfinite(arrival) else float(record.time[np.isfinite(record.heading.values[:, 0])][-1])
-    frames = body_frames(record, np.linspace(0.0, end, _STILLS))
-    for spine in frames.spine[:, 0]:
-        axes.plot(spine[:, 0], spine[:, 1], "-o", color=style.BLACK, alpha=0.35, linewidth=2.5, markersize=3, zorder=2)
-        axes.plot(*spine[0], "o", color=style.BLACK, markersize=4.5, zorder=4)

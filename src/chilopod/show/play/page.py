@@ -17,7 +17,7 @@ from chilopod.planar import PlanarModel
 from chilopod.progress import Progress, silent
 from chilopod.robot import Robot
 from chilopod.show.scene.outline import SLIMNESS
-from chilopod.show.scene.replay_page import COLORS
+from chilopod.show.style import SCENE as COLORS
 from chilopod.steering import ARRIVAL_RADIUS, LegYawController, RadiusLaw, SpringLaw
 from chilopod.steering.course import Course
 from chilopod.tasks.radius_law import that_holds

@@ -14,17 +14,7 @@ from chilopod.steering import Verdict, arrivals
 
 @dataclass(frozen=True)
 class Aim:
-    """A target while it is one.
-
-    Attributes
-    ----------
-    place
-        x and y, m.
-    since
-        From when on, s.
-    reached
-        Time at which it was reached, s; None if never.
-    """
+    """A target: place (m), time from which on it is one, and time at which it was reached, None if never (s)."""
 
     place: tuple[float, float]
     since: float
@@ -36,13 +26,7 @@ class Aim:
 
 
 def aims_of(record: xr.Dataset) -> tuple[tuple[Aim, ...], ...]:
-    """Targets of every robot in the order of their turns.
-
-    Parameters
-    ----------
-    record
-        As described in :mod:`chilopod.show.scene.frames`.
-    """
+    """Targets of every robot of a record in the order of their turns."""
     start = float(record["time"].values[0])
     if "goal_place" in record:
         goals = record[["goal_place", "goal_begin", "goal_end", "goal_verdict"]]

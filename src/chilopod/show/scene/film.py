@@ -25,7 +25,7 @@ from chilopod.show import style
 from chilopod.show.scene.encoder import ENCODER, encoded, has_encoder
 from chilopod.show.scene.frames import Outcome, Scene, scene
 from chilopod.show.scene.outline import SLIMNESS
-from chilopod.show.scene.replay import COLORS
+from chilopod.show.style import SCENE as COLORS
 
 Array = NDArray[np.float64]
 
@@ -50,18 +50,12 @@ def filmed(
 
     Parameters
     ----------
-    record
-        As described in :mod:`chilopod.show.scene.frames`.
-    titles
-        Names of the robots: by label in the record, or in the order of the record.
+    record, titles
+        Record, and titles of its robots by label or in their order, see :mod:`chilopod.show.scene.frames`.
     heading
         Text above all panels.
-    fps
-        Frames per second of the film.
-    speed
-        Seconds of the walk per second of the film.
-    size
-        Width and height, pixels, both even.
+    fps, speed, size
+        Frames per second of the film, seconds of the walk per second of it, and its width and height, even pixels.
 
     Raises
     ------
@@ -75,7 +69,7 @@ def filmed(
 
 
 def frame_times(record: xr.Dataset, size: tuple[int, int], fps: int, speed: float) -> Array:
-    """When the frames of a film are, s of the record.
+    """Times of the frames of a film, s.
 
     Raises
     ------
@@ -224,32 +218,41 @@ class Stage:
             self._fit(text, across)
 
     def _panels(self, bottom: float, top: float) -> None:
-        """Lay the panels out as large as they fit, with title and outcome in one line if there is room for both."""
-        floor, width = self.shown.floor, self.size[0] - 2.0 * GAP
-        count, aspect = len(self.shown.titles), (floor.y1 - floor.y0) / (floor.x1 - floor.x0)
-        captions = self._captions()
+        """Lay the panels out, all of one size, in the middle of the room there is."""
+        captions, width = self._captions(), self.size[0] - 2.0 * GAP
+        across, tall, columns, lines = self._layout(width, top - bottom, captions.longest)
+        caption, rows = self._tall(lines), math.ceil(len(self.shown.titles) / columns)
+        left = GAP + 0.5 * (width - columns * across - (columns - 1) * APART)
+        top -= max(0.0, 0.5 * (top - bottom + GAP - rows * (tall + caption + GAP)))
+        self.panels = []
+        for index, outcome in enumerate(captions.outcomes):
+            x = left + (index % columns) * (across + APART)
+            y = top - (index // columns) * (tall + caption + GAP)
+            self._place(captions, index, (x, y), across, lines)
+            self.panels.append(self._panel(index, (x, y - caption), (across, tall), outcome))
+
+    def _layout(self, width: float, height: float, longest: float) -> tuple[float, float, int, int]:
+        """Width and height of a panel, columns, and lines of a caption: one if there is room for title and outcome."""
+        floor, count = self.shown.floor, len(self.shown.titles)
+        aspect = (floor.y1 - floor.y0) / (floor.x1 - floor.x0)
         for lines in (1, 2):
-            caption = self._tall(lines)
             sizes = []
             for columns in range(1, count + 1):
                 rows = math.ceil(count / columns)
                 wide = (width - APART * (columns - 1)) / columns
-                sizes.append((min(wide, ((top - bottom - GAP * (rows - 1)) / rows - caption) / aspect), columns))
+                sizes.append((min(wide, ((height - GAP * (rows - 1)) / rows - self._tall(lines)) / aspect), columns))
             across, columns = max(sizes)
-            if captions.longest <= across:
+            if longest <= across:
                 break
         across = max(across, 40.0)
-        left = GAP + 0.5 * (width - columns * across - (columns - 1) * APART)
-        rows = math.ceil(count / columns)
-        top -= max(0.0, 0.5 * (top - bottom + GAP - rows * (across * aspect + caption + GAP)))
-        self.panels = []
-        for index, outcome in enumerate(captions.outcomes):
-            x = left + (index % columns) * (across + APART)
-            y = top - (index // columns) * (across * aspect + caption + GAP)
-            self._place(captions, index, (x, y), across, lines)
-            box = (x, y - caption - across * aspect, across, across * aspect)
-            axes = self.figure.add_axes(tuple(np.array(box) / np.tile(self.size, 2)))
-            self.panels.append(FilmPanel(self.shown, index, axes, across / (floor.x1 - floor.x0), self.font, outcome))
+        return across, across * aspect, columns, lines
+
+    def _panel(self, index: int, at: tuple[float, float], size: tuple[float, float], outcome: Text) -> FilmPanel:
+        """Panel below a place; sizes in pixels."""
+        box = (at[0], at[1] - size[1], *size)
+        axes = self.figure.add_axes(tuple(np.array(box) / np.tile(self.size, 2)))
+        floor = self.shown.floor
+        return FilmPanel(self.shown, index, axes, size[0] / (floor.x1 - floor.x0), self.font, outcome)
 
 
 class FilmPanel:

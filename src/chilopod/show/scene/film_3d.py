@@ -47,16 +47,9 @@ def film_3d(
     size: tuple[int, int] = (1440, 400),
     follow: bool = False,
 ) -> bytes:
-    """Walks of the twin as a film, side by side, H.264 in mp4.
+    """Walks of the twin as a film, side by side, H.264 in mp4, as :func:`chilopod.show.scene.film.filmed`.
 
-    Parameters
-    ----------
-    record
-        As described at the top of this module; the film is no smoother.
-    titles, heading, fps, speed, size
-        As for :func:`chilopod.show.scene.film.filmed`.
-    follow
-        True if every panel follows its robot; otherwise all show the same piece of floor, with all of all walks.
+    Every panel follows its robot, or all show the same piece of floor, with all of all walks.
 
     Raises
     ------
@@ -83,16 +76,8 @@ def stills(
     heading: str = "",
     size: tuple[int, int] = _PICTURE,
 ) -> bytes:
-    """Moments of walks as pictures in one PNG, all of the same piece of floor; a row for every robot.
-
-    Parameters
-    ----------
-    record, titles, heading
-        As for :func:`film_3d`; by default without titles and heading.
-    times
-        Times of the moments, s, shape (T,); the nearest samples are shown.
-    size
-        Width and height of a picture, pixels.
+    """Moments of walks (s, shape (T,)) as pictures of a size (pixels) in one PNG, all of the same piece of floor; a row
+    for every robot. The nearest samples are shown.
 
     Raises
     ------
@@ -190,28 +175,22 @@ class _Stage3D(Stage):
         self.walks, self.follow = walks, follow
         self.studio: Studio
         super().__init__(walks.shown, heading, size, speed)
+        note = self._text(self.size[0] - GAP, GAP, f"tiles of {TILE:g} m", ha="right", fontsize=0.85 * self.font)
+        note.set_visible(self._room_beside_key(note))
 
-    def _panels(self, bottom: float, top: float) -> None:
-        """Lay the panels out, all of one size, with title and outcome in one line if there is room for both."""
-        width, count = self.size[0] - 2.0 * GAP, len(self.shown.titles)
+    def _layout(self, width: float, height: float, longest: float) -> tuple[float, float, int, int]:
+        count, robot = len(self.shown.titles), self.shown.frames.robot
         columns = _columns(count)
         rows = math.ceil(count / columns)
         across = max(_NARROWEST, int((width - APART * (columns - 1)) / columns))
-        captions = self._captions()
-        lines = 1 if captions.longest <= across else 2
-        caption = self._tall(lines)
-        tall = max(_LOWEST, int((top - bottom - GAP * (rows - 1)) / rows - caption))
-        robot, panel = self.shown.frames.robot, (across, tall)
-        self.studio = Studio(robot, panel, self.walks.view(panel, 0 if self.follow else None))
-        self.panels = []
-        for index, outcome in enumerate(captions.outcomes):
-            x = GAP + (index % columns) * (across + APART)
-            y = top - (index // columns) * (tall + caption + GAP)
-            self._place(captions, index, (x, y), across, lines)
-            corner = (round(x), round(self.size[1] - y + caption))
-            self.panels.append(_Panel3D(self, index, panel, corner, outcome))
-        note = self._text(self.size[0] - GAP, GAP, f"tiles of {TILE:g} m", ha="right", fontsize=0.85 * self.font)
-        note.set_visible(self._room_beside_key(note))
+        lines = 1 if longest <= across else 2
+        tall = max(_LOWEST, int((height - GAP * (rows - 1)) / rows - self._tall(lines)))
+        self.studio = Studio(robot, (across, tall), self.walks.view((across, tall), 0 if self.follow else None))
+        return across, tall, columns, lines
+
+    def _panel(self, index: int, at: tuple[float, float], size: tuple[float, float], outcome: Text) -> FilmPanel:
+        corner = (round(at[0]), round(self.size[1] - at[1]))
+        return _Panel3D(self, index, (int(size[0]), int(size[1])), corner, outcome)
 
     def _room_beside_key(self, note: Text) -> bool:
         renderer = self.canvas.get_renderer()

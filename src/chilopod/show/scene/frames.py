@@ -23,6 +23,7 @@ from chilopod.errors import ParameterError
 from chilopod.kinematics import directions, foot_places, from_modules, module_centres, module_headings
 from chilopod.robot import Robot
 from chilopod.show.scene.aims import Aim, aims_of, places_of
+from chilopod.show.words import round_down
 from chilopod.steering import ARRIVAL_RADIUS
 
 Array = NDArray[np.float64]
@@ -43,20 +44,16 @@ class BodyFrames:
     robot
         Description of the robots, but for their springs.
     time
-        (T,) s.
+        Times, (T,), s.
     spine
-        (T, R, N+1, 2) m: front end of module 1, the yaw joints, rear end of module N.
-    centres
-        (T, R, N, 2) m, of the modules.
-    headings
-        (T, R, N) rad, of the modules, left positive.
-    feet
-        (T, R, N, 2, 2) m, by module, side (left, right) and axis.
-    stands
-        (T, R, N, 2) whether the foot is on the floor.
+        Front end of module 1, the yaw joints and the rear end of module N, (T, R, N+1, 2), m.
+    centres, headings
+        Centres (T, R, N, 2), m, and headings (T, R, N), rad, left positive, of the modules.
+    feet, stands
+        Places of the feet by module, side (left, right) and axis, (T, R, N, 2, 2), m, and True for each on the floor.
     walks
-        (T, R) whether the record has the robot then. Once it has not, all of the above stay as they were last; of a
-        robot that never started they are NaN, and no foot stands.
+        True while the record has the robot, (T, R). After that all of the above stay as they were last; of a robot that
+        never started they are NaN, and no foot stands.
     """
 
     robot: Robot
@@ -70,18 +67,10 @@ class BodyFrames:
 
 
 def body_frames(record: xr.Dataset, times: ArrayLike | None = None) -> BodyFrames:
-    """Place modules and feet.
+    """Place modules and feet of a record at T times (s), by default those of the record.
 
-    Standing feet move back along their module as the gait has it, swinging ones forward as a half ellipse looks from
-    above.
-
-    Parameters
-    ----------
-    record
-        As described at the top of this module.
-    times
-        (T,) s; between samples the body is interpolated, while the feet keep the gait's exact clock. By default those
-        of the record.
+    Between samples the body is interpolated, while the feet keep the gait's exact clock: standing ones move back along
+    their module, swinging ones forward.
 
     Raises
     ------
@@ -101,16 +90,10 @@ def body_frames(record: xr.Dataset, times: ArrayLike | None = None) -> BodyFrame
 def bodies(
     robot: Robot, time: Array, position: Array, heading: Array, joint_angles: Array, leg_yaw: Array
 ) -> BodyFrames:
-    """Place modules and feet of robots under way.
+    """Place modules and feet of robots of one description at T times (s).
 
-    Parameters
-    ----------
-    robot
-        Description of the robots, but for their springs.
-    time
-        (T,) s.
-    position, heading, joint_angles, leg_yaw
-        As in a record, NaN after a robot stopped: (T, R, 2), (T, R), (T, R, N-1) and (T, R, 2), m and rad.
+    ``position``, ``heading``, ``joint_angles`` and ``leg_yaw`` are as in a record, NaN after a robot stopped, in m and
+    rad: (T, R, 2), (T, R), (T, R, N-1) and (T, R, 2).
     """
     walks = np.isfinite(position).all(-1) & np.isfinite(heading) & np.isfinite(joint_angles).all(-1)
     walks &= np.isfinite(leg_yaw).all(-1)
@@ -175,17 +158,8 @@ def _feet(robot: Robot, centres: Array, headings: Array, reach: Array, leg_yaw: 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Outcome of a robot's walk.
-
-    Attributes
-    ----------
-    text
-        Such as "arrived at 18.4 s", "3 of 5 targets", or the status; nothing is said before its time.
-    kind
-        "arrived", "stopped" (its record ends early) or "ended" (with the record, or where it was told to halt).
-    time
-        From when on it is known, s.
-    """
+    """Outcome of a robot's walk, such as "arrived at 18.4 s", known from a time (s) on; its kind is "arrived",
+    "stopped" (the record ends early) or "ended" (with the record, or where it was told to halt)."""
 
     text: str
     kind: str
@@ -194,15 +168,8 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Floor:
-    """The piece of the floor that is shown, alike for all robots.
-
-    Attributes
-    ----------
-    x0, x1, y0, y1
-        Its edges, m.
-    grid
-        Distance of the grid lines, which pass through the origin, m.
-    """
+    """Piece of the floor that is shown, alike for all robots: its edges, and the distance of the grid lines, which pass
+    through the origin, m."""
 
     x0: float
     x1: float
@@ -210,24 +177,16 @@ class Floor:
     y1: float
     grid: float
 
+    def span(self) -> tuple[Array, float]:
+        """Middle, and how far positions on a page may be from it: the floor, and as far again on every side, m."""
+        middle = np.array([0.5 * (self.x0 + self.x1), 0.5 * (self.y0 + self.y1)])
+        return middle, 1.5 * max(self.x1 - self.x0, self.y1 - self.y0)
+
 
 @dataclass(frozen=True)
 class Scene:
-    """Everything that is drawn.
-
-    Attributes
-    ----------
-    frames
-        The bodies.
-    floor
-        Part of the floor that is seen.
-    titles, outcomes
-        One for each robot.
-    aims
-        One sequence for each robot: its targets in the order of their turns.
-    arrival_radius
-        m; 0 where there are no targets.
-    """
+    """Everything that is drawn: bodies, floor, and of each robot title, outcome and targets in the order of their
+    turns; the radius (m) is 0 where there are no targets."""
 
     frames: BodyFrames
     floor: Floor
@@ -242,16 +201,8 @@ class Scene:
 
 
 def scene(record: xr.Dataset, titles: Mapping[Any, str] | Sequence[str], times: ArrayLike | None = None) -> Scene:
-    """Everything that is drawn of a record.
-
-    Parameters
-    ----------
-    record
-        As described at the top of this module.
-    titles
-        Title of each robot: by its label in the record, or in the order of the record.
-    times
-        As for :func:`body_frames`.
+    """Everything that is drawn of a record at some times (s), by default those of the record; titles are by the labels
+    of the robots, or in their order.
 
     Raises
     ------
@@ -276,7 +227,7 @@ def _titles(record: xr.Dataset, titles: Mapping[Any, str] | Sequence[str]) -> tu
     if isinstance(titles, Mapping):
         missing = [label for label in labels if label not in titles]
         if missing:
-            raise ParameterError(f"has none for robot {missing[0]!r}", field="titles")
+            raise ParameterError(f"has none for robot {missing[0]!r}", field="titles", allowed="one for each robot")
         return tuple(titles[label] for label in labels)
     if len(titles) != len(labels):
         raise ParameterError(f"has {len(titles)} titles", field="titles", allowed=f"{len(labels)}, one for each robot")
@@ -322,7 +273,4 @@ def _floor(frames: BodyFrames, aims: Array, radius: float) -> Floor:
 
 def _grid(extent: float) -> float:
     """1 m where that makes a readable grid, otherwise 1, 2 or 5 times the power of ten that does."""
-    if 2.0 <= extent <= 14.0:
-        return 1.0
-    power = 10.0 ** np.floor(np.log10(extent / 3.0))
-    return float(max(step * power for step in (1, 2, 5) if step * power <= extent / 3.0 * (1.0 + 1e-9)))
+    return 1.0 if 2.0 <= extent <= 14.0 else round_down(extent / 3.0)

@@ -11,6 +11,7 @@ from matplotlib.transforms import Affine2D
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.kinematics import directions, module_centres, module_headings
+from chilopod.show import style
 
 Array = NDArray[np.float64]
 
@@ -19,20 +20,8 @@ SLIMNESS = 0.36
 
 
 def chain(angles: ArrayLike, length: float) -> tuple[Array, Array, Array]:
-    """Modules of one length with given joint angles, about their mean position and heading.
-
-    Parameters
-    ----------
-    angles
-        Heading of each module less that of the module in front of it, rad, shape (N-1,).
-    length
-        Length of a module.
-
-    Returns
-    -------
-    centres, headings, joints
-        Shapes (N, 2), (N,), (N-1, 2).
-    """
+    """Centres (N, 2), headings (N,) and joints (N-1, 2) of modules of one length with given joint angles (rad), about
+    their mean position and heading."""
     headings = module_headings(0.0, angles)
     headings -= headings.mean()
     centres = module_centres(np.zeros(2), headings, length)
@@ -62,6 +51,14 @@ def draw_modules(axes: Axes, centres: Array, headings: Array, length: float, **l
         axes.add_patch(box)
 
 
+def draw_spines(axes: Axes, spines: Array) -> None:
+    """Draw bodies (moments, points, 2) as lines with their joints, the front end a larger dot."""
+    look: dict[str, Any] = {"alpha": 0.35, "linewidth": 2.5, "markersize": 3, "zorder": 2}
+    for spine in spines:
+        axes.plot(spine[:, 0], spine[:, 1], "-o", color=style.BLACK, **look)
+        axes.plot(*spine[0], "o", color=style.BLACK, markersize=4.5, zorder=4)
+
+
 def draw_joints(axes: Axes, joints: Array, color: str, size: float = 4.0) -> None:
     """Draw yaw joints as dots."""
     axes.plot(joints[:, 0], joints[:, 1], "o", color="white", markeredgecolor=color, markersize=size, zorder=4)
@@ -70,9 +67,4 @@ def draw_joints(axes: Axes, joints: Array, color: str, size: float = 4.0) -> Non
 def draw_heading(axes: Axes, centre: Array, heading: float, length: float, color: str) -> None:
     """Draw the arrow that says which end is the front."""
     ahead = np.array([np.cos(heading), np.sin(heading)])
-    axes.annotate(
-        "",
-        tuple(centre + 1.15 * length * ahead),
-        tuple(centre + 0.6 * length * ahead),
-        arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.6, "shrinkA": 0, "shrinkB": 0},
-    )
+    style.arrow(axes, tuple(centre + 0.6 * length * ahead), tuple(centre + 1.15 * length * ahead), color=color, lw=1.6)

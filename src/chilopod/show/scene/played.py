@@ -1,24 +1,29 @@
-"""A recorded walk that plays: in a browser from one file, in a notebook where it is."""
+"""A recorded walk that plays: in a browser from one file that needs nothing else, in a notebook where it is."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
+from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 import xarray as xr
+from jinja2 import Environment, FunctionLoader, StrictUndefined
 
 from chilopod.output import write_atomic
-from chilopod.show.scene.frames import robot_of
-from chilopod.show.scene.replay import replay as from_above
-from chilopod.show.scene.replay_3d import replay_3d
+from chilopod.show.scene.frames import Scene, robot_of, scene
+from chilopod.show.scene.outline import SLIMNESS
+from chilopod.show.scene.packing import LARGEST, encoded, packed
+from chilopod.show.style import SCENE
 
 SHOWN: Final = 6
 """Walks of a replay: more are hard to tell apart."""
 
 _HEIGHT: Final = 560  # px, in a notebook
+_RATE: Final = 25.0  # Hz; the eye needs no more, and every sample makes the page larger
 
 
 @dataclass(frozen=True)
@@ -59,6 +64,10 @@ def replay(
 ) -> Replay:
     """Let recorded walks play: in three dimensions where the record has poses, seen from above where it has none.
 
+    The page plays at once, unless the reader's system asks for little motion. With an address that ends in ``#t=12.5``
+    it waits at that time (s), with ``follow`` it stays close to the robot, and in three dimensions ``view=`` is
+    oblique, behind, side or above; ``&`` joins them.
+
     Parameters
     ----------
     record
@@ -79,5 +88,73 @@ def replay(
         titles = [f"walk {i + 1}" for i in range(record.sizes["robot"])]
     if heading is None:
         heading = robot_of(record).name
-    page_of = replay_3d if "pose" in record else from_above
-    return Replay(heading, page_of(record, titles=titles, heading=heading))
+    time = record["time"].values
+    every = max(1, round(1.0 / (_RATE * float(time[1] - time[0])))) if len(time) > 1 else 1
+    shown = scene(record, titles, time[::every])
+    if "pose" in record:
+        from chilopod.show.scene.replay_3d import FINE, solid
+
+        data, words = solid(record, shown), {"fine": f"{shown.floor.grid / FINE:g} m"}
+        return Replay(heading, _page("replay_3d.html.j2", shown, heading, "in three dimensions", data, **words))
+    return Replay(heading, _page("replay.html.j2", shown, heading, "seen from above", _flat(shown)))
+
+
+def _page(name: str, shown: Scene, heading: str, view: str, data: Mapping[str, Any], **words: str) -> str:
+    """A template with what is seen, and the data that its scripts read; they have an entry ``robots`` with one mapping
+    a robot."""
+    folder, time, floor = files("chilopod.show.scene"), shown.frames.time, shown.floor
+    environment = Environment(
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        loader=FunctionLoader(lambda file: folder.joinpath(file).read_text(encoding="utf-8")),
+    )
+    panels = [
+        {"title": title, "alt": f"{title}: the robot on the floor, {view}. Outcome: {outcome.text}."}
+        for title, outcome in zip(shown.titles, shown.outcomes, strict=True)
+    ]
+    robots = [
+        {
+            "outcome": {"text": outcome.text, "kind": outcome.kind, "time": outcome.time},
+            "aims": [{"place": aim.place, "since": aim.since, "reached": aim.reached} for aim in aims],
+            **more,
+        }
+        for outcome, aims, more in zip(shown.outcomes, shown.aims, data["robots"], strict=True)
+    ]
+    common = {
+        "time": {"start": float(time[0]), "step": float(np.diff(time[:2]).sum()), "count": len(time)},
+        "floor": {"x0": floor.x0, "x1": floor.x1, "y0": floor.y0, "y1": floor.y1, "grid": floor.grid},
+        "colors": SCENE,
+        "arrivalRadius": shown.arrival_radius,
+    }
+    return environment.get_template(name).render(
+        heading=heading,
+        panels=panels,
+        colors=SCENE,
+        grid=f"{floor.grid:g} m",
+        has_targets=any(shown.aims),
+        data={**common, **data, "robots": robots},
+        **words,
+    )
+
+
+def _flat(shown: Scene) -> dict[str, Any]:
+    """Data of walks seen from above; arrays are little-endian, in base64."""
+    frames = shown.frames
+    robot, count, n = frames.robot, len(frames.time), frames.robot.body.modules
+    # First the spine, then left and right foot of every module.
+    points = np.concatenate([frames.spine, frames.feet.reshape(count, -1, 2 * n, 2)], axis=2)
+    origin, reach = shown.floor.span()
+    step = reach / LARGEST
+    steps = packed(points, origin, step)
+    stands = np.packbits(frames.stands.reshape(count, -1, 2 * n), axis=-1, bitorder="little")
+    length = robot.module_length
+    return {
+        "scale": {"x": float(origin[0]), "y": float(origin[1]), "step": step},
+        "body": {"modules": n, "length": length, "width": SLIMNESS * length, "offset": robot.legs.forward_offset},
+        "robots": [
+            {"points": encoded(steps[:, index]), "stands": encoded(stands[:, index])}
+            for index in range(len(shown.titles))
+        ],
+    }

@@ -1,8 +1,8 @@
-"""A walk of the three-dimensional robot as one HTML page that plays it, seen from wherever one likes."""
+"""Data of a page that plays walks of the three-dimensional robot, seen from wherever one likes."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, Final
 
 import mujoco
@@ -11,63 +11,49 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from chilopod.errors import ParameterError
-from chilopod.show.scene.frames import Scene, scene
+from chilopod.show.scene.frames import Scene
 from chilopod.show.scene.outline_3d import drawn, yaw_joint
-from chilopod.show.scene.replay_page import LARGEST, encoded, packed, page, shown_times, span
+from chilopod.show.scene.packing import LARGEST, encoded, packed
 from chilopod.twin.model import TwinModel, compiled
 
 Array = NDArray[np.float64]
 
-_SCRIPTS: Final = ("replay_3d_pose.js", "replay_3d_paint.js", "replay_3d.js")
-_FINE: Final = 10  # thin grid lines from one to the next
+FINE: Final = 10
+"""Thin grid lines from one grid line to the next."""
+
 _WILDEST: Final = 10.0  # m and rad: what diverges is drawn no further than that
 
 
-def replay_3d(record: xr.Dataset, *, titles: Mapping[Any, str] | Sequence[str], heading: str) -> str:
-    """The record as a page: one panel per robot, in three dimensions, with controls to play it and to look around.
-
-    The page opens from disk and plays as :func:`chilopod.show.scene.replay.replay` does. Its address may end in
-    ``#t=12.5`` (s; it waits there), ``view=`` with oblique, behind, side or above, and ``follow``, joined by ``&``.
-    It holds the joints' positions at 25 Hz as whole numbers of 16 bits; the script puts the bodies where they are.
-
-    Parameters
-    ----------
-    record
-        From :func:`chilopod.twin.simulate.simulate` with ``poses=True``.
-    titles, heading
-        As for :func:`chilopod.show.scene.replay.replay`.
-
-    Returns
-    -------
-    str
-        The HTML.
+def solid(record: xr.Dataset, shown: Scene) -> dict[str, Any]:
+    """Data that the scripts of a page in three dimensions read: the joints' positions as whole numbers of 16 bits
+    (little-endian, in base64), from which they put the bodies where they are.
 
     Raises
     ------
     ParameterError
-        If the record has no poses or does not go with its robot, or a robot has no title.
+        If the poses of the record are not those of its robot.
     """
-    if "pose" not in record:
-        raise ParameterError(
-            "has no poses, so the robot cannot be drawn in three dimensions",
-            field="record",
-            allowed="a record of the twin, simulated with poses=True",
-        )
-    times = shown_times(record)
-    shown = scene(record, titles, times)
     plan = compiled(shown.frames.robot)
-    poses = record["pose"].transpose("time", "robot", "coordinate")
-    if poses.sizes["coordinate"] != plan.model.nq:
+    found = record["pose"].transpose("time", "robot", "coordinate")
+    if found.sizes["coordinate"] != plan.model.nq:
         raise ParameterError(
-            f"has poses of {poses.sizes['coordinate']} coordinates",
+            f"has poses of {found.sizes['coordinate']} coordinates",
             field="record",
             allowed=f"{plan.model.nq}, those of its robot",
         )
-    kept = _continued(poses.sel(time=times).values, _quaternions(plan.model))
-    view = "the robot on the floor, in three dimensions"
-    fine = f"{shown.floor.grid / _FINE:g} m"
-    data = _data(shown, plan, kept)
-    return page("replay_3d.html.j2", shown, heading, view, data, _SCRIPTS, fine=fine)
+    poses = _continued(found.sel(time=shown.frames.time).values, _quaternions(plan.model))
+    origin, step = _scale(shown, poses)
+    steps = packed(poses, origin, step)
+    pole = plan.model.geom("pole").size
+    return {
+        "fine": FINE,
+        "scale": {"origin": origin.tolist(), "step": step.tolist()},
+        "length": plan.robot.body.length,
+        "pole": {"radius": float(pole[0]), "height": 2.0 * float(pole[1])},
+        "bodies": _bodies(plan.model),
+        "shapes": _shapes(plan) + _pins(plan),
+        "robots": [{"pose": encoded(steps[:, robot])} for robot in range(poses.shape[1])],
+    }
 
 
 def _quaternions(model: mujoco.MjModel) -> list[int]:
@@ -90,29 +76,13 @@ def _continued(poses: Array, quaternions: Sequence[int]) -> Array:
     return poses
 
 
-def _data(shown: Scene, plan: TwinModel, poses: Array) -> dict[str, Any]:
-    """Data that the script of the page reads; coordinates are little-endian, in base64."""
-    origin, step = _scale(shown, poses)
-    steps = packed(poses, origin, step)
-    pole = plan.model.geom("pole").size
-    return {
-        "fine": _FINE,
-        "scale": {"origin": origin.tolist(), "step": step.tolist()},
-        "length": plan.robot.body.length,
-        "pole": {"radius": float(pole[0]), "height": 2.0 * float(pole[1])},
-        "bodies": _bodies(plan.model),
-        "shapes": _shapes(plan) + _pins(plan),
-        "robots": [{"pose": encoded(steps[:, robot])} for robot in range(poses.shape[1])],
-    }
-
-
 def _scale(shown: Scene, poses: Array) -> tuple[Array, Array]:
     """Middle and step of every coordinate."""
     with np.errstate(invalid="ignore"):
         finite = np.where(np.isfinite(poses), poses, 0.0).clip(-_WILDEST, _WILDEST)
     low, high = finite.min(axis=(0, 1)), finite.max(axis=(0, 1))
     middle, reach = 0.5 * (low + high), 0.5 * (high - low)
-    middle[:2], reach[:2] = span(shown.floor)
+    middle[:2], reach[:2] = shown.floor.span()
     # Of what does not change a step of any size will do.
     return middle, np.maximum(reach, 1e-9) / LARGEST
 

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import ParameterError
 from chilopod.robot import Robot
 from chilopod.show import style
-from chilopod.show.scene.replay_page import COLORS
+from chilopod.show.style import SCENE as COLORS
 from chilopod.twin.legs import twin_of
 from chilopod.twin.model import AWAY, POLE_GROUP, SIDES, build, scanner_place
 
@@ -42,30 +42,14 @@ _SHADOW, _DISC, _PATH = 0.001, 0.002, 0.003  # m above the floor, one above the 
 
 @dataclass(frozen=True)
 class View:
-    """From where a picture is taken.
-
-    Attributes
-    ----------
-    middle
-        Point at which the lens is aimed, m, shape (3,).
-    distance
-        From there to the lens, m.
-    """
+    """Point at which the lens is aimed, m, shape (3,), and its distance from there, m."""
 
     middle: Array
     distance: float
 
 
 def framing(points: ArrayLike, aspect: float) -> View:
-    """The nearest view, from above at an angle, that has all of some points in its picture.
-
-    Parameters
-    ----------
-    points
-        m, shape (P, 3).
-    aspect
-        Width of the picture over its height.
-    """
+    """The nearest view, from above at an angle, that has all points (m, shape (P, 3)) in a picture of this aspect."""
     axes = np.stack([_RIGHT, np.cross(_RIGHT, _AHEAD), _AHEAD])
     across, up, depth = axes @ np.asarray(points, dtype=np.float64).T
     half = math.tan(0.5 * _OPENING)
@@ -88,17 +72,13 @@ class Look:
     pose
         MuJoCo's ``qpos``; None shows the floor alone.
     stands
-        True if each foot is on the floor, (N, 2).
+        True for each foot on the floor, (N, 2).
     walks
-        True if the robot still walks, or has arrived or was halted; if not, it is pale.
-    path
-        Path of the centre of module 1 up to then, m, (P, 2).
-    target
-        m, (2,), or None.
-    radius
-        Within which the target counts as reached, m.
-    arrived
-        True if it has been.
+        False of a robot that has failed: it is pale.
+    path, target
+        Path of module 1 so far, (P, 2), and place of the target, (2,), or None, m.
+    radius, arrived
+        Radius of arrival, m, and True if the target has been reached.
     """
 
     pose: Array | None
@@ -111,19 +91,8 @@ class Look:
 
 
 class Studio:
-    """Takes pictures within :func:`chilopod.twin.gl.context`; to be closed before that.
-
-    Parameters
-    ----------
-    robot
-        With a twin.
-    size
-        Width and height of the pictures, pixels.
-    view
-        Roughly from where they will be taken.
-    fine
-        True if things cast shadows, which takes several times as long; otherwise a patch of shade lies under a module.
-    """
+    """Camera for pictures of one size (pixels) and from about one view, within :func:`chilopod.twin.gl.context`; to be
+    closed before that. Fine pictures have shadows, which take several times as long; others a patch of shade."""
 
     def __init__(self, robot: Robot, size: tuple[int, int], view: View, fine: bool = False) -> None:
         self.robot, self.fine = robot, fine

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -23,12 +23,15 @@ from chilopod import units
 from chilopod.analysis.parameters import ALL, K1, PAPER_UNIT, stiffness
 from chilopod.analysis.straight_walk import bifurcations, first_loss, pitchfork
 from chilopod.errors import AnalysisError
-from chilopod.frozen import Short
+from chilopod.notebook import Summary, axes_for
 from chilopod.progress import Progress, silent
 from chilopod.record import Array
 from chilopod.robot import Robot
 from chilopod.stability import Kind
 from chilopod.tasks.identify.data import CriticalMode
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 FREE = ("ground.friction", "legs.half_width", "legs.forward_offset")
 """The constants that are fitted, SI."""
@@ -52,7 +55,7 @@ _UNITS = {  # of the profile, N*mm/deg where none is given
 
 
 @dataclass(frozen=True)
-class Identification(Short):
+class Identification(Summary):
     """Result of an identification of the planar constants.
 
     Attributes
@@ -107,6 +110,25 @@ class Identification(Short):
             "largest_residual": float(np.abs(self.residuals).max()),
             "constants_from_every_start_si": self.starts.tolist(),
         }
+
+    @property
+    def title(self) -> str:
+        """Robot, and how well its constants meet the data."""
+        largest = np.abs(self.residuals).max()
+        return f"{self.given.name}: largest residual {largest:.2f}; 1 is what the tolerances of the data allow"
+
+    def _told(self) -> tuple[list[str], list[Sequence[str]], list[str]]:
+        constants = self.as_json()["constants"].items()
+        rows = [(path, each["text"], each["allowed_text"]) for path, each in constants]
+        return [], [("constant", "best", "allowed by the data"), *rows], []
+
+    def plot(self, axes: Axes | None = None) -> Axes:
+        """Draw the largest residual over the forward offset, where the other constants are fitted again."""
+        axes = axes_for(axes)
+        axes.plot(1e3 * self.profile.forward_offset, self.profile.largest_residual)
+        axes.axhline(1.0, linestyle=":", color="C7")
+        axes.set(xlabel="forward offset (mm)", ylabel="largest residual", ylim=(0.0, None))
+        return axes
 
 
 def residuals(robot: Robot, data: CriticalMode) -> Array:

@@ -1,0 +1,166 @@
+"""Sliders of the page: one row of a table each. A new slider is one more row."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from chilopod import units
+from chilopod.analysis.parameters import ALL, PAPER_UNIT
+from chilopod.live.state import Settings
+from chilopod.robot import Robot
+
+STRIDES = (0.2, 1.5)
+"""Range of the stride, relative to the robot file."""
+
+_SOFTEST, _STIFFEST = 0.05, 1.5  # of the stiffest spring of the file
+
+
+@dataclass(frozen=True)
+class Slider:
+    """A number of the walk that can be changed while it goes on.
+
+    Attributes
+    ----------
+    name
+        Name in wishes; of a number of the robot file its path there.
+    label, hint
+        Words beside the slider, and those that appear where the mouse rests on it.
+    unit, si
+        Unit at the page, and unit of all values here.
+    limits, step
+        Smallest and largest value, and the step in the unit of the page.
+    read, apply
+        Function of settings: their value; and of settings and a value: settings with it.
+    keys
+        Hot keys that make the value smaller and larger by the factor, each with what it does in words.
+    moves
+        Names of the sliders that follow this one at the page.
+    folder
+        Folder of the panel, empty for none.
+    """
+
+    name: str
+    label: str
+    hint: str
+    unit: str
+    si: str
+    limits: tuple[float, float]
+    step: float
+    read: Callable[[Settings], float]
+    apply: Callable[[Settings, float], Settings]
+    keys: tuple[tuple[str, str], ...] = ()
+    shift: bool = False
+    factor: float = 1.1
+    moves: tuple[str, ...] = ()
+    folder: str = ""
+
+    def at_page(self, value: float) -> float:
+        """A value in the unit of the page."""
+        return float(f"{units.from_si(value, self.unit):.9g}")
+
+    def from_page(self, value: float) -> float:
+        """A value of the page in SI units."""
+        return units.parse(f"{float(value)!r} {self.unit}", self.unit)
+
+
+def sliders_of(file: Robot) -> dict[str, Slider]:
+    """All sliders of a robot by name, in the order of the page."""
+    stride = file.gait.stride
+    rows = (
+        *_springs(file),
+        Slider(
+            name="friction",
+            label="friction",
+            hint="Friction of the floor, relative to the robot file",
+            unit="",
+            si="times that of the robot file",
+            limits=(0.3, 3.0),
+            step=0.05,
+            read=lambda settings: settings.friction,
+            apply=lambda settings, factor: _with_friction(settings, file, factor),
+            keys=(("F", "Floor more slippery"), ("G", "Floor less slippery")),
+        ),
+        _of_robot(
+            "gait.stride",
+            label="stride",
+            hint="Length of every step, cm",
+            unit="cm",
+            si="m",
+            limits=(STRIDES[0] * stride, STRIDES[1] * stride),
+            step=round(100.0 * stride / 60.0, 6),
+            keys=(("F", "Shorter steps"), ("G", "Longer steps")),
+            shift=True,
+        ),
+        Slider(
+            name="speed",
+            label="speed",
+            hint="Seconds of walking that one second shows",
+            unit="",
+            si="times real time",
+            limits=(1.0, 20.0),
+            step=0.5,
+            read=lambda settings: settings.speed,
+            apply=lambda settings, times: replace(settings, speed=times),
+            keys=(("pagedown", "Slower"), ("pageup", "Faster")),
+            factor=2.0,
+        ),
+    )
+    return {row.name: row for row in rows}
+
+
+def _of_robot(path: str, **look: Any) -> Slider:
+    """Slider of a number of the robot file."""
+
+    def apply(settings: Settings, value: float) -> Settings:
+        return replace(settings, robot=settings.robot.with_value(path, value))
+
+    return Slider(name=path, **{"read": lambda settings: settings.robot.get(path), "apply": apply, **look})
+
+
+def _springs(file: Robot) -> list[Slider]:
+    """Sliders of the first spring, of all springs together, and of each of the others."""
+    own = file.springs
+    low = _SOFTEST * max(own.stiffness) if own.softest is None else min(own.softest)
+    high = _STIFFEST * max(own.stiffness) if own.stiffest is None else max(own.stiffest)
+    look: dict[str, Any] = {
+        "unit": PAPER_UNIT,
+        "si": "N*m/rad",
+        "limits": (low, high),
+        "step": float(f"{units.from_si(high - low, PAPER_UNIT) / 400.0:.1g}"),
+    }
+    names = tuple(f"{ALL}[{joint}]" for joint in range(len(own.stiffness)))
+    first = _of_robot(
+        names[0],
+        label="first spring",
+        hint="Stiffness of joint 1 (the paper's k1), N·mm/deg",
+        keys=(("Z", "First spring softer"), ("X", "First spring stiffer")),
+        **look,
+    )
+    together = _of_robot(
+        ALL,
+        label="all springs",
+        hint="Stiffness of all joints, N·mm/deg",
+        read=lambda settings: float(np.mean(settings.robot.springs.stiffness)),
+        moves=names,
+        keys=(("Z", "All springs softer"), ("X", "All springs stiffer")),
+        shift=True,
+        **look,
+    )
+    folder = "Each spring (N·mm/deg)"
+    others = (
+        _of_robot(name, label=f"spring {joint}", hint=f"Stiffness of joint {joint}, N·mm/deg", folder=folder, **look)
+        for joint, name in enumerate(names[1:], 2)
+    )
+    return [first, together, *others]
+
+
+def _with_friction(settings: Settings, file: Robot, factor: float) -> Settings:
+    """The floor of the file, times a factor, for all engines."""
+    robot = settings.robot.with_value("ground.friction", factor * file.ground.friction)
+    if file.twin is not None:
+        robot = robot.with_value("twin.sliding_friction", factor * file.twin.sliding_friction)
+    return replace(settings, robot=robot, friction=factor)
