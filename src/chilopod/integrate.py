@@ -58,6 +58,19 @@ def _size(value: Any) -> float:
     return max(abs(value.real), abs(value.imag) / COMPLEX_STEP)
 
 
+@njit(inline="always")
+def first_step(size: float, slope: float, left: float) -> float:
+    """Guess of the first step from the sizes of state and slope: the control corrects it within two steps."""
+    return 0.01 * max(size, 1e-3) / slope if slope > 0.0 else left
+
+
+@njit(inline="always")
+def step_factor(error: float, rejected: bool) -> float:
+    """Length of the next step over that of the last one, after its error and whether the one before was rejected."""
+    factor = SAFETY / np.sqrt(np.sqrt(np.sqrt(error))) if error > 0.0 else GROW
+    return max(SHRINK, min(1.0 if rejected else GROW, factor))
+
+
 @functools.cache
 def integrator(rhs: Callable[..., None], on_disk: bool = True) -> Callable[..., tuple[float, bool]]:
     """The compiled integrator of one right-hand side (numba keeps it on disk, which it cannot for a function argument).
@@ -94,13 +107,12 @@ def integrator(rhs: Callable[..., None], on_disk: bool = True) -> Callable[..., 
         t = t0
         rhs(t, x, args, k[0])
         if h <= 0.0:
-            # |x| / |x'| with a tenth of a safety factor: the controller corrects within two steps.
             scale = 0.0
             slope = 0.0
             for i in range(n):
                 scale = max(scale, _size(x[i]))
                 slope = max(slope, _size(k[0, i]))
-            h = 0.01 * max(scale, 1e-3) / slope if slope > 0.0 else t1 - t0
+            h = first_step(scale, slope, t1 - t0)
         rejected = False
         for _ in range(MAX_STEPS):
             remaining = t1 - t
@@ -143,22 +155,19 @@ def integrator(rhs: Callable[..., None], on_disk: bool = True) -> Callable[..., 
                 error = step * err5 * err5 / np.sqrt(err5 * err5 + 0.01 * err3 * err3)
             if not np.isfinite(error + check):
                 error = 1e300
-            if error <= 1.0:
+            factor = step_factor(error, rejected)
+            rejected = error > 1.0
+            if not rejected:
                 t = t_new
                 for i in range(n):
                     x[i] = y[i]
                     k[0, i] = k[12, i]
-                factor = GROW if error == 0.0 else min(GROW, SAFETY * error ** (-0.125))
-                if rejected:
-                    factor = min(1.0, factor)
-                rejected = False
                 if not last or factor < 1.0:
                     h = step * factor
                 if last:
                     return h, True
             else:
-                h = step * max(SHRINK, SAFETY * error ** (-0.125))
-                rejected = True
+                h = step * factor
                 if h < 1e-14 * max(abs(t), t1 - t0):
                     return h, False
         return h, False

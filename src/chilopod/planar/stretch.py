@@ -17,7 +17,7 @@ from chilopod.compiled import copy_into, njit, parallel_njit
 from chilopod.engine.actuators import FROM, GOAL, RAMPING, SETTLING, SINCE, UNTIL
 from chilopod.engine.actuators import SLOPE as RAMP
 from chilopod.errors import ParameterError
-from chilopod.integrate import GROW, LANES_WORK, MAX_STEPS, SAFETY, SHRINK, STAGES, lanes_step
+from chilopod.integrate import LANES_WORK, MAX_STEPS, STAGES, first_step, lanes_step, step_factor
 from chilopod.lanes import LANES, as_lanes, choose, room
 from chilopod.planar.contact import MOMENTS, sum_moments
 from chilopod.planar.dynamics import BEHIND, DECAY, LEVEL, ORIGIN, SCRATCH, SLOPE, SPRING, TORQUE, rhs
@@ -278,7 +278,7 @@ def _choose_step(lane: int, pieces: Any, lanes: Any, slope: Any, clock: Any, at:
         for i in range(lanes.x.shape[0]):
             scale = max(scale, abs(lanes.x[i, lane]))
             steep = max(steep, abs(slope[i, lane]))
-        at.next[lane] = 0.01 * max(scale, 1e-3) / steep if steep > 0.0 else left
+        at.next[lane] = first_step(scale, steep, left)
     at.last[lane] = at.next[lane] >= left * (1.0 - 1e-12)
     clock[_STEP, lane] = left if at.last[lane] else at.next[lane]
 
@@ -287,16 +287,14 @@ def _choose_step(lane: int, pieces: Any, lanes: Any, slope: Any, clock: Any, at:
 def _judge_step(lane: int, clock: Any, at: Any) -> bool:
     """Go on in time if the step was good enough, and say how long the next shall be; whether that is of any use."""
     error, step = clock[_ERROR, lane], clock[_STEP, lane]
-    factor = SAFETY / np.sqrt(np.sqrt(np.sqrt(error))) if error > 0.0 else GROW
+    factor = step_factor(error, at.rejected[lane])
     at.tried[lane] += 1
-    if error > 1.0:
-        at.next[lane] = step * max(SHRINK, factor)
-        at.rejected[lane] = True
+    at.rejected[lane] = error > 1.0
+    if at.rejected[lane]:
+        at.next[lane] = step * factor
         if at.next[lane] < 1e-14 * max(abs(clock[_TIME, lane]), at.end[lane] - at.begin[lane]):
             return False
     else:
-        factor = min(1.0 if at.rejected[lane] else GROW, factor)
-        at.rejected[lane] = False
         if not at.last[lane] or factor < 1.0:
             at.next[lane] = step * factor
         clock[_TIME, lane] += step
