@@ -75,26 +75,13 @@ def step_factor(error: float, rejected: bool) -> float:
 def integrator(rhs: Callable[..., None], on_disk: bool = True) -> Callable[..., tuple[float, bool]]:
     """The compiled integrator of one right-hand side (numba keeps it on disk, which it cannot for a function argument).
 
-    Parameters
-    ----------
-    rhs
-        Compiled function ``rhs(t, x, args, out)`` that writes ``dx/dt`` into ``out``; smooth between ``t0`` and ``t1``.
-    on_disk
-        True to keep the compiled code on disk. Not for a function made at run time: its code would never be found
-        again, and leave a file behind at every run.
+    ``rhs(t, x, args, out)`` writes ``dx/dt`` into ``out`` and is smooth between ``t0`` and ``t1``. Of one that is made
+    at run time nothing is kept on disk: its code would never be found again.
 
-    Returns
-    -------
-        ``integrate(args, x, t0, t1, h, tolerance, work) -> (h, reached)``, which advances ``x`` in place:
-
-        - args: passed through to ``rhs``;
-        - x: state, shape (n,), float64 or complex128 (see the module docstring);
-        - t0, t1: interval, ``t1 > t0``;
-        - h: first step to try; 0 lets the routine guess. The step to start the next call with is returned;
-        - tolerance: bound on the local error of each component, relative to ``max(1, |x|)``, on state and tangent
-          alike;
-        - work: scratch, shape (16, n), the dtype of ``x``;
-        - reached: whether ``t1`` was reached.
+    Returns ``integrate(args, x, t0, t1, h, tolerance, work) -> (h, reached)``, which advances the state ``x``, shape
+    (n,), float64 or complex128, in place. ``h`` is the first step to try, 0 for a guess, and the one to start the next
+    call with; ``tolerance`` bounds the local error of each component of state and tangent, relative to ``max(1, |x|)``;
+    ``work`` is scratch, shape (16, n), of the dtype of ``x``; ``reached`` says whether ``t1`` was reached.
     """
 
     @(fused_njit if on_disk else numba.njit(fastmath={"contract"}))
@@ -191,22 +178,11 @@ def _sum_slopes(k: Any, which: int, i: int, zero: Any) -> Any:
 def lanes_step(rhs: Callable[..., None]) -> Callable[..., Any]:
     """A compiled step of states side by side in lanes, each at its own time and of its own length.
 
-    Parameters
-    ----------
-    rhs
-        As of :func:`integrator`, for numbers in lanes (see :mod:`chilopod.lanes`).
-
-    Returns
-    -------
-        ``attempt(args, x, t, step, tolerance, work, wide) -> error``, all in lanes but the tolerance:
-
-        - args: passed through to ``rhs``;
-        - x, t, step: state, shape (n,), time, and length of the step;
-        - tolerance: bound on the local error of each component, relative to ``max(1, |x|)``;
-        - work: scratch, shape (LANES_WORK, n or more). The slope at the beginning is given in row 0, and the new state
-          is left in row STAGES;
-        - wide: the same memory in ``LANES`` lanes, whatever their number elsewhere: sums of slopes go through it.
-        - error: of the step, as a part of what is tolerated; 1e300 where the new state is not finite.
+    Returns ``attempt(args, x, t, step, tolerance, work, wide) -> error``, all in lanes but the tolerance, as for
+    :func:`integrator`. ``work`` is scratch, shape (LANES_WORK, n or more): row 0 holds the slope at the beginning, and
+    row STAGES is left with the new state. ``wide`` is the same memory in ``LANES`` lanes, through which sums of slopes
+    go, whatever the number of lanes elsewhere. The error is a part of what is tolerated, 1e300 where the new state is
+    not finite.
     """
 
     @njit

@@ -25,21 +25,8 @@ _Kind = TypeVar("_Kind", bound="BatchWalk")
 
 
 class Beginning(NamedTuple):
-    """Beginning of a batch of walks.
-
-    Attributes
-    ----------
-    robots
-        One a walk.
-    states
-        One a walk, shape (walks, n).
-    factors
-        Factor on the friction of every foot, shape (walks, N, 2).
-    target
-        m, shape (walks, 2), or None.
-    seeds
-        One a walk, or None.
-    """
+    """Beginning of a batch of walks: robots and states, one a walk, shape (walks, n); factors on the friction of every
+    foot, shape (walks, N, 2); targets, m, shape (walks, 2), and seeds, or None."""
 
     robots: Sequence[Robot]
     states: Array
@@ -59,14 +46,8 @@ def begin(
 ) -> Beginning:
     """Arguments of ``start``, see :class:`chilopod.engine.Engine`, with one row a walk.
 
-    Parameters
-    ----------
-    robots
-        One, or one a walk, that go together.
-    standing, size
-        State of a robot that has none given, shape (1, n), and length of one that has.
-    initial, friction, target, seeds
-        As given.
+    Robots that go together are one, or one a walk. ``standing`` is the state of a robot that has none given, shape (1,
+    n), ``size`` the length of one that has.
     """
     feet, noise = (robots[0].body.modules, 2), as_seeds(seeds)
     arguments = {"initial": (initial, (size,)), "friction": (friction, feet), "target": (target, (2,))}
@@ -93,17 +74,7 @@ def resumed(traits: Traits, saved: bytes, make: Callable[[Beginning, Recording |
 
 
 class BatchWalk(Walk):
-    """Robots, actuators, targets and time of a walk.
-
-    Parameters
-    ----------
-    traits
-        Traits of its engine.
-    begun, record, tolerance, expected
-        As of ``start``.
-    numbers
-        Numbers that a sample of the record takes.
-    """
+    """Robots, actuators, targets and time of a walk; a sample of its record takes so many ``numbers``."""
 
     def __init__(
         self,

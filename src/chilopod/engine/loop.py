@@ -88,13 +88,8 @@ class Referee(Protocol):
 
 
 def event_times(controller: Controller, gait: Gait, duration: float) -> Iterator[tuple[float, Event]]:
-    """All instants in [0, duration) at which a controller is asked, in order, one after the other.
-
-    Raises
-    ------
-    ParameterError, AnalysisError
-        If the controller's events are none.
-    """
+    """All instants in [0, duration) at which a controller is asked, in order, one after the other; ParameterError or
+    AnalysisError if the controller's events are none."""
     return ((time, event) for time, _, event in _numbered(controller, gait, 0.0, duration))
 
 

@@ -24,14 +24,10 @@ _PATH: Final = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_][\w.]*")
 
 
 def engine_named(name: str) -> Engine:
-    """An engine by its name, one of :data:`ENGINES`; or one of your own as ``package.module:object``.
+    """An engine by its name, one of :data:`ENGINES`; or one of your own as ``package.module:object``. ParameterError if
+    there is none.
 
     It is imported now, not before: MuJoCo takes a moment to load.
-
-    Raises
-    ------
-    ParameterError
-        If there is none.
     """
     engine: Engine
     if not isinstance(name, str):
@@ -127,13 +123,8 @@ def _theirs(who: str, what: str, call: Callable[..., Any], /, *arguments: Any, *
 
 
 def controller_named(path: str) -> Controller:
-    """An instance of a controller's class, given as ``package.module:Class``, with the defaults of all its fields.
-
-    Raises
-    ------
-    ParameterError
-        If it cannot be imported or is no controller, see :func:`check_controller`.
-    """
+    """An instance of a controller's class, given as ``package.module:Class``, with the defaults of all its fields;
+    ParameterError if it cannot be imported or is no controller, see :func:`check_controller`."""
     made = _imported("controller", path)
     if not isinstance(made, type):
         raise ParameterError("is no class", field="controller", value=path, allowed="package.module:Class")
@@ -153,13 +144,8 @@ def controller_named(path: str) -> Controller:
 
 
 def check_controller(controller: Controller) -> None:
-    """Make sure that a controller can be part of a trial: a frozen dataclass with ``events`` and ``act``.
-
-    Raises
-    ------
-    ParameterError
-        If it is not.
-    """
+    """Make sure that a controller can be part of a trial: a frozen dataclass with ``events`` and ``act``;
+    ParameterError if it is not."""
     kind = type(controller)
     for name in ("events", "act"):
         if not callable(getattr(controller, name, None)):

@@ -66,26 +66,8 @@ class FollowedModel(PlanarModel):
 
     @staticmethod
     def flow_each(models: Sequence[PlanarModel], states: ArrayLike, t0: float, t1: float) -> Array:
-        """Carry every state by the model of its own robot, on all cores.
-
-        Parameters
-        ----------
-        models
-            As many as states.
-        states
-            Shape (states, 2N+1), or with poses behind, (states, 2N+4).
-        t0, t1
-            Times, s, ``t0 <= t1``.
-
-        Returns
-        -------
-        States at t1, of the shape of ``states``.
-
-        Raises
-        ------
-        AnalysisError
-            If a motion diverges.
-        """
+        """Carry every state, shape (states, 2N+1) or with poses behind (states, 2N+4), from t0 to t1 (s) by the model
+        of its own robot, on all cores; AnalysisError if a motion diverges."""
         batch = np.array(states, dtype=np.float64, order="C")
         _check_one_each(models, batch, "states")
         if not _alike(models):
@@ -121,22 +103,11 @@ class WalkMeans(ReadOnlyArrays):
 
 
 def walk_means(models: Sequence[PlanarModel], orbits: ArrayLike) -> WalkMeans:
-    """Means over one period of the walk of every robot that starts in its state at time 0.
+    """Means over one period of the walk of every robot that starts in its state at time 0, ``orbits`` of shape (walks,
+    2N+1).
 
     All robots run through the period together, stopping at the nodes of Gauss-Legendre quadrature. Powers are those of
-    :func:`chilopod.planar.powers`.
-
-    Parameters
-    ----------
-    models
-        As many as orbits.
-    orbits
-        States at time 0, shape (walks, 2N+1).
-
-    Raises
-    ------
-    AnalysisError
-        If a motion diverges.
+    :func:`chilopod.planar.powers`. AnalysisError if a motion diverges.
     """
     orbits = np.asarray(orbits, dtype=np.float64)
     _check_one_each(models, orbits, "orbits")

@@ -59,15 +59,8 @@ class Powers:
 
 
 def module_motion(model: PlanarModel, x: ArrayLike) -> tuple[Array, Array]:
-    """Headings and velocities of the modules in module 1's frame.
-
-    Returns
-    -------
-    heading
-        Relative to module 1, rad, shape (N,).
-    twist
-        Velocity of the centre (m/s) and yaw rate (rad/s) in module 1's frame, shape (N, 3).
-    """
+    """Headings of the modules relative to module 1, rad, shape (N,), and velocity of their centres (m/s) and yaw rate
+    (rad/s) in module 1's frame, shape (N, 3)."""
     x = np.asarray(x, dtype=np.float64)
     n = model.modules
     heading = module_headings(0.0, x[3 : n + 2])
@@ -128,23 +121,10 @@ def powers(
 
 
 def foot_powers(friction: Array, slip: Array, heading: Array, speed: float) -> tuple[Array, Array]:
-    """Powers that the leg motors deliver and the floor takes, with straight legs.
+    """Powers that the leg motors deliver and the floor takes, with straight legs, W, both of shape (...).
 
-    Parameters
-    ----------
-    friction
-        Friction of every foot, 0 in the air, N*s/m, shape (..., N, 2).
-    slip
-        Velocity of every foot on the floor, m/s, shape (..., N, 2, 2).
-    heading
-        Heading of every module, on the same axes, rad, shape (..., N).
-    speed
-        At which standing feet move back, m/s.
-
-    Returns
-    -------
-    legs, floor
-        W, shape (...).
+    Friction (0 in the air) is in N*s/m, shape (..., N, 2), slip the velocity of every foot on the floor, m/s, shape
+    (..., N, 2, 2), headings are on the same axes, rad, shape (..., N), and standing feet move back at ``speed``, m/s.
     """
     back = -speed * directions(heading)[0][..., None, :]
     force = -friction[..., None] * slip

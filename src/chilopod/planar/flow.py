@@ -29,17 +29,9 @@ _integrate = integrator(rhs)
 
 
 class Chains(NamedTuple):
-    """Numbers of robots of one gait and size, the robot in front.
-
-    Attributes
-    ----------
-    scalars
-        See :mod:`chilopod.planar.dynamics`, shape (robots, 4).
-    stiffness, damping
-        Stiffness and damping of the joints, N*m/rad and N*m*s/rad, shape (robots, N-1).
-    moments
-        Contact moments at the start of the contact interval of every piece, shape (robots, pieces, N, 8).
-    """
+    """Numbers of robots of one gait and size: scalars (see :mod:`chilopod.planar.dynamics`), shape (robots, 4);
+    stiffness and damping of the joints, N*m/rad and N*m*s/rad, shape (robots, N-1); contact moments at the start of the
+    contact interval of every piece, shape (robots, pieces, N, 8)."""
 
     scalars: Any
     stiffness: Any
@@ -76,27 +68,12 @@ def advance(
 ) -> Any:
     """Carry every row of ``states`` through all pieces of time, in place, on all cores.
 
-    Parameters
-    ----------
-    starts, widths
-        Start of each piece in its contact interval, and its duration, s, shape (pieces,).
-    robots
-        One robot for all states, or one for each.
-    states
-        Reduced states, shape (states, 2N+1), or with poses behind, (states, 2N+4); float64 or complex128.
-    tolerance
-        Tolerance of the integrator, relative to max(1, |x|).
-    nodes
-        Parts of every piece at which states are recorded, rising, 0 to 1.
+    Pieces start at times in their contact intervals and last so long, s, shape (pieces,). There is one robot for all
+    states or one for each; states have shape (states, 2N+1), or with poses behind (states, 2N+4), float64 or
+    complex128. The tolerance is relative to max(1, |x|). Nodes are parts of every piece, rising, 0 to 1.
 
-    Returns
-    -------
-    Reduced states at the nodes, shape (states, pieces, nodes, 2N+1); None if a motion diverges.
-
-    Raises
-    ------
-    ParameterError
-        If shapes do not go together: compiled code would read beyond them.
+    Returns reduced states at the nodes, shape (states, pieces, nodes, 2N+1), None if a motion diverges. ParameterError
+    if shapes do not go together: compiled code would read beyond them.
     """
     count, (several, joints) = len(states), robots.stiffness.shape
     fits = (

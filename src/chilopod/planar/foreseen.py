@@ -13,20 +13,8 @@ _REACH = 6.0
 
 
 def check_steps(robot: Robot, seconds: float) -> None:
-    """Refuse a walk that would take more steps than anybody waits for.
-
-    Parameters
-    ----------
-    robot
-        The robot.
-    seconds
-        Length of the walk, s.
-
-    Raises
-    ------
-    ParameterError
-        Naming what makes it move so fast.
-    """
+    """Refuse a walk of some seconds that would take more steps than anybody waits for, naming what makes it move so
+    fast."""
     rates = {**_rates(robot), "gait.stance, gait.swing": _switches(robot)}
     steps = robot.body.modules * seconds * sum(rates.values()) / _REACH
     if steps > MOST_STEPS:

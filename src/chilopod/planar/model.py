@@ -322,16 +322,10 @@ class PlanarModel(ReadOnlyArrays):
 def carry(
     models: Sequence[PlanarModel], states: Any, t0: float, t1: float, tolerance: float, nodes: Array | None = None
 ) -> Any:
-    """Carry states of robots of one gait and size in place, one robot for all states or one each.
+    """Carry states of robots of one gait and size in place, one robot for all states or one each; AnalysisError if a
+    motion diverges.
 
-    Returns
-    -------
-    States at the nodes of every piece, see :func:`chilopod.planar.flow.advance`.
-
-    Raises
-    ------
-    AnalysisError
-        If a motion diverges.
+    Returns what :func:`chilopod.planar.flow.advance` recorded at the nodes.
     """
     starts, widths, interval = models[0]._pieces(t0, t1)
     recorded = advance(starts, widths, _chains(models, interval), states, tolerance, nodes)

@@ -23,19 +23,9 @@ Array = NDArray[np.float64]
 
 
 def planar_record(model: PlanarModel, samples: Array, states: Array, leg_yaw: Array) -> xr.Dataset:
-    """States over time as named quantities on the floor, see :func:`chilopod.record.walk_record`.
-
-    Parameters
-    ----------
-    model
-        Any of the robots.
-    samples
-        s, shape (samples,).
-    states
-        With poses, shape (samples, robots, 2N+4).
-    leg_yaw
-        rad, shape (samples, robots, 2).
-    """
+    """States with poses over time, shape (samples, robots, 2N+4), as named quantities on the floor, see
+    :func:`chilopod.record.walk_record`; samples are in s, leg yaw in rad, shape (samples, robots, 2), and any of the
+    robots' models will do."""
     n = model.modules
     heading = states[..., 2 * n + 3]
     return walk_record(
@@ -53,14 +43,8 @@ def planar_record(model: PlanarModel, samples: Array, states: Array, leg_yaw: Ar
 def foot_forces(
     models: Sequence[PlanarModel], samples: Array, states: Array, leg_yaw: Array, friction: Array
 ) -> xr.DataArray:
-    """Force of the floor on every foot, zero for those in the air, along the floor's axes, N.
-
-    Foot by foot from places and velocities, without the contact moments.
-
-    Returns
-    -------
-    Over (time, robot, module, side, axis).
-    """
+    """Force of the floor on every foot, zero for those in the air, along the floor's axes, N, over (time, robot,
+    module, side, axis): foot by foot from places and velocities, without the contact moments."""
     n, gait = models[0].modules, models[0].robot.gait
     length = np.array([model.robot.module_length for model in models])[:, None]
     heading = module_headings(states[..., 2 * n + 3], states[..., 3 : n + 2])

@@ -45,19 +45,10 @@ _attempt = lanes_step(_slope)
 class Pieces(NamedTuple):
     """Pieces of time that all robots walk through.
 
-    Attributes
-    ----------
-    begins
-        Time at which each piece begins, s, shape (pieces,).
-    starts, widths
-        Start of each piece in its contact interval, and its duration, s, shape (pieces,).
-    interval
-        The contact interval each piece belongs to, shape (pieces,).
-    sample
-        Place in ``record`` of the state at the end of a piece, -1 for none, shape (pieces,).
-    contact, stroke
-        By interval: whether each foot stands, and where it is at the start (m ahead of mid-stroke), shape
-        (intervals, N, 2).
+    Each begins at a time, starts so far into its contact interval and has a width, s; it belongs to a contact
+    ``interval``, and ``sample`` is the place in ``record`` of the state at its end, -1 for none; all of shape
+    (pieces,). By interval, ``contact`` says whether each foot stands and ``stroke`` where it is at the start, m ahead
+    of mid-stroke, shape (intervals, N, 2).
     """
 
     begins: Any
@@ -72,18 +63,10 @@ class Pieces(NamedTuple):
 class Robots(NamedTuple):
     """Robots and their commands.
 
-    Attributes
-    ----------
-    scalars, feet
-        See ``dynamics.py``, shape (robots, 4); forward offset and half-width, m, shape (robots, 2).
-    damping
-        N*m*s/rad, shape (robots, N-1).
-    friction
-        Friction of every foot, N*s/m, shape (robots, N, 2).
-    profile, lag, torque
-        See :class:`chilopod.engine.Actuators`, shapes (7, robots, N-1), (robots, N-1), (robots, N-1).
-    yaw
-        Yaw of the legs of module 1, rad, shape (robots, 2).
+    ``scalars``, see ``dynamics.py``, has shape (robots, 4), ``feet`` (forward offset and half-width, m) and ``yaw`` (of
+    the legs of module 1, rad) have shape (robots, 2), ``damping`` (N*m*s/rad) shape (robots, N-1), ``friction`` of
+    every foot (N*s/m) shape (robots, N, 2). ``profile``, ``lag`` and ``torque`` are those of
+    :class:`chilopod.engine.Actuators`, shapes (7, robots, N-1), (robots, N-1) and (robots, N-1).
     """
 
     scalars: Any
@@ -107,22 +90,11 @@ class _Lanes(NamedTuple):
 
 
 class _Places(NamedTuple):
-    """Where the robot in each lane is.
+    """Where the robot in each lane is: its number, or NOBODY, and its piece.
 
-    No step straddles the end of a ramp: a piece is walked in parts.
-
-    Attributes
-    ----------
-    robot, piece
-        Number of the robot, or NOBODY, and of its piece.
-    begin, end
-        From where to where of the piece the present part is, s.
-    next
-        Step to try next, s; 0 for a guess.
-    tried, rejected
-        Steps in this part so far, and whether the one before was rejected.
-    last
-        True if the present step is to be the last of the part.
+    No step straddles the end of a ramp: a piece is walked in parts, from ``begin`` to ``end`` of it (s). ``next`` is
+    the step to try next (s), 0 for a guess; ``tried`` counts the steps in this part, ``rejected`` says whether the one
+    before was, and ``last`` whether the present one is to be the last of the part.
     """
 
     robot: Any
@@ -360,27 +332,11 @@ def carry(
 ) -> None:
     """Carry robots through all pieces of time, in place, on all cores; each robot on its own, step by step.
 
-    Parameters
-    ----------
-    rows
-        Numbers of the robots that walk, at least one.
-    pieces, robots
-        See :class:`Pieces` and :class:`Robots`.
-    tolerance
-        Tolerance of the integrator, relative to max(1, |x|).
-    states
-        Reduced states with poses behind, shape (robots, 2N+4).
-    step
-        To start with, s; 0 for a guess; the last one is left there, shape (robots,).
-    status
-        Left at WALKING, or DIVERGED or OUT_OF_RANGE where a robot fails, shape (robots,).
-    record
-        States over (samples, robots, 2N+4); what no robot reached is left alone.
-
-    Raises
-    ------
-    ParameterError
-        If shapes of arrays do not go together, or there are no rows or pieces.
+    ``rows`` are the numbers of the robots that walk, at least one. States have poses behind, shape (robots, 2N+4).
+    ``step`` is the one to start with, s, 0 for a guess, and is left at the last one; ``status`` is left at WALKING, or
+    DIVERGED or OUT_OF_RANGE where a robot fails; both of shape (robots,). ``record`` has states over (samples, robots,
+    2N+4); what no robot reached is left alone. ParameterError if shapes of arrays do not go together, or there are no
+    rows or pieces.
     """
     what = (rows, pieces, robots, tolerance, states, step, status, record)
     threads = numba.get_num_threads()

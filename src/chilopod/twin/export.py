@@ -108,13 +108,7 @@ FORMATS: dict[str, tuple[str, Callable[[Robot], str]]] = {".xml": ("MJCF", mjcf)
 
 
 def format_of(suffix: str) -> tuple[str, Callable[[Robot], str]]:
-    """The format that goes with a suffix, such as ``.urdf``.
-
-    Raises
-    ------
-    ParameterError
-        If none does.
-    """
+    """The format that goes with a suffix, such as ``.urdf``; ParameterError if none does."""
     if suffix.lower() not in FORMATS:
         allowed = " or ".join(f"{end} ({name})" for end, (name, _) in FORMATS.items())
         raise ParameterError("is the suffix of no format", field="out", value=suffix, allowed=allowed)
