@@ -111,7 +111,9 @@ class _Medium(io.FileIO):
 
     def failure(self, path: Path) -> OutputError | None:
         """Failure of the file, if any."""
-        return self._error and OutputError(f"cannot be written ({self._error.strerror})", source=str(path))
+        if self._error is None:
+            return None
+        return OutputError(f"cannot be written ({self._error.strerror})", source=str(path))
 
     def readinto(self, buffer: Any) -> int:
         # What could not be written is zeros.

@@ -122,6 +122,13 @@ class BatchWalk(Walk):
         self._actuators.restore(part(arrays, "told_"))
         self._targets.restore(part(arrays, "target_"))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return resumed, (self.traits, self.save(), self._maker())
+
+    def _maker(self) -> Any:
+        """Function that makes such a walk of beginning, record and tolerance."""
+        return type(self)
+
     def _saved(self) -> tuple[dict[str, Any], dict[str, Any]]:
         """Settings and arrays of the engine's own, ``states`` among them."""
         raise NotImplementedError

@@ -12,15 +12,14 @@ from itertools import count, islice, takewhile
 from typing import Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
-from chilopod.engine.arguments import as_number, check_time
+from chilopod.engine.arguments import as_array, as_number, check_time
 from chilopod.engine.contract import Command, Controller, Event, Observation, Walk
 from chilopod.errors import AnalysisError, ParameterError, in_words
 from chilopod.gait import Gait
 from chilopod.progress import Progress, silent
 
-Array = NDArray[np.float64]
 _T = TypeVar("_T")
 
 _MOMENT = 0.3
@@ -35,17 +34,7 @@ _FIRST, _SHORTEST = 0.02, 1e-3
 
 @dataclass
 class Spent:
-    """Where the time of walks went.
-
-    Attributes
-    ----------
-    controller
-        In controllers, s.
-    total
-        s.
-    progress
-        Told how far the walks are that are under way.
-    """
+    """Where the time of walks went, s: in controllers, and in all; ``progress`` is told how far the walks are."""
 
     controller: float = 0.0
     total: float = 0.0
@@ -128,7 +117,7 @@ def steer(
     until: float,
     controller: Controller | None = None,
     *,
-    bearing_noise: Array | None = None,
+    bearing_noise: ArrayLike | None = None,
     referee: Referee | None = None,
     progress: Progress = silent,
 ) -> None:
@@ -136,10 +125,8 @@ def steer(
 
     Parameters
     ----------
-    walk
-        Changed in place.
-    until
-        s.
+    walk, until
+        Changed in place, up to a time, s.
     controller
         Without one the robots walk on as they were told.
     bearing_noise
@@ -159,13 +146,10 @@ def steer(
     until = check_time(until, begun)
     if not callable(progress):
         raise ParameterError("cannot be called", field="progress", value=progress, allowed="a function of two")
-    if bearing_noise is not None and (bearing_noise.ndim != 2 or len(bearing_noise) != len(walk.robots)):
-        raise ParameterError(
-            "has the wrong shape",
-            field="bearing_noise",
-            value=bearing_noise.shape,
-            allowed=f"({len(walk.robots)}, as many as events)",
-        )
+    noise = None if bearing_noise is None else np.atleast_2d(as_array("bearing_noise", bearing_noise))
+    if noise is not None and (noise.ndim != 2 or len(noise) != len(walk.robots)):
+        allowed = f"({len(walk.robots)}, as many as events)"
+        raise ParameterError("has the wrong shape", field="bearing_noise", value=noise.shape, allowed=allowed)
 
     def tell() -> None:
         # Where there is nowhere to go, a referee ends the walk before it begins.
@@ -185,10 +169,10 @@ def steer(
                 break
             continue
         seen = walk.observe()
-        if bearing_noise is not None:
-            if index >= bearing_noise.shape[1]:
-                raise ParameterError("is for fewer events", field="bearing_noise", value=bearing_noise.shape[1])
-            seen = replace(seen, bearing=(seen.bearing + bearing_noise[:, index] + np.pi) % (2.0 * np.pi) - np.pi)
+        if noise is not None:
+            if index >= noise.shape[1]:
+                raise ParameterError("is for fewer events", field="bearing_noise", value=noise.shape[1])
+            seen = replace(seen, bearing=(seen.bearing + noise[:, index] + np.pi) % (2.0 * np.pi) - np.pi)
         if referee is not None:
             seen = referee.through(index, seen)
         assert controller is not None
@@ -226,13 +210,7 @@ def _instants(
 
 @dataclass
 class _Pace:
-    """Walks on in stretches that take a moment each; a walk is the same to the bit however it is cut.
-
-    Attributes
-    ----------
-    stretch
-        s of the walk, the next one.
-    """
+    """Walks on in stretches that take a moment each, the next one ``stretch`` s long."""
 
     stretch: float = _FIRST
 

@@ -124,7 +124,8 @@ def walk_means(models: Sequence[PlanarModel], orbits: ArrayLike) -> WalkMeans:
     first, schedule = models[0], models[0].schedule
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
     fractions, widths = 0.5 * (1.0 + nodes), np.diff(schedule.times)
-    states = np.concatenate([orbits, np.zeros((len(orbits), 3))], axis=1)
+    states = np.zeros((len(orbits), first.dimension + 3))
+    states[:, :-3] = orbits
     recorded = carry(models, states, 0.0, first.period, first.tolerance, fractions)
     share = 0.5 * weights * widths[:, None] / first.period
     angles = recorded[..., 3 : first.modules + 2]

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
-import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from chilopod.engine import Controller, event_times, steer
-from chilopod.engine.arguments import as_array
-from chilopod.errors import ParameterError
+from chilopod.engine import Controller, steer
 from chilopod.planar.walk import TOLERANCE, start
+from chilopod.progress import Progress, silent
 from chilopod.record import LONGEST, RATE, Recording, in_range
 from chilopod.robot import Robot
 
@@ -28,7 +26,7 @@ def simulate(
     rate: float = RATE,
     tolerance: float = TOLERANCE,
     forces: bool = False,
-    progress: Callable[[float, str], None] = lambda done, words: None,
+    progress: Progress = silent,
 ) -> xr.Dataset:
     """Let robots walk on the plane; each one alone, all of them at the same time.
 
@@ -76,23 +74,14 @@ def simulate(
         If an argument has the wrong shape or is out of range, or the robots do not go together.
     """
     in_range("duration", duration, LONGEST, "s")
-    record = Recording(rate, forces)
     walk = start(
         robots,
         initial=initial,
         friction=friction,
         target=target,
-        record=record,
+        record=Recording(rate, forces),
         tolerance=tolerance,
         expected=duration,
     )
-    noise = None
-    if controller is not None and bearing_noise is not None:
-        count, asked = len(walk.robots), sum(1 for _ in event_times(controller, walk.robots[0].gait, duration))
-        noise = np.atleast_2d(as_array("bearing_noise", bearing_noise))
-        if noise.ndim != 2 or len(noise) != count or noise.shape[1] < asked:
-            raise ParameterError(
-                "has the wrong shape", field="bearing_noise", value=noise.shape, allowed=f"({count}, {asked} or more)"
-            )
-    steer(walk, duration, controller, bearing_noise=noise, progress=progress)
+    steer(walk, duration, controller, bearing_noise=bearing_noise, progress=progress)
     return walk.to_dataset(copy=False)

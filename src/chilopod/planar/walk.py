@@ -221,9 +221,6 @@ class PlanarWalk(BatchWalk):
             "samples": self._samples.rows,
         }
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return resume, (self.save(),)
-
     def restore(self, settings: dict[str, Any], arrays: dict[str, Any]) -> None:
         super().restore(settings, arrays)
         self._step, self._status = arrays["step"], arrays["status"]

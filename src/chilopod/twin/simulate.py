@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import xarray as xr
 from numpy.typing import ArrayLike
 
 from chilopod.engine import Controller, steer
+from chilopod.progress import Progress, silent
 from chilopod.record import LONGEST, RATE, Recording, in_range
 from chilopod.robot import Robot
 from chilopod.twin.start import start
@@ -28,7 +29,7 @@ def simulate(
     poses: bool = False,
     threads: int = 0,
     tolerance: float = TOLERANCE,
-    progress: Callable[[float, str], None] = lambda done, words: None,
+    progress: Progress = silent,
 ) -> xr.Dataset:
     """Let robots walk on the floor; each one alone, all of them at the same time.
 
@@ -61,11 +62,6 @@ def simulate(
     Dataset as that of :func:`chilopod.planar.simulate`, with ``leg_yaw`` as the joints are, not as they should be; with
     a target and a controller also ``seen_bearing`` and ``seen_distance`` over (event, robot), what the controller saw,
     NaN where the pole was out of view; with ``poses``, ``pose`` over (time, robot, coordinate).
-
-    Raises
-    ------
-    ParameterError
-        If an argument has the wrong shape or is out of range, or the robots do not go together.
     """
     in_range("duration", duration, LONGEST, "s")
     walk = start(

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import copyreg
 from collections.abc import Sequence
 from functools import partial
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -122,11 +120,3 @@ def start(
 def resume(saved: bytes, threads: int = 0, *, edit: Edit | None = None, traits: Traits = traits) -> TwinWalk:
     """A walk that was saved, see :class:`chilopod.engine.Engine`; the number of threads does not matter."""
     return resumed(traits, saved, partial(TwinWalk, traits=traits, threads=threads, edit=edit))
-
-
-def _reduced(walk: TwinWalk) -> tuple[Any, ...]:
-    """How a walk is copied and pickled."""
-    return partial(resume, edit=walk.edit, traits=walk.traits), (walk.save(),)
-
-
-copyreg.pickle(TwinWalk, _reduced)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import mujoco
@@ -60,7 +61,7 @@ class TwinWalk(BatchWalk):
         robots, count = begun.robots, len(begun.robots)
         self._plan = plan = compiled(without_springs(robots[0]), bool(record and record.forces), edit)
         super().__init__(traits, begun, record, tolerance, expected, count * (plan.model.nq + plan.model.nv))
-        self.edit = edit
+        self._edit = edit
         self._seeds = None if begun.seeds is None else np.array(begun.seeds, dtype=np.object_)
         self._batch = Batch(plan.model, count, threads or cores())
         self._springs = np.array([each.springs.stiffness for each in robots])
@@ -193,6 +194,9 @@ class TwinWalk(BatchWalk):
             # Nobody walks on, but the record goes on with nothing.
             for store in self._kept().values():
                 store.grown(self._sampling.count(self._tick * self._plan.steps_per_control))
+
+    def _maker(self) -> Any:
+        return partial(TwinWalk, traits=self.traits, threads=0, edit=self._edit)
 
     def _saved(self) -> tuple[dict[str, Any], dict[str, Any]]:
         settings = {
