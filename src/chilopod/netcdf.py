@@ -84,10 +84,6 @@ def unsealed(path: Path) -> bytes:
     with sealed_file(path) as file:
         content = file.read()
     data = content[:-_LENGTH]
-    if not _is_whole(data, content):
+    if sealed(data) != content:
         raise UnsoundError("is damaged or was edited, or chilopod did not write it")
     return data
-
-
-def _is_whole(data: bytes, content: bytes) -> bool:
-    return sealed(data) == content

@@ -188,12 +188,8 @@ def rows_anew(
             "a record is of one walk", field="restart", allowed="a walk that was started with record=None"
         )
     if abs(cycles - round(cycles)) > BEGINNING:
-        raise ParameterError(
-            "is in the middle of a gait cycle",
-            field="restart",
-            value=f"{time:g} s",
-            allowed=f"a whole multiple of the period, {robots[0].gait.period:g} s",
-        )
+        allowed = f"a whole multiple of the period, {robots[0].gait.period:g} s"
+        raise ParameterError("is in the middle of a gait cycle", field="restart", value=f"{time:g} s", allowed=allowed)
     count, own = int(marked.sum()), as_seeds(seeds)
     if own is not None and len(own) != count:
         raise ParameterError("has the wrong length", field="seeds", value=len(own), allowed=str(count))

@@ -36,13 +36,9 @@ def engine_named(name: str) -> Engine:
         engine = import_module(_MODULES[name])  # a module is an engine
         return engine
     if ":" not in name:
-        raise ParameterError(
-            "there is no such engine",
-            field="engine",
-            value=name,
-            allowed=f"{', '.join(ENGINES)}, or package.module:object",
-            nearest=nearest_name(name, ENGINES),
-        )
+        problem = "there is no such engine"
+        allowed = f"{', '.join(ENGINES)}, or package.module:object"
+        raise ParameterError(problem, field="engine", value=name, allowed=allowed, nearest=nearest_name(name, ENGINES))
     return _Own(name, _imported("engine", name))
 
 
@@ -133,12 +129,9 @@ def controller_named(path: str) -> Controller:
     except (ParameterError, KeyboardInterrupt):
         raise
     except BaseException as error:  # it is somebody else's code
-        raise ParameterError(
-            f"cannot be made: {in_words(error)}",
-            field="controller",
-            value=path,
-            allowed="a class whose fields all have defaults",
-        ) from error
+        problem = f"cannot be made: {in_words(error)}"
+        allowed = "a class whose fields all have defaults"
+        raise ParameterError(problem, field="controller", value=path, allowed=allowed) from error
     check_controller(controller)
     return controller
 
@@ -152,12 +145,9 @@ def check_controller(controller: Controller) -> None:
             raise ParameterError(f"has no {name}", field="controller", value=kind.__name__, allowed="events and act")
     frozen = dataclasses.is_dataclass(kind) and kind.__dataclass_params__.frozen
     if not frozen:
-        raise ParameterError(
-            "can change, so nobody could tell trials apart",
-            field="controller",
-            value=kind.__name__,
-            allowed="a frozen dataclass: @dataclass(frozen=True)",
-        )
+        problem = "can change, so nobody could tell trials apart"
+        allowed = "a frozen dataclass: @dataclass(frozen=True)"
+        raise ParameterError(problem, field="controller", value=kind.__name__, allowed=allowed)
 
 
 def path_of(kind: type) -> str:

@@ -123,19 +123,9 @@ class PlanarModel(ReadOnlyArrays):
         return self.reflection if abs(turns - round(turns)) < _SAME_INSTANT else None
 
     def flow(self, x: ArrayLike, t0: float, t1: float) -> tuple[Array, Array]:
-        """State at t1 of the robot that is in state x at t0, and its derivative with respect to x.
+        """State at t1 of the robot that is in state x, shape (2N+1,), at t0, and its derivative with respect to x.
 
-        Parameters
-        ----------
-        x
-            Shape (2N+1,).
-        t0, t1
-            Times, s, ``t0 <= t1``; the gait is at phase 0 at time 0.
-
-        Raises
-        ------
-        AnalysisError
-            If the motion diverges.
+        Times are in s, ``t0 <= t1``; the gait is at phase 0 at time 0. AnalysisError if the motion diverges.
         """
         state, derivative, _ = self.flow_with_error(x, t0, t1)
         return state, derivative
@@ -144,8 +134,10 @@ class PlanarModel(ReadOnlyArrays):
         """:meth:`flow`, and a bound on the error of the largest entry of the derivative."""
         x = self._checked(x)
         if (x == self.orbit).all():
-            matrix, error = self._linear_flow(t0, t1)
-            return x.copy(), matrix, error
+            to_joint, from_joint = _joint_rates(self.modules)
+            matrix = from_joint.copy()
+            error, _ = linear.propagate(*self._linear_pieces(t0, t1), self._clock(t0, t1), matrix)
+            return x, to_joint @ matrix, _ROWS_DIFFER * error
         n = self.dimension
         batch = np.tile(x.astype(np.complex128), (n, 1))
         batch += 1j * COMPLEX_STEP * np.eye(n)
@@ -159,15 +151,7 @@ class PlanarModel(ReadOnlyArrays):
 
     def flow_states(self, states: ArrayLike, t0: float, t1: float) -> Array:
         """Carry many states, shape (states, 2N+1), on all cores, without derivatives."""
-        batch = np.array(states, dtype=np.float64, order="C")
-        if batch.ndim != 2 or batch.shape[1] != self.dimension:
-            raise ParameterError(
-                "states have the wrong shape",
-                value=batch.shape,
-                allowed=f"(any number, {self.dimension})",
-                field="states",
-            )
-        self._check_finite(batch, "states")
+        batch = self._checked(states, "states", ("any number",))
         carry([self], batch, t0, t1, self.tolerance)
         return batch
 
@@ -236,19 +220,15 @@ class PlanarModel(ReadOnlyArrays):
     # -- inside
     # ---------------------------------------------------------------------------------------------------------------
 
-    def _checked(self, x: ArrayLike) -> Array:
-        state = np.asarray(x, dtype=np.float64)
-        if state.shape != (self.dimension,):
-            raise ParameterError(
-                "state has the wrong shape", field="x", value=state.shape, allowed=f"({self.dimension},)"
-            )
-        self._check_finite(state, "x")
-        return state
-
-    @staticmethod
-    def _check_finite(states: Array, field: str) -> None:
+    def _checked(self, given: ArrayLike, field: str = "x", ahead: tuple[str, ...] = ()) -> Array:
+        """Copy of a state, or of several, whose axes are ``ahead``."""
+        states = np.array(given, dtype=np.float64, order="C")
+        if states.ndim != len(ahead) + 1 or states.shape[-1] != self.dimension:
+            allowed = f"({', '.join((*ahead, str(self.dimension)))})"
+            raise ParameterError("has the wrong shape", field=field, value=states.shape, allowed=allowed)
         if not np.isfinite(states).all():
             raise ParameterError("must be finite", field=field)
+        return states
 
     def _pieces(self, t0: float, t1: float) -> tuple[Array, Array, NDArray[np.intp]]:
         return pieces(self.robot.gait, self.modules, t0, t1)
@@ -260,12 +240,9 @@ class PlanarModel(ReadOnlyArrays):
         robot = self.robot
         n, intervals = self.modules, len(self.schedule.times) - 1
         if 3 * intervals * (n + 2) * (2 * n + 1) > _MOST_NUMBERS:
-            raise AnalysisError(
-                f"its equations are too many: {intervals} intervals between touch-downs and lift-offs in a period",
-                field="body.modules",
-                value=n,
-                allowed="fewer modules, or phases with which many legs touch down at once",
-            )
+            problem = f"its equations are too many: {intervals} intervals between touch-downs and lift-offs in a period"
+            allowed = "fewer modules, or phases with which many legs touch down at once"
+            raise AnalysisError(problem, field="body.modules", value=n, allowed=allowed)
         passive, joint, rates, decay = _passive_matrices(
             robot.gait,
             self.modules,
@@ -311,12 +288,6 @@ class PlanarModel(ReadOnlyArrays):
     def _clock(self, t0: float, t1: float) -> float:
         """The largest time from which those between t0 and t1 are computed."""
         return max(abs(t0), abs(t1), self.period)
-
-    def _linear_flow(self, t0: float, t1: float) -> tuple[Array, float]:
-        to_joint, from_joint = _joint_rates(self.modules)
-        matrix = from_joint.copy()
-        error, _ = linear.propagate(*self._linear_pieces(t0, t1), self._clock(t0, t1), matrix)
-        return to_joint @ matrix, _ROWS_DIFFER * error
 
 
 def carry(

@@ -32,27 +32,18 @@ def simulate(
 
     Parameters
     ----------
-    robots
-        One, or one for every walk; they share gait and number of modules and may differ in all else.
+    robots, initial, friction, target, tolerance
+        As for :func:`start`.
     duration
         s; the gait is at phase 0 at time 0.
-    initial
-        States with poses, shape (walks, 2N+4) or (2N+4,), such as :func:`initial_states` gives; by default the straight
-        walk from the origin along x.
-    friction
-        Factor on the friction coefficient of every foot, positive, shape (N, 2) or (walks, N, 2).
     controller
         Asked for commands at its events; without one the legs stay straight. In this model a leg's yaw moves at once
         and matters only while its foot stands.
-    target
-        Its place on the floor, m, shape (2,) or (walks, 2), for the controller to see.
     bearing_noise
         Error added to the bearing that the controller sees at its events, rad, shape (walks, at least as many as
         events); the last axis is the order of events.
     rate
         Samples per second.
-    tolerance
-        Tolerance of every step, relative to max(1, |state|).
     forces
         True to add the force on every foot.
     progress

@@ -21,7 +21,6 @@ from chilopod.integrate import LANES_WORK, MAX_STEPS, STAGES, first_step, lanes_
 from chilopod.lanes import LANES, as_lanes, choose, room
 from chilopod.planar.contact import MOMENTS, sum_moments
 from chilopod.planar.dynamics import BEHIND, DECAY, LEVEL, ORIGIN, SCRATCH, SLOPE, SPRING, TORQUE, rhs
-from chilopod.planar.shapes import fit
 
 WALKING, DIVERGED, OUT_OF_RANGE, HALTED = range(4)
 MOST_BENT = 0.5 * np.pi
@@ -107,6 +106,34 @@ class _Places(NamedTuple):
     last: Any
 
 
+@njit
+def _fit(rows: Any, pieces: Any, robots: Any, states: Any, step: Any, status: Any, record: Any) -> bool:
+    """True if arguments of :func:`carry` have shapes that go together and are not empty: compiled loops look at no
+    index."""
+    (count, joints), size = robots.lag.shape, pieces.widths.size
+    return bool(
+        0 < rows.size <= count
+        and size > 0
+        and pieces.begins.size == size
+        and pieces.starts.size == size
+        and pieces.interval.size == size
+        and pieces.sample.size == size
+        and pieces.contact.shape == (len(pieces.contact), joints + 1, 2)
+        and pieces.stroke.shape == pieces.contact.shape
+        and states.shape == (count, 2 * joints + 6)
+        and record.shape[1:] == states.shape
+        and step.size == count
+        and status.size == count
+        and robots.scalars.shape == (count, 4)
+        and robots.feet.shape == (count, 2)
+        and robots.yaw.shape == (count, 2)
+        and robots.damping.shape == (count, joints)
+        and robots.torque.shape == (count, joints)
+        and robots.friction.shape == (count, joints + 1, 2)
+        and robots.profile.shape == (7, count, joints)
+    )
+
+
 def _carrier(width: int) -> Callable[..., bool]:
     """The loop on one thread for a number of lanes.
 
@@ -118,7 +145,7 @@ def _carrier(width: int) -> Callable[..., bool]:
     def carry(
         rows: Any, pieces: Any, robots: Any, tolerance: float, states: Any, step: Any, status: Any, record: Any
     ) -> bool:
-        if not fit(rows, pieces, robots, states, step, status, record):
+        if not _fit(rows, pieces, robots, states, step, status, record):
             return False
         n, size = pieces.contact.shape[1], states.shape[1]
         joints = n - 1
@@ -319,7 +346,7 @@ def walk(
     record: Any,
 ) -> bool:
     """As :func:`carry`, parted into groups, those of a group on one thread: the answer hangs on neither."""
-    if not fit(rows, pieces, robots, states, step, status, record):
+    if not _fit(rows, pieces, robots, states, step, status, record):
         return False
     for group in numba.prange(groups):
         mine = rows[group * rows.size // groups : (group + 1) * rows.size // groups]

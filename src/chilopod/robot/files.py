@@ -63,8 +63,11 @@ def read_table(robot: str | Path) -> tuple[dict[str, Any], str]:
         missing = not (source and path.exists())
     except OSError:
         missing = False  # reading it says why it cannot be
+    if missing and (isinstance(robot, Path) or len(path.parts) > 1 or path.suffix):
+        raise RobotFileError("no such file", source=source, nearest=nearest_name(source, names))
     if missing:
-        raise _not_found(robot, names)
+        allowed, nearest = f"a robot file or one of the presets {', '.join(names)}", nearest_name(source, names)
+        raise RobotFileError("no such preset or file", value=source, allowed=allowed, nearest=nearest)
     text = read_text(path, "robot file", RobotFileError)
     try:
         return parsed(text), source
@@ -91,14 +94,6 @@ def parsed(text: str) -> dict[str, Any]:
 def to_toml(table: Mapping[str, Any]) -> str:
     """Write a table as TOML text that reads back to equal values; None values are left out."""
     return "\n".join(_lines(table, ())).strip() + "\n"
-
-
-def _not_found(robot: str | Path, names: list[str]) -> RobotFileError:
-    source, path = str(robot), Path(robot)
-    if isinstance(robot, Path) or len(path.parts) > 1 or path.suffix:
-        return RobotFileError("no such file", source=source, nearest=nearest_name(source, names))
-    allowed = f"a robot file or one of the presets {', '.join(names)}"
-    return RobotFileError("no such preset or file", value=source, allowed=allowed, nearest=nearest_name(source, names))
 
 
 def _frozen(value: Any) -> Any:

@@ -81,11 +81,8 @@ class Springs(Description):
         if self.softest is not None and self.stiffest is not None:
             for joint, (low, high) in enumerate(zip(self.softest, self.stiffest, strict=False)):
                 if low > high:
-                    raise ParameterError(
-                        f"of joint {joint + 1}, softest is above stiffest",
-                        value=f"{low:g} N*m/rad",
-                        allowed=f"at most {high:g} N*m/rad",
-                    )
+                    problem = f"of joint {joint + 1}, softest is above stiffest"
+                    raise ParameterError(problem, value=f"{low:g} N*m/rad", allowed=f"at most {high:g} N*m/rad")
         return self
 
 
@@ -179,12 +176,9 @@ class Twin(Description):
     def _whole_steps(self) -> Self:
         steps = self.control_interval / self.timestep
         if not (steps > 0.5 and abs(steps - round(steps)) < 1e-6):
-            raise ParameterError(
-                "does not go into twin.control_interval a whole number of times",
-                field="timestep",
-                value=f"{self.timestep:g} s",
-                allowed=f"{self.control_interval:g} s over a whole number",
-            )
+            problem = "does not go into twin.control_interval a whole number of times"
+            allowed = f"{self.control_interval:g} s over a whole number"
+            raise ParameterError(problem, field="timestep", value=f"{self.timestep:g} s", allowed=allowed)
         return self
 
 

@@ -35,21 +35,11 @@ _KINDS = {"inertial": "body", "general": "actuator"}
 
 
 def mjcf(robot: Robot) -> str:
-    """The robot as the text of an MJCF file.
+    """The robot, one with a twin, as the text of an MJCF file.
 
     MuJoCo makes of it the model that :func:`chilopod.twin.simulate` uses, every number to the bit. For the viewer there
     are a floor one can see, a light, a camera that follows, and the keyframe ``start``: the robot before it walks, with
-    the servo targets of that instant.
-
-    Parameters
-    ----------
-    robot
-        With a twin.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such robot.
+    the servo targets of that instant. ParameterError if the twin cannot be built.
     """
     twin = TwinModel(robot)
     spec = build(robot)

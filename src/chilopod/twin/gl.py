@@ -101,11 +101,6 @@ def import_mujoco() -> None:
             os.environ["MUJOCO_GL"] = wish
 
 
-def backend() -> str | None:
-    """The backend that works here, or None."""
-    return find().backend
-
-
 @contextmanager
 def context(width: int, height: int) -> Iterator[None]:
     """Make OpenGL ready to draw off-screen within, so many pixels; OutputError if no backend works, with what to do

@@ -61,9 +61,7 @@ def check_reach(robot: Robot) -> None:
 def twin_of(robot: Robot) -> Twin:
     """The robot's [twin]; ParameterError if it has none."""
     if robot.twin is None:
-        raise ParameterError(
-            "this robot has none, so the three-dimensional model cannot be built",
-            field="twin",
-            allowed="the keys of [twin] in the robot file; the preset aoi2022 has them",
-        )
+        problem = "this robot has none, so the three-dimensional model cannot be built"
+        allowed = "the keys of [twin] in the robot file; the preset aoi2022 has them"
+        raise ParameterError(problem, field="twin", allowed=allowed)
     return robot.twin

@@ -35,27 +35,16 @@ def simulate(
 
     Parameters
     ----------
-    robots
-        One, or one for every walk; they may differ in the numbers of their springs and in nothing else.
-    duration, friction, forces, progress
+    robots, initial, friction, target, seeds, threads, tolerance
+        As for :func:`start`.
+    duration, forces, progress
         As for :func:`chilopod.planar.simulate`.
-    initial
-        From :func:`initial_states`, shape (walks, nq) or (nq,); by default straight from the origin along x.
     controller
         Asked for commands at its events, which act at the first servo target from then on.
-    target
-        Place of the pole on the floor, m, shape (2,) or (walks, 2). The controller sees what the scanner made of its
-        last scan.
-    seeds
-        Seeds of the scanner's noise, one a walk; without them it has none.
     rate
         Samples per second; they are taken at the nearest step.
     poses
         True to add the positions of all joints, from which the robot can be drawn.
-    threads
-        At most; 0 for all cores. Results are the same to the bit at any number.
-    tolerance
-        At which MuJoCo's solver of contact forces stops, relative.
 
     Returns
     -------
