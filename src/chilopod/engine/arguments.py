@@ -155,7 +155,7 @@ def rows_of(
             raise ParameterError("has the wrong length", field=name, value=each, allowed=f"1 or {count}")
     for name, rows in arrays.items():
         if rows is not None:
-            arrays[name] = np.array(np.broadcast_to(rows, (count, *rows.shape[1:])))
+            arrays[name] = np.array(np.broadcast_to(rows, (count, *rows.shape[1:])), order="C")
     return count, arrays
 
 

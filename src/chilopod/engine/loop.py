@@ -146,10 +146,13 @@ def steer(
     until = check_time(until, begun)
     if not callable(progress):
         raise ParameterError("cannot be called", field="progress", value=progress, allowed="a function of two")
-    noise = None if bearing_noise is None else np.atleast_2d(as_array("bearing_noise", bearing_noise))
-    if noise is not None and (noise.ndim != 2 or len(noise) != len(walk.robots)):
-        allowed = f"({len(walk.robots)}, as many as events)"
-        raise ParameterError("has the wrong shape", field="bearing_noise", value=noise.shape, allowed=allowed)
+    noise = None
+    if controller is not None and bearing_noise is not None:
+        count, asked = len(walk.robots), sum(1 for _ in event_times(controller, gait, until))
+        noise = np.atleast_2d(as_array("bearing_noise", bearing_noise))
+        if noise.ndim != 2 or len(noise) != count or noise.shape[1] < asked:
+            allowed = f"({count}, {asked} or more)"
+            raise ParameterError("has the wrong shape", field="bearing_noise", value=noise.shape, allowed=allowed)
 
     def tell() -> None:
         # Where there is nowhere to go, a referee ends the walk before it begins.
@@ -170,8 +173,6 @@ def steer(
             continue
         seen = walk.observe()
         if noise is not None:
-            if index >= noise.shape[1]:
-                raise ParameterError("is for fewer events", field="bearing_noise", value=noise.shape[1])
             seen = replace(seen, bearing=(seen.bearing + noise[:, index] + np.pi) % (2.0 * np.pi) - np.pi)
         if referee is not None:
             seen = referee.through(index, seen)
