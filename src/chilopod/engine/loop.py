@@ -148,10 +148,10 @@ def steer(
         raise ParameterError("cannot be called", field="progress", value=progress, allowed="a function of two")
     noise = None
     if controller is not None and bearing_noise is not None:
-        count, asked = len(walk.robots), sum(1 for _ in event_times(controller, gait, until))
+        walks, events = len(walk.robots), sum(1 for _ in event_times(controller, gait, until))
         noise = np.atleast_2d(as_array("bearing_noise", bearing_noise))
-        if noise.ndim != 2 or len(noise) != count or noise.shape[1] < asked:
-            allowed = f"({count}, {asked} or more)"
+        if noise.ndim != 2 or len(noise) != walks or noise.shape[1] < events:
+            allowed = f"({walks}, {events} or more)"
             raise ParameterError("has the wrong shape", field="bearing_noise", value=noise.shape, allowed=allowed)
 
     def tell() -> None:
