@@ -12,9 +12,8 @@ from scipy.linalg import qr
 from chilopod.errors import ParameterError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.integrate import COMPLEX_STEP
-from chilopod.kinematics import foot_places, foot_velocities, from_modules, module_headings, module_velocities
 from chilopod.planar.drift import Drift
-from chilopod.planar.energy import foot_powers
+from chilopod.planar.energy import foot_powers, foot_slip
 from chilopod.planar.model import PlanarModel, carry
 
 Array = NDArray[np.float64]
@@ -130,9 +129,9 @@ def walk_means(models: Sequence[PlanarModel], orbits: ArrayLike) -> WalkMeans:
     share = 0.5 * weights * widths[:, None] / first.period
     angles = recorded[..., 3 : first.modules + 2]
     mean_angle, most_bent = np.einsum("sn,wsnj->wj", share, angles), np.abs(angles).max(axis=(1, 2, 3))
-    legs, floor = _powers(models, recorded, widths[:, None] * fractions)
+    legs, floor = _powers(models, np.moveaxis(recorded, 0, 2), widths[:, None] * fractions)
     drifts = tuple(Drift(ahead, left, turn, first.period) for ahead, left, turn in states[:, -3:].tolist())
-    leg_power, floor_power = (np.einsum("sn,wsn->w", share, power) for power in (legs, floor))
+    leg_power, floor_power = (np.einsum("sn,snw->w", share, power) for power in (legs, floor))
     return WalkMeans(mean_angle, most_bent, leg_power, floor_power, drifts)
 
 
@@ -146,23 +145,10 @@ def _alike(models: Sequence[PlanarModel]) -> bool:
 
 
 def _powers(models: Sequence[PlanarModel], x: Array, since: Array) -> tuple[Array, Array]:
-    """Powers of legs and floor, W, shape (walks, pieces, nodes), in states x, shape (walks, pieces, nodes, 2N+1),
+    """Powers of legs and floor, W, shape (pieces, nodes, walks), in states x, shape (pieces, nodes, walks, 2N+1),
     ``since`` (s), shape (pieces, nodes), the start of each piece."""
-    n, gait, schedule = models[0].modules, models[0].robot.gait, models[0].schedule
-    # One number a robot, for all its pieces, nodes, modules and sides.
-    length, friction, offset, half_width = (
-        np.array(values)[:, None, None, None, None]
-        for values in (
-            [model.robot.module_length for model in models],
-            [model.robot.ground.friction for model in models],
-            [model.robot.legs.forward_offset for model in models],
-            [model.robot.legs.half_width for model in models],
-        )
-    )
-    heading = module_headings(np.zeros(x.shape[:-1]), x[..., 3 : n + 2])
-    rate = module_headings(x[..., 2], x[..., n + 2 :])
-    velocity = module_velocities(x[..., :2], heading, rate, length[..., 0])
-    stroke = schedule.stroke[:, None] - gait.speed * since[..., None, None]
-    places = foot_places(offset, half_width, stroke)
-    slip = from_modules(velocity, heading, foot_velocities(places, rate, gait.speed))
-    return foot_powers(friction * schedule.contact[:, None], slip, heading, gait.speed)
+    schedule, speed = models[0].schedule, models[0].robot.gait.speed
+    stroke = schedule.stroke[:, None] - speed * since[..., None, None]
+    heading, slip = foot_slip(models, x, stroke[:, :, None])
+    friction = np.array([model.robot.ground.friction for model in models])[:, None, None]
+    return foot_powers(friction * schedule.contact[:, None, None], slip, heading, speed)

@@ -8,14 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from chilopod.kinematics import (
-    directions,
-    foot_places,
-    foot_velocities,
-    from_modules,
-    module_headings,
-    module_velocities,
-)
+from chilopod.planar.energy import foot_slip, front_velocity
 from chilopod.planar.model import PlanarModel
 from chilopod.record import walk_record
 
@@ -32,7 +25,7 @@ def planar_record(model: PlanarModel, samples: Array, states: Array, leg_yaw: Ar
         samples,
         position=states[..., 2 * n + 1 : 2 * n + 3],
         heading=heading,
-        velocity=_front_velocity(states, heading),
+        velocity=front_velocity(states, heading),
         heading_rate=states[..., 2],
         joint_angle=states[..., 3 : n + 2],
         joint_rate=states[..., n + 2 : 2 * n + 1],
@@ -46,28 +39,13 @@ def foot_forces(
     """Force of the floor on every foot, zero for those in the air, along the floor's axes, N, over (time, robot,
     module, side, axis): foot by foot from places and velocities, without the contact moments."""
     n, gait = models[0].modules, models[0].robot.gait
-    length = np.array([model.robot.module_length for model in models])[:, None]
-    heading = module_headings(states[..., 2 * n + 3], states[..., 3 : n + 2])
-    rate = module_headings(states[..., 2], states[..., n + 2 : 2 * n + 1])
-    velocity = module_velocities(_front_velocity(states, heading[..., 0]), heading, rate, length)
-
     phase = gait.phases(samples, n)[:, None]
-    yaw = np.zeros((*heading.shape, 2))
+    yaw = np.zeros((*states.shape[:2], n, 2))
     yaw[..., 0, :] = leg_yaw
-    offset = np.array([model.robot.legs.forward_offset for model in models])[:, None, None]
-    half_width = np.array([model.robot.legs.half_width for model in models])[:, None, None]
-    places = foot_places(offset, half_width, gait.stroke(phase), yaw)
-    slip = from_modules(velocity, heading, foot_velocities(places, rate, gait.speed, yaw))
+    _, slip = foot_slip(models, states, gait.stroke(phase), yaw)
     return xr.DataArray(
         np.where(gait.stands(phase)[..., None], -friction[..., None] * slip, 0.0),
         dims=("time", "robot", "module", "side", "axis"),
         coords={"module": np.arange(1, n + 1)},
         attrs={"units": "N"},
     )
-
-
-def _front_velocity(states: Array, heading: Array) -> Array:
-    """Velocity of module 1 on the floor, m/s, shape (..., 2)."""
-    ahead, left = directions(heading)
-    velocity: Array = states[..., :1] * ahead + states[..., 1:2] * left
-    return velocity
