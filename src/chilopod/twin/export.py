@@ -55,11 +55,10 @@ def mjcf(robot: Robot) -> str:
 
 
 def urdf(robot: Robot) -> str:
-    """The robot as the text of a URDF file.
+    """The robot as the text of a URDF file; ParameterError as for :func:`mjcf`.
 
     Links are named as in MuJoCo; that of module 1 is the root and floats. Feet alone collide. URDF has no springs, no
-    servos and no friction of the floor: a comment in the file says what they are. Parameter and
-    error are those of :func:`mjcf`.
+    servos and no friction of the floor: a comment in the file says what they are.
     """
     twin, model = twin_of(robot), TwinModel(robot).model
     root = ET.Element("robot", name=robot.name)
