@@ -151,7 +151,7 @@ class PlanarModel(ReadOnlyArrays):
 
     def flow_states(self, states: ArrayLike, t0: float, t1: float) -> Array:
         """Carry many states, shape (states, 2N+1), on all cores, without derivatives."""
-        batch = self._checked(states, "states", ("any number",))
+        batch = self._checked(states, "states", several=True)
         carry([self], batch, t0, t1, self.tolerance)
         return batch
 
@@ -220,11 +220,11 @@ class PlanarModel(ReadOnlyArrays):
     # -- inside
     # ---------------------------------------------------------------------------------------------------------------
 
-    def _checked(self, given: ArrayLike, field: str = "x", ahead: tuple[str, ...] = ()) -> Array:
-        """Copy of a state, or of several, whose axes are ``ahead``."""
+    def _checked(self, given: ArrayLike, field: str = "x", several: bool = False) -> Array:
+        """Copy of a state, or of several."""
         states = np.array(given, dtype=np.float64, order="C")
-        if states.ndim != len(ahead) + 1 or states.shape[-1] != self.dimension:
-            allowed = f"({', '.join((*ahead, str(self.dimension)))})"
+        if states.ndim != 1 + several or states.shape[-1] != self.dimension:
+            allowed = f"(any number, {self.dimension})" if several else f"({self.dimension},)"
             raise ParameterError("has the wrong shape", field=field, value=states.shape, allowed=allowed)
         if not np.isfinite(states).all():
             raise ParameterError("must be finite", field=field)
