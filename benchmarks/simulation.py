@@ -28,6 +28,7 @@ from chilopod.gait import Gait
 from chilopod.integrate import integrator
 from chilopod.planar import PlanarModel, initial_states, simulate
 from chilopod.planar.dynamics import rhs
+from chilopod.planar.model import carry
 from chilopod.robot import Robot, load_robot
 
 from _timing import duration, machine, table, write_section
@@ -68,7 +69,7 @@ def ours(robot: Robot, start: Array, seconds: float, tolerance: float) -> Call:
 
     def compute() -> Array:
         state = np.append(start, np.zeros(3))[None]
-        model._advance(state, 0.0, seconds)
+        carry([model], state, 0.0, seconds, model.tolerance)
         return state[0, -3:]
 
     return compute

@@ -41,8 +41,8 @@ def test_all_is_here(capsys):
     assert all(each["found"] for each in found.values())
     # Only a machine without a driver may lack something.
     assert {name for name, each in found.items() if each["mend"]} <= {"OpenGL"}
-    if gl.backend():
-        assert gl.backend() in found["OpenGL"]["found"]
+    if backend := gl.find().backend:
+        assert backend in found["OpenGL"]["found"]
 
 
 def test_processor_and_kernels(capsys, monkeypatch):

@@ -16,20 +16,9 @@ _LONGEST_NAME = 200
 class ChilopodError(Exception):
     """Base of all errors chilopod raises on purpose.
 
-    Parameters
-    ----------
-    problem
-        Problem, in a few words.
-    field
-        Dotted name of what is wrong, such as ``body.mass``.
-    value
-        Value that was given; None when none was.
-    allowed
-        Values that are allowed, in words.
-    nearest
-        The valid name nearest to the one given.
-    source
-        The file it stands in.
+    Each has the problem in a few words; and as far as they are known the dotted name of what is wrong, such as
+    ``body.mass``, the value that was given, the values that are allowed in words, the valid name nearest to the one
+    given, and the source, the file it stands in.
     """
 
     def __init__(

@@ -10,17 +10,8 @@ from chilopod.errors import ExtraError, briefly
 def needs(package: str, *, extra: str) -> None:
     """Say in one line what to install, unless a package is there; to be called before it is imported.
 
-    Parameters
-    ----------
-    package
-        Its name where it is imported.
-    extra
-        Name of the chilopod extra that installs it.
-
-    Raises
-    ------
-    ExtraError
-        If it is not installed, or something is that it cannot be imported with.
+    Raises ExtraError if the package, named as it is imported, is not installed or cannot be imported; the error names
+    the chilopod extra that installs it.
     """
     try:
         import_module(package)

@@ -133,11 +133,6 @@ class Gait(Description):
         -------
         Schedule
             Shared between calls with the same arguments. Switches closer than 1e-12 of a period are one switch.
-
-        Raises
-        ------
-        ParameterError
-            If `modules` or `duration` is not positive.
         """
         if modules < 1:
             raise ParameterError("must be positive", field="modules", value=modules)

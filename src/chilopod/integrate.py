@@ -58,30 +58,30 @@ def _size(value: Any) -> float:
     return max(abs(value.real), abs(value.imag) / COMPLEX_STEP)
 
 
+@njit(inline="always")
+def first_step(size: float, slope: float, left: float) -> float:
+    """Guess of the first step from the sizes of state and slope: the control corrects it within two steps."""
+    return 0.01 * max(size, 1e-3) / slope if slope > 0.0 else left
+
+
+@njit(inline="always")
+def step_factor(error: float, rejected: bool) -> float:
+    """Length of the next step over that of the last one, after its error and whether the one before was rejected."""
+    factor = SAFETY / np.sqrt(np.sqrt(np.sqrt(error))) if error > 0.0 else GROW
+    return max(SHRINK, min(1.0 if rejected else GROW, factor))
+
+
 @functools.cache
 def integrator(rhs: Callable[..., None], on_disk: bool = True) -> Callable[..., tuple[float, bool]]:
     """The compiled integrator of one right-hand side (numba keeps it on disk, which it cannot for a function argument).
 
-    Parameters
-    ----------
-    rhs
-        Compiled function ``rhs(t, x, args, out)`` that writes ``dx/dt`` into ``out``; smooth between ``t0`` and ``t1``.
-    on_disk
-        True to keep the compiled code on disk. Not for a function made at run time: its code would never be found
-        again, and leave a file behind at every run.
+    ``rhs(t, x, args, out)`` writes ``dx/dt`` into ``out`` and is smooth between ``t0`` and ``t1``. Of one that is made
+    at run time nothing is kept on disk: its code would never be found again.
 
-    Returns
-    -------
-        ``integrate(args, x, t0, t1, h, tolerance, work) -> (h, reached)``, which advances ``x`` in place:
-
-        - args: passed through to ``rhs``;
-        - x: state, shape (n,), float64 or complex128 (see the module docstring);
-        - t0, t1: interval, ``t1 > t0``;
-        - h: first step to try; 0 lets the routine guess. The step to start the next call with is returned;
-        - tolerance: bound on the local error of each component, relative to ``max(1, |x|)``, on state and tangent
-          alike;
-        - work: scratch, shape (16, n), the dtype of ``x``;
-        - reached: whether ``t1`` was reached.
+    Returns ``integrate(args, x, t0, t1, h, tolerance, work) -> (h, reached)``, which advances the state ``x``, shape
+    (n,), float64 or complex128, in place. ``h`` is the first step to try, 0 for a guess, and the one to start the next
+    call with; ``tolerance`` bounds the local error of each component of state and tangent, relative to ``max(1, |x|)``;
+    ``work`` is scratch, shape (16, n), of the dtype of ``x``; ``reached`` says whether ``t1`` was reached.
     """
 
     @(fused_njit if on_disk else numba.njit(fastmath={"contract"}))
@@ -94,13 +94,12 @@ def integrator(rhs: Callable[..., None], on_disk: bool = True) -> Callable[..., 
         t = t0
         rhs(t, x, args, k[0])
         if h <= 0.0:
-            # |x| / |x'| with a tenth of a safety factor: the controller corrects within two steps.
             scale = 0.0
             slope = 0.0
             for i in range(n):
                 scale = max(scale, _size(x[i]))
                 slope = max(slope, _size(k[0, i]))
-            h = 0.01 * max(scale, 1e-3) / slope if slope > 0.0 else t1 - t0
+            h = first_step(scale, slope, t1 - t0)
         rejected = False
         for _ in range(MAX_STEPS):
             remaining = t1 - t
@@ -143,22 +142,19 @@ def integrator(rhs: Callable[..., None], on_disk: bool = True) -> Callable[..., 
                 error = step * err5 * err5 / np.sqrt(err5 * err5 + 0.01 * err3 * err3)
             if not np.isfinite(error + check):
                 error = 1e300
-            if error <= 1.0:
+            factor = step_factor(error, rejected)
+            rejected = error > 1.0
+            if not rejected:
                 t = t_new
                 for i in range(n):
                     x[i] = y[i]
                     k[0, i] = k[12, i]
-                factor = GROW if error == 0.0 else min(GROW, SAFETY * error ** (-0.125))
-                if rejected:
-                    factor = min(1.0, factor)
-                rejected = False
                 if not last or factor < 1.0:
                     h = step * factor
                 if last:
                     return h, True
             else:
-                h = step * max(SHRINK, SAFETY * error ** (-0.125))
-                rejected = True
+                h = step * factor
                 if h < 1e-14 * max(abs(t), t1 - t0):
                     return h, False
         return h, False
@@ -182,22 +178,11 @@ def _sum_slopes(k: Any, which: int, i: int, zero: Any) -> Any:
 def lanes_step(rhs: Callable[..., None]) -> Callable[..., Any]:
     """A compiled step of states side by side in lanes, each at its own time and of its own length.
 
-    Parameters
-    ----------
-    rhs
-        As of :func:`integrator`, for numbers in lanes (see :mod:`chilopod.lanes`).
-
-    Returns
-    -------
-        ``attempt(args, x, t, step, tolerance, work, wide) -> error``, all in lanes but the tolerance:
-
-        - args: passed through to ``rhs``;
-        - x, t, step: state, shape (n,), time, and length of the step;
-        - tolerance: bound on the local error of each component, relative to ``max(1, |x|)``;
-        - work: scratch, shape (LANES_WORK, n or more). The slope at the beginning is given in row 0, and the new state
-          is left in row STAGES;
-        - wide: the same memory in ``LANES`` lanes, whatever their number elsewhere: sums of slopes go through it.
-        - error: of the step, as a part of what is tolerated; 1e300 where the new state is not finite.
+    Returns ``attempt(args, x, t, step, tolerance, work, wide) -> error``, all in lanes but the tolerance, as for
+    :func:`integrator`. ``work`` is scratch, shape (LANES_WORK, n or more): row 0 holds the slope at the beginning, and
+    row STAGES is left with the new state. ``wide`` is the same memory in ``LANES`` lanes, through which sums of slopes
+    go, whatever the number of lanes elsewhere. The error is a part of what is tolerated, 1e300 where the new state is
+    not finite.
     """
 
     @njit

@@ -15,78 +15,31 @@ Array = NDArray[np.float64]
 
 
 def module_headings(heading: ArrayLike, joint_angles: ArrayLike) -> Array:
-    """Headings of all modules; likewise their yaw rates, from that of module 1 and the joint rates.
-
-    Parameters
-    ----------
-    heading
-        Heading of module 1, rad, shape (...).
-    joint_angles
-        Heading of a module less that of the one in front of it, rad, shape (..., N-1).
-
-    Returns
-    -------
-    rad, shape (..., N).
-    """
+    """Headings of all modules, rad, shape (..., N), from that of module 1, shape (...), and the joint angles, shape
+    (..., N-1); likewise their yaw rates, from that of module 1 and the joint rates."""
     return np.asarray(heading, dtype=np.float64)[..., None] + _summed(np.asarray(joint_angles, dtype=np.float64), -1)
 
 
 def module_centres(position: ArrayLike, headings: Array, length: float) -> Array:
-    """Centres of all modules.
-
-    Parameters
-    ----------
-    position
-        Centre of module 1, m, shape (..., 2).
-    headings
-        rad, shape (..., N).
-    length
-        Length of a module, m.
-
-    Returns
-    -------
-    m, shape (..., N, 2).
-    """
+    """Centres of all modules, m, shape (..., N, 2), from that of module 1, m, shape (..., 2), and their headings, rad,
+    shape (..., N); ``length`` is that of a module, m."""
     half = 0.5 * length * directions(headings)[0]
     return np.asarray(position)[..., None, :] - _summed(half[..., :-1, :] + half[..., 1:, :], -2)
 
 
 def module_velocities(velocity: ArrayLike, headings: Array, rates: Array, length: ArrayLike) -> Array:
-    """Velocities of the centres of all modules: the derivative of :func:`module_centres`.
-
-    Parameters
-    ----------
-    velocity
-        Velocity of the centre of module 1, m/s, shape (..., 2).
-    headings, rates
-        rad and rad/s, shape (..., N).
-    length
-        Length of a module, m, one for all or shape (..., 1).
-
-    Returns
-    -------
-    m/s, shape (..., N, 2).
-    """
+    """Velocities of the centres of all modules, m/s, shape (..., N, 2): the derivative of :func:`module_centres`, with
+    yaw rates, rad/s, shape (..., N), and a length, m, for all or of shape (..., 1)."""
     swing = (0.5 * np.asarray(length, dtype=np.float64) * rates)[..., None] * directions(headings)[1]
     return np.asarray(velocity)[..., None, :] - _summed(swing[..., :-1, :] + swing[..., 1:, :], -2)
 
 
 def foot_places(forward_offset: ArrayLike, half_width: ArrayLike, stroke: ArrayLike, yaw: ArrayLike = 0.0) -> Array:
-    """Places of all feet in the frames of their modules.
+    """Places of all feet in the frames of their modules: ahead of the centre and left of the axis, m, shape (..., N, 2,
+    2).
 
-    Parameters
-    ----------
-    forward_offset, half_width
-        Forward offset and half width of a foot at mid-stroke, ahead of the centre and to the side of the axis, m, one
-        for all or shape (..., 1, 1).
-    stroke
-        Distance of a foot ahead of mid-stroke along its stroke, m, shape (..., N, 2).
-    yaw
-        Yaw of the strokes, about the feet at mid-stroke, left positive, rad, shape (..., N, 2).
-
-    Returns
-    -------
-    m, ahead of the centre and left of the axis, shape (..., N, 2, 2).
+    Offset and half-width are those of a foot at mid-stroke, m, for all or of shape (..., 1, 1); ``stroke`` is how far
+    it is ahead of that, m, and ``yaw`` (rad, left positive) turns its stroke about it, both of shape (..., N, 2).
     """
     stroke, side = np.asarray(stroke, dtype=np.float64), np.multiply(half_width, [1.0, -1.0])
     ahead, left = forward_offset + stroke * np.cos(yaw), side + stroke * np.sin(yaw)
@@ -94,22 +47,11 @@ def foot_places(forward_offset: ArrayLike, half_width: ArrayLike, stroke: ArrayL
 
 
 def foot_velocities(places: Array, rates: Array, speed: float, yaw: ArrayLike = 0.0) -> Array:
-    """Velocities of standing feet relative to the centres of their modules, in the frames of the modules.
+    """Velocities of standing feet relative to the centres of their modules, in the frames of these, m/s, shape (..., N,
+    2, 2).
 
-    Parameters
-    ----------
-    places
-        As from :func:`foot_places`.
-    rates
-        Yaw rates of the modules, rad/s, shape (..., N).
-    speed
-        At which a standing foot moves back along its stroke, m/s.
-    yaw
-        As for :func:`foot_places`.
-
-    Returns
-    -------
-    m/s, shape (..., N, 2, 2).
+    Places and yaw are those of :func:`foot_places`, rates those of the modules, rad/s, shape (..., N); standing feet
+    move back along their strokes at ``speed``, m/s.
     """
     turn = rates[..., None]
     along, across = -speed * np.cos(yaw) - turn * places[..., 1], -speed * np.sin(yaw) + turn * places[..., 0]
@@ -117,20 +59,10 @@ def foot_velocities(places: Array, rates: Array, speed: float, yaw: ArrayLike = 
 
 
 def from_modules(centres: Array, headings: Array, inside: Array) -> Array:
-    """Positions and velocities of feet, from the frames of their modules, on the axes that headings are measured from.
+    """Places or velocities of feet, shape (..., N, 2, 2), on the axes that headings are measured from.
 
-    Parameters
-    ----------
-    centres
-        Places of the modules' centres, or their velocities, shape (..., N, 2).
-    headings
-        rad, shape (..., N).
-    inside
-        Places of feet, or velocities, relative to the centre, shape (..., N, 2, 2).
-
-    Returns
-    -------
-    Shape (..., N, 2, 2).
+    ``inside`` has them relative to the centres of their modules, in the frames of these, same shape; ``centres`` has
+    the places or velocities of the centres, shape (..., N, 2); headings are in rad, shape (..., N).
     """
     ahead, left = (direction[..., None, :] for direction in directions(headings))
     out: Array = centres[..., None, :] + inside[..., :1] * ahead + inside[..., 1:] * left

@@ -31,13 +31,7 @@ _INDEX = ir.IntType(32)
 
 
 class LanesType(types.Type):  # type: ignore[misc]
-    """The type of a number in lanes.
-
-    Parameters
-    ----------
-    width
-        Number of lanes, 1 or ``LANES``.
-    """
+    """The type of a number in lanes: 1 of them, or ``LANES``."""
 
     def __init__(self, width: int) -> None:
         self.width = width

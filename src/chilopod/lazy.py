@@ -28,15 +28,8 @@ class _Package(ModuleType):
 
 
 def exports(package: str, names: Mapping[str, Sequence[str]]) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """``__getattr__`` and ``__dir__`` for the module of a package.
-
-    Parameters
-    ----------
-    package
-        Its ``__name__``.
-    names
-        Names that each of its submodules exports.
-    """
+    """``__getattr__`` and ``__dir__`` for the module of a package; ``names`` are those that each of its submodules
+    exports."""
     homes = {name: f"{package}.{submodule}" for submodule, given in names.items() for name in given}
     module = sys.modules[package]
     module.__class__ = _Package

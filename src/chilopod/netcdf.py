@@ -38,15 +38,7 @@ def storable(data: xr.Dataset) -> xr.Dataset:
 
 
 def netcdf(data: xr.Dataset, unlimited: Iterable[str] = ()) -> bytes:
-    """The bytes of a netCDF-4 file.
-
-    Parameters
-    ----------
-    data
-        The dataset.
-    unlimited
-        Dimensions that may grow.
-    """
+    """The bytes of a netCDF-4 file; ``unlimited`` names dimensions that may grow."""
     return bytes(storable(data).to_netcdf(engine="h5netcdf", unlimited_dims=unlimited))
 
 
@@ -59,14 +51,8 @@ def sealed(content: bytes) -> bytes:
 def sealed_file(path: Path) -> Iterator[IO[bytes]]:
     """A file that ends with a seal, open; the seal is not checked, and nothing is read of what has none.
 
-    Raises
-    ------
-    FileNotFoundError
-        If there is none.
-    UnsoundError
-        If it is no file, cannot be read, or has no seal.
-    OutputError
-        If this process has no more memory, or too many files open, to read it.
+    FileNotFoundError if there is none; UnsoundError if it is no file, cannot be read, or has no seal; OutputError if
+    this process has no more memory, or too many files open, to read it.
     """
     try:
         # A pipe of this name must not keep us waiting.
@@ -93,13 +79,8 @@ def sealed_file(path: Path) -> Iterator[IO[bytes]]:
 
 
 def unsealed(path: Path) -> bytes:
-    """The netCDF file that was :func:`sealed`.
-
-    Raises
-    ------
-    FileNotFoundError, UnsoundError, OutputError
-        As for :func:`sealed_file`, and if the seal is broken.
-    """
+    """The netCDF file that was :func:`sealed`; errors as for :func:`sealed_file`, UnsoundError also if the seal is
+    broken."""
     with sealed_file(path) as file:
         content = file.read()
     data = content[:-_LENGTH]

@@ -1,4 +1,7 @@
-"""Writing results: a file is there whole or not at all, replaces nothing it should not, and no result is lost."""
+"""Writing results: a file is there whole or not at all, replaces nothing it should not, and no result is lost.
+
+What cannot be done raises OutputError, in one line that names the file.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +9,8 @@ import os
 import shutil
 import stat
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, nullcontext, suppress
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import IO
 
@@ -15,7 +18,7 @@ from chilopod import memory
 from chilopod.errors import OutputError
 
 Content = str | bytes | bytearray | IO[bytes]
-"""Content of a file: text, to be written as UTF-8, bytes, or another open file, such as one of :func:`spool`."""
+"""Content of a file: text, to be written as UTF-8, bytes, or another open file."""
 
 _COPIED = 2**24  # bytes at a time
 
@@ -23,17 +26,7 @@ _COPIED = 2**24  # bytes at a time
 def check_files(paths: Iterable[Path], *, replace: bool = False) -> None:
     """Make sure, before any work is done for them, that files can be written; nothing is made or changed.
 
-    Parameters
-    ----------
-    paths
-        The files.
-    replace
-        True if those that are there already may be replaced.
-
-    Raises
-    ------
-    OutputError
-        If one of them is there and may not be replaced, is no regular file, or its folder cannot be written.
+    With ``replace`` those that are there already may be replaced; what is no regular file never is.
     """
     files = [Path(path) for path in paths]
     for path in files:
@@ -47,13 +40,7 @@ def check_files(paths: Iterable[Path], *, replace: bool = False) -> None:
 
 
 def check_folder(path: str | Path) -> Path:
-    """Make sure that files can be written into a folder, or that it can be made; nothing is made.
-
-    Raises
-    ------
-    OutputError
-        If that is not so.
-    """
+    """Make sure that files can be written into a folder, or that it can be made; nothing is made."""
     path = Path(path)
     try:
         _check_names(path)
@@ -65,20 +52,7 @@ def check_folder(path: str | Path) -> Path:
 
 
 def check_room(path: Path, needed: float) -> None:
-    """Make sure, before any work is done for it, that there is room for a large file, or for more files in a folder.
-
-    Parameters
-    ----------
-    path
-        Path of the file or the folder.
-    needed
-        Bytes, at least.
-
-    Raises
-    ------
-    OutputError
-        If there is not.
-    """
+    """Make sure, before any work is done for it, that there is room (bytes) for a large file, or more in a folder."""
     try:
         free = float(shutil.disk_usage(_nearest(path)).free)
     except (OSError, ValueError) as error:
@@ -97,14 +71,12 @@ def write_atomic(
     folders: bool = True,
     temporary: str = ".chilopod-",
 ) -> Path:
-    """Write a file so that it never exists half-written.
+    """Write a file so that it never exists half-written, and return its path; where it fails nothing is left behind.
 
     Parameters
     ----------
-    path
-        Path of the file.
-    content
-        Content of the file.
+    path, content
+        Path and content of the file.
     replace
         True if a file that is already there may be replaced; what is no regular file never is.
     durable
@@ -113,16 +85,6 @@ def write_atomic(
         True if its folder is made where there is none.
     temporary
         Prefix of its name until it is whole; such a file stays where a process is killed.
-
-    Returns
-    -------
-    Path
-        `path`.
-
-    Raises
-    ------
-    OutputError
-        If the file exists and may not be replaced, or cannot be written; nothing is left behind.
     """
     path = Path(path)
     try:
@@ -142,26 +104,10 @@ def write_atomic(
 
 
 def write_all(files: Iterable[tuple[Path, Content]], *, replace: bool = True) -> list[Path]:
-    """Write the files of a result; what cannot be written where it should go is kept elsewhere.
+    """Write the files of a result, paths and contents, one after the other as they are given; return their paths.
 
-    Elsewhere is the first place that takes it: the same folder under another name, the one above, the current folder,
-    the home folder, the folder for temporary files.
-
-    Parameters
-    ----------
-    files
-        Paths and contents. They are written one after the other, as the iterable gives them.
-    replace
-        True if files that are already there may be replaced.
-
-    Returns
-    -------
-    The files.
-
-    Raises
-    ------
-    OutputError
-        If a file could not be written where it should go; it says where it is kept.
+    What cannot be written where it should go is kept under another name in the same folder, or else in the current one,
+    and the error says where.
     """
     written: list[Path] = []
     kept: list[Path] = []
@@ -179,35 +125,19 @@ def write_all(files: Iterable[tuple[Path, Content]], *, replace: bool = True) ->
 
 
 def spool(path: Path, size: int = 0) -> IO[bytes]:
-    """A file for a large result that is still being computed, which vanishes with this process unless
-    :func:`write_atomic` gives it a name.
+    """A nameless file for a large result that is still being computed, on the same disk; it vanishes with this process.
 
-    Parameters
-    ----------
-    path
-        Path of the result: the file is on the same disk, or where else :func:`write_all` would keep it.
-    size
-        Bytes that are set aside for it.
-
-    Raises
-    ------
-    OutputError
-        If there is no room for it.
+    Room is set aside for twice the size (bytes): for the file, and for the copy that :func:`write_atomic` makes of it.
     """
-    failure: OutputError | None = None
-    for folder in _folders(path):
-        file = None
-        try:
-            file = _nameless(_nearest(Path(folder())))
+    try:
+        with ExitStack() as unless_it_fails:
+            file = unless_it_fails.enter_context(tempfile.TemporaryFile(dir=_nearest(path.parent)))
             if size and hasattr(os, "posix_fallocate"):
-                os.posix_fallocate(file.fileno(), 0, size)
+                os.posix_fallocate(file.fileno(), 0, 2 * size)
+            unless_it_fails.pop_all()
             return file
-        except (OSError, ValueError, RuntimeError) as error:
-            if file is not None:
-                file.close()
-            failure = failure or _refused(path, error)
-    assert failure is not None
-    raise failure
+    except (OSError, ValueError) as error:
+        raise _refused(path, error) from None
 
 
 def sync_folder(path: Path) -> None:
@@ -276,11 +206,10 @@ def _nearest(folder: Path) -> Path:
 
 def _fill(path: Path, content: Content, durable: bool) -> None:
     """Make a new file of this content."""
-    named = not isinstance(content, str | bytes | bytearray) and _named(content, path)
-    with open(path, "r+b" if named else "xb") as file:
+    with open(path, "xb") as file:
         if isinstance(content, str | bytes | bytearray):
             file.write(content.encode() if isinstance(content, str) else content)
-        elif not named:
+        else:
             content.seek(0)
             shutil.copyfileobj(content, file, _COPIED)
         if durable:
@@ -288,38 +217,11 @@ def _fill(path: Path, content: Content, durable: bool) -> None:
             os.fsync(file.fileno())
 
 
-def _named(content: IO[bytes], path: Path) -> bool:
-    """Give an open file without a name one, where the system can do that."""
-    if not hasattr(os, "O_TMPFILE"):
-        return False
-    handle = os.open(path.parent, os.O_RDONLY)
-    try:
-        # With a folder that it does not need, the link is that to which the source points.
-        os.link(f"/proc/self/fd/{content.fileno()}", path, src_dir_fd=handle)
-    except OSError:
-        return False
-    finally:
-        os.close(handle)
-    return True
-
-
-def _folders(path: Path) -> tuple[Callable[[], Path | str], ...]:
-    """Where a result may go; asking may fail, with RuntimeError if nobody knows where home is."""
-    return path.parent.resolve, path.parent.parent.resolve, Path.cwd, Path.home, tempfile.gettempdir
-
-
-def _nameless(folder: Path) -> IO[bytes]:
-    if hasattr(os, "O_TMPFILE"):
-        with suppress(OSError):  # some file systems cannot
-            return os.fdopen(os.open(folder, os.O_TMPFILE | os.O_RDWR, 0o666), "w+b")
-    return tempfile.TemporaryFile(dir=folder)
-
-
 def _kept(path: Path, content: Content) -> list[Path]:
     """Where else a file could be written; nothing if nowhere."""
-    for folder in _folders(path):
-        with suppress(OSError, RuntimeError):
-            return [write_atomic(_free(Path(folder()) / path.name), content, replace=False)]
+    for folder in (path.parent.resolve, Path.cwd):
+        with suppress(OSError):
+            return [write_atomic(_free(folder() / path.name), content, replace=False)]
     return []
 
 

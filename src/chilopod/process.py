@@ -31,13 +31,8 @@ _SHOW_CURSOR = b"\n\x1b[?25h"  # a progress bar hides it
 
 
 class Stream(io.FileIO):
-    """A file that never fails whoever writes into it: what cannot be written is lost, and why is kept.
-
-    Attributes
-    ----------
-    failure
-        The first reason; None as long as all could be written.
-    """
+    """A file that never fails whoever writes into it: what cannot be written is lost, and the first reason is kept as
+    ``failure``."""
 
     failure: OSError | None = None
 

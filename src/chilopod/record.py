@@ -1,4 +1,4 @@
-"""Record of a walk, the same names and units for every engine."""
+"""Record of a walk, the same names and units for every engine; what is wrong is a ParameterError that names it."""
 
 from __future__ import annotations
 
@@ -103,13 +103,7 @@ class Recording:
 
 
 def as_number(name: str, value: object) -> float:
-    """One plain number.
-
-    Raises
-    ------
-    ParameterError
-        If it is none.
-    """
+    """One plain number."""
     try:
         if np.ndim(value) != 0 or np.asarray(value).dtype.kind not in "fiuO":  # type: ignore[arg-type]
             raise TypeError
@@ -119,33 +113,18 @@ def as_number(name: str, value: object) -> float:
 
 
 def in_range(name: str, value: object, most: float, unit: str = "") -> float:
-    """A plain number that is positive and within reason, both in this unit.
-
-    Raises
-    ------
-    ParameterError
-        If it is none, naming the field.
-    """
+    """A plain number that is positive and within reason, both in this unit."""
     value = as_number(name, value)
     if not 0.0 < value <= most:
         high = f"{most:g} {unit}".strip()
-        raise ParameterError(
-            "is out of range",
-            field=name,
-            value=f"{value:g} {unit}" if unit else value,
-            allowed=f"more than 0, at most {high}",
-        )
+        problem = "is out of range"
+        allowed = f"more than 0, at most {high}"
+        raise ParameterError(problem, field=name, value=f"{value:g} {unit}" if unit else value, allowed=allowed)
     return value
 
 
 def check_size(record: Recording | None, until: float, numbers: int) -> None:
-    """Refuse a record that nobody can hold, of ``numbers`` at every sample.
-
-    Raises
-    ------
-    ParameterError
-        If it would be, or if ``until`` is no time.
-    """
+    """Refuse a record that nobody can hold, of ``numbers`` at every sample, and what is no time."""
     if not (isinstance(until, Real) and until >= 0.0):
         raise ParameterError("is no time", field="expected", value=until, allowed="0 s or more")
     if record is not None and (until * record.rate + 1.0) * numbers > MOST_NUMBERS:
@@ -155,24 +134,10 @@ def check_size(record: Recording | None, until: float, numbers: int) -> None:
 
 
 def check_memory(needed: float) -> None:
-    """Refuse records that memory cannot hold.
-
-    Parameters
-    ----------
-    needed
-        Bytes.
-
-    Raises
-    ------
-    ParameterError
-        If there is not so much.
-    """
+    """Refuse records for which memory does not have so many bytes."""
     if needed > memory.available():
-        raise ParameterError(
-            f"would take {memory.in_words(needed)} of memory, and {memory.in_words(memory.available())} are free",
-            field="record",
-            allowed="fewer walks, samples or seconds",
-        )
+        problem = f"would take {memory.in_words(needed)} of memory, and {memory.in_words(memory.available())} are free"
+        raise ParameterError(problem, field="record", allowed="fewer walks, samples or seconds")
 
 
 class Samples:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import io
 import os
-from contextlib import suppress
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Self
 
@@ -25,28 +25,15 @@ class RecordFile:
     """A netCDF-4 file of many walks of one duration and rate, written as their records come, in any order.
 
     Until :meth:`write` it has no name, and vanishes with this process. What fails meanwhile is said there, so that it
-    does not stop the walks. Used as a context: it is gone when that is left.
-
-    Parameters
-    ----------
-    path
-        Path of the file.
-    robots
-        Number of walks.
-    least
-        Bytes that it will have, at least.
-
-    Raises
-    ------
-    OutputError
-        If there is no room for so many.
+    does not stop the walks. Used as a context: it is gone when that is left. OutputError at once if there is no room
+    for the bytes that it will have at least.
     """
 
     def __init__(self, path: Path, robots: int, least: float = 0.0) -> None:
         check_room(path, least)
         self._path, self._robots = path, robots
         self._failure: OutputError | None = None
-        self._medium: _Medium | None = None
+        self._spooled: IO[bytes] | None = None
         self._file: Any = None
         self._stored: dict[str, tuple[Any, int]] = {}
 
@@ -55,44 +42,28 @@ class RecordFile:
 
     def __exit__(self, *_: object) -> None:
         self._finish()
-        if self._medium is not None:
-            self._medium.file.close()
+        if self._spooled is not None:
+            self._spooled.close()
 
     def add(self, index: int, record: xr.Dataset) -> None:
-        """Put in the record of one walk.
-
-        Parameters
-        ----------
-        index
-            Its ``robot`` in the file.
-        record
-            With one ``robot``, and otherwise like the others; the ``trial`` of the file is that of ``robot`` 0.
-        """
-        if self._failure is None and self._file is None:
+        """Put in the record of one walk, with one ``robot``, as robot ``index`` of the file; the ``trial`` of the file
+        is that of robot 0."""
+        if self._spooled is None and self._failure is None:
             self._begin(record)
         if self._failure is not None:
             return
         if index == 0:
             self._file.attrs["trial"] = record.attrs["trial"]
         for name, (stored, axis) in self._stored.items():
-            values = record.variables[name].values
-            front = (slice(None),) * axis
-            stored[(*front, slice(index, index + 1))] = values
+            stored[(*(slice(None),) * axis, slice(index, index + 1))] = record.variables[name].values
+        self._failure = self._medium.failure(self._path)
 
     def write(self, *, replace: bool) -> list[Path]:
-        """Give the file its name, see :func:`chilopod.output.write_all`.
-
-        Raises
-        ------
-        OutputError
-            If it cannot have it, and says where it is kept; or if there was no room for it.
-        """
+        """Give the file its name, see :func:`chilopod.output.write_all`; OutputError if there was no room for it."""
         self._finish()
         if self._failure is not None:
             raise self._failure
-        if self._medium is None:
-            return []
-        return write_all([(self._path, self._medium.file)], replace=replace)
+        return [] if self._spooled is None else write_all([(self._path, self._spooled)], replace=replace)
 
     def _begin(self, record: xr.Dataset) -> None:
         """Make the file from the first record, which holds all names, dimensions and attributes."""
@@ -102,10 +73,11 @@ class RecordFile:
         each = sum(variable.nbytes for variable in over)
         chunks = sum(-(-record.sizes["time"] // _LONGEST) if "time" in variable.dims else 1 for variable in over)
         try:
-            self._medium = _Medium(spool(self._path, self._robots * (each + chunks * _A_CHUNK) + _ABOUT))
+            self._spooled = spool(self._path, self._robots * (each + chunks * _A_CHUNK) + _ABOUT)
         except OutputError as error:
             self._failure = error
             return
+        self._medium = _Medium(self._spooled.fileno(), "r+b", closefd=False)
         # A chunk of the file is of one robot: each record is written at a stretch.
         shaped = record.copy()
         for variable in shaped.variables.values():
@@ -129,19 +101,13 @@ class RecordFile:
         if self._file is not None:
             self._file.close()
             self._file = None
-        if self._medium is not None and self._failure is None:
-            self._failure = self._medium.failure(self._path)
-            self._medium.trim()
+            self._failure = self._failure or self._medium.failure(self._path)
 
 
-class _Medium:
+class _Medium(io.FileIO):
     """File that HDF5 writes into: it never raises, because HDF5 dies of that; it remembers what failed."""
 
-    def __init__(self, file: IO[bytes]) -> None:
-        self.file = file
-        self._handle = file.fileno()
-        self._at = self._size = 0
-        self._error: OSError | None = None
+    _error: OSError | None = None
 
     def failure(self, path: Path) -> OutputError | None:
         """Failure of the file, if any."""
@@ -149,45 +115,25 @@ class _Medium:
             return None
         return OutputError(f"cannot be written ({self._error.strerror})", source=str(path))
 
-    def trim(self) -> None:
-        """Cut off room that was not needed."""
-        with suppress(OSError):
-            os.ftruncate(self._handle, self._size)
-
-    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        self._at = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: self._size}[whence]
-        return self._at
-
-    def tell(self) -> int:
-        return self._at
-
-    def flush(self) -> None:
-        pass
-
-    def truncate(self, size: int | None = None) -> int:
-        self._size = self._at if size is None else size
-        return self._size
-
-    def readinto(self, buffer: memoryview) -> int:
-        length = min(len(buffer), max(self._size - self._at, 0))
-        found = os.pread(self._handle, length, self._at)
-        buffer[:length] = found.ljust(length, b"\0")
-        self._at += length
-        return length
-
-    def read(self, size: int = -1) -> bytes:
-        buffer = bytearray(max(self._size - self._at, 0) if size < 0 else size)
-        return bytes(buffer[: self.readinto(memoryview(buffer))])
+    def readinto(self, buffer: Any) -> int:
+        # What could not be written is zeros.
+        found = super().readinto(buffer) or 0
+        buffer[found:] = bytes(len(buffer) - found)
+        return len(buffer)
 
     def write(self, content: Any) -> int:
         rest = memoryview(content).cast("B")
         length = len(rest)
         try:
             while self._error is None and len(rest):
-                done = os.pwrite(self._handle, rest, self._at + length - len(rest))
-                rest = rest[done:]
+                rest = rest[os.write(self.fileno(), rest) :]
         except OSError as error:
             self._error = error
-        self._at += length
-        self._size = max(self._size, self._at)
         return length
+
+    def truncate(self, size: int | None = None) -> int:
+        try:
+            return super().truncate(size)
+        except OSError as error:
+            self._error = self._error or error
+            return size or 0

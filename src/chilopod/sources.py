@@ -40,13 +40,8 @@ def checkout() -> str:
 
 @functools.lru_cache
 def digest(without: Sequence[str] = ()) -> str:
-    """SHA-256 over the names and contents of all Python files of the package, in hexadecimal; computed once a process.
-
-    Parameters
-    ----------
-    without
-        Names of subpackages that do not count.
-    """
+    """SHA-256 over the names and contents of all Python files of the package, in hexadecimal, but for subpackages that
+    do not count; computed once a process."""
     total = hashlib.sha256()
     for name in sorted(_AT_FIRST):
         if name.partition("/")[0] not in without:

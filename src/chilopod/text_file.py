@@ -14,20 +14,8 @@ _LARGEST: Final = 1_000_000
 def read_text(path: str | Path, kind: str, refused: type[ChilopodError]) -> str:
     """Read a file that may be anything, in no more time and memory than a text by hand takes.
 
-    Parameters
-    ----------
-    path
-        The file.
-    kind
-        Kind of file that is expected, such as ``robot file``.
-    refused
-        The exception for a file that is not.
-
-    Raises
-    ------
-    ChilopodError
-        The one given: if the file is missing, a folder or anything else that is no regular file, too large, empty, or
-        no text.
+    Raises ``refused`` if it is missing, a folder or anything else that is no regular file, too large, empty, or no
+    text; ``kind`` says what was expected, such as ``robot file``.
     """
     source = str(path)
     try:

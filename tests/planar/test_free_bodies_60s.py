@@ -7,6 +7,7 @@ from free_bodies import FreeBodies
 from chilopod import load_robot
 from chilopod.integrate import integrator
 from chilopod.planar import PlanarModel
+from chilopod.planar.model import carry
 
 N_MM_PER_DEG = 1e-3 * 180 / np.pi
 MINUTE = 60.0
@@ -17,7 +18,7 @@ CURVED = load_robot("aoi2022-planar").with_value("springs.stiffness[0]", 10 * N_
 def walked(model, x, pose, t0, t1):
     """State and pose at t1 by the package."""
     whole = np.concatenate([x, pose])[None]
-    model._advance(whole, t0, t1)
+    carry([model], whole, t0, t1, model.tolerance)
     return whole[0, : model.dimension], whole[0, model.dimension :]
 
 

@@ -25,7 +25,7 @@ def read(picture):
 
 @pytest.fixture(scope="module")
 def drawn():
-    if gl.backend() is None:
+    if gl.find().backend is None:
         pytest.skip(gl.find().missing)
 
 

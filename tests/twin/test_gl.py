@@ -37,31 +37,31 @@ def answers(monkeypatch, **faults):
 def test_takes_the_first_that_works_and_remembers_it(monkeypatch):
     tried = answers(monkeypatch, egl="crashes", osmesa="")
     assert gl.find() == gl.Found("osmesa", "a driver")
-    assert gl.backend() == "osmesa"
+    assert gl.find().backend == "osmesa"
     assert tried == ["egl", "osmesa"]
 
 
 def test_tries_glfw_only_with_a_display(monkeypatch):
     tried = answers(monkeypatch, egl="broken", osmesa="broken", glfw="")
-    assert gl.backend() is None
+    assert gl.find().backend is None
     assert tried == ["egl", "osmesa"]
     gl.find.cache_clear()
     monkeypatch.setenv("DISPLAY", ":0")
-    assert gl.backend() == "glfw"
+    assert gl.find().backend == "glfw"
 
 
 @pytest.mark.parametrize(("system", "first"), [("darwin", "cgl"), ("win32", "glfw")])
 def test_other_systems_have_their_own(monkeypatch, system, first):
     monkeypatch.setattr(sys, "platform", system)
     answers(monkeypatch, **{first: ""})
-    assert gl.backend() == first
+    assert gl.find().backend == first
 
 
 @pytest.mark.parametrize(("wish", "name"), [("egl", "egl"), (" OSMesa ", "osmesa"), ("glx", "glfw"), ("on", "egl")])
 def test_what_the_user_set_counts(monkeypatch, wish, name):
     monkeypatch.setenv("MUJOCO_GL", wish)
     tried = answers(monkeypatch, egl="", osmesa="", glfw="")
-    assert gl.backend() == name
+    assert gl.find().backend == name
     assert tried == [name]
 
 
@@ -118,7 +118,7 @@ def test_leaves_the_environment_alone():
 
 
 def test_context_draws_whenever_mujoco_was_imported():
-    if gl.backend() is None:
+    if gl.find().backend is None:
         pytest.skip(gl.find().missing)
     import mujoco
     import numpy as np

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.engine.arguments import as_array, as_number
 from chilopod.engine.contract import Command
 from chilopod.engine.ramps import Ramps
+from chilopod.engine.saved import part
 from chilopod.errors import ParameterError
 from chilopod.record import LONGEST
 from chilopod.robot import Robot
@@ -94,7 +95,8 @@ class Actuators:
         return bool(self._adjustable.any())
 
     def command(self, time: float, command: Command, walking: NDArray[np.bool_]) -> None:
-        """Obey, from now on; robots that no longer walk do not.
+        """Obey, from now on; robots that no longer walk do not. What is no command raises ParameterError and changes
+        nothing.
 
         Parameters
         ----------
@@ -104,11 +106,6 @@ class Actuators:
             Command of each actuator.
         walking
             Shape (robots,).
-
-        Raises
-        ------
-        ParameterError
-            If it is no command for these robots; nothing has changed then.
         """
         if not isinstance(command, Command):
             raise ParameterError("is no chilopod.engine.Command", field="command", value=type(command).__name__)
@@ -137,13 +134,7 @@ class Actuators:
             self._log.append(when | what)
 
     def restart(self, which: NDArray[np.bool_]) -> None:
-        """Let some robots be as at the start, from now on; only where nothing is kept of what was commanded.
-
-        Parameters
-        ----------
-        which
-            Shape (robots,).
-        """
+        """Let some robots, shape (robots,), be as at the start; only where nothing is kept of what was commanded."""
         profile, driven = self.profile.copy(), self.driven & ~which
         profile[:, which] = 0.0
         profile[FROM, which] = profile[GOAL, which] = self._start[which]
@@ -165,13 +156,7 @@ class Actuators:
         return _rate(self.profile, self.lag, time)
 
     def add_to(self, data: xr.Dataset) -> None:
-        """Add to a record what was commanded, and the springs: over time if any of them can be adjusted.
-
-        Parameters
-        ----------
-        data
-            From :func:`chilopod.record.walk_record`, with ``time``; changed in place.
-        """
+        """Add to a record, in place, what was commanded, and the springs: over time if any of them can be adjusted."""
         over = ("robot", "joint")
         if not self.adjustable:
             data["stiffness"] = (over, self._start.copy(), {"units": "N*m/rad"})
@@ -211,10 +196,9 @@ class Actuators:
     def restore(self, state: dict[str, Any]) -> None:
         """Become as another was, of the same robots."""
         self.joint_torque, self.driven, self.profile = state["joint_torque"], state["driven"], state["profile"]
-        yaw = {name.removeprefix("yaw_"): each for name, each in state.items() if name.startswith("yaw_")}
-        self._leg_yaw.restore(yaw)
+        self._leg_yaw.restore(part(state, "yaw_"))
         self._profiles = list(zip(state["profile_times"].tolist(), state["profiles"], strict=True))
-        logged = {name.removeprefix("log_"): values for name, values in state.items() if name.startswith("log_")}
+        logged = part(state, "log_")
         count = len(next(iter(logged.values()), ()))
         self._log = [{name: values[i] for name, values in logged.items()} for i in range(count)]
 

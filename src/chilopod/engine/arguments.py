@@ -1,4 +1,4 @@
-"""Checks of arguments that all engines share."""
+"""Checks of arguments that all engines share; each raises ParameterError, naming the argument, where it is wrong."""
 
 from __future__ import annotations
 
@@ -20,13 +20,7 @@ BEGINNING = 1e-9
 
 
 def as_array(name: str, value: object) -> Array:
-    """An array of plain numbers, not necessarily a copy.
-
-    Raises
-    ------
-    ParameterError
-        If it is none.
-    """
+    """An array of plain numbers, not necessarily a copy."""
     try:
         array = np.asarray(value)
         if array.dtype.kind not in "fiu":
@@ -37,13 +31,7 @@ def as_array(name: str, value: object) -> Array:
 
 
 def as_seeds(seeds: object, name: str = "seeds") -> list[int] | None:
-    """Whole numbers, zero or more; None for None.
-
-    Raises
-    ------
-    ParameterError
-        If they are none.
-    """
+    """Whole numbers, zero or more; None for None."""
     if seeds is None:
         return None
     try:
@@ -56,13 +44,7 @@ def as_seeds(seeds: object, name: str = "seeds") -> list[int] | None:
 
 
 def as_marks(name: str, value: object, count: int) -> NDArray[np.bool_]:
-    """An array of True and False, one each; a copy.
-
-    Raises
-    ------
-    ParameterError
-        If it is none.
-    """
+    """An array of True and False, one each; a copy."""
     try:
         marks = np.array(value)
     except (TypeError, ValueError):
@@ -73,13 +55,7 @@ def as_marks(name: str, value: object, count: int) -> NDArray[np.bool_]:
 
 
 def as_robots(robots: object) -> list[Robot]:
-    """One robot or several as a list.
-
-    Raises
-    ------
-    ParameterError
-        If there is none, or something else.
-    """
+    """One robot or several as a list."""
     given = [robots] if isinstance(robots, Robot) else robots
     if not isinstance(given, Sequence) or isinstance(given, str) or not all(isinstance(each, Robot) for each in given):
         raise ParameterError("is no robot, nor several of them", field="robots", value=type(robots).__name__)
@@ -89,26 +65,14 @@ def as_robots(robots: object) -> list[Robot]:
 
 
 def as_robot(robot: object) -> Robot:
-    """One robot.
-
-    Raises
-    ------
-    ParameterError
-        If it is none.
-    """
+    """One robot."""
     if not isinstance(robot, Robot):
         raise ParameterError("is no robot", field="robot", value=type(robot).__name__, allowed="a chilopod Robot")
     return robot
 
 
 def check_wishes(record: object, expected: object) -> float:
-    """Duration of a walk, s, checked together with what an engine is to record.
-
-    Raises
-    ------
-    ParameterError
-        If it is no :class:`chilopod.record.Recording`, or no such time.
-    """
+    """Duration of a walk, s, checked together with what an engine is to record."""
     if not isinstance(record, Recording | None):
         raise ParameterError("is none", field="record", value=record, allowed="a chilopod.record.Recording, or None")
     seconds = as_number("expected", expected)
@@ -120,13 +84,7 @@ def check_wishes(record: object, expected: object) -> float:
 def standing(
     robot: Robot, joint_angles: ArrayLike, heading: ArrayLike, position: ArrayLike
 ) -> tuple[Array, Array, Array]:
-    """Arguments of ``initial_states`` as arrays with one row a robot: (robots, N-1), (robots,), (robots, 2).
-
-    Raises
-    ------
-    ParameterError
-        If one has the wrong shape or is not finite, or their numbers do not agree.
-    """
+    """Arguments of ``initial_states`` as arrays with one row a robot: (robots, N-1), (robots,), (robots, 2)."""
     joints = as_robot(robot).body.modules - 1
     angles, headings = as_array("joint_angles", joint_angles), as_array("heading", heading)
     places = as_array("position", position)
@@ -173,11 +131,6 @@ def rows_of(
     Returns
     -------
     Number of walks, and the arrays, each its own copy; None for what was not given.
-
-    Raises
-    ------
-    ParameterError
-        If one has the wrong shape, is not finite, or their numbers do not agree.
     """
     counts = {"robots": len(robots), "seeds": len(seeds) if seeds else 1}
     arrays: dict[str, Array | None] = {}
@@ -202,7 +155,7 @@ def rows_of(
             raise ParameterError("has the wrong length", field=name, value=each, allowed=f"1 or {count}")
     for name, rows in arrays.items():
         if rows is not None:
-            arrays[name] = np.array(np.broadcast_to(rows, (count, *rows.shape[1:])))
+            arrays[name] = np.array(np.broadcast_to(rows, (count, *rows.shape[1:])), order="C")
     return count, arrays
 
 
@@ -228,11 +181,6 @@ def rows_anew(
     Returns
     -------
     Which robots, and the arrays; None for what was not given, or if there are no such robots.
-
-    Raises
-    ------
-    ParameterError
-        If it is not the time for it, or an argument is none.
     """
     marked, cycles = as_marks("which", which, len(robots)), time / robots[0].gait.period
     if record is not None:
@@ -240,12 +188,8 @@ def rows_anew(
             "a record is of one walk", field="restart", allowed="a walk that was started with record=None"
         )
     if abs(cycles - round(cycles)) > BEGINNING:
-        raise ParameterError(
-            "is in the middle of a gait cycle",
-            field="restart",
-            value=f"{time:g} s",
-            allowed=f"a whole multiple of the period, {robots[0].gait.period:g} s",
-        )
+        allowed = f"a whole multiple of the period, {robots[0].gait.period:g} s"
+        raise ParameterError("is in the middle of a gait cycle", field="restart", value=f"{time:g} s", allowed=allowed)
     count, own = int(marked.sum()), as_seeds(seeds)
     if own is not None and len(own) != count:
         raise ParameterError("has the wrong length", field="seeds", value=len(own), allowed=str(count))
@@ -258,13 +202,7 @@ def rows_anew(
 
 
 def check_time(until: float, now: float) -> float:
-    """The time to walk on to, s; refuses to walk back, and beyond all reason.
-
-    Raises
-    ------
-    ParameterError
-        If ``until`` is before ``now`` (s), or no such time.
-    """
+    """The time to walk on to, s; refuses to walk back, and beyond all reason."""
     until = as_number("until", until)
     if not now <= until <= LONGEST:
         problem = "has passed" if until < now else "is no time"

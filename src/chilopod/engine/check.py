@@ -128,15 +128,14 @@ def _batching(trial: Trial) -> None:
 
 
 def _saving(trial: Trial) -> None:
-    whole, walk = trial.walked(trial.start()), trial.start()
-    told = dict(zip(TIMES, trial.commands(), strict=True))
-    for time in sorted({*TIMES, *np.round(trial.random.uniform(0.0, END, 5), 4).tolist(), END}):
-        walk.advance(time)
-        saved = walk.save()
-        walk = trial.engine.resume(saved)
-        expect(walk.time == time, f"saved at {time} s, it goes on at {walk.time} s")
-        if time in told:
-            walk.command(told[time])
+    def again(walk: Walk) -> Walk:
+        same = trial.engine.resume(walk.save())
+        expect(same.time == walk.time, f"saved at {walk.time} s, it goes on at {same.time} s")
+        return same
+
+    whole, times = trial.walked(trial.start()), np.round(trial.random.uniform(0.0, END, 5), 4).tolist()
+    walk = trial.led(trial.start(), dict.fromkeys((*TIMES, *times, END), again))
+    saved = walk.save()
     expect_same(whole, walk.to_dataset(), "in one piece and saved and resumed")
     expect_refused("a saved walk with a changed byte", lambda: trial.engine.resume(saved[:-9] + b"?" + saved[-8:]))
     expect_refused("half a saved walk", lambda: trial.engine.resume(saved[: len(saved) // 2]))

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from chilopod.engine.check_trial import END, TIMES, Trial, expect, expect_near, expect_refused, expect_same
-from chilopod.engine.contract import Array, Command, Status, Walk
+from chilopod.engine.check_trial import END, Trial, expect, expect_near, expect_refused, expect_same
+from chilopod.engine.contract import Array, Command, Observation, Status, Walk
 from chilopod.record import Recording
 
 BREAKS = 0.6
@@ -36,30 +36,28 @@ def aims(trial: Trial) -> None:
     """Targets that are moved, taken away and put up."""
     here, there, nowhere = np.array([0.9, 0.4]), np.array([0.8, -0.5]), np.full(2, np.nan)
     where = np.stack([there, nowhere, here])
-    walk, still = trial.start(target=None), trial.walked(trial.start())
+
+    def aimed(walk: Walk) -> Walk:
+        expect(np.isnan(walk.observe().bearing).all(), "a target is seen where there is none")
+        wrong: Any = (here[:1], np.full((len(where) + 1, 2), 1.0), here * np.inf, [np.nan, 1.0], "there", None)
+        for target in wrong:
+            expect_refused(f"the target {target}", partial(walk.aim, target))
+        walk.aim(here)
+        before = walk.observe()
+        walk.aim(where)
+        walk = trial.engine.resume(walk.save())
+        seen, pose = walk.observe(), walk.pose()
+        away = where - pose[:, :2]
+        bearing = np.arctan2(away[:, 1], away[:, 0]) - pose[:, 2]
+        # A scanner's last look is from a moment ago.
+        expect_near(seen.distance, np.hypot(away[:, 0], away[:, 1]), 0.03, "distance of a target that was moved, m")
+        expect_near(seen.bearing, bearing, 0.05, "bearing of a target that was moved, rad")
+        expect_near(seen.distance[2:], before.distance[2:], 0.0, "distance of a target that stayed, m")
+        return walk
+
+    still = trial.walked(trial.start())
     expect("target" not in trial.walked(trial.start(target=None)), "the record has a target where there is none")
-    told = dict(zip(TIMES, trial.commands(), strict=True))
-    for time in sorted({*TIMES, BREAKS, END}):
-        walk.advance(time)
-        if time == BREAKS:
-            expect(np.isnan(walk.observe().bearing).all(), "a target is seen where there is none")
-            wrong: Any = (here[:1], np.full((len(where) + 1, 2), 1.0), here * np.inf, [np.nan, 1.0], "there", None)
-            for target in wrong:
-                expect_refused(f"the target {target}", partial(walk.aim, target))
-            walk.aim(here)
-            before = walk.observe()
-            walk.aim(where)
-            walk = trial.engine.resume(walk.save())
-            seen, pose = walk.observe(), walk.pose()
-            away = where - pose[:, :2]
-            bearing = np.arctan2(away[:, 1], away[:, 0]) - pose[:, 2]
-            # A scanner's last look is from a moment ago.
-            expect_near(seen.distance, np.hypot(away[:, 0], away[:, 1]), 0.03, "distance of a target that was moved, m")
-            expect_near(seen.bearing, bearing, 0.05, "bearing of a target that was moved, rad")
-            expect_near(seen.distance[2:], before.distance[2:], 0.0, "distance of a target that stayed, m")
-        if time in told:
-            walk.command(told[time])
-    data = walk.to_dataset()
+    data = trial.led(trial.start(target=None), {BREAKS: aimed}).to_dataset()
     over = ("time", "robot", "axis")
     expect("target" in data, "the record has no target")
     expect(data.target.dims == over, f"target is over {data.target.dims}, not {over}")
@@ -74,24 +72,22 @@ def aims(trial: Trial) -> None:
 
 def halts(trial: Trial) -> None:
     """One of three, then all."""
-    free, walk = trial.walked(trial.start()), trial.start()
-    told = dict(zip(TIMES, trial.commands(), strict=True))
-    for time in sorted({*TIMES, _STOPS, END}):
-        walk.advance(time)
-        if time == _STOPS:
-            wrong: Any = ([1], np.ones(len(trial.robots)), np.ones(len(trial.robots) + 1, dtype=bool), None)
-            for which in wrong:
-                expect_refused(f"halting {which}", partial(walk.halt, which))
-            walk.halt(np.array([False, True, False]))
-            before = walk.observe()
-            walk = trial.engine.resume(walk.save())
-        if time in told:
-            walk.command(told[time])
+
+    def halted(walk: Walk) -> Walk:
+        wrong: Any = ([1], np.ones(len(trial.robots)), np.ones(len(trial.robots) + 1, dtype=bool), None)
+        for which in wrong:
+            expect_refused(f"halting {which}", partial(walk.halt, which))
+        walk.halt(np.array([False, True, False]))
+        before.append(walk.observe())
+        return trial.engine.resume(walk.save())
+
+    before: list[Observation] = []
+    free, walk = trial.walked(trial.start()), trial.led(trial.start(), {_STOPS: halted})
     expect(walk.status == (Status.WALKED, Status.HALTED, Status.WALKED), f"status is {walk.status}")
     seen = walk.observe()
     for what, array in (("bearing", seen.bearing), ("joint_angles", seen.joint_angles), ("pose", walk.pose())):
         expect(np.isnan(array[1]).all(), f"a robot that was halted has {what}")
-    expect(np.array_equal(seen.leg_yaw[1], before.leg_yaw[1]), "a robot that was halted obeys")
+    expect(np.array_equal(seen.leg_yaw[1], before[0].leg_yaw[1]), "a robot that was halted obeys")
     data = walk.to_dataset()
     last = round(_STOPS * 50.0)
     for name in ("position", "heading", "joint_angle", "distance"):

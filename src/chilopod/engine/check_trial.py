@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -64,16 +64,25 @@ class Trial:
             Command(joint_torque=torque),
         ]
 
-    def walked(self, walk: Walk, which: Sequence[int] = (0, 1, 2), stops: Sequence[float] = ()) -> xr.Dataset:
-        """The record of a walk with the commands, interrupted and looked at besides."""
+    def led(self, walk: Walk, at: Mapping[float, Callable[[Walk], Walk]], which: Sequence[int] = (0, 1, 2)) -> Walk:
+        """A walk up to the end with the commands, going on at some times, before a command, as what is made of it."""
         told = dict(zip(TIMES, self.commands(which), strict=True))
-        for time in sorted({*TIMES, *stops, END}):
+        for time in sorted({*TIMES, *at, END}):
             if time > walk.time:
                 walk.advance(time)
-            walk.observe()
+            walk = at[time](walk) if time in at else walk
             if time in told:
                 walk.command(told[time])
-        return walk.to_dataset()
+        return walk
+
+    def walked(self, walk: Walk, which: Sequence[int] = (0, 1, 2), stops: Sequence[float] = ()) -> xr.Dataset:
+        """The record of a walk with the commands, interrupted and looked at besides."""
+        return self.led(walk, dict.fromkeys((*TIMES, *stops, END), _looked_at), which).to_dataset()
+
+
+def _looked_at(walk: Walk) -> Walk:
+    walk.observe()
+    return walk
 
 
 def expect_same(a: xr.Dataset, b: xr.Dataset, what: str) -> None:

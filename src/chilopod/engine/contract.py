@@ -130,6 +130,8 @@ class Walk(Protocol):
     batch, with any number of threads, and after :meth:`save` and ``resume``. Only commands change a walk, and
     :meth:`halt` ends it; :meth:`restart` begins another in its place.
 
+    What is given wrongly raises :class:`chilopod.errors.ParameterError` and leaves the walk as it is.
+
     A walk belongs to one thread at a time. Threads may take turns; while one is within a verb (a method, not a
     property), every verb of the same walk raises :class:`chilopod.errors.ThreadError` in another, and changes nothing.
     """
@@ -166,11 +168,6 @@ class Walk(Protocol):
         ----------
         target
             m, shape (robots, 2) or (2,); a row of NaN: there is none, so nothing is seen.
-
-        Raises
-        ------
-        ParameterError
-            If it has the wrong shape, or is infinite. The walk is as before.
         """
 
     def halt(self, which: NDArray[np.bool_]) -> None:
@@ -180,11 +177,6 @@ class Walk(Protocol):
         ----------
         which
             Shape (robots,). Those that no longer walk stay as they are.
-
-        Raises
-        ------
-        ParameterError
-            If it is something else. The walk is as before.
         """
 
     def states(self) -> Array:
@@ -217,30 +209,13 @@ class Walk(Protocol):
             Likewise; None: as it is.
         seeds
             Seeds of the noise of their sensors, counted from now, one each; None: it goes on.
-
-        Raises
-        ------
-        ParameterError
-            If the walk is in the middle of a cycle or keeps a record, or an argument is none. The walk is as before.
         """
 
     def command(self, command: Command) -> None:
-        """Tell the actuators, from now on.
-
-        Raises
-        ------
-        ParameterError
-            If the command is none: wrong shape, NaN, a spring that cannot be adjusted. The walk is as before.
-        """
+        """Tell the actuators, from now on."""
 
     def advance(self, until: float) -> None:
-        """Walk on to a time, s. Robots that fail stop there, with a status; the others go on.
-
-        Raises
-        ------
-        ParameterError
-            If that time has passed, or is not finite.
-        """
+        """Walk on to a time, s. Robots that fail stop there, with a status; the others go on."""
 
     def save(self) -> bytes:
         """Everything that it takes to go on, the record so far included."""
@@ -306,20 +281,18 @@ class Traits:
 
 
 class Engine(Protocol):
-    """Something that starts walks: a module such as :mod:`chilopod.planar`, or an object."""
+    """Something that starts walks: a module such as :mod:`chilopod.planar`, or an object.
+
+    What is given wrongly raises :class:`chilopod.errors.ParameterError`.
+    """
 
     @property
     def traits(self) -> Traits:
         """Properties of the engine."""
 
     def common(self, robot: Robot) -> Hashable:
-        """Properties that robots must have in common to walk in one batch.
-
-        Raises
-        ------
-        ParameterError
-            If the engine cannot walk such a robot at all.
-        """
+        """Properties that robots must have in common to walk in one batch; ParameterError for a robot that the engine
+        cannot walk at all."""
 
     def initial_states(
         self,
@@ -380,21 +353,10 @@ class Engine(Protocol):
             Expected duration of the walk, s, so that memory may be taken at once; 0: not known.
         options
             The engine's own.
-
-        Raises
-        ------
-        ParameterError
-            If an argument has the wrong shape or is out of range, or the robots do not go together.
         """
 
     def resume(self, saved: bytes) -> Walk:
-        """A walk that was saved, to the bit.
-
-        Raises
-        ------
-        ParameterError
-            If it was not saved by this engine and version, or is damaged.
-        """
+        """A walk that was saved by this engine and version, to the bit."""
 
 
 class FootCreep(Protocol):

@@ -12,15 +12,14 @@ from itertools import count, islice, takewhile
 from typing import Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
-from chilopod.engine.arguments import as_number, check_time
+from chilopod.engine.arguments import as_array, as_number, check_time
 from chilopod.engine.contract import Command, Controller, Event, Observation, Walk
 from chilopod.errors import AnalysisError, ParameterError, in_words
 from chilopod.gait import Gait
 from chilopod.progress import Progress, silent
 
-Array = NDArray[np.float64]
 _T = TypeVar("_T")
 
 _MOMENT = 0.3
@@ -35,17 +34,7 @@ _FIRST, _SHORTEST = 0.02, 1e-3
 
 @dataclass
 class Spent:
-    """Where the time of walks went.
-
-    Attributes
-    ----------
-    controller
-        In controllers, s.
-    total
-        s.
-    progress
-        Told how far the walks are that are under way.
-    """
+    """Where the time of walks went, s: in controllers, and in all; ``progress`` is told how far the walks are."""
 
     controller: float = 0.0
     total: float = 0.0
@@ -88,13 +77,8 @@ class Referee(Protocol):
 
 
 def event_times(controller: Controller, gait: Gait, duration: float) -> Iterator[tuple[float, Event]]:
-    """All instants in [0, duration) at which a controller is asked, in order, one after the other.
-
-    Raises
-    ------
-    ParameterError, AnalysisError
-        If the controller's events are none.
-    """
+    """All instants in [0, duration) at which a controller is asked, in order, one after the other; ParameterError or
+    AnalysisError if the controller's events are none."""
     return ((time, event) for time, _, event in _numbered(controller, gait, 0.0, duration))
 
 
@@ -133,7 +117,7 @@ def steer(
     until: float,
     controller: Controller | None = None,
     *,
-    bearing_noise: Array | None = None,
+    bearing_noise: ArrayLike | None = None,
     referee: Referee | None = None,
     progress: Progress = silent,
 ) -> None:
@@ -141,10 +125,8 @@ def steer(
 
     Parameters
     ----------
-    walk
-        Changed in place.
-    until
-        s.
+    walk, until
+        Changed in place, up to a time, s.
     controller
         Without one the robots walk on as they were told.
     bearing_noise
@@ -164,13 +146,13 @@ def steer(
     until = check_time(until, begun)
     if not callable(progress):
         raise ParameterError("cannot be called", field="progress", value=progress, allowed="a function of two")
-    if bearing_noise is not None and (bearing_noise.ndim != 2 or len(bearing_noise) != len(walk.robots)):
-        raise ParameterError(
-            "has the wrong shape",
-            field="bearing_noise",
-            value=bearing_noise.shape,
-            allowed=f"({len(walk.robots)}, as many as events)",
-        )
+    noise = None
+    if controller is not None and bearing_noise is not None:
+        walks, events = len(walk.robots), sum(1 for _ in event_times(controller, gait, until))
+        noise = np.atleast_2d(as_array("bearing_noise", bearing_noise))
+        if noise.ndim != 2 or len(noise) != walks or noise.shape[1] < events:
+            allowed = f"({walks}, {events} or more)"
+            raise ParameterError("has the wrong shape", field="bearing_noise", value=noise.shape, allowed=allowed)
 
     def tell() -> None:
         # Where there is nowhere to go, a referee ends the walk before it begins.
@@ -190,10 +172,8 @@ def steer(
                 break
             continue
         seen = walk.observe()
-        if bearing_noise is not None:
-            if index >= bearing_noise.shape[1]:
-                raise ParameterError("is for fewer events", field="bearing_noise", value=bearing_noise.shape[1])
-            seen = replace(seen, bearing=(seen.bearing + bearing_noise[:, index] + np.pi) % (2.0 * np.pi) - np.pi)
+        if noise is not None:
+            seen = replace(seen, bearing=(seen.bearing + noise[:, index] + np.pi) % (2.0 * np.pi) - np.pi)
         if referee is not None:
             seen = referee.through(index, seen)
         assert controller is not None
@@ -231,13 +211,7 @@ def _instants(
 
 @dataclass
 class _Pace:
-    """Walks on in stretches that take a moment each; a walk is the same to the bit however it is cut.
-
-    Attributes
-    ----------
-    stretch
-        s of the walk, the next one.
-    """
+    """Walks on in stretches that take a moment each, the next one ``stretch`` s long."""
 
     stretch: float = _FIRST
 

@@ -24,14 +24,10 @@ _PATH: Final = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_][\w.]*")
 
 
 def engine_named(name: str) -> Engine:
-    """An engine by its name, one of :data:`ENGINES`; or one of your own as ``package.module:object``.
+    """An engine by its name, one of :data:`ENGINES`; or one of your own as ``package.module:object``. ParameterError if
+    there is none.
 
     It is imported now, not before: MuJoCo takes a moment to load.
-
-    Raises
-    ------
-    ParameterError
-        If there is none.
     """
     engine: Engine
     if not isinstance(name, str):
@@ -40,13 +36,9 @@ def engine_named(name: str) -> Engine:
         engine = import_module(_MODULES[name])  # a module is an engine
         return engine
     if ":" not in name:
-        raise ParameterError(
-            "there is no such engine",
-            field="engine",
-            value=name,
-            allowed=f"{', '.join(ENGINES)}, or package.module:object",
-            nearest=nearest_name(name, ENGINES),
-        )
+        problem = "there is no such engine"
+        allowed = f"{', '.join(ENGINES)}, or package.module:object"
+        raise ParameterError(problem, field="engine", value=name, allowed=allowed, nearest=nearest_name(name, ENGINES))
     return _Own(name, _imported("engine", name))
 
 
@@ -127,13 +119,8 @@ def _theirs(who: str, what: str, call: Callable[..., Any], /, *arguments: Any, *
 
 
 def controller_named(path: str) -> Controller:
-    """An instance of a controller's class, given as ``package.module:Class``, with the defaults of all its fields.
-
-    Raises
-    ------
-    ParameterError
-        If it cannot be imported or is no controller, see :func:`check_controller`.
-    """
+    """An instance of a controller's class, given as ``package.module:Class``, with the defaults of all its fields;
+    ParameterError if it cannot be imported or is no controller, see :func:`check_controller`."""
     made = _imported("controller", path)
     if not isinstance(made, type):
         raise ParameterError("is no class", field="controller", value=path, allowed="package.module:Class")
@@ -142,36 +129,25 @@ def controller_named(path: str) -> Controller:
     except (ParameterError, KeyboardInterrupt):
         raise
     except BaseException as error:  # it is somebody else's code
-        raise ParameterError(
-            f"cannot be made: {in_words(error)}",
-            field="controller",
-            value=path,
-            allowed="a class whose fields all have defaults",
-        ) from error
+        problem = f"cannot be made: {in_words(error)}"
+        allowed = "a class whose fields all have defaults"
+        raise ParameterError(problem, field="controller", value=path, allowed=allowed) from error
     check_controller(controller)
     return controller
 
 
 def check_controller(controller: Controller) -> None:
-    """Make sure that a controller can be part of a trial: a frozen dataclass with ``events`` and ``act``.
-
-    Raises
-    ------
-    ParameterError
-        If it is not.
-    """
+    """Make sure that a controller can be part of a trial: a frozen dataclass with ``events`` and ``act``;
+    ParameterError if it is not."""
     kind = type(controller)
     for name in ("events", "act"):
         if not callable(getattr(controller, name, None)):
             raise ParameterError(f"has no {name}", field="controller", value=kind.__name__, allowed="events and act")
     frozen = dataclasses.is_dataclass(kind) and kind.__dataclass_params__.frozen
     if not frozen:
-        raise ParameterError(
-            "can change, so nobody could tell trials apart",
-            field="controller",
-            value=kind.__name__,
-            allowed="a frozen dataclass: @dataclass(frozen=True)",
-        )
+        problem = "can change, so nobody could tell trials apart"
+        allowed = "a frozen dataclass: @dataclass(frozen=True)"
+        raise ParameterError(problem, field="controller", value=kind.__name__, allowed=allowed)
 
 
 def path_of(kind: type) -> str:

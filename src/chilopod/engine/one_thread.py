@@ -36,11 +36,8 @@ def _alone(name: str, verb: Callable[..., Any]) -> Callable[..., Any]:
             return verb(self, *arguments, **named)
         # One step for the interpreter, so that of two threads one is first.
         if state.setdefault(_INSIDE, me) != me:
-            raise ThreadError(
-                "another thread is within a verb of this walk",
-                field=f"walk.{name}",
-                allowed="one thread at a time: a walk each, or a lock",
-            )
+            allowed = "one thread at a time: a walk each, or a lock"
+            raise ThreadError("another thread is within a verb of this walk", field=f"walk.{name}", allowed=allowed)
         try:
             return verb(self, *arguments, **named)
         finally:

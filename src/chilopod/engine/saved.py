@@ -23,19 +23,8 @@ _DIGEST = 32  # bytes
 
 
 def pack(traits: Traits, robots: Sequence[Robot], settings: Mapping[str, Any], arrays: Mapping[str, Any]) -> bytes:
-    """The bytes of a walk.
-
-    Parameters
-    ----------
-    traits
-        Traits of its engine.
-    robots
-        One a walk.
-    settings
-        Plain data: numbers, text, lists and None.
-    arrays
-        By name.
-    """
+    """The bytes of a walk: the traits of its engine, its robots, settings that are plain data (numbers, text, lists,
+    None), and arrays by name."""
     written = {id(robot): robot.to_toml() for robot in {id(robot): robot for robot in robots}.values()}
     texts = [written[id(robot)] for robot in robots]
     distinct = list(dict.fromkeys(texts))
@@ -48,13 +37,8 @@ def pack(traits: Traits, robots: Sequence[Robot], settings: Mapping[str, Any], a
 
 
 def unpack(traits: Traits, saved: object) -> tuple[list[Robot], dict[str, Any], dict[str, Any]]:
-    """Robots, settings and arrays of a walk that :func:`pack` made.
-
-    Raises
-    ------
-    ParameterError
-        If it is no such thing, damaged, or another engine's or version's.
-    """
+    """Robots, settings and arrays of a walk that :func:`pack` made; ParameterError if it is no such thing, damaged, or
+    another engine's or version's."""
     if not isinstance(saved, bytes | bytearray | memoryview):
         raise ParameterError("is no saved walk", field="saved", value=type(saved).__name__, allowed="bytes")
     saved = bytes(saved)
@@ -87,13 +71,8 @@ def part(arrays: Mapping[str, Any], prefix: str) -> dict[str, Any]:
 
 @contextmanager
 def read_back() -> Iterator[None]:
-    """While a walk is made from what was unpacked: what does not fit together is no saved walk.
-
-    Raises
-    ------
-    ParameterError
-        For whatever is missing, or of another kind or shape.
-    """
+    """While a walk is made from what was unpacked: whatever is missing, or of another kind or shape, is a
+    ParameterError."""
     try:
         yield
     except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:

@@ -51,11 +51,6 @@ class Targets:
             s, not before that of the last move.
         target
             m, shape (robots, 2) or (2,); a row of NaN where there is none.
-
-        Raises
-        ------
-        ParameterError
-            If these are no places for these robots; nothing has changed then.
         """
         given, shape = as_array("target", target), self.present.shape
         if given.shape not in (shape, (2,)):

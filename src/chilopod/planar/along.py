@@ -4,23 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import qr
 
-from chilopod.compiled import copy_into, parallel_njit
-from chilopod.errors import AnalysisError, ParameterError
+from chilopod.errors import ParameterError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.integrate import COMPLEX_STEP, integrator
-from chilopod.kinematics import foot_places, foot_velocities, from_modules, module_headings, module_velocities
+from chilopod.integrate import COMPLEX_STEP
 from chilopod.planar.drift import Drift
-from chilopod.planar.dynamics import SCRATCH, rhs
-from chilopod.planar.energy import foot_powers
-from chilopod.planar.flow import advance
-from chilopod.planar.model import PlanarModel
+from chilopod.planar.energy import foot_powers, foot_slip
+from chilopod.planar.model import PlanarModel, carry
 
 Array = NDArray[np.float64]
 
@@ -31,8 +25,6 @@ _AT_ONCE = 500  # walks of which the motion is held in memory
 _DERIVATIVE = 100.0  # tolerance of the derivative over that of the state
 _CUTS = (1 / 6, 1 / 3, 1 / 2)  # of the interval, where tangents that have died out are dropped
 _DEAD = 1e-12  # size of a tangent that no longer matters, relative to the largest
-
-_integrate = integrator(rhs)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -60,7 +52,7 @@ class FollowedModel(PlanarModel):
         state, left, right = x.astype(np.complex128), np.eye(self.dimension), np.eye(self.dimension)
         for start, end in zip(times, times[1:], strict=False):
             batch = np.ascontiguousarray(state + 1j * COMPLEX_STEP * left.T)  # numba would compile all once more
-            self._advance(batch, start, end, tolerance)
+            carry([self], batch, start, end, tolerance)
             state, left = batch[0].real.astype(np.complex128), batch.imag.T / COMPLEX_STEP
             basis, upper, order = qr(left, mode="economic", pivoting=True)
             size = np.abs(np.diag(upper))
@@ -73,41 +65,14 @@ class FollowedModel(PlanarModel):
 
     @staticmethod
     def flow_each(models: Sequence[PlanarModel], states: ArrayLike, t0: float, t1: float) -> Array:
-        """Carry every state by the model of its own robot, on all cores.
-
-        Parameters
-        ----------
-        models
-            As many as states.
-        states
-            Shape (states, 2N+1), or with poses behind, (states, 2N+4).
-        t0, t1
-            Times, s, ``t0 <= t1``.
-
-        Returns
-        -------
-        States at t1, of the shape of ``states``.
-
-        Raises
-        ------
-        AnalysisError
-            If a motion diverges.
-        """
+        """Carry every state, shape (states, 2N+1) or with poses behind (states, 2N+4), from t0 to t1 (s) by the model
+        of its own robot, on all cores; AnalysisError if a motion diverges."""
         batch = np.array(states, dtype=np.float64, order="C")
         _check_one_each(models, batch, "states")
         if not _alike(models):
-            return np.concatenate(
-                [
-                    FollowedModel.flow_each([model], state[None], t0, t1)
-                    for model, state in zip(models, batch, strict=True)
-                ]
-            )
-        starts, widths, interval = models[0]._pieces(t0, t1)
-        ok = np.ones(len(batch), dtype=np.bool_)
-        owner = np.arange(len(batch))
-        advance(starts, widths, *_stacked(models, interval), owner, batch, models[0].tolerance, ok)
-        if not ok.all():
-            raise AnalysisError(f"the motion diverges between {t0:g} s and {t1:g} s", field="x")
+            alone = zip(models, batch[:, None], strict=True)
+            return np.concatenate([FollowedModel.flow_each([model], state, t0, t1) for model, state in alone])
+        carry(models, batch, t0, t1, models[0].tolerance)
         return batch
 
 
@@ -137,22 +102,11 @@ class WalkMeans(ReadOnlyArrays):
 
 
 def walk_means(models: Sequence[PlanarModel], orbits: ArrayLike) -> WalkMeans:
-    """Means over one period of the walk of every robot that starts in its state at time 0.
+    """Means over one period of the walk of every robot that starts in its state at time 0, ``orbits`` of shape (walks,
+    2N+1).
 
     All robots run through the period together, stopping at the nodes of Gauss-Legendre quadrature. Powers are those of
-    :func:`chilopod.planar.powers`.
-
-    Parameters
-    ----------
-    models
-        As many as orbits.
-    orbits
-        States at time 0, shape (walks, 2N+1).
-
-    Raises
-    ------
-    AnalysisError
-        If a motion diverges.
+    :func:`chilopod.planar.powers`. AnalysisError if a motion diverges.
     """
     orbits = np.asarray(orbits, dtype=np.float64)
     _check_one_each(models, orbits, "orbits")
@@ -163,28 +117,21 @@ def walk_means(models: Sequence[PlanarModel], orbits: ArrayLike) -> WalkMeans:
     if len(orbits) > at_once:
         starts = range(0, len(orbits), at_once)
         parts = [walk_means(models[i : i + at_once], orbits[i : i + at_once]) for i in starts]
-        return WalkMeans(
-            np.concatenate([part.mean_angle for part in parts]),
-            np.concatenate([part.most_bent for part in parts]),
-            np.concatenate([part.leg_power for part in parts]),
-            np.concatenate([part.floor_power for part in parts]),
-            tuple(drift for part in parts for drift in part.drifts),
-        )
+        names = ("mean_angle", "most_bent", "leg_power", "floor_power")
+        means = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+        return WalkMeans(**means, drifts=tuple(drift for part in parts for drift in part.drifts))
     first, schedule = models[0], models[0].schedule
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
     fractions, widths = 0.5 * (1.0 + nodes), np.diff(schedule.times)
-    states = np.concatenate([orbits, np.zeros((len(orbits), 3))], axis=1)
-    recorded = np.empty((len(orbits), len(widths), NODES, first.dimension))
-    ok = np.ones(len(orbits), dtype=np.bool_)
-    _record(widths, fractions, *_stacked(models, np.arange(len(widths))), states, first.tolerance, recorded, ok)
-    if not ok.all():
-        raise AnalysisError("the motion diverges within a period", field="orbits")
+    states = np.zeros((len(orbits), first.dimension + 3))
+    states[:, :-3] = orbits
+    recorded = carry(models, states, 0.0, first.period, first.tolerance, fractions)
     share = 0.5 * weights * widths[:, None] / first.period
     angles = recorded[..., 3 : first.modules + 2]
     mean_angle, most_bent = np.einsum("sn,wsnj->wj", share, angles), np.abs(angles).max(axis=(1, 2, 3))
-    legs, floor = _powers(models, recorded, widths[:, None] * fractions)
+    legs, floor = _powers(models, np.moveaxis(recorded, 0, 2), widths[:, None] * fractions)
     drifts = tuple(Drift(ahead, left, turn, first.period) for ahead, left, turn in states[:, -3:].tolist())
-    leg_power, floor_power = (np.einsum("sn,wsn->w", share, power) for power in (legs, floor))
+    leg_power, floor_power = (np.einsum("sn,snw->w", share, power) for power in (legs, floor))
     return WalkMeans(mean_angle, most_bent, leg_power, floor_power, drifts)
 
 
@@ -197,72 +144,11 @@ def _alike(models: Sequence[PlanarModel]) -> bool:
     return all(models[0].can_flow_with(model) for model in models[1:])
 
 
-def _stacked(models: Sequence[PlanarModel], interval: NDArray[np.intp]) -> tuple[Array, Array, Array, Array]:
-    """Scalars, stiffness, damping and moments of robots of one gait, as :func:`chilopod.planar.flow.advance` takes
-    them."""
-    return (
-        np.concatenate([model.scalars for model in models]),
-        np.stack([model.stiffness for model in models]),
-        np.stack([model.damping for model in models]),
-        np.stack([model.moments(interval) for model in models]),
-    )
-
-
-@parallel_njit
-def _record(
-    widths: Any,
-    fractions: Any,
-    scalars: Any,
-    stiffness: Any,
-    damping: Any,
-    moments: Any,
-    states: Any,
-    tolerance: float,
-    recorded: Any,
-    ok: Any,
-) -> None:
-    """Carry every row of ``states``, with its pose, through one period in place; ``recorded[row, piece, node]`` is the
-    reduced state on the way, at ``fractions`` of each piece."""
-    for r in numba.prange(states.shape[0]):
-        x = states[r].copy()
-        work = np.empty((16, x.size), x.dtype)
-        scratch = np.empty((moments.shape[2], SCRATCH), x.dtype)
-        h = 0.0
-        for s in range(widths.size):
-            args = (scalars[r], stiffness[r], damping[r], moments[r, s], scratch)
-            t = 0.0
-            for node in range(fractions.size + 1):
-                end = widths[s] * fractions[node] if node < fractions.size else widths[s]
-                h, reached = _integrate(args, x, t, end, h, tolerance, work)
-                if not reached:
-                    ok[r] = False
-                    break
-                t = end
-                if node < fractions.size:
-                    copy_into(recorded[r, s, node], x)
-            if not ok[r]:
-                break
-        copy_into(states[r], x)
-
-
 def _powers(models: Sequence[PlanarModel], x: Array, since: Array) -> tuple[Array, Array]:
-    """Powers of legs and floor, W, shape (walks, pieces, nodes), in states x, shape (walks, pieces, nodes, 2N+1),
+    """Powers of legs and floor, W, shape (pieces, nodes, walks), in states x, shape (pieces, nodes, walks, 2N+1),
     ``since`` (s), shape (pieces, nodes), the start of each piece."""
-    n, gait, schedule = models[0].modules, models[0].robot.gait, models[0].schedule
-    # One number a robot, for all its pieces, nodes, modules and sides.
-    length, friction, offset, half_width = (
-        np.array(values)[:, None, None, None, None]
-        for values in (
-            [model.robot.module_length for model in models],
-            [model.robot.ground.friction for model in models],
-            [model.robot.legs.forward_offset for model in models],
-            [model.robot.legs.half_width for model in models],
-        )
-    )
-    heading = module_headings(np.zeros(x.shape[:-1]), x[..., 3 : n + 2])
-    rate = module_headings(x[..., 2], x[..., n + 2 :])
-    velocity = module_velocities(x[..., :2], heading, rate, length[..., 0])
-    stroke = schedule.stroke[:, None] - gait.speed * since[..., None, None]
-    places = foot_places(offset, half_width, stroke)
-    slip = from_modules(velocity, heading, foot_velocities(places, rate, gait.speed))
-    return foot_powers(friction * schedule.contact[:, None], slip, heading, gait.speed)
+    schedule, speed = models[0].schedule, models[0].robot.gait.speed
+    stroke = schedule.stroke[:, None] - speed * since[..., None, None]
+    heading, slip = foot_slip(models, x, stroke[:, :, None])
+    friction = np.array([model.robot.ground.friction for model in models])[:, None, None]
+    return foot_powers(friction * schedule.contact[:, None, None], slip, heading, speed)

@@ -32,6 +32,7 @@ LENGTH, MASS, INERTIA, SPEED = range(4)
 SCRATCH = 10
 """Numbers per module that the right-hand side keeps."""
 
+_COS, _SIN, _RATE, _VX, _VY, _HX, _HY, _INVERSE, _BIAS, _JOINT = range(SCRATCH)
 
 SPRING = 6
 ORIGIN, LEVEL, SLOPE, BEHIND, DECAY, TORQUE = range(SPRING)
@@ -92,7 +93,6 @@ def rhs(t: float, x: Any, args: Any, out: Any) -> None:
     travel = speed * t
 
     # Directions (relative to module 1), rates and velocities, head to tail, all in module 1's frame.
-    # Columns of work: cos, sin, rate, vx, vy | hx, hy, 1/j, bias torque, joint torque.
     rate = x[2]
     vx = x[0]
     vy = x[1]
@@ -108,12 +108,12 @@ def rhs(t: float, x: Any, args: Any, out: Any) -> None:
             vx += half * rate * s
             vy -= half * rate * c
             # Torque of spring and damper on this module; minus that on the module in front.
-            work[i, 9] = _spring_torque(springs, i - 1, x[2 + i], t) - damping[i - 1] * x[n + 1 + i]
-        work[i, 0] = c
-        work[i, 1] = s
-        work[i, 2] = rate
-        work[i, 3] = vx
-        work[i, 4] = vy
+            work[i, _JOINT] = _spring_torque(springs, i - 1, x[2 + i], t) - damping[i - 1] * x[n + 1 + i]
+        work[i, _COS] = c
+        work[i, _SIN] = s
+        work[i, _RATE] = rate
+        work[i, _VX] = vx
+        work[i, _VY] = vy
 
     # Tail to head. (pxx, pxy, pyy) and (fx, fy): inertia and bias force with which everything behind acts on the rear
     # joint.
@@ -124,9 +124,9 @@ def rhs(t: float, x: Any, args: Any, out: Any) -> None:
     fy = pxx
     torque_behind = pxx
     for i in range(n - 1, -1, -1):
-        c = work[i, 0]
-        s = work[i, 1]
-        rate = work[i, 2]
+        c = work[i, _COS]
+        s = work[i, _SIN]
+        rate = work[i, _RATE]
         # Viscous feet, where they are by now: p - travel d, with d = (1, 0) + e.
         c_sum = moments[i, C_SUM]
         c_ex = moments[i, C_EX]
@@ -136,8 +136,8 @@ def rhs(t: float, x: Any, args: Any, out: Any) -> None:
         c_pp = moments[i, C_PP] - travel * (2.0 * moments[i, C_PD] - travel * c_sum)
         c_pxe = moments[i, C_PXE] - travel * c_ey
         # Velocity of the centre along the module, less that of the straight walk, and across.
-        u = c * work[i, 3] + s * work[i, 4] - speed
-        w = c * work[i, 4] - s * work[i, 3]
+        u = c * work[i, _VX] + s * work[i, _VY] - speed
+        w = c * work[i, _VY] - s * work[i, _VX]
         along = c_y * rate - c_sum * u + speed * c_ex
         across = speed * c_ey - c_sum * w - c_x * rate
         turning = c_y * u - c_x * w - c_pp * rate + speed * c_pxe
@@ -173,14 +173,14 @@ def rhs(t: float, x: Any, args: Any, out: Any) -> None:
             bx += gx
             by += gy
             bt += rx * gy - ry * gx
-        work[i, 5] = hx
-        work[i, 6] = hy
-        work[i, 8] = bt
+        work[i, _HX] = hx
+        work[i, _HY] = hy
+        work[i, _BIAS] = bt
         if i > 0:
-            torque = work[i, 9]
+            torque = work[i, _JOINT]
             torque_behind = torque
             inverse = reciprocal(j)
-            work[i, 7] = inverse
+            work[i, _INVERSE] = inverse
             pxx = axx - hx * hx * inverse
             pxy = axy - hx * hy * inverse
             pyy = ayy - hy * hy * inverse
@@ -208,15 +208,15 @@ def rhs(t: float, x: Any, args: Any, out: Any) -> None:
     ay = out[1] + x[2] * x[0]
     alpha = out[2]
     for i in range(1, n):
-        c = work[i - 1, 0]
-        s = work[i - 1, 1]
-        rate = work[i - 1, 2]
+        c = work[i - 1, _COS]
+        s = work[i - 1, _SIN]
+        rate = work[i - 1, _RATE]
         reach = half if i > 1 else 0.0
         rx = -(reach + half) * c
         ry = -(reach + half) * s
         ax += -alpha * ry - rate * rate * rx
         ay += alpha * rx - rate * rate * ry
-        new = (work[i, 9] - work[i, 8] - work[i, 5] * ax - work[i, 6] * ay) * work[i, 7]
+        new = (work[i, _JOINT] - work[i, _BIAS] - work[i, _HX] * ax - work[i, _HY] * ay) * work[i, _INVERSE]
         out[2 + i] = x[n + 1 + i]
         out[n + 1 + i] = new - alpha
         alpha = new

@@ -5,6 +5,7 @@ Written without the recursion of :mod:`chilopod.planar.dynamics`, so that the ba
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -59,20 +60,10 @@ class Powers:
 
 
 def module_motion(model: PlanarModel, x: ArrayLike) -> tuple[Array, Array]:
-    """Headings and velocities of the modules in module 1's frame.
-
-    Returns
-    -------
-    heading
-        Relative to module 1, rad, shape (N,).
-    twist
-        Velocity of the centre (m/s) and yaw rate (rad/s) in module 1's frame, shape (N, 3).
-    """
-    x = np.asarray(x, dtype=np.float64)
-    n = model.modules
-    heading = module_headings(0.0, x[3 : n + 2])
-    rate = module_headings(x[2], x[n + 2 : 2 * n + 1])
-    velocity = module_velocities(x[:2], heading, rate, model.robot.module_length)
+    """Headings of the modules relative to module 1, rad, shape (N,), and velocity of their centres (m/s) and yaw rate
+    (rad/s) in module 1's frame, shape (N, 3)."""
+    state = np.asarray(x, dtype=np.float64)
+    heading, rate, velocity = _chain_motion(state, model.modules, model.robot.module_length)
     return heading, np.column_stack([velocity, rate])
 
 
@@ -111,10 +102,8 @@ def powers(
     """
     x = np.asarray(x, dtype=np.float64)
     robot, gait = model.robot, model.robot.gait
-    heading, twist = module_motion(model, x)
     phase = gait.phases(t, model.modules)
-    places = foot_places(robot.legs.forward_offset, robot.legs.half_width, gait.stroke(phase))
-    slip = from_modules(twist[:, :2], heading, foot_velocities(places, twist[:, 2], gait.speed))
+    (heading,), (slip,) = foot_slip([model], x[None], gait.stroke(phase))
     friction = np.where(gait.stands(phase), robot.ground.friction, 0.0)
     legs, floor = foot_powers(friction, slip, heading, gait.speed)
     angles, rates = x[3 : model.modules + 2], x[model.modules + 2 :]
@@ -127,24 +116,43 @@ def powers(
     )
 
 
+def foot_slip(models: Sequence[PlanarModel], states: Array, stroke: Array, yaw: ArrayLike = 0.0) -> tuple[Array, Array]:
+    """Headings of modules, rad, shape (..., robots, N), and velocities of feet on the floor, m/s, shape (..., robots,
+    N, 2, 2).
+
+    They are on the axes of module 1, or on those of the floor where ``states``, shape (..., robots, 2N+1), have poses
+    behind; stroke (m) and yaw (rad) are as for :func:`chilopod.kinematics.foot_places`.
+    """
+    robots = [model.robot for model in models]
+    sizes = [(each.module_length, each.legs.forward_offset, each.legs.half_width) for each in robots]
+    length, offset, half_width = np.array(sizes).T[..., None]
+    heading, rate, velocity = _chain_motion(states, models[0].modules, length)
+    places = foot_places(offset[:, None], half_width[:, None], stroke, yaw)
+    inside = foot_velocities(places, rate, robots[0].gait.speed, yaw)
+    return heading, from_modules(velocity, heading, inside)
+
+
+def front_velocity(states: Array, heading: Array) -> Array:
+    """Velocity of module 1 on the axes that its heading is measured from, m/s, shape (..., 2)."""
+    ahead, left = directions(heading)
+    velocity: Array = states[..., :1] * ahead + states[..., 1:2] * left
+    return velocity
+
+
+def _chain_motion(states: Array, modules: int, length: ArrayLike) -> tuple[Array, Array, Array]:
+    """Headings, yaw rates and velocities of modules, see :func:`foot_slip`."""
+    joints = modules - 1
+    front = states[..., 2 * joints + 5] if states.shape[-1] > 2 * joints + 3 else np.zeros(states.shape[:-1])
+    heading = module_headings(front, states[..., 3 : joints + 3])
+    rate = module_headings(states[..., 2], states[..., joints + 3 : 2 * joints + 3])
+    return heading, rate, module_velocities(front_velocity(states, front), heading, rate, length)
+
+
 def foot_powers(friction: Array, slip: Array, heading: Array, speed: float) -> tuple[Array, Array]:
-    """Powers that the leg motors deliver and the floor takes, with straight legs.
+    """Powers that the leg motors deliver and the floor takes, with straight legs, W, both of shape (...).
 
-    Parameters
-    ----------
-    friction
-        Friction of every foot, 0 in the air, N*s/m, shape (..., N, 2).
-    slip
-        Velocity of every foot on the floor, m/s, shape (..., N, 2, 2).
-    heading
-        Heading of every module, on the same axes, rad, shape (..., N).
-    speed
-        At which standing feet move back, m/s.
-
-    Returns
-    -------
-    legs, floor
-        W, shape (...).
+    Friction (0 in the air) is in N*s/m, shape (..., N, 2), slip the velocity of every foot on the floor, m/s, shape
+    (..., N, 2, 2), headings are on the same axes, rad, shape (..., N), and standing feet move back at ``speed``, m/s.
     """
     back = -speed * directions(heading)[0][..., None, :]
     force = -friction[..., None] * slip

@@ -1,16 +1,18 @@
 """Flow of the nonlinear planar model and its derivative, many robots at a time.
 
-The compiled loop runs over robots; each is carried from switch to switch, so that the integrator only ever sees a
-smooth right-hand side. A tangent is one more "robot" whose state has an imaginary part (see
+The compiled loop runs over robots; each is carried from switch to switch of its contact pattern, so that the integrator
+only ever sees a smooth right-hand side. A tangent is one more "robot" whose state has an imaginary part (see
 :mod:`chilopod.integrate`).
 """
 
 from __future__ import annotations
 
-from typing import Any
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from chilopod.compiled import copy_into, parallel_njit
 from chilopod.errors import ParameterError
@@ -18,85 +20,102 @@ from chilopod.integrate import integrator
 from chilopod.planar.contact import MOMENTS
 from chilopod.planar.dynamics import SCRATCH, rhs
 
+if TYPE_CHECKING:
+    from chilopod.gait import Gait
+
+Array = NDArray[np.float64]
+
 _integrate = integrator(rhs)
 
 
-def advance(
-    starts: Any,
-    widths: Any,
-    scalars: Any,
-    stiffness: Any,
-    damping: Any,
-    moments: Any,
-    owner: Any,
-    states: Any,
-    tolerance: float,
-    ok: Any,
-) -> None:
-    """Carry every row of ``states`` through all intervals, in place, on all cores.
+class Chains(NamedTuple):
+    """Numbers of robots of one gait and size: scalars (see :mod:`chilopod.planar.dynamics`), shape (robots, 4);
+    stiffness and damping of the joints, N*m/rad and N*m*s/rad, shape (robots, N-1); contact moments at the start of the
+    contact interval of every piece, shape (robots, pieces, N, 8)."""
 
-    Parameters
-    ----------
-    starts, widths
-        Start of each piece in its contact interval, and its duration, s, shape (pieces,).
-    scalars, stiffness, damping
-        Scalars, stiffness and damping of the robots, shapes (robots, 4), (robots, N-1), (robots, N-1).
-    moments
-        Contact moments at the start of the contact interval of every piece, shape (robots, pieces, N, 8).
-    owner
-        Number of the robot to which a state belongs, shape (states,).
-    states
-        Reduced states, shape (states, 2N+1), or with poses behind, (states, 2N+4); float64 or complex128.
-    tolerance
-        Tolerance of the integrator, relative to max(1, |x|).
-    ok
-        Set to False where a state could not be carried to the end, shape (states,).
+    scalars: Any
+    stiffness: Any
+    damping: Any
+    moments: Any
 
-    Raises
-    ------
-    ParameterError
-        If their shapes do not go together: compiled code would read beyond them.
+
+@lru_cache(maxsize=256)
+def pieces(gait: Gait, modules: int, t0: float, t1: float) -> tuple[Array, Array, NDArray[np.intp]]:
+    """Cut [t0, t1] at the switches.
+
+    Returns
+    -------
+    Where in its contact interval each piece starts (s), how long it lasts (s), and which interval of the period it
+    belongs to.
     """
-    count, (robots, joints) = len(states), stiffness.shape
+    if not (np.isfinite(t0) and np.isfinite(t1) and t0 <= t1):
+        raise ParameterError("times must be finite and in order", field="t0, t1", value=(t0, t1), allowed="t0 <= t1")
+    period = gait.period
+    times = gait.schedule(modules).times
+    first, last = int(np.floor(t0 / period)), int(np.ceil(t1 / period))
+    switches = (period * np.arange(first, last)[:, None] + times[:-1]).ravel()
+    interval = np.tile(np.arange(len(times) - 1), max(0, last - first))
+    begins = np.maximum(switches, t0)
+    ends = np.minimum(np.append(switches[1:], last * period), t1)
+    # However short, a piece counts: the fastest motion is over in little more than round-off.
+    used = ends > begins
+    starts = (begins - switches)[used]
+    return starts, (ends - begins)[used], interval[used]
+
+
+def advance(
+    starts: Array, widths: Array, robots: Chains, states: Any, tolerance: float, nodes: Array | None = None
+) -> Any:
+    """Carry every row of ``states`` through all pieces of time, in place, on all cores.
+
+    Pieces start at times in their contact intervals and last so long, s, shape (pieces,). There is one robot for all
+    states or one for each; states have shape (states, 2N+1), or with poses behind (states, 2N+4), float64 or
+    complex128. The tolerance is relative to max(1, |x|). Nodes are parts of every piece, rising, 0 to 1.
+
+    Returns reduced states at the nodes, shape (states, pieces, nodes, 2N+1), None if a motion diverges. ParameterError
+    if shapes do not go together: compiled code would read beyond them.
+    """
+    count, (several, joints) = len(states), robots.stiffness.shape
     fits = (
         starts.shape == widths.shape
-        and scalars.shape == (robots, 4)
-        and damping.shape == (robots, joints)
-        and moments.shape == (robots, widths.size, joints + 1, MOMENTS)
+        and robots.scalars.shape == (several, 4)
+        and robots.damping.shape == (several, joints)
+        and robots.moments.shape == (several, widths.size, joints + 1, MOMENTS)
         and states.shape[1:] in ((2 * joints + 3,), (2 * joints + 6,))
-        and owner.shape == ok.shape == (count,)
-        and (count == 0 or 0 <= owner.min() <= owner.max() < robots)
+        and several in (1, count)
     )
     if not fits:
         allowed = f"(any number, {2 * joints + 3} or {2 * joints + 6})"
         raise ParameterError("has the wrong shape", field="states", value=states.shape, allowed=allowed)
+    nodes = np.empty(0) if nodes is None else nodes
+    recorded = np.empty((count, widths.size, nodes.size, 2 * joints + 3), states.dtype)
+    ok = np.ones(count, dtype=np.bool_)
     if count:
-        _advance(starts, widths, scalars, stiffness, damping, moments, owner, states, tolerance, ok)
+        _advance(starts, widths, robots, states, tolerance, nodes, recorded, ok)
+    return recorded if ok.all() else None
 
 
 @parallel_njit
 def _advance(
-    starts: Any,
-    widths: Any,
-    scalars: Any,
-    stiffness: Any,
-    damping: Any,
-    moments: Any,
-    owner: Any,
-    states: Any,
-    tolerance: float,
-    ok: Any,
+    starts: Any, widths: Any, robots: Any, states: Any, tolerance: float, nodes: Any, recorded: Any, ok: Any
 ) -> None:
     for r in numba.prange(states.shape[0]):
-        p = owner[r]
+        p = min(np.intp(r), robots.scalars.shape[0] - 1)
         x = states[r].copy()
         work = np.empty((16, x.size), x.dtype)
-        scratch = np.empty((moments.shape[2], SCRATCH), x.dtype)
+        scratch = np.empty((robots.moments.shape[2], SCRATCH), x.dtype)
         h = 0.0
         for s in range(widths.size):
-            args = (scalars[p], stiffness[p], damping[p], moments[p, s], scratch)
-            h, reached = _integrate(args, x, starts[s], starts[s] + widths[s], h, tolerance, work)
-            if not reached:
-                ok[r] = False
+            args = (robots.scalars[p], robots.stiffness[p], robots.damping[p], robots.moments[p, s], scratch)
+            t = starts[s]
+            for node in range(nodes.size + 1):
+                end = starts[s] + (widths[s] * nodes[node] if node < nodes.size else widths[s])
+                h, ok[r] = _integrate(args, x, t, end, h, tolerance, work)
+                if not ok[r]:
+                    break
+                t = end
+                if node < nodes.size:
+                    copy_into(recorded[r, s, node], x)
+            if not ok[r]:
                 break
         copy_into(states[r], x)

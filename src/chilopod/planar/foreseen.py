@@ -13,28 +13,15 @@ _REACH = 6.0
 
 
 def check_steps(robot: Robot, seconds: float) -> None:
-    """Refuse a walk that would take more steps than anybody waits for.
-
-    Parameters
-    ----------
-    robot
-        The robot.
-    seconds
-        Length of the walk, s.
-
-    Raises
-    ------
-    ParameterError
-        Naming what makes it move so fast.
-    """
-    rates = {**_rates(robot), "gait.stance, gait.swing": _switches(robot)}
+    """Refuse a walk of some seconds that would take more steps than anybody waits for, naming what makes it move so
+    fast."""
+    switches = len(robot.gait.schedule(robot.body.modules).times) - 1  # as far as they differ; each ends a step
+    rates = {**_rates(robot), "gait.stance, gait.swing": _REACH * switches / robot.gait.period}
     steps = robot.body.modules * seconds * sum(rates.values()) / _REACH
     if steps > MOST_STEPS:
-        raise ParameterError(
-            f"the motion is too fast to follow for {seconds:g} s: about {steps:.0e} steps of modules",
-            field=max(rates, key=rates.__getitem__),
-            allowed=f"what takes at most {MOST_STEPS:.0e}",
-        )
+        problem = f"the motion is too fast to follow for {seconds:g} s: about {steps:.0e} steps of modules"
+        allowed = f"what takes at most {MOST_STEPS:.0e}"
+        raise ParameterError(problem, field=max(rates, key=rates.__getitem__), allowed=allowed)
 
 
 def _rates(robot: Robot) -> dict[str, float]:
@@ -52,8 +39,3 @@ def _rates(robot: Robot) -> dict[str, float]:
         "springs.stiffness": (4.0 * max(springs.stiffness) / inertia) ** 0.5,
         "springs.damping": 4.0 * max(springs.damping) / inertia,
     }
-
-
-def _switches(robot: Robot) -> float:
-    """Touch-downs and lift-offs, 1/s, as far as they differ; each ends a step."""
-    return _REACH * (len(robot.gait.schedule(robot.body.modules).times) - 1) / robot.gait.period

@@ -71,29 +71,15 @@ def system_matrices(
     k_j or damper d_j at joint j puts -k_j theta_j - d_j theta_j' between its modules: column j of ``joint`` times that
     torque.
 
-    Parameters
-    ----------
-    length, mass, inertia
-        Length, mass and inertia of a module, m, kg, kg*m^2.
-    speed
-        Speed of the straight walk, m/s.
-    moments
-        Contact moments at the start of every interval, shape (intervals, N, 8), all legs straight.
-    durations
-        Durations of the intervals, s, shape (intervals,).
+    Length, mass and inertia are those of a module, SI; ``speed`` is that of the straight walk, m/s; contact moments are
+    those at the start of every interval, shape (intervals, N, 8), all legs straight; intervals have durations, s, shape
+    (intervals,).
 
-    Returns
-    -------
-    passive
-        Shape (intervals, N+2, 3, 2N+1): the upper rows of A0, A1, A2. The lower rows are the same for all robots:
-        theta_j' = w_j - w_{j-1}.
-    joint
-        Acceleration of the velocities by a unit torque at a joint, shape (N+2, N-1).
-    rates
-        Joint rates as functions of the velocities, shape (N-1, N+2).
-    decay
-        The fastest rate at which the feet damp motion in every interval, 1/s, shape (intervals,). What springs and
-        dampers add is for :func:`joint_bound`.
+    Returns ``passive``, shape (intervals, N+2, 3, 2N+1), the upper rows of A0, A1, A2 (the lower rows are the same for
+    all robots: theta_j' = w_j - w_{j-1}); ``joint``, acceleration of the velocities by a unit torque at a joint, shape
+    (N+2, N-1); ``rates``, joint rates as functions of the velocities, shape (N-1, N+2); and ``decay``, the fastest rate
+    at which the feet damp motion in every interval, 1/s, shape (intervals,), without springs and dampers, which are for
+    :func:`joint_bound`.
     """
     intervals, n, _ = moments.shape
     # The mass matrix of a long chain is nearly singular and turns round-off in what follows into accelerations a
@@ -315,26 +301,14 @@ def propagate_batch(
 def propagate(
     widths: Array, upper: Array, decay: Array, frequency: float, clock: float, matrix: Array
 ) -> tuple[float, int]:
-    """Multiply ``matrix`` from the left by the fundamental matrix over all intervals, in place.
+    """Multiply ``matrix``, shape (2N+1, 2N+1), from the left by the fundamental matrix over all intervals, in place.
 
-    Parameters
-    ----------
-    widths
-        Duration of every interval, s, shape (intervals,).
-    upper
-        Upper rows of A0, A1, A2 of every interval, shape (intervals, N+2, 3, 2N+1), springs and dampers included.
-    decay
-        Fastest decay in every interval, 1/s, shape (intervals,); it need not be exact.
-    frequency
-        Highest frequency at which the springs ring, 1/s; likewise.
-    clock
-        The largest time that went into the widths, s: they are rounded to some eps of it.
-    matrix
-        Shape (2N+1, 2N+1).
+    Intervals have widths, s, shape (intervals,), which are rounded to some eps of ``clock``, the largest time that went
+    into them; upper rows of A0, A1, A2, shape (intervals, N+2, 3, 2N+1), springs and dampers included; and a fastest
+    decay, 1/s, shape (intervals,), which need not be exact, nor need the highest frequency at which the springs ring,
+    1/s.
 
-    Returns
-    -------
-    The bound on the error of the largest entry, and the number of Taylor orders computed.
+    Returns the bound on the error of the largest entry, and the number of Taylor orders computed.
     """
     n, intervals = len(matrix), widths.size
     if (matrix.shape, upper.shape, decay.size) != ((n, n), (intervals, (n + 3) // 2, 3, n), intervals):

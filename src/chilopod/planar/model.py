@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,8 +18,7 @@ from chilopod.planar.contact import contact_moments
 from chilopod.planar.drift import Drift
 from chilopod.planar.dynamics import SCRATCH
 from chilopod.planar.dynamics import rhs as compiled_rhs
-from chilopod.planar.flow import advance
-from chilopod.planar.pieces import pieces
+from chilopod.planar.flow import Chains, advance, pieces
 
 if TYPE_CHECKING:
     from chilopod.gait import Gait, Schedule
@@ -124,19 +123,9 @@ class PlanarModel(ReadOnlyArrays):
         return self.reflection if abs(turns - round(turns)) < _SAME_INSTANT else None
 
     def flow(self, x: ArrayLike, t0: float, t1: float) -> tuple[Array, Array]:
-        """State at t1 of the robot that is in state x at t0, and its derivative with respect to x.
+        """State at t1 of the robot that is in state x, shape (2N+1,), at t0, and its derivative with respect to x.
 
-        Parameters
-        ----------
-        x
-            Shape (2N+1,).
-        t0, t1
-            Times, s, ``t0 <= t1``; the gait is at phase 0 at time 0.
-
-        Raises
-        ------
-        AnalysisError
-            If the motion diverges.
+        Times are in s, ``t0 <= t1``; the gait is at phase 0 at time 0. AnalysisError if the motion diverges.
         """
         state, derivative, _ = self.flow_with_error(x, t0, t1)
         return state, derivative
@@ -145,12 +134,14 @@ class PlanarModel(ReadOnlyArrays):
         """:meth:`flow`, and a bound on the error of the largest entry of the derivative."""
         x = self._checked(x)
         if (x == self.orbit).all():
-            matrix, error = self._linear_flow(t0, t1)
-            return x.copy(), matrix, error
+            to_joint, from_joint = _joint_rates(self.modules)
+            matrix = from_joint.copy()
+            error, _ = linear.propagate(*self._linear_pieces(t0, t1), self._clock(t0, t1), matrix)
+            return x, to_joint @ matrix, _ROWS_DIFFER * error
         n = self.dimension
         batch = np.tile(x.astype(np.complex128), (n, 1))
         batch += 1j * COMPLEX_STEP * np.eye(n)
-        self._advance(batch, t0, t1)
+        carry([self], batch, t0, t1, self.tolerance)
         derivative = batch.imag.T / COMPLEX_STEP
         # Against finer steps the global error stays within some tens of the tolerance per step, times the growth of the
         # motion; and the derivative is that of a motion so much in error, which counts as its growth once more.
@@ -160,16 +151,8 @@ class PlanarModel(ReadOnlyArrays):
 
     def flow_states(self, states: ArrayLike, t0: float, t1: float) -> Array:
         """Carry many states, shape (states, 2N+1), on all cores, without derivatives."""
-        batch = np.array(states, dtype=np.float64, order="C")
-        if batch.ndim != 2 or batch.shape[1] != self.dimension:
-            raise ParameterError(
-                "states have the wrong shape",
-                value=batch.shape,
-                allowed=f"(any number, {self.dimension})",
-                field="states",
-            )
-        self._check_finite(batch, "states")
-        self._advance(batch, t0, t1)
+        batch = self._checked(states, "states", several=True)
+        carry([self], batch, t0, t1, self.tolerance)
         return batch
 
     def rhs(self, t: float, x: ArrayLike) -> Array:
@@ -178,15 +161,14 @@ class PlanarModel(ReadOnlyArrays):
         starts, _, interval = self._pieces(t, t + self.period)
         out = np.empty_like(x)
         scratch = np.empty((self.modules, SCRATCH))
-        scalars, stiffness, damping = self._constants()
-        args = (scalars[0], stiffness[0], damping[0], self.moments(interval[:1])[0], scratch)
-        compiled_rhs(float(starts[0]), x, args, out)
+        scalars, stiffness, damping, moments = (part[0] for part in _chains([self], interval[:1]))
+        compiled_rhs(float(starts[0]), x, (scalars, stiffness, damping, moments[0], scratch), out)
         return out
 
     def drift(self, x: ArrayLike) -> Drift:
         """How the robot moves over the floor in one period that starts in state x at time 0."""
         batch = np.append(self._checked(x), np.zeros(3))[None]
-        self._advance(batch, 0.0, self.period)
+        carry([self], batch, 0.0, self.period, self.tolerance)
         forward, left, turn = batch[0, -3:].tolist()
         return Drift(forward, left, turn, self.period)
 
@@ -238,51 +220,18 @@ class PlanarModel(ReadOnlyArrays):
     # -- inside
     # ---------------------------------------------------------------------------------------------------------------
 
-    def _checked(self, x: ArrayLike) -> Array:
-        state = np.asarray(x, dtype=np.float64)
-        if state.shape != (self.dimension,):
-            raise ParameterError(
-                "state has the wrong shape", field="x", value=state.shape, allowed=f"({self.dimension},)"
-            )
-        self._check_finite(state, "x")
-        return state
-
-    @staticmethod
-    def _check_finite(states: Array, field: str) -> None:
+    def _checked(self, given: ArrayLike, field: str = "x", several: bool = False) -> Array:
+        """Copy of a state, or of several."""
+        states = np.array(given, dtype=np.float64, order="C")
+        if states.ndim != 1 + several or states.shape[-1] != self.dimension:
+            allowed = f"(any number, {self.dimension})" if several else f"({self.dimension},)"
+            raise ParameterError("has the wrong shape", field=field, value=states.shape, allowed=allowed)
         if not np.isfinite(states).all():
             raise ParameterError("must be finite", field=field)
+        return states
 
     def _pieces(self, t0: float, t1: float) -> tuple[Array, Array, NDArray[np.intp]]:
         return pieces(self.robot.gait, self.modules, t0, t1)
-
-    def _constants(self) -> tuple[Array, Array, Array]:
-        """Copies of scalars, stiffness and damping as the compiled loops take them: one robot in front, writable, for
-        numba would compile everything once more for arrays that are not."""
-        return self.scalars.copy(), self.stiffness[None].copy(), self.damping[None].copy()
-
-    def _advance(
-        self,
-        batch: NDArray[np.float64] | NDArray[np.complex128],
-        t0: float,
-        t1: float,
-        tolerance: float | None = None,
-    ) -> None:
-        """Carry states in place; with the model's own tolerance unless another one is given."""
-        starts, widths, interval = self._pieces(t0, t1)
-        moments = self.moments(interval)
-        ok = np.ones(len(batch), dtype=np.bool_)
-        advance(
-            starts,
-            widths,
-            *self._constants(),
-            moments[None],
-            np.zeros(len(batch), dtype=np.intp),
-            batch,
-            self.tolerance if tolerance is None else tolerance,
-            ok,
-        )
-        if not ok.all():
-            raise AnalysisError(f"the motion diverges between {t0:g} s and {t1:g} s", field="x")
 
     @cached_property
     def _linearised(self) -> tuple[Array, Array, Array, Array, float]:
@@ -291,12 +240,9 @@ class PlanarModel(ReadOnlyArrays):
         robot = self.robot
         n, intervals = self.modules, len(self.schedule.times) - 1
         if 3 * intervals * (n + 2) * (2 * n + 1) > _MOST_NUMBERS:
-            raise AnalysisError(
-                f"its equations are too many: {intervals} intervals between touch-downs and lift-offs in a period",
-                field="body.modules",
-                value=n,
-                allowed="fewer modules, or phases with which many legs touch down at once",
-            )
+            problem = f"its equations are too many: {intervals} intervals between touch-downs and lift-offs in a period"
+            allowed = "fewer modules, or phases with which many legs touch down at once"
+            raise AnalysisError(problem, field="body.modules", value=n, allowed=allowed)
         passive, joint, rates, decay = _passive_matrices(
             robot.gait,
             self.modules,
@@ -343,11 +289,30 @@ class PlanarModel(ReadOnlyArrays):
         """The largest time from which those between t0 and t1 are computed."""
         return max(abs(t0), abs(t1), self.period)
 
-    def _linear_flow(self, t0: float, t1: float) -> tuple[Array, float]:
-        to_joint, from_joint = _joint_rates(self.modules)
-        matrix = from_joint.copy()
-        error, _ = linear.propagate(*self._linear_pieces(t0, t1), self._clock(t0, t1), matrix)
-        return to_joint @ matrix, _ROWS_DIFFER * error
+
+def carry(
+    models: Sequence[PlanarModel], states: Any, t0: float, t1: float, tolerance: float, nodes: Array | None = None
+) -> Any:
+    """Carry states of robots of one gait and size in place, one robot for all states or one each; AnalysisError if a
+    motion diverges.
+
+    Returns what :func:`chilopod.planar.flow.advance` recorded at the nodes.
+    """
+    starts, widths, interval = models[0]._pieces(t0, t1)
+    recorded = advance(starts, widths, _chains(models, interval), states, tolerance, nodes)
+    if recorded is None:
+        raise AnalysisError(f"the motion diverges between {t0:g} s and {t1:g} s", field="x")
+    return recorded
+
+
+def _chains(models: Sequence[PlanarModel], interval: NDArray[np.intp]) -> Chains:
+    """Copies of the models' numbers as the compiled loop takes them: numba compiles once more for read-only arrays."""
+    return Chains(
+        np.concatenate([model.scalars for model in models]),
+        np.stack([model.stiffness for model in models]),
+        np.stack([model.damping for model in models]),
+        np.stack([model.moments(interval) for model in models]),
+    )
 
 
 @lru_cache(maxsize=32)

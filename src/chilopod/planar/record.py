@@ -8,14 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from chilopod.kinematics import (
-    directions,
-    foot_places,
-    foot_velocities,
-    from_modules,
-    module_headings,
-    module_velocities,
-)
+from chilopod.planar.energy import foot_slip, front_velocity
 from chilopod.planar.model import PlanarModel
 from chilopod.record import walk_record
 
@@ -23,26 +16,16 @@ Array = NDArray[np.float64]
 
 
 def planar_record(model: PlanarModel, samples: Array, states: Array, leg_yaw: Array) -> xr.Dataset:
-    """States over time as named quantities on the floor, see :func:`chilopod.record.walk_record`.
-
-    Parameters
-    ----------
-    model
-        Any of the robots.
-    samples
-        s, shape (samples,).
-    states
-        With poses, shape (samples, robots, 2N+4).
-    leg_yaw
-        rad, shape (samples, robots, 2).
-    """
+    """States with poses over time, shape (samples, robots, 2N+4), as named quantities on the floor, see
+    :func:`chilopod.record.walk_record`; samples are in s, leg yaw in rad, shape (samples, robots, 2), and any of the
+    robots' models will do."""
     n = model.modules
     heading = states[..., 2 * n + 3]
     return walk_record(
         samples,
         position=states[..., 2 * n + 1 : 2 * n + 3],
         heading=heading,
-        velocity=_front_velocity(states, heading),
+        velocity=front_velocity(states, heading),
         heading_rate=states[..., 2],
         joint_angle=states[..., 3 : n + 2],
         joint_rate=states[..., n + 2 : 2 * n + 1],
@@ -53,37 +36,16 @@ def planar_record(model: PlanarModel, samples: Array, states: Array, leg_yaw: Ar
 def foot_forces(
     models: Sequence[PlanarModel], samples: Array, states: Array, leg_yaw: Array, friction: Array
 ) -> xr.DataArray:
-    """Force of the floor on every foot, zero for those in the air, along the floor's axes, N.
-
-    Foot by foot from places and velocities, without the contact moments.
-
-    Returns
-    -------
-    Over (time, robot, module, side, axis).
-    """
+    """Force of the floor on every foot, zero for those in the air, along the floor's axes, N, over (time, robot,
+    module, side, axis): foot by foot from places and velocities, without the contact moments."""
     n, gait = models[0].modules, models[0].robot.gait
-    length = np.array([model.robot.module_length for model in models])[:, None]
-    heading = module_headings(states[..., 2 * n + 3], states[..., 3 : n + 2])
-    rate = module_headings(states[..., 2], states[..., n + 2 : 2 * n + 1])
-    velocity = module_velocities(_front_velocity(states, heading[..., 0]), heading, rate, length)
-
     phase = gait.phases(samples, n)[:, None]
-    yaw = np.zeros((*heading.shape, 2))
+    yaw = np.zeros((*states.shape[:2], n, 2))
     yaw[..., 0, :] = leg_yaw
-    offset = np.array([model.robot.legs.forward_offset for model in models])[:, None, None]
-    half_width = np.array([model.robot.legs.half_width for model in models])[:, None, None]
-    places = foot_places(offset, half_width, gait.stroke(phase), yaw)
-    slip = from_modules(velocity, heading, foot_velocities(places, rate, gait.speed, yaw))
+    _, slip = foot_slip(models, states, gait.stroke(phase), yaw)
     return xr.DataArray(
         np.where(gait.stands(phase)[..., None], -friction[..., None] * slip, 0.0),
         dims=("time", "robot", "module", "side", "axis"),
         coords={"module": np.arange(1, n + 1)},
         attrs={"units": "N"},
     )
-
-
-def _front_velocity(states: Array, heading: Array) -> Array:
-    """Velocity of module 1 on the floor, m/s, shape (..., 2)."""
-    ahead, left = directions(heading)
-    velocity: Array = states[..., :1] * ahead + states[..., 1:2] * left
-    return velocity

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
-import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from chilopod.engine import Controller, event_times, steer
-from chilopod.engine.arguments import as_array
-from chilopod.errors import ParameterError
+from chilopod.engine import Controller, steer
 from chilopod.planar.walk import TOLERANCE, start
+from chilopod.progress import Progress, silent
 from chilopod.record import LONGEST, RATE, Recording, in_range
 from chilopod.robot import Robot
 
@@ -28,33 +26,24 @@ def simulate(
     rate: float = RATE,
     tolerance: float = TOLERANCE,
     forces: bool = False,
-    progress: Callable[[float, str], None] = lambda done, words: None,
+    progress: Progress = silent,
 ) -> xr.Dataset:
     """Let robots walk on the plane; each one alone, all of them at the same time.
 
     Parameters
     ----------
-    robots
-        One, or one for every walk; they share gait and number of modules and may differ in all else.
+    robots, initial, friction, target, tolerance
+        As for :func:`start`.
     duration
         s; the gait is at phase 0 at time 0.
-    initial
-        States with poses, shape (walks, 2N+4) or (2N+4,), such as :func:`initial_states` gives; by default the straight
-        walk from the origin along x.
-    friction
-        Factor on the friction coefficient of every foot, positive, shape (N, 2) or (walks, N, 2).
     controller
         Asked for commands at its events; without one the legs stay straight. In this model a leg's yaw moves at once
         and matters only while its foot stands.
-    target
-        Its place on the floor, m, shape (2,) or (walks, 2), for the controller to see.
     bearing_noise
         Error added to the bearing that the controller sees at its events, rad, shape (walks, at least as many as
         events); the last axis is the order of events.
     rate
         Samples per second.
-    tolerance
-        Tolerance of every step, relative to max(1, |state|).
     forces
         True to add the force on every foot.
     progress
@@ -76,23 +65,14 @@ def simulate(
         If an argument has the wrong shape or is out of range, or the robots do not go together.
     """
     in_range("duration", duration, LONGEST, "s")
-    record = Recording(rate, forces)
     walk = start(
         robots,
         initial=initial,
         friction=friction,
         target=target,
-        record=record,
+        record=Recording(rate, forces),
         tolerance=tolerance,
         expected=duration,
     )
-    noise = None
-    if controller is not None and bearing_noise is not None:
-        count, asked = len(walk.robots), sum(1 for _ in event_times(controller, walk.robots[0].gait, duration))
-        noise = np.atleast_2d(as_array("bearing_noise", bearing_noise))
-        if noise.ndim != 2 or len(noise) != count or noise.shape[1] < asked:
-            raise ParameterError(
-                "has the wrong shape", field="bearing_noise", value=noise.shape, allowed=f"({count}, {asked} or more)"
-            )
-    steer(walk, duration, controller, bearing_noise=noise, progress=progress)
+    steer(walk, duration, controller, bearing_noise=bearing_noise, progress=progress)
     return walk.to_dataset(copy=False)

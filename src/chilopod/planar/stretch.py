@@ -17,11 +17,10 @@ from chilopod.compiled import copy_into, njit, parallel_njit
 from chilopod.engine.actuators import FROM, GOAL, RAMPING, SETTLING, SINCE, UNTIL
 from chilopod.engine.actuators import SLOPE as RAMP
 from chilopod.errors import ParameterError
-from chilopod.integrate import GROW, LANES_WORK, MAX_STEPS, SAFETY, SHRINK, STAGES, lanes_step
+from chilopod.integrate import LANES_WORK, MAX_STEPS, STAGES, first_step, lanes_step, step_factor
 from chilopod.lanes import LANES, as_lanes, choose, room
 from chilopod.planar.contact import MOMENTS, sum_moments
 from chilopod.planar.dynamics import BEHIND, DECAY, LEVEL, ORIGIN, SCRATCH, SLOPE, SPRING, TORQUE, rhs
-from chilopod.planar.shapes import fit
 
 WALKING, DIVERGED, OUT_OF_RANGE, HALTED = range(4)
 MOST_BENT = 0.5 * np.pi
@@ -45,19 +44,10 @@ _attempt = lanes_step(_slope)
 class Pieces(NamedTuple):
     """Pieces of time that all robots walk through.
 
-    Attributes
-    ----------
-    begins
-        Time at which each piece begins, s, shape (pieces,).
-    starts, widths
-        Start of each piece in its contact interval, and its duration, s, shape (pieces,).
-    interval
-        The contact interval each piece belongs to, shape (pieces,).
-    sample
-        Place in ``record`` of the state at the end of a piece, -1 for none, shape (pieces,).
-    contact, stroke
-        By interval: whether each foot stands, and where it is at the start (m ahead of mid-stroke), shape
-        (intervals, N, 2).
+    Each begins at a time, starts so far into its contact interval and has a width, s; it belongs to a contact
+    ``interval``, and ``sample`` is the place in ``record`` of the state at its end, -1 for none; all of shape
+    (pieces,). By interval, ``contact`` says whether each foot stands and ``stroke`` where it is at the start, m ahead
+    of mid-stroke, shape (intervals, N, 2).
     """
 
     begins: Any
@@ -72,18 +62,10 @@ class Pieces(NamedTuple):
 class Robots(NamedTuple):
     """Robots and their commands.
 
-    Attributes
-    ----------
-    scalars, feet
-        See ``dynamics.py``, shape (robots, 4); forward offset and half-width, m, shape (robots, 2).
-    damping
-        N*m*s/rad, shape (robots, N-1).
-    friction
-        Friction of every foot, N*s/m, shape (robots, N, 2).
-    profile, lag, torque
-        See :class:`chilopod.engine.Actuators`, shapes (7, robots, N-1), (robots, N-1), (robots, N-1).
-    yaw
-        Yaw of the legs of module 1, rad, shape (robots, 2).
+    ``scalars``, see ``dynamics.py``, has shape (robots, 4), ``feet`` (forward offset and half-width, m) and ``yaw`` (of
+    the legs of module 1, rad) have shape (robots, 2), ``damping`` (N*m*s/rad) shape (robots, N-1), ``friction`` of
+    every foot (N*s/m) shape (robots, N, 2). ``profile``, ``lag`` and ``torque`` are those of
+    :class:`chilopod.engine.Actuators`, shapes (7, robots, N-1), (robots, N-1) and (robots, N-1).
     """
 
     scalars: Any
@@ -107,22 +89,11 @@ class _Lanes(NamedTuple):
 
 
 class _Places(NamedTuple):
-    """Where the robot in each lane is.
+    """Where the robot in each lane is: its number, or NOBODY, and its piece.
 
-    No step straddles the end of a ramp: a piece is walked in parts.
-
-    Attributes
-    ----------
-    robot, piece
-        Number of the robot, or NOBODY, and of its piece.
-    begin, end
-        From where to where of the piece the present part is, s.
-    next
-        Step to try next, s; 0 for a guess.
-    tried, rejected
-        Steps in this part so far, and whether the one before was rejected.
-    last
-        True if the present step is to be the last of the part.
+    No step straddles the end of a ramp: a piece is walked in parts, from ``begin`` to ``end`` of it (s). ``next`` is
+    the step to try next (s), 0 for a guess; ``tried`` counts the steps in this part, ``rejected`` says whether the one
+    before was, and ``last`` whether the present one is to be the last of the part.
     """
 
     robot: Any
@@ -133,6 +104,34 @@ class _Places(NamedTuple):
     tried: Any
     rejected: Any
     last: Any
+
+
+@njit
+def _fit(rows: Any, pieces: Any, robots: Any, states: Any, step: Any, status: Any, record: Any) -> bool:
+    """True if arguments of :func:`carry` have shapes that go together and are not empty: compiled loops look at no
+    index."""
+    (count, joints), size = robots.lag.shape, pieces.widths.size
+    return bool(
+        0 < rows.size <= count
+        and size > 0
+        and pieces.begins.size == size
+        and pieces.starts.size == size
+        and pieces.interval.size == size
+        and pieces.sample.size == size
+        and pieces.contact.shape == (len(pieces.contact), joints + 1, 2)
+        and pieces.stroke.shape == pieces.contact.shape
+        and states.shape == (count, 2 * joints + 6)
+        and record.shape[1:] == states.shape
+        and step.size == count
+        and status.size == count
+        and robots.scalars.shape == (count, 4)
+        and robots.feet.shape == (count, 2)
+        and robots.yaw.shape == (count, 2)
+        and robots.damping.shape == (count, joints)
+        and robots.torque.shape == (count, joints)
+        and robots.friction.shape == (count, joints + 1, 2)
+        and robots.profile.shape == (7, count, joints)
+    )
 
 
 def _carrier(width: int) -> Callable[..., bool]:
@@ -146,7 +145,7 @@ def _carrier(width: int) -> Callable[..., bool]:
     def carry(
         rows: Any, pieces: Any, robots: Any, tolerance: float, states: Any, step: Any, status: Any, record: Any
     ) -> bool:
-        if not fit(rows, pieces, robots, states, step, status, record):
+        if not _fit(rows, pieces, robots, states, step, status, record):
             return False
         n, size = pieces.contact.shape[1], states.shape[1]
         joints = n - 1
@@ -278,7 +277,7 @@ def _choose_step(lane: int, pieces: Any, lanes: Any, slope: Any, clock: Any, at:
         for i in range(lanes.x.shape[0]):
             scale = max(scale, abs(lanes.x[i, lane]))
             steep = max(steep, abs(slope[i, lane]))
-        at.next[lane] = 0.01 * max(scale, 1e-3) / steep if steep > 0.0 else left
+        at.next[lane] = first_step(scale, steep, left)
     at.last[lane] = at.next[lane] >= left * (1.0 - 1e-12)
     clock[_STEP, lane] = left if at.last[lane] else at.next[lane]
 
@@ -287,16 +286,14 @@ def _choose_step(lane: int, pieces: Any, lanes: Any, slope: Any, clock: Any, at:
 def _judge_step(lane: int, clock: Any, at: Any) -> bool:
     """Go on in time if the step was good enough, and say how long the next shall be; whether that is of any use."""
     error, step = clock[_ERROR, lane], clock[_STEP, lane]
-    factor = SAFETY / np.sqrt(np.sqrt(np.sqrt(error))) if error > 0.0 else GROW
+    factor = step_factor(error, at.rejected[lane])
     at.tried[lane] += 1
-    if error > 1.0:
-        at.next[lane] = step * max(SHRINK, factor)
-        at.rejected[lane] = True
+    at.rejected[lane] = error > 1.0
+    if at.rejected[lane]:
+        at.next[lane] = step * factor
         if at.next[lane] < 1e-14 * max(abs(clock[_TIME, lane]), at.end[lane] - at.begin[lane]):
             return False
     else:
-        factor = min(1.0 if at.rejected[lane] else GROW, factor)
-        at.rejected[lane] = False
         if not at.last[lane] or factor < 1.0:
             at.next[lane] = step * factor
         clock[_TIME, lane] += step
@@ -349,7 +346,7 @@ def walk(
     record: Any,
 ) -> bool:
     """As :func:`carry`, parted into groups, those of a group on one thread: the answer hangs on neither."""
-    if not fit(rows, pieces, robots, states, step, status, record):
+    if not _fit(rows, pieces, robots, states, step, status, record):
         return False
     for group in numba.prange(groups):
         mine = rows[group * rows.size // groups : (group + 1) * rows.size // groups]
@@ -362,27 +359,11 @@ def carry(
 ) -> None:
     """Carry robots through all pieces of time, in place, on all cores; each robot on its own, step by step.
 
-    Parameters
-    ----------
-    rows
-        Numbers of the robots that walk, at least one.
-    pieces, robots
-        See :class:`Pieces` and :class:`Robots`.
-    tolerance
-        Tolerance of the integrator, relative to max(1, |x|).
-    states
-        Reduced states with poses behind, shape (robots, 2N+4).
-    step
-        To start with, s; 0 for a guess; the last one is left there, shape (robots,).
-    status
-        Left at WALKING, or DIVERGED or OUT_OF_RANGE where a robot fails, shape (robots,).
-    record
-        States over (samples, robots, 2N+4); what no robot reached is left alone.
-
-    Raises
-    ------
-    ParameterError
-        If shapes of arrays do not go together, or there are no rows or pieces.
+    ``rows`` are the numbers of the robots that walk, at least one. States have poses behind, shape (robots, 2N+4).
+    ``step`` is the one to start with, s, 0 for a guess, and is left at the last one; ``status`` is left at WALKING, or
+    DIVERGED or OUT_OF_RANGE where a robot fails; both of shape (robots,). ``record`` has states over (samples, robots,
+    2N+4); what no robot reached is left alone. ParameterError if shapes of arrays do not go together, or there are no
+    rows or pieces.
     """
     what = (rows, pieces, robots, tolerance, states, step, status, record)
     threads = numba.get_num_threads()

@@ -26,20 +26,10 @@ _SAME_INSTANT = 1e-10  # s, within which a sample is taken at a switch
 
 
 class Timeline:
-    """The cuts of one walk.
+    """The cuts of one walk, by the contact pattern of one period and samples per second, 0 for none.
 
-    Parameters
-    ----------
-    schedule
-        Contact pattern of one period.
-    rate
-        Samples per second; 0 for none.
-
-    Attributes
-    ----------
-    position
-        Place in time, as plain numbers: time of the last cut (s), number of the contact interval it lies in, counted
-        from time 0, or ends, and number of the next sample.
+    Attribute ``position`` is the place in time, as plain numbers: time of the last cut (s), number of the contact
+    interval it lies in, counted from time 0, or ends, and number of the next sample.
     """
 
     def __init__(self, schedule: Schedule, rate: float) -> None:
@@ -61,10 +51,8 @@ class Timeline:
     def whole_pieces(self, until: float) -> tuple[Array, Array, Array, NDArray[np.intp], NDArray[np.intp]]:
         """Go on to the last cut up to a time.
 
-        Returns
-        -------
-        Of every piece between two cuts: when it begins (s), where in its contact interval that is (s), how long it
-        lasts (s), which interval of the period that is, and which sample is taken at its end, or -1.
+        Returns, of every piece between two cuts, when it begins (s), where in its contact interval that is (s), how
+        long it lasts (s), which interval of the period that is, and which sample is taken at its end, or -1.
         """
         # More than there can be: the switches and samples in between.
         span = max(until - self.cut, 0.0)

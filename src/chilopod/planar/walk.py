@@ -9,27 +9,16 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.engine import Actuators, Command, Observation, Status, Targets, Traits, one_thread
-from chilopod.engine.arguments import (
-    as_marks,
-    as_number,
-    as_robot,
-    as_robots,
-    as_seeds,
-    check_time,
-    check_wishes,
-    rows_anew,
-    rows_of,
-    standing,
-)
-from chilopod.engine.saved import pack, part, read_back, unpack
+from chilopod.engine import Command, Observation, Status, Traits, one_thread
+from chilopod.engine.arguments import as_marks, as_robot, as_robots, check_time, check_wishes, rows_anew, standing
+from chilopod.engine.batch import BatchWalk, Beginning, begin, resumed
 from chilopod.errors import ParameterError
 from chilopod.planar import stretch
 from chilopod.planar.foreseen import check_steps
 from chilopod.planar.model import PlanarModel
 from chilopod.planar.record import foot_forces, planar_record
 from chilopod.planar.timeline import Timeline
-from chilopod.record import Recording, Samples, add_outcome, bearing_and_distance, check_size, in_range
+from chilopod.record import Recording, Samples, bearing_and_distance, check_size, in_range
 from chilopod.robot import Robot
 
 Array = NDArray[np.float64]
@@ -112,69 +101,38 @@ def start(
     """
     tolerance, expected = in_range("tolerance", tolerance, 1e-2), check_wishes(record, expected)
     given = as_robots(robots)
-    n = given[0].body.modules
     if record is not None and record.poses:
         raise ParameterError("the planar model has none", field="poses", value=True, allowed="False, or the twin")
-    count, rows = rows_of(
-        given,
-        {"initial": (initial, (2 * n + 4,)), "friction": (friction, (n, 2)), "target": (target, (2,))},
-        as_seeds(seeds),
-    )
     if any(common(robot) != common(given[0]) for robot in given[1:]):
         raise ParameterError("must have the same gait and number of modules", field="robots")
-    all_robots = given * count if len(given) == 1 else given
-    states = rows["initial"]
-    return PlanarWalk(
-        all_robots,
-        np.broadcast_to(initial_states(given[0]) if states is None else states, (count, 2 * n + 4)).copy(),
-        np.ones((count, n, 2)) if rows["friction"] is None else rows["friction"],
-        rows["target"],
-        record,
-        tolerance,
-        expected,
-    )
+    standing_still = initial_states(given[0])
+    begun = begin(given, standing_still, standing_still.shape[1], initial, friction, target, seeds)
+    return PlanarWalk(begun, record, tolerance, expected)
 
 
 def resume(saved: bytes) -> PlanarWalk:
     """A walk that was saved, see :class:`chilopod.engine.Engine`."""
-    robots, settings, arrays = unpack(traits, saved)
-    with read_back():
-        walk = PlanarWalk(
-            robots,
-            arrays["states"],
-            arrays["factors"],
-            None,
-            None if settings["record"] is None else Recording(**settings["record"]),
-            as_number("tolerance", settings["tolerance"]),
-        )
-        walk.restore(settings, arrays)
-    return walk
+    return resumed(traits, saved, PlanarWalk)
 
 
 @one_thread
-class PlanarWalk:
+class PlanarWalk(BatchWalk):
     """Robots under way on the plane, see :class:`chilopod.engine.Walk`; :func:`start` makes one.
 
-    A leg's yaw moves at once here and matters only while its foot stands.
+    A target is seen wherever it is. A leg's yaw moves at once here and matters only while its foot stands.
     """
 
-    def __init__(
-        self,
-        robots: Sequence[Robot],
-        states: Array,
-        factors: Array,
-        target: Array | None,
-        record: Recording | None,
-        tolerance: float,
-        expected: float = 0.0,
-    ) -> None:
-        self._robots = tuple(robots)
-        distinct: dict[int, PlanarModel] = {}
-        self._models = [distinct.setdefault(id(robot), PlanarModel(robot)) for robot in robots]
+    def __init__(self, begun: Beginning, record: Recording | None, tolerance: float, expected: float = 0.0) -> None:
+        robots, states = begun.robots, begun.states
+        distinct = {id(robot): robot for robot in robots}
+        for robot in distinct.values():
+            check_steps(robot, expected)
+        super().__init__(traits, begun, record, tolerance, expected, states.size)
+        models = {key: PlanarModel(robot) for key, robot in distinct.items()}
+        self._models = [models[id(robot)] for robot in robots]
         self._modules = self._models[0].modules
-        self._record, self._tolerance, self._factors = record, tolerance, factors
         self._own_friction = np.array([robot.ground.friction for robot in robots])[:, None, None]
-        self._friction = self._own_friction * factors
+        self._friction = self._own_friction * self._factors
         schedule = self._models[0].schedule
         self._feet = (schedule.contact, schedule.stroke)
         self._bodies = (
@@ -182,30 +140,13 @@ class PlanarWalk:
             np.array([(robot.legs.forward_offset, robot.legs.half_width) for robot in robots]),
         )
         self._damping = np.array([robot.springs.damping for robot in robots])
-        self._actuators = Actuators(robots, keep=record is not None)
-        self._targets = Targets(len(robots), target, keep=record is not None)
         self._timeline = Timeline(schedule, record.rate if record else 0.0)
-        self._time = 0.0
         self._states, self._step = states, np.zeros(len(robots))
         self._status = np.full(len(robots), stretch.WALKING)
         self._here: tuple[Array, Array, NDArray[np.intp]] | None = None
-        for robot in {id(robot): robot for robot in robots}.values():
-            check_steps(robot, expected)
-        check_size(record, expected, states.size)
-        rows = int(expected * record.rate) + 2 if record else 0
-        self._samples = Samples(states.shape, rows)
+        self._samples = Samples(states.shape, self._expected_rows)
         if record:
             self._samples.grown(1)[0] = states
-
-    @property
-    def robots(self) -> tuple[Robot, ...]:
-        """One a walk."""
-        return self._robots
-
-    @property
-    def time(self) -> float:
-        """s."""
-        return self._time
 
     @property
     def status(self) -> tuple[Status, ...]:
@@ -213,26 +154,19 @@ class PlanarWalk:
         return tuple(_STATUS[int(each)] for each in self._status)
 
     def observe(self) -> Observation:
-        """See :class:`chilopod.engine.Walk`; a target is seen wherever it is."""
         states, n = self._seen(), self._modules
         bearing, distance = bearing_and_distance(
             states[:, 2 * n + 1 : 2 * n + 3], states[:, 2 * n + 3], self._targets.present
         )
-        told = self._actuators
-        return Observation(
-            self._time, bearing, distance, states[:, 3 : n + 2], told.leg_yaw.copy(), told.stiffness(self._time)
-        )
+        return self._observation(bearing, distance, states[:, 3 : n + 2])
 
     def pose(self) -> Array:
-        """See :class:`chilopod.engine.Walk`."""
         return self._seen()[:, 2 * self._modules + 1 :]
 
     def aim(self, target: ArrayLike) -> None:
-        """See :class:`chilopod.engine.Walk`."""
         self._targets.move(self._time, target)
 
     def halt(self, which: NDArray[np.bool_]) -> None:
-        """See :class:`chilopod.engine.Walk`."""
         marked = as_marks("which", which, len(self._robots))
         self._arrive(marked)
         marked &= self._status == stretch.WALKING
@@ -241,7 +175,6 @@ class PlanarWalk:
             self._here[-1][marked] = stretch.HALTED
 
     def states(self) -> Array:
-        """See :class:`chilopod.engine.Walk`: states with poses, (robots, 2N+4)."""
         return self._seen()
 
     def restart(
@@ -251,7 +184,6 @@ class PlanarWalk:
         friction: ArrayLike | None = None,
         seeds: Sequence[int] | None = None,
     ) -> None:
-        """See :class:`chilopod.engine.Walk`; seeds are not used."""
         arguments = {
             "initial": (initial, self._states.shape[1:]),
             "friction": (friction, self._factors.shape[1:]),
@@ -267,7 +199,6 @@ class PlanarWalk:
             self._actuators.restart(marked)
 
     def command(self, command: Command) -> None:
-        """See :class:`chilopod.engine.Walk`."""
         *_, status = self._now()
         self._actuators.command(self._time, command, status == stretch.WALKING)
         self._arrive(np.ones(len(self._robots), dtype=np.bool_))
@@ -275,45 +206,27 @@ class PlanarWalk:
         self._here = None
 
     def advance(self, until: float) -> None:
-        """See :class:`chilopod.engine.Walk`."""
         until = check_time(until, self._time)
         check_size(self._record, until, self._states.size)
         pieces = self._timeline.whole_pieces(until)
         self._time, self._here = until, None
         self._carry(pieces, self._states, self._step, self._status)
 
-    def save(self) -> bytes:
-        """See :class:`chilopod.engine.Walk`."""
-        record = self._record
-        settings = {
-            "record": None if record is None else {"rate": record.rate, "forces": record.forces, "poses": record.poses},
-            "tolerance": self._tolerance,
-            "time": self._time,
-        }
-        arrays = {
+    def _saved(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        return {}, {
             "states": self._states,
             "step": self._step,
             "status": self._status,
-            "factors": self._factors,
             "position": self._timeline.position,
             "samples": self._samples.rows,
-            **{f"target_{name}": values for name, values in self._targets.state().items()},
-            **{f"told_{name}": values for name, values in self._actuators.state().items()},
         }
-        return pack(traits, self._robots, settings, arrays)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return resume, (self.save(),)
 
     def restore(self, settings: dict[str, Any], arrays: dict[str, Any]) -> None:
-        """Become as the walk was that was saved, of the same robots."""
-        self._time = as_number("time", settings["time"])
+        super().restore(settings, arrays)
         self._step, self._status = arrays["step"], arrays["status"]
         self._timeline.position = arrays["position"]
         if len(arrays["samples"]):
             self._samples.grown(len(arrays["samples"]))[:] = arrays["samples"]
-        self._actuators.restore(part(arrays, "told_"))
-        self._targets.restore(part(arrays, "target_"))
 
     def to_dataset(self, copy: bool = True) -> xr.Dataset:
         """The record so far, see :func:`chilopod.planar.simulate`; without a copy if the walk ends here."""
@@ -328,13 +241,8 @@ class PlanarWalk:
         if self._record and self._record.forces:
             acting = self._actuators.leg_yaw_told(times)
             data["foot_force"] = foot_forces(self._models, times, states, acting, self._friction)
-        add_outcome(data, [each.label for each in self.status], self._targets.recorded(times))
-        data.attrs = {
-            "engine": traits.name,
-            "robot": self._robots[0].to_toml(),
-            "duration": self._time,
-            "tolerance": self._tolerance,
-        }
+        self._finish(data, times)
+        data.attrs["tolerance"] = self._tolerance
         return data
 
     # -- inside

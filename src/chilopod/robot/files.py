@@ -47,22 +47,11 @@ def presets() -> list[str]:
 
 
 def read_table(robot: str | Path) -> tuple[dict[str, Any], str]:
-    """Read a robot file or preset.
+    """Read a robot file, or a preset by its name: the table as it stands in the file, not yet validated, and what to
+    call the source in messages.
 
-    Parameters
-    ----------
-    robot
-        Name of a preset or path of a file. A file that is named like a preset is reached as ``./name``.
-
-    Returns
-    -------
-    tuple
-        The table as it stands in the file, not yet validated, and what to call the source in messages.
-
-    Raises
-    ------
-    RobotFileError
-        If there is no such file or preset, or it is no TOML.
+    A file that is named like a preset is reached as ``./name``. RobotFileError if there is no such file or preset, or
+    it is no TOML.
     """
     if not isinstance(robot, str | Path):
         raise RobotFileError("is no robot", field="robot", value=robot, allowed="a preset or the path of a file")
@@ -74,8 +63,11 @@ def read_table(robot: str | Path) -> tuple[dict[str, Any], str]:
         missing = not (source and path.exists())
     except OSError:
         missing = False  # reading it says why it cannot be
+    if missing and (isinstance(robot, Path) or len(path.parts) > 1 or path.suffix):
+        raise RobotFileError("no such file", source=source, nearest=nearest_name(source, names))
     if missing:
-        raise _not_found(robot, names)
+        allowed, nearest = f"a robot file or one of the presets {', '.join(names)}", nearest_name(source, names)
+        raise RobotFileError("no such preset or file", value=source, allowed=allowed, nearest=nearest)
     text = read_text(path, "robot file", RobotFileError)
     try:
         return parsed(text), source
@@ -85,13 +77,7 @@ def read_table(robot: str | Path) -> tuple[dict[str, Any], str]:
 
 
 def parsed(text: str) -> dict[str, Any]:
-    """Read TOML text, whoever wrote it.
-
-    Raises
-    ------
-    RobotFileError
-        If it is none, or would take very long to read.
-    """
+    """Read TOML text, whoever wrote it; RobotFileError if it is none, or would take very long to read."""
     # What takes Python's reader time that grows with the square of their number: the parts of one key. Between two of
     # these characters there is a key at most, or part of a text; and no text of a robot is that long.
     dots = max(between.count(".") for between in _BETWEEN_KEYS.split(text))
@@ -108,14 +94,6 @@ def parsed(text: str) -> dict[str, Any]:
 def to_toml(table: Mapping[str, Any]) -> str:
     """Write a table as TOML text that reads back to equal values; None values are left out."""
     return "\n".join(_lines(table, ())).strip() + "\n"
-
-
-def _not_found(robot: str | Path, names: list[str]) -> RobotFileError:
-    source, path = str(robot), Path(robot)
-    if isinstance(robot, Path) or len(path.parts) > 1 or path.suffix:
-        return RobotFileError("no such file", source=source, nearest=nearest_name(source, names))
-    allowed = f"a robot file or one of the presets {', '.join(names)}"
-    return RobotFileError("no such preset or file", value=source, allowed=allowed, nearest=nearest_name(source, names))
 
 
 def _frozen(value: Any) -> Any:

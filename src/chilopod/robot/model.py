@@ -90,25 +90,13 @@ class Robot(Description):
 
     @classmethod
     def load(cls, robot: str | Path) -> Self:
-        """Read a robot file, or a preset by its name.
-
-        Raises
-        ------
-        RobotFileError
-            If it cannot be read or describes no valid robot; the message says where and why.
-        """
+        """Read a robot file, or a preset by its name; RobotFileError says where and why that is no valid robot."""
         table, source = read_table(robot)
         try:
             return cls(**table)
         except ChilopodError as error:
-            raise RobotFileError(
-                error.problem,
-                field=error.field,
-                value=error.value,
-                allowed=error.allowed,
-                nearest=error.nearest,
-                source=source,
-            ) from None
+            told = {name: getattr(error, name) for name in ("field", "value", "allowed", "nearest")}
+            raise RobotFileError(error.problem, **told, source=source) from None
         except RecursionError:
             raise RobotFileError("is nested too deeply", source=source) from None
 
@@ -137,11 +125,8 @@ class Robot(Description):
         for key in quantities(Springs):
             values = getattr(self.springs, key)
             if values is not None and len(values) != joints:
-                raise ParameterError(
-                    f"has {len(values)} values",
-                    field=f"springs.{key}",
-                    allowed=f"{joints}, one fewer than body.modules, or a single value for all",
-                )
+                allowed = f"{joints}, one fewer than body.modules, or a single value for all"
+                raise ParameterError(f"has {len(values)} values", field=f"springs.{key}", allowed=allowed)
         for path in self.provenance:
             try:
                 self._locate(path)
@@ -186,18 +171,10 @@ class Robot(Description):
         return tuple(paths)
 
     def get(self, path: str) -> float:
-        """Return a parameter in SI units.
+        """Return a parameter in SI units, such as ``gait.stride`` or ``springs.stiffness[0]``.
 
-        Parameters
-        ----------
-        path
-            Such as ``gait.stride`` or ``springs.stiffness[0]``. Without an index the springs count as one parameter,
-            which has a value if all are alike. ``body.yaw_inertia`` is `module_yaw_inertia` where none is given.
-
-        Raises
-        ------
-        ParameterError
-            If `path` names no number, or springs of different value.
+        Without an index the springs count as one parameter, which has a value if all are alike. ``body.yaw_inertia`` is
+        `module_yaw_inertia` where none is given. Here and below, a path that names no number is a ParameterError.
         """
         place = self._locate(path)
         if path == "body.yaw_inertia":
@@ -212,17 +189,11 @@ class Robot(Description):
         return float(value[place.index or 0])
 
     def unit_of(self, path: str) -> str:
-        """Return the unit a parameter is written in, such as ``N*mm/deg``; empty for a count.
-
-        Raises
-        ------
-        ParameterError
-            If `path` names no number.
-        """
+        """Return the unit a parameter is written in, such as ``N*mm/deg``; empty for a count."""
         return self._locate(path).quantity.display
 
     def si_unit_of(self, path: str) -> str:
-        """Return the SI unit of what `get` returns, such as ``N*m/rad``; raises as `unit_of`."""
+        """Return the SI unit of what `get` returns, such as ``N*m/rad``."""
         return self._locate(path).quantity.si
 
     def with_value(self, path: str, value: float) -> Self:
@@ -231,11 +202,7 @@ class Robot(Description):
         `path` is as for `get`; without an index all springs are set. Changing ``body.modules`` repeats the last spring
         and damper for joints that are new and drops those that are gone; length and mass are those of the whole robot
         and stay. What `provenance` said of a changed parameter is replaced by a note that it was overridden.
-
-        Raises
-        ------
-        ParameterError
-            If `path` names no number or `value` is out of range.
+        ParameterError if `value` is out of range.
         """
         place = self._locate(path)
         try:
@@ -257,13 +224,7 @@ class Robot(Description):
             raise
 
     def set_from_text(self, assignments: Iterable[str]) -> Self:
-        """Return this robot with overrides such as ``springs.stiffness[0]=12 N*mm/deg`` made in the order given.
-
-        Raises
-        ------
-        ParameterError, UnitError
-            If one of them is no assignment, or as `override`.
-        """
+        """Return this robot with overrides such as ``springs.stiffness[0]=12 N*mm/deg`` made in the order given."""
         robot = self
         for assignment in assignments:
             path, equals, value = assignment.partition("=")

@@ -44,12 +44,7 @@ QUANTITIES: Final = {
 @lru_cache(maxsize=1024)
 def place_of(path: str) -> Place:
     """Read a dotted path such as ``springs.stiffness[0]``; whether the robot has that many springs is not checked.
-
-    Raises
-    ------
-    ParameterError
-        If `path` names no number, with the nearest path that does.
-    """
+    ParameterError if it names no number, with the nearest path that does."""
     known = QUANTITIES
     match = _PATH.fullmatch(path)
     stem, index = match.groups() if match else (path, None)

@@ -81,11 +81,8 @@ class Springs(Description):
         if self.softest is not None and self.stiffest is not None:
             for joint, (low, high) in enumerate(zip(self.softest, self.stiffest, strict=False)):
                 if low > high:
-                    raise ParameterError(
-                        f"of joint {joint + 1}, softest is above stiffest",
-                        value=f"{low:g} N*m/rad",
-                        allowed=f"at most {high:g} N*m/rad",
-                    )
+                    problem = f"of joint {joint + 1}, softest is above stiffest"
+                    raise ParameterError(problem, value=f"{low:g} N*m/rad", allowed=f"at most {high:g} N*m/rad")
         return self
 
 
@@ -110,19 +107,19 @@ class Twin(Description):
     Attributes
     ----------
     hip_height
-        Hip height of the leg's pitch axis at the body above the centre of its foot in stance, m.
+        Height of a leg's pitch axis at the body above the centre of its foot in stance, m.
     upper_link, lower_link
         Lengths of the two links of a leg, from pitch axis to pitch axis and from there to the foot's centre, m.
     link_mass
-        Link mass of each link, kg; taken from the mass of the whole robot.
+        Mass of each link, kg; taken from the mass of the whole robot.
     foot_radius
-        Foot radius of the round foot, m.
+        Radius of the round foot, m.
     body_width, body_height
-        Body width and body height of the box that a module's body is, m; its length is that of the module.
+        Width and height of the box that a module's body is, m; its length is that of the module.
     clearance
         Height of the tip path's half ellipse, m.
     servo_stiffness, servo_damping
-        Servo stiffness and servo damping of every leg joint's position servo, N*m/rad and N*m*s/rad.
+        Stiffness and damping of every leg joint's position servo, N*m/rad and N*m*s/rad.
     joint_inertia
         Reflected inertia of every servo's motor, kg*m^2.
     sliding_friction
@@ -134,7 +131,7 @@ class Twin(Description):
     control_interval
         Time between two servo targets, s.
     timestep
-        Timestep of the simulation, s; a whole number of them makes a control interval.
+        Step of the simulation, s; a whole number of them makes a control interval.
     scanner_view, scanner_step
         Whole angle the scanner sees, centred ahead, and between two of its beams, rad.
     scanner_period
@@ -144,9 +141,9 @@ class Twin(Description):
     scanner_resolution, scanner_noise
         Step of its distances, and standard deviation of their error, m.
     scanner_offset
-        Scanner offset of the scanner ahead of the centre of module 1, m.
+        Distance of the scanner ahead of the centre of module 1, m.
     pole_radius
-        Pole radius of the pole that marks a target, m.
+        Radius of the pole that marks a target, m.
     """
 
     hip_height: Annotated[float, Quantity("m", "mm")]
@@ -179,12 +176,9 @@ class Twin(Description):
     def _whole_steps(self) -> Self:
         steps = self.control_interval / self.timestep
         if not (steps > 0.5 and abs(steps - round(steps)) < 1e-6):
-            raise ParameterError(
-                "does not go into twin.control_interval a whole number of times",
-                field="timestep",
-                value=f"{self.timestep:g} s",
-                allowed=f"{self.control_interval:g} s over a whole number",
-            )
+            problem = "does not go into twin.control_interval a whole number of times"
+            allowed = f"{self.control_interval:g} s over a whole number"
+            raise ParameterError(problem, field="timestep", value=f"{self.timestep:g} s", allowed=allowed)
         return self
 
 

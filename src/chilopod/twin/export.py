@@ -35,21 +35,11 @@ _KINDS = {"inertial": "body", "general": "actuator"}
 
 
 def mjcf(robot: Robot) -> str:
-    """The robot as the text of an MJCF file.
+    """The robot, one with a twin, as the text of an MJCF file.
 
     MuJoCo makes of it the model that :func:`chilopod.twin.simulate` uses, every number to the bit. For the viewer there
     are a floor one can see, a light, a camera that follows, and the keyframe ``start``: the robot before it walks, with
-    the servo targets of that instant.
-
-    Parameters
-    ----------
-    robot
-        With a twin.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such robot.
+    the servo targets of that instant. ParameterError if the twin cannot be built.
     """
     twin = TwinModel(robot)
     spec = build(robot)
@@ -65,11 +55,10 @@ def mjcf(robot: Robot) -> str:
 
 
 def urdf(robot: Robot) -> str:
-    """The robot as the text of a URDF file.
+    """The robot as the text of a URDF file; ParameterError as for :func:`mjcf`.
 
     Links are named as in MuJoCo; that of module 1 is the root and floats. Feet alone collide. URDF has no springs, no
-    servos and no friction of the floor: a comment in the file says what they are. Parameter and
-    error are those of :func:`mjcf`.
+    servos and no friction of the floor: a comment in the file says what they are.
     """
     twin, model = twin_of(robot), TwinModel(robot).model
     root = ET.Element("robot", name=robot.name)
@@ -108,13 +97,7 @@ FORMATS: dict[str, tuple[str, Callable[[Robot], str]]] = {".xml": ("MJCF", mjcf)
 
 
 def format_of(suffix: str) -> tuple[str, Callable[[Robot], str]]:
-    """The format that goes with a suffix, such as ``.urdf``.
-
-    Raises
-    ------
-    ParameterError
-        If none does.
-    """
+    """The format that goes with a suffix, such as ``.urdf``; ParameterError if none does."""
     if suffix.lower() not in FORMATS:
         allowed = " or ".join(f"{end} ({name})" for end, (name, _) in FORMATS.items())
         raise ParameterError("is the suffix of no format", field="out", value=suffix, allowed=allowed)

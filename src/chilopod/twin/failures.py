@@ -24,22 +24,12 @@ def failures(
     yaw_positions: NDArray[np.intp],
     warned: NDArray[np.bool_],
 ) -> dict[int, tuple[int, Status]]:
-    """Failures of the robots of a batch in some steps.
+    """Failures of the robots of a batch in some steps: by robot, the first step that is no longer a walk's, and how it
+    ended.
 
-    Parameters
-    ----------
-    positions, rates
-        MuJoCo's ``qpos`` and ``qvel`` after every step, shapes (robots, steps, nq) and (robots, steps, nv).
-    before
-        The same before the first step, (robots, nq) and (robots, nv).
-    yaw_positions
-        Yaw positions of the yaw joints in ``qpos``, (N-1,).
-    warned
-        True if MuJoCo warned of a robot, which it then stopped, repeating its last state, (robots,).
-
-    Returns
-    -------
-    By robot: the first step that is no longer a walk's, and how it ended.
+    Positions and rates are MuJoCo's ``qpos`` and ``qvel`` after every step, shapes (robots, steps, nq) and (robots,
+    steps, nv), ``before`` the same before the first step, (robots, nq) and (robots, nv). The yaw joints have their
+    places in ``qpos``, (N-1,). MuJoCo stops a robot that it warned of, (robots,), and repeats its last state.
     """
     bends = positions[..., yaw_positions]
     with np.errstate(invalid="ignore", over="ignore"):

@@ -49,19 +49,8 @@ context.free()
 
 @dataclass(frozen=True)
 class Found:
-    """Backend that was found.
-
-    Attributes
-    ----------
-    backend
-        ``egl``, ``osmesa``, ``glfw`` or ``cgl``; None if none works.
-    renderer
-        Name of the driver.
-    missing
-        Missing part, in a few words; empty if there is none.
-    mend
-        The one thing to do about it.
-    """
+    """Backend that was found, ``egl``, ``osmesa``, ``glfw`` or ``cgl``, and the name of its driver; or None, what is
+    missing in a few words, and the one thing to do about it."""
 
     backend: str | None
     renderer: str = ""
@@ -96,13 +85,7 @@ def find() -> Found:
 
 
 def import_mujoco() -> None:
-    """Import MuJoCo even where ``MUJOCO_GL`` names what is not there; on its own, MuJoCo does not survive that.
-
-    Raises
-    ------
-    ImportError
-        If it is not installed.
-    """
+    """Import MuJoCo even where ``MUJOCO_GL`` names what is not there; on its own, MuJoCo does not survive that."""
     try:
         importlib.import_module("mujoco")
     except ImportError:
@@ -118,25 +101,10 @@ def import_mujoco() -> None:
             os.environ["MUJOCO_GL"] = wish
 
 
-def backend() -> str | None:
-    """The backend that works here, or None."""
-    return find().backend
-
-
 @contextmanager
 def context(width: int, height: int) -> Iterator[None]:
-    """Make OpenGL ready to draw off-screen within.
-
-    Parameters
-    ----------
-    width, height
-        Width and height of what is drawn, pixels.
-
-    Raises
-    ------
-    OutputError
-        If there is no backend that works; its one line says what to do about it.
-    """
+    """Make OpenGL ready to draw off-screen within, so many pixels; OutputError if no backend works, with what to do
+    about it."""
     found = find()
     if found.backend is None:
         raise OutputError(f"films and stills in 3-D need OpenGL; {found.missing}; to mend it: {found.mend}")

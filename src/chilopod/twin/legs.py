@@ -17,19 +17,8 @@ Array = NDArray[np.float64]
 
 
 def tip_path(robot: Robot, phase: ArrayLike) -> Array:
-    """Where the tip of a leg is to be.
-
-    Parameters
-    ----------
-    robot
-        With a twin.
-    phase
-        In cycles, any shape; 0 is touch-down at the AEP.
-
-    Returns
-    -------
-    Ahead of and above the middle of the stance line, m, shape (..., 2).
-    """
+    """Where the tip of a leg is to be at a phase in cycles, any shape (0 is touch-down at the AEP): ahead of and above
+    the middle of the stance line, m, shape (..., 2)."""
     gait, clearance = robot.gait, twin_of(robot).clearance
     cycles = np.asarray(phase, dtype=np.float64) % 1.0
     above = np.where(gait.stands(cycles), 0.0, clearance * np.sin(gait.swing_angle(cycles)))
@@ -37,24 +26,8 @@ def tip_path(robot: Robot, phase: ArrayLike) -> Array:
 
 
 def joint_angles(twin: Twin, ahead: ArrayLike, below: ArrayLike) -> Array:
-    """Inverse kinematics of the two pitch joints.
-
-    Parameters
-    ----------
-    twin
-        Lengths of the links.
-    ahead, below
-        Position of the foot's centre relative to the hip, m.
-
-    Returns
-    -------
-    Hip and knee, rad, shape (..., 2).
-
-    Raises
-    ------
-    ParameterError
-        If the leg is too short, or its links too unlike, to get there.
-    """
+    """Inverse kinematics of the two pitch joints: hip and knee, rad, shape (..., 2), that put the foot's centre so far
+    ahead of and below the hip, m. ParameterError if the leg is too short, or its links too unlike, to get there."""
     x, z = np.broadcast_arrays(np.asarray(ahead, dtype=np.float64), np.asarray(below, dtype=np.float64))
     upper, lower = twin.upper_link, twin.lower_link
     distance = np.hypot(x, z)
@@ -72,53 +45,23 @@ def joint_angles(twin: Twin, ahead: ArrayLike, below: ArrayLike) -> Array:
 
 
 def servo_targets(robot: Robot, times: ArrayLike) -> Array:
-    """Hip and knee of every leg over time.
-
-    Parameters
-    ----------
-    robot
-        With a twin.
-    times
-        s, shape (T,).
-
-    Returns
-    -------
-    rad, shape (T, modules, 2 sides, 2 joints).
-
-    Raises
-    ------
-    ParameterError
-        If the legs cannot follow.
-    """
+    """Hip and knee of every leg at times, s, shape (T,): rad, shape (T, modules, 2 sides, 2 joints). ParameterError if
+    the legs cannot follow."""
     twin = twin_of(robot)
     tip = tip_path(robot, robot.gait.phases(times, robot.body.modules))
     return joint_angles(twin, tip[..., 0], twin.hip_height - tip[..., 1])
 
 
 def check_reach(robot: Robot) -> None:
-    """Make sure, before anything is simulated, that the legs reach all of their path.
-
-    Raises
-    ------
-    ParameterError
-        If they do not.
-    """
+    """Make sure, before anything is simulated, that the legs reach all of their path; ParameterError if they do not."""
     tip = tip_path(robot, np.linspace(0.0, 1.0, 721))
     joint_angles(twin_of(robot), tip[:, 0], twin_of(robot).hip_height - tip[:, 1])
 
 
 def twin_of(robot: Robot) -> Twin:
-    """The robot's [twin].
-
-    Raises
-    ------
-    ParameterError
-        If it has none.
-    """
+    """The robot's [twin]; ParameterError if it has none."""
     if robot.twin is None:
-        raise ParameterError(
-            "this robot has none, so the three-dimensional model cannot be built",
-            field="twin",
-            allowed="the keys of [twin] in the robot file; the preset aoi2022 has them",
-        )
+        problem = "this robot has none, so the three-dimensional model cannot be built"
+        allowed = "the keys of [twin] in the robot file; the preset aoi2022 has them"
+        raise ParameterError(problem, field="twin", allowed=allowed)
     return robot.twin

@@ -48,7 +48,7 @@ _ROLLING = (0.0, 0.0)  # feet do not resist turning on the spot nor rolling
 
 
 class TwinModel:
-    """A robot compiled for MuJoCo, and where its parts are in MuJoCo's arrays.
+    """A robot compiled for MuJoCo, and where its parts are in MuJoCo's arrays; ParameterError if there is none such.
 
     Parameters
     ----------
@@ -65,26 +65,17 @@ class TwinModel:
         As given.
     model
         Compiled; not to be changed.
-    yaw_joints
-        Index of the yaw joints among the joints, front to rear, (N-1,).
-    yaw_positions, yaw_rates
-        Yaw positions and yaw rates of the yaw joints in ``qpos`` and ``qvel``, (N-1,).
+    yaw_joints, yaw_positions, yaw_rates
+        Numbers of the yaw joints, front to rear, and their places in ``qpos`` and ``qvel``, (N-1,).
     feet
         Geom of every foot, (N, 2).
-    leg_positions
-        Leg positions of hip and knee in ``qpos``, (N, 2, 2).
-    leg_controls
-        Leg controls of their servos in ``ctrl``, (N, 2, 2).
+    leg_positions, leg_controls
+        Places of hip and knee in ``qpos``, and of their servos in ``ctrl``, (N, 2, 2).
     leg_yaw_positions, leg_yaw_controls
-        Leg yaw positions and leg yaw controls of the leg yaw joints of module 1, (2,).
+        Places of the leg yaw joints of module 1, likewise, (2,).
     spring_controls
-        Spring controls of the actuators that change the springs, (N-1,): N*m/rad above the spring's own stiffness;
+        Places in ``ctrl`` of the actuators that change the springs, (N-1,): N*m/rad above the spring's own stiffness;
         empty if none does.
-
-    Raises
-    ------
-    ParameterError
-        If there is no such robot: legs that cannot reach, bodies that touch the floor, masses that do not add up.
     """
 
     def __init__(self, robot: Robot, forces: bool = False, edit: Edit | None = None) -> None:
@@ -237,19 +228,13 @@ def _legs(module: int) -> list[str]:
 
 def _check_bodies(robot: Robot, twin: Twin) -> None:
     if 4.0 * twin.link_mass >= robot.module_mass:
-        raise ParameterError(
-            "leaves no mass for the bodies: a module has four links",
-            field="twin.link_mass",
-            value=f"{twin.link_mass:g} kg",
-            allowed=f"less than {0.25 * robot.module_mass:.4g} kg",
-        )
+        problem = "leaves no mass for the bodies: a module has four links"
+        allowed = f"less than {0.25 * robot.module_mass:.4g} kg"
+        raise ParameterError(problem, field="twin.link_mass", value=f"{twin.link_mass:g} kg", allowed=allowed)
     if 0.5 * twin.body_height >= twin.hip_height + twin.foot_radius:
-        raise ParameterError(
-            "the body would touch the floor",
-            field="twin.body_height",
-            value=f"{1e3 * twin.body_height:g} mm",
-            allowed=f"less than {2e3 * (twin.hip_height + twin.foot_radius):g} mm",
-        )
+        problem = "the body would touch the floor"
+        allowed = f"less than {2e3 * (twin.hip_height + twin.foot_radius):g} mm"
+        raise ParameterError(problem, field="twin.body_height", value=f"{1e3 * twin.body_height:g} mm", allowed=allowed)
     low, high = yaw_inertia_range(robot.body, robot.legs, twin)
     if not low <= robot.module_yaw_inertia <= high:
         raise ParameterError(

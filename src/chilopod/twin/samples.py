@@ -10,15 +10,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class Sampling:
-    """Samples at the steps that are nearest to their times.
-
-    Attributes
-    ----------
-    rate
-        Samples per second; 0 for none.
-    timestep
-        s.
-    """
+    """Samples at the steps that are nearest to their times: samples per second, 0 for none, and the timestep, s."""
 
     rate: float
     timestep: float

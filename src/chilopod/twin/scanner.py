@@ -28,16 +28,9 @@ def beams(twin: Twin) -> Array:
 
 
 class Scanner:
-    """The scanners of a batch of robots: a scan every so often, looked at when it is asked for.
+    """The scanners of a batch of robots, where they start: a scan every so often, looked at when it is asked for.
 
-    Parameters
-    ----------
-    twin
-        Twin that carries the scanner.
-    batch
-        The robots, where they start.
-    seeds
-        Seeds of its noise, one a robot, which the walk may replace; None for none.
+    Its noise has a seed for each robot, which the walk may replace, or there is none.
     """
 
     def __init__(self, twin: Twin, batch: Batch, seeds: NDArray[np.object_] | None) -> None:
@@ -51,15 +44,8 @@ class Scanner:
     def passed(self, before: int, now: int, poses: Array, ids: NDArray[np.intp]) -> None:
         """Take note of where robots were, for the last scan up to now.
 
-        Parameters
-        ----------
-        before, now
-            Control intervals gone by since the start.
-        poses
-            Poses of module 1 at the end of every interval from ``before`` on: place and quaternion, shape
-            (len(ids), intervals, 7).
-        ids
-            Numbers of the robots.
+        Times are control intervals gone by since the start. Poses of module 1, place and quaternion, are those at the
+        end of every interval from ``before`` on, shape (len(ids), intervals, 7).
         """
         number = int(now / self._every + _SAME_INSTANT)
         while self._tick_of(number) > now:  # the same number, however time is cut
@@ -108,24 +94,10 @@ class Scanner:
 
 
 def scan(twin: Twin, batch: Batch, poses: Array, ids: NDArray[np.intp], noise: Array | None = None) -> Array:
-    """One scan of some robots.
+    """One scan of some robots: distances, m, shape (len(ids), beams); NaN where there is nothing within range.
 
-    Parameters
-    ----------
-    twin
-        The scanner.
-    batch
-        The robots and their targets.
-    poses
-        Poses of module 1 of all robots at the time of the scan: place and quaternion, shape (robots, 7).
-    ids
-        Numbers of the robots.
-    noise
-        Standard normal deviates, shape (len(ids), beams); None for a scanner without noise.
-
-    Returns
-    -------
-    Distances, m, shape (len(ids), beams); NaN where there is nothing within range.
+    Poses of module 1 are those of all robots at the time of the scan, place and quaternion, shape (robots, 7). Noise is
+    given as standard normal deviates, shape (len(ids), beams).
     """
     angles = beams(twin)
     local = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=-1)
@@ -144,19 +116,8 @@ def scan(twin: Twin, batch: Batch, poses: Array, ids: NDArray[np.intp], noise: A
 
 
 def detect(twin: Twin, distances: Array) -> tuple[float, float]:
-    """Where the pole is in one scan: the widest run of neighbouring beams that see something.
-
-    Parameters
-    ----------
-    twin
-        The scanner and the pole's radius.
-    distances
-        One scan, m, (beams,).
-
-    Returns
-    -------
-    Bearing (left positive, rad) and distance (m) of the pole's axis from the centre of module 1; NaN if it is not seen.
-    """
+    """Bearing (left positive, rad) and distance (m) of the pole's axis from the centre of module 1 in one scan, m,
+    (beams,): the widest run of neighbouring beams that see something. NaN if it is not seen."""
     seen = np.flatnonzero(np.isfinite(distances))
     if not len(seen):
         return float("nan"), float("nan")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import xarray as xr
 from numpy.typing import ArrayLike
 
 from chilopod.engine import Controller, steer
+from chilopod.progress import Progress, silent
 from chilopod.record import LONGEST, RATE, Recording, in_range
 from chilopod.robot import Robot
 from chilopod.twin.start import start
@@ -28,44 +29,28 @@ def simulate(
     poses: bool = False,
     threads: int = 0,
     tolerance: float = TOLERANCE,
-    progress: Callable[[float, str], None] = lambda done, words: None,
+    progress: Progress = silent,
 ) -> xr.Dataset:
     """Let robots walk on the floor; each one alone, all of them at the same time.
 
     Parameters
     ----------
-    robots
-        One, or one for every walk; they may differ in the numbers of their springs and in nothing else.
-    duration, friction, forces, progress
+    robots, initial, friction, target, seeds, threads, tolerance
+        As for :func:`start`.
+    duration, forces, progress
         As for :func:`chilopod.planar.simulate`.
-    initial
-        From :func:`initial_states`, shape (walks, nq) or (nq,); by default straight from the origin along x.
     controller
         Asked for commands at its events, which act at the first servo target from then on.
-    target
-        Place of the pole on the floor, m, shape (2,) or (walks, 2). The controller sees what the scanner made of its
-        last scan.
-    seeds
-        Seeds of the scanner's noise, one a walk; without them it has none.
     rate
         Samples per second; they are taken at the nearest step.
     poses
         True to add the positions of all joints, from which the robot can be drawn.
-    threads
-        At most; 0 for all cores. Results are the same to the bit at any number.
-    tolerance
-        At which MuJoCo's solver of contact forces stops, relative.
 
     Returns
     -------
     Dataset as that of :func:`chilopod.planar.simulate`, with ``leg_yaw`` as the joints are, not as they should be; with
     a target and a controller also ``seen_bearing`` and ``seen_distance`` over (event, robot), what the controller saw,
     NaN where the pole was out of view; with ``poses``, ``pose`` over (time, robot, coordinate).
-
-    Raises
-    ------
-    ParameterError
-        If an argument has the wrong shape or is out of range, or the robots do not go together.
     """
     in_range("duration", duration, LONGEST, "s")
     walk = start(

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import copyreg
 from collections.abc import Sequence
 from functools import partial
-from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.engine import Traits
-from chilopod.engine.arguments import as_number, as_robot, as_robots, as_seeds, check_wishes, rows_of, standing
-from chilopod.engine.saved import read_back, unpack
+from chilopod.engine.arguments import as_number, as_robot, as_robots, check_wishes, standing
+from chilopod.engine.batch import begin, resumed
 from chilopod.errors import ParameterError
 from chilopod.record import Recording, in_range
 from chilopod.robot import Robot
@@ -110,53 +108,15 @@ def start(
         raise ParameterError("is no number of threads", field="threads", value=threads, allowed="0 (all cores) or more")
     if not callable(edit or common) or not isinstance(traits, Traits):  # type: ignore[redundant-expr]
         raise ParameterError("are none", field="edit, traits", allowed="a function or None; a chilopod.engine.Traits")
-    given, noise = as_robots(robots), as_seeds(seeds)
+    given = as_robots(robots)
     first = common(given[0])
     if any(common(each) != first for each in given[1:]):
         raise ParameterError("may differ in their springs only", field="robots")
-    size, n = state_size(compiled(first, edit=edit), initial), first.body.modules
-    count, rows = rows_of(
-        given, {"initial": (initial, (size,)), "friction": (friction, (n, 2)), "target": (target, (2,))}, noise
-    )
-    states = rows["initial"]
-    return TwinWalk(
-        traits,
-        given * count if len(given) == 1 else given,
-        np.tile(initial_states(given[0], edit=edit), (count, 1)) if states is None else states,
-        np.ones((count, n, 2)) if rows["friction"] is None else rows["friction"],
-        rows["target"],
-        None if noise is None else noise * (count if len(noise) == 1 else 1),
-        record,
-        tolerance=tolerance,
-        threads=int(threads),
-        expected=expected,
-        edit=edit,
-    )
+    size, standing_still = state_size(compiled(first, edit=edit), initial), initial_states(given[0], edit=edit)
+    begun = begin(given, standing_still, size, initial, friction, target, seeds)
+    return TwinWalk(begun, record, tolerance, expected, traits=traits, threads=int(threads), edit=edit)
 
 
 def resume(saved: bytes, threads: int = 0, *, edit: Edit | None = None, traits: Traits = traits) -> TwinWalk:
     """A walk that was saved, see :class:`chilopod.engine.Engine`; the number of threads does not matter."""
-    robots, settings, arrays = unpack(traits, saved)
-    with read_back():
-        walk = TwinWalk(
-            traits,
-            robots,
-            arrays["positions"],
-            arrays["factors"],
-            None,
-            as_seeds(settings["seeds"]),
-            None if settings["record"] is None else Recording(**settings["record"]),
-            tolerance=as_number("tolerance", settings["tolerance"]),
-            threads=threads,
-            edit=edit,
-        )
-        walk.restore(settings, arrays)
-    return walk
-
-
-def _reduced(walk: TwinWalk) -> tuple[Any, ...]:
-    """How a walk is copied and pickled."""
-    return partial(resume, edit=walk.edit, traits=walk.traits), (walk.save(),)
-
-
-copyreg.pickle(TwinWalk, _reduced)
+    return resumed(traits, saved, partial(TwinWalk, traits=traits, threads=threads, edit=edit))

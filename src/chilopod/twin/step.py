@@ -33,15 +33,8 @@ _WIDTH, _MIDDLE, _POWER = 0.001, 0.5, 2.0  # of how impedance grows with depth: 
 
 
 def with_step(spec: mujoco.MjSpec, twin: Twin) -> None:
-    """Give a description what its joints and feet need for the step of the twin.
-
-    Parameters
-    ----------
-    spec
-        Its servos' joints have the inertia of their motors as ``armature``; its feet are geoms named ``*_foot``.
-    twin
-        For step, damping and inertia of the servos, and how the floor pushes.
-    """
+    """Give a description what its joints and feet need for the step of the twin; its servos' joints have the inertia of
+    their motors as ``armature``, its feet are geoms named ``*_foot``."""
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
     feet = [geom for geom in spec.geoms if geom.name.endswith("_foot")]
     own = _mobility(spec, feet)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import mujoco
@@ -13,12 +14,12 @@ from mujoco.batch import Batch
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.cores import cores
-from chilopod.engine import Actuators, Command, Observation, Ramps, Status, Targets, Traits, one_thread
-from chilopod.engine.arguments import as_array, as_marks, as_number, as_seeds, check_time, rows_anew
-from chilopod.engine.saved import pack, part
+from chilopod.engine import Command, Observation, Ramps, Status, Traits, one_thread
+from chilopod.engine.arguments import as_array, as_marks, as_seeds, check_time, rows_anew
+from chilopod.engine.batch import BatchWalk, Beginning
+from chilopod.engine.saved import part
 from chilopod.errors import ParameterError
-from chilopod.record import Recording, Samples, add_outcome, check_size, walk_record
-from chilopod.robot import Robot
+from chilopod.record import Recording, Samples, check_size, walk_record
 from chilopod.twin.failures import failures
 from chilopod.twin.legs import servo_targets
 from chilopod.twin.model import AWAY, SIDES, Edit, TwinModel, compiled, silence, without_springs
@@ -39,54 +40,46 @@ _STATE = ("time", "qpos", "qvel", "qacc_warmstart", "qfrc_applied")
 
 
 @one_thread
-class TwinWalk:
+class TwinWalk(BatchWalk):
     """Robots under way on the floor, see :class:`chilopod.engine.Walk`; :func:`chilopod.twin.start` makes one.
 
     Time goes in servo targets (ticks), every control interval: a walk is advanced to the first of them that is not
-    before the time asked for, and commands act from there.
+    before the time asked for, and commands act from there. A target is seen as in the scanner's last scan.
     """
 
     def __init__(
         self,
-        traits: Traits,
-        robots: Sequence[Robot],
-        states: Array,
-        factors: Array,
-        target: Array | None,
-        seeds: Sequence[int] | None,
+        begun: Beginning,
         record: Recording | None,
-        *,
         tolerance: float,
-        threads: int,
         expected: float = 0.0,
+        *,
+        traits: Traits,
+        threads: int,
         edit: Edit | None = None,
     ) -> None:
-        self.traits, self.edit = traits, edit
-        self._robots, self._factors = tuple(robots), factors
-        self._seeds = None if seeds is None else np.array(seeds, dtype=np.object_)
-        self._record, self._tolerance = record, tolerance
-        self._plan = compiled(without_springs(robots[0]), bool(record and record.forces), edit)
-        plan, count = self._plan, len(robots)
+        robots, count = begun.robots, len(begun.robots)
+        self._plan = plan = compiled(without_springs(robots[0]), bool(record and record.forces), edit)
+        super().__init__(traits, begun, record, tolerance, expected, count * (plan.model.nq + plan.model.nv))
+        self._edit = edit
+        self._seeds = None if begun.seeds is None else np.array(begun.seeds, dtype=np.object_)
         self._batch = Batch(plan.model, count, threads or cores())
         self._springs = np.array([each.springs.stiffness for each in robots])
         self._batch.expand("jnt_stiffness")[:, plan.yaw_joints] = self._springs
         self._batch.expand("dof_damping")[:, plan.yaw_rates] = [each.springs.damping for each in robots]
         self._rub()
         self._batch.expand("opt.tolerance")[:] = tolerance
-        self._put(np.arange(count), states)
+        self._put(np.arange(count), begun.states)
         self._scanner = Scanner(plan.twin, self._batch, self._seeds)
-        self._targets = Targets(count, target, keep=record is not None)
         self._put_poles()
-        self._actuators = Actuators(robots, keep=record is not None)
         self._leg_yaw = Ramps(np.zeros((count, 2)))
-        self._time, self._tick = 0.0, 0
+        self._tick = 0
         self._status = [Status.WALKED] * count
         self._walking = np.arange(count)
         self._servos_from, self._servos = 0, np.empty((0, plan.leg_controls.size))
         self._seen: list[tuple[Array, Array]] = []
 
-        check_size(record, expected, count * (plan.model.nq + plan.model.nv))
-        rows = int(expected * record.rate) + 2 if record else 0
+        rows = self._expected_rows
         self._sampling = Sampling(record.rate if record else 0.0, plan.twin.timestep)
         self._positions = Samples((count, plan.model.nq), rows)
         self._rates = Samples((count, plan.model.nv), rows)
@@ -111,30 +104,17 @@ class TwinWalk:
         return max(1, int(min(_LONGEST_STRETCH / twin.control_interval, most)))
 
     @property
-    def robots(self) -> tuple[Robot, ...]:
-        """One a walk."""
-        return self._robots
-
-    @property
-    def time(self) -> float:
-        """Time that was asked for, s."""
-        return self._time
-
-    @property
     def status(self) -> tuple[Status, ...]:
         """One a robot."""
         return tuple(self._status)
 
     def observe(self) -> Observation:
-        """See :class:`chilopod.engine.Walk`; a target is seen as in the scanner's last scan."""
         bearing, distance = self._look()
         angles = self._batch.bind("qpos")[:, self._plan.yaw_positions].copy()
         angles[~self._on_foot()] = np.nan
-        told = self._actuators
-        return Observation(self._time, bearing, distance, angles, told.leg_yaw.copy(), told.stiffness(self._time))
+        return self._observation(bearing, distance, angles)
 
     def pose(self) -> Array:
-        """See :class:`chilopod.engine.Walk`."""
         places = self._batch.bind("qpos")[:, :7]
         pose = np.column_stack([places[:, :2], _heading(rotation(places[:, 3:]))])
         pose[~self._on_foot()] = np.nan
@@ -146,13 +126,11 @@ class TwinWalk:
         self._put_poles()
 
     def halt(self, which: NDArray[np.bool_]) -> None:
-        """See :class:`chilopod.engine.Walk`."""
         marked = as_marks("which", which, len(self._robots)) & self._on_foot()
         self._status = [Status.HALTED if ends else each for ends, each in zip(marked, self._status, strict=True)]
         self._walking = np.flatnonzero(self._on_foot())
 
     def states(self) -> Array:
-        """See :class:`chilopod.engine.Walk`: MuJoCo's ``qpos``, then ``qvel``, (robots, nq + nv)."""
         states = np.hstack([self._batch.bind("qpos"), self._batch.bind("qvel")])
         states[~self._on_foot()] = np.nan
         return states
@@ -190,7 +168,6 @@ class TwinWalk:
         self._put_poles()
 
     def command(self, command: Command) -> None:
-        """See :class:`chilopod.engine.Walk`."""
         self._actuators.command(self._time, command, self._on_foot())
         self._leg_yaw.to(
             self._actuators.leg_yaw, self._tick, max(1, round(command.within / self._plan.twin.control_interval))
@@ -200,7 +177,6 @@ class TwinWalk:
             self._seen.append(self._look())
 
     def advance(self, until: float) -> None:
-        """See :class:`chilopod.engine.Walk`."""
         until = check_time(until, self._time)
         check_size(self._record, until, len(self._robots) * (self._plan.model.nq + self._plan.model.nv))
         interval = self._plan.twin.control_interval
@@ -219,44 +195,35 @@ class TwinWalk:
             for store in self._kept().values():
                 store.grown(self._sampling.count(self._tick * self._plan.steps_per_control))
 
-    def save(self) -> bytes:
-        """See :class:`chilopod.engine.Walk`."""
-        record = self._record
+    def _maker(self) -> Any:
+        return partial(TwinWalk, traits=self.traits, threads=0, edit=self._edit)
+
+    def _saved(self) -> tuple[dict[str, Any], dict[str, Any]]:
         settings = {
-            "record": None if record is None else {"rate": record.rate, "forces": record.forces, "poses": record.poses},
-            "tolerance": self._tolerance,
             "seeds": None if self._seeds is None else self._seeds.tolist(),
-            "time": self._time,
             "tick": self._tick,
             "status": [each.name for each in self._status],
         }
-        arrays = {
-            "factors": self._factors,
-            "positions": self._batch.bind("qpos"),
+        return settings, {
+            "states": self._batch.bind("qpos"),
             **{f"state_{name}": self._batch.bind(name) for name in _STATE},
             **{f"samples_{name}": samples.rows for name, samples in self._kept().items()},
-            **{f"told_{name}": values for name, values in self._actuators.state().items()},
             **{f"yaw_{name}": values for name, values in self._leg_yaw.state().items()},
-            **{f"target_{name}": values for name, values in self._targets.state().items()},
             **{f"scan_{name}": values for name, values in self._scanner.state().items()},
             "seen": np.array(self._seen).reshape(-1, 2, len(self._robots)),
         }
-        return pack(self.traits, self._robots, settings, arrays)
 
     def restore(self, settings: dict[str, Any], arrays: dict[str, Any]) -> None:
-        """Become as the walk was that was saved, of the same robots."""
-        self._time, self._tick = as_number("time", settings["time"]), operator.index(settings["tick"])
-        self._status = [Status[name] for name in settings["status"]]
+        super().restore(settings, arrays)
+        self._tick, self._status = operator.index(settings["tick"]), [Status[name] for name in settings["status"]]
         self._walking = np.flatnonzero(self._on_foot())
         for name in _STATE:
             self._batch.bind(name)[:] = arrays[f"state_{name}"]
         for name, samples in self._kept().items():
             rows = arrays[f"samples_{name}"]
             samples.grown(len(rows))[:] = rows
-        self._actuators.restore(part(arrays, "told_"))
         self._leg_yaw.restore(part(arrays, "yaw_"))
         self._seen = [(each[0], each[1]) for each in arrays["seen"]]
-        self._targets.restore(part(arrays, "target_"))
         self._scanner.restore(part(arrays, "scan_"))
         self._put_poles()
 
@@ -279,8 +246,7 @@ class TwinWalk:
             leg_yaw=positions[..., plan.leg_yaw_positions],
         )
         self._actuators.add_to(data)
-        target = self._targets.recorded(times)
-        if self._seen and target is not None:
+        if self._seen and self._targets.recorded(times) is not None:
             seen = np.array(self._seen)
             data["seen_bearing"] = (("event", "robot"), seen[:, 0], {"units": "rad"})
             data["seen_distance"] = (("event", "robot"), seen[:, 1], {"units": "m"})
@@ -296,8 +262,7 @@ class TwinWalk:
             data["foot_load"] = (over, -forces.reshape(shape)[..., 2], {"units": "N"})
         if self._record and self._record.poses:
             data["pose"] = (("time", "robot", "coordinate"), positions, {"units": "m, 1, rad: MuJoCo's qpos"})
-        add_outcome(data, [each.label for each in self._status], target)
-        data.attrs = {"engine": self.traits.name, "robot": self._robots[0].to_toml(), "duration": self._time}
+        self._finish(data, times)
         return data
 
     # -- inside

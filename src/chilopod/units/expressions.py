@@ -116,12 +116,7 @@ def unit(text: str) -> Unit:
     """Read a product of units such as ``N*mm/deg``, ``kg*m^2`` or ``N*m/(rad/s)``.
 
     ``*``, a middle dot or a space multiplies, ``/`` divides by the next unit only, ``^`` or ``**`` raises to a power.
-    The empty text is the unit of a plain number.
-
-    Raises
-    ------
-    UnitError
-        If a name is unknown or the text is no product of units.
+    The empty text is the unit of a plain number. UnitError if a name is unknown or the text is no product of units.
     """
     if len(text) > _LONGEST_TEXT:
         raise UnitError("too long for a unit", value=text, allowed=f"up to {_LONGEST_TEXT} characters")
@@ -164,12 +159,8 @@ def parse(value: object, si_unit: str) -> float:
     Returns
     -------
     float
-        The double nearest to the quantity in SI units.
-
-    Raises
-    ------
-    UnitError
-        If `value` is neither, its unit is unknown or of another dimension, or it is not finite.
+        The double nearest to the quantity in SI units; UnitError if `value` is neither, its unit is unknown or of
+        another dimension, or it is not finite.
     """
     kind = _kind(unit(si_unit).dimension)
     if isinstance(value, Real) and not isinstance(value, bool):

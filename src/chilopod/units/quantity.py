@@ -49,13 +49,8 @@ class Quantity:
     optional: bool = False
 
     def check(self, value: float, given: object = None) -> float:
-        """Return `value` (SI units) if it is in range; an int where whole numbers are asked for.
-
-        Raises
-        ------
-        ParameterError
-            If it is not; the message shows `given`, what the user wrote, where there is such a thing.
-        """
+        """Return `value` (SI units) if it is in range; an int where whole numbers are asked for. Otherwise the
+        ParameterError shows `given`, what the user wrote, where there is such a thing."""
         if self.at_least <= value <= self.at_most and not (self.integer and value != math.floor(value)):
             return int(value) if self.integer else value
         shown = value if given is None else given
