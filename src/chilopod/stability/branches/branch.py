@@ -21,12 +21,10 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import ParameterError
 from chilopod.flows.arguments import checked_count
 from chilopod.notebook import picture
-from chilopod.stability.branches.branch_points import Anchor, BranchPoint, Step
+from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve
 from chilopod.stability.branches.branch_starts import IN_FOLD, Start, anchored, begin, branch_sizes, switch
-from chilopod.stability.branches.closure import closes
 from chilopod.stability.branches.curve import PRECISION, Curve
 from chilopod.stability.branches.inspection import Found, inspect
-from chilopod.stability.branches.stepping import taken
 from chilopod.stability.budget import Budget
 from chilopod.stability.capabilities import Family, given_scale
 from chilopod.stability.orbits import Orbit
@@ -34,7 +32,8 @@ from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.shown import Result, axes_for, columns, dataset, mark, rows, said
 from chilopod.stability.spectrum.errors import VERDICTS
 from chilopod.stability.tracing.ending import Ending
-from chilopod.stability.tracing.tracer import Pace, trace
+from chilopod.stability.tracing.step import Step
+from chilopod.stability.tracing.tracer import outward, trace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,7 +49,6 @@ LONGEST = 0.15
 BUDGET = 200_000
 """Flows that a branch may ask for by default."""
 
-_FEW, _MANY = 4, 7  # corrections after which steps grow, and shrink
 _STYLES = {True: "-", False: "--", None: ":"}  # of lines, by stability
 _NARROWEST = 1e-9  # width of an interval, relative to the values in it
 
@@ -284,7 +282,7 @@ def proceed(
     if not isinstance(branch, Branch):
         raise ParameterError("is no branch", field="branch", value=branch, allowed="what `follow` gives")
     end = branch.points[-1]
-    if not low <= end.value <= high or _outward(end, between):
+    if not low <= end.value <= high or outward(np.array([between]), np.array([end.value]), end.tangent[-1:]):
         raise ParameterError(
             "does not go on beyond the branch's last point", field="between", value=between,
             allowed=f"{end.value!r} well within",
@@ -351,73 +349,44 @@ def _anchored(
     return curve.anchor(replace(start, tangent=tangent / np.linalg.norm(tangent), units=units, special=None))
 
 
-def _outward(point: BranchPoint, between: tuple[float, float]) -> bool:
-    """True if a curve leaves the interval where it is."""
-    ahead = float(point.tangent[-1])
-    return bool((point.value <= between[0] and ahead < 0.0) or (point.value >= between[1] and ahead > 0.0))
-
-
 @dataclass
-class _Orbits:
-    """A branch that is being followed: see :class:`chilopod.stability.tracing.tracer.Traced`."""
+class _Followed:
+    """A branch that is being followed: a client of the tracer."""
 
-    curve: Curve
-    anchor: Anchor
-    found: list[BranchPoint]
+    equations: Curve
+    points: list[BranchPoint]
     remarks: list[str]
     closely: bool
     progress: Progress
 
-    def advance(self, size: float, count: int) -> tuple[_Advance, int]:
-        """A step, cut off where the curve has come back to its start."""
-        step, left = taken(self.curve, self.anchor, size)
-        within, closed = inspect(self.curve, step, self.closely), None
-        if count > 2 and not left:
-            closed = closes(self.curve, self.found[0], step)
-        ending = Ending.LEFT_INTERVAL if left else None
-        if closed is not None:
-            points = tuple(point for point in within.points if _before(point, closed, step))
-            return _Advance(closed, replace(within, points=points), Ending.CLOSED), step.corrections
-        return _Advance(step, within, ending), step.corrections
+    def look(self, step: Step[Anchor, OnCurve], ending: Ending | None) -> tuple[_Looked, Ending | None]:
+        """What happens within a step."""
+        return _Looked(step, inspect(self.equations, step, self.closely)), ending
 
-    def arrive(self, step: _Advance, count: int) -> Ending | None:
-        """Go on to the end of a step."""
-        self.found += [*step.within.points, step.taken.end.last]
-        self.remarks += step.within.remarks
-        self.anchor = step.taken.end
-        self.progress(count, self.found[-1])
-        return step.ending
+    def keep(self, found: _Looked, count: int) -> None:
+        """Keep a step, with what happens within it."""
+        self.points += [*found.within.points, found.step.end.last]
+        self.remarks += found.within.remarks
+        self.progress(count, self.points[-1])
 
 
-class _Advance(NamedTuple):
-    """A step, what happens within it, and why the branch ends with it, if it does."""
-
-    taken: Step
+class _Looked(NamedTuple):
+    step: Step[Anchor, OnCurve]
     within: Found
-    ending: Ending | None
 
 
 def _followed(
     curve: Curve, branch: Branch, anchor: Anchor, points: int | None, longest: float, closely: bool, progress: Progress
 ) -> Branch:
-    orbits = _Orbits(curve, anchor, list(branch.points), list(branch.remarks), closely, progress)
-    ending, reason, size = Ending.LEFT_INTERVAL, "", branch.step
-    if not _outward(orbits.found[-1], curve.between):
-        with curve.budget:
-            ending, reason, size = trace(orbits, branch.step, Pace(longest, _FEW, _MANY), points, curve.budget)
+    curve.first = branch.points[0]
+    client = _Followed(curve, list(branch.points), list(branch.remarks), closely, progress)
+    with curve.budget:
+        ending, reason, size = trace(client, anchor, branch.step, longest, points)
     return replace(
         branch,
-        points=tuple(orbits.found),
+        points=tuple(client.points),
         ending=ending,
         step=size,
         reason=reason,
-        remarks=tuple(dict.fromkeys(orbits.remarks)),
+        remarks=tuple(dict.fromkeys(client.remarks)),
     )
-
-
-def _before(point: BranchPoint, closed: Step, step: Step) -> bool:
-    """True if a special point within a step comes before the place where the curve closes."""
-    start = step.start.last
-    assert start.units is not None
-    moved = np.append(point.orbit - start.orbit, point.value - start.value) / start.units
-    return float(start.tangent @ moved) <= closed.size

@@ -295,7 +295,7 @@ def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
     )
     leaving = start.mode is not None
     if not leaving:
-        return Anchor(point, np.vstack([matrix, tangent]), None, section)
+        return curve.anchored(point, np.vstack([matrix, tangent]), section)
     return curve.anchor(point, ahead=ahead, leaving=True)
 
 

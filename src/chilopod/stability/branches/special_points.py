@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.stability.branches.branch_points import BranchPoint, Step
+from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.crossing_points.description import described
 from chilopod.stability.crossing_points.place import SAFETY, Course, Sample, place_error
@@ -21,6 +21,7 @@ from chilopod.stability.orbits import Orbit, bounded, find_orbit
 from chilopod.stability.points import Kind
 from chilopod.stability.returns import ReturnMap, returned_states
 from chilopod.stability.symmetry.isotypic import Block
+from chilopod.stability.tracing.step import Step
 from chilopod.stability.unit_circle.critical import Crossing
 from chilopod.stability.unit_circle.spectra import TARGETS, Event
 
@@ -29,6 +30,8 @@ Array = NDArray[np.float64]
 _CRITICAL = 1e-5  # distance from the circle within which a multiplier is the critical one of a located point
 _BESIDE = 1e-3  # of a step: how far beside a point rates of change are taken
 _SAME = 1e-6  # of the sizes of the states
+
+Part = Step[Anchor, OnCurve]
 
 
 @dataclass(frozen=True)
@@ -43,7 +46,7 @@ class Place:
 
 
 def special_point(
-    curve: Curve, at: Callable[[float], Step], place: Place, between: tuple[float, float], blocks: Blocks
+    curve: Curve, at: Callable[[float], Part], place: Place, between: tuple[float, float], blocks: Blocks
 ) -> BranchPoint | None:
     """The special point at a place within a step; None if no multiplier is critical there after all.
 
@@ -65,11 +68,11 @@ def special_point(
     course = Course(
         lambda places: [_sample(at, each) for each in places], low, high, high - low, _BESIDE * (high - low)
     )
-    point, regular = at(crossing.value).end.last, None
+    point, regular = curve.arrived(at(crossing.value)).end.last, None
     if not place.fold and (block is None or block.trivial):
 
         def bounded_at(_: float, moved: Array, error: Array, image: ReturnMap) -> Orbit:
-            x, value = _reached(curve, at(high), moved)
+            x, value = curve.reached(at(high).start.last, moved)
             return bounded(curve.system(value), x, image, error=error[:-1] * curve.units(x.size)[:-1])
 
         regular = past_singular(course, crossing, bounded_at)
@@ -78,7 +81,7 @@ def special_point(
         along = place_error(course, crossing, orbit.image)
     else:
         orbit, along = regular.orbit, regular.error_bound
-        point = replace(point, value=_reached(curve, at(high), regular.sampled)[1])
+        point = replace(point, value=curve.reached(at(high).start.last, regular.sampled)[1])
     found = described(
         curve.system(point.value),
         (point.value, _value_error(curve, at, place, between, along, orbit.image)),
@@ -96,31 +99,23 @@ def special_point(
     return replace(point, orbit=orbit.state, special=found.kind, error_bound=bound, bifurcation=found)
 
 
-def blocks_along(curve: Curve, step: Step) -> Blocks:
-    """The blocks that the spatial symmetries of the orbits on a step make of their return maps."""
-    last = step.end.last
-    system = curve.system(last.value)
-    image = curve.image(last.orbit, last.value, curve.section(last), with_error=True)
+def blocks_along(curve: Curve, last: BranchPoint) -> Blocks:
+    """The blocks that the spatial symmetries of the orbits on a step make of their return maps, by the last of them."""
+    section = curve.section_at(last.orbit, last.value, last.period)
+    image = curve.image(last.orbit, last.value, section, with_error=True)
     # On a branch orbits are not solved for to the last digit.
-    return orbit_blocks(system, Orbit(last.orbit, image, _SAME * curve.units(last.orbit.size)[:-1]))[0]
+    return orbit_blocks(curve.system(last.value), Orbit(last.orbit, image, _SAME * curve.units(last.orbit.size)[:-1]))[0]
 
 
-def _sample(at: Callable[[float], Step], place: float) -> Sample:
+def _sample(at: Callable[[float], Part], place: float) -> Sample:
     """An orbit on a step, as far as the step moved."""
     part = at(float(place))
-    return Sample(float(place), part.moved, part.image)
-
-
-def _reached(curve: Curve, step: Step, moved: Array) -> tuple[Array, float]:
-    """State and parameter so far, in units, from where a step starts."""
-    start = step.start.last
-    total = curve.units(start.orbit.size) * moved
-    return start.orbit + total[:-1], start.value + float(total[-1])
+    return Sample(float(place), part.moved, part.found.image)
 
 
 def _orbit(curve: Curve, point: BranchPoint, place: Place, blocks: Blocks) -> Orbit:
     """The orbit with its error bounds, where it is a simple solution."""
-    system, section, x = curve.system(point.value), curve.section(point), point.orbit
+    system, section, x = curve.system(point.value), curve.section_at(point.orbit, point.value, point.period), point.orbit
     if place.block is not None and not place.block.trivial:
         # Solved for where H - 1 is singular it may have strayed along a mode that has not its symmetry.
         x = sum((block.basis @ (block.dual @ x) for block in blocks if block is not None and block.trivial), 0.0 * x)
@@ -136,7 +131,7 @@ def _orbit(curve: Curve, point: BranchPoint, place: Place, blocks: Blocks) -> Or
 
 def _value_error(
     curve: Curve,
-    at: Callable[[float], Step],
+    at: Callable[[float], Part],
     place: Place,
     between: tuple[float, float],
     along: float,
@@ -156,9 +151,9 @@ def _value_error(
     return float(0.5 * bend * along**2) + _fold_error(curve, at(place.crossing.value), image)
 
 
-def _fold_error(curve: Curve, here: Step, image: ReturnMap) -> float:
+def _fold_error(curve: Curve, here: Part, image: ReturnMap) -> float:
     """left . (H - x) = 0 fixes the parameter at a fold to first order; x itself enters in second order only."""
-    x = here.end.last.orbit
+    x = here.found.x
     sizes = curve.units(x.size)[:-1]
     matrix = here.matrix[:-1]
     left = np.linalg.svd(matrix[:, :-1])[0][:, -1]
