@@ -27,7 +27,7 @@ from chilopod.stability.equilibria import (
     ROUNDING,
     Equilibrium,
     autonomous,
-    find_equilibrium,
+    equilibrium_at,
     hopf_form,
     linear_part,
 )
@@ -98,9 +98,7 @@ def locate_hopf(
     """
     low, high = checked_interval(between)
     family = functools.lru_cache(_KEPT)(family)
-    with UserCode("family", low):
-        system = autonomous(family(low))
-        start = find_equilibrium(system, equilibrium)
+    system, start = equilibrium_at(family, low, equilibrium)
     duration, scale = _duration(start, system.guess_period), _scale(system, start)
     samples = Samples(lambda v: _resting(family(v), duration, scale), start.state, low, high, budget, seconds)
 
@@ -247,9 +245,7 @@ def _hopf_point(
     value, state = point.value, point.orbit
     rate, frequency = _rate(family, between, point, duration)
     for correcting in (True, True, False):  # the search has found it almost to the last digit
-        with UserCode("family", value):
-            system = autonomous(family(value))
-            here = find_equilibrium(system, state)
+        system, here = equilibrium_at(family, value, state)
         index = int(np.abs(here.eigenvalues - 1j * frequency).argmin())
         state, frequency = here.state, float(here.eigenvalues[index].imag)
         off = float(here.eigenvalues[index].real)
@@ -284,12 +280,7 @@ def _beside(
 ) -> tuple[Array, list[tuple[Autonomous, Equilibrium]]]:
     """Values of the parameter to both sides of one, shape (2,), with the systems and their equilibria there."""
     values = np.clip(value + _BESIDE * (between[1] - between[0]) * np.array([-1.0, 1.0]), *between)
-    found = []
-    for each in values.tolist():
-        with UserCode("family", each):
-            system = autonomous(family(each))
-            found.append((system, find_equilibrium(system, state)))
-    return values, found
+    return values, [equilibrium_at(family, value, state) for value in values.tolist()]
 
 
 def _rate(

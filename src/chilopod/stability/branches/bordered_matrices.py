@@ -11,28 +11,15 @@ from chilopod.stability.symmetry.mirrored import symmetric_states
 
 Array = NDArray[np.float64]
 
-_UNCERTAIN = 1e-6  # singular value, relative to the largest, that counts as zero: the derivative is a difference over that
+_UNCERTAIN = 1e-6  # singular value, relative to the largest, that counts as zero: as uncertain as a difference is
 
 
 def symmetric_space(system: SystemLike, state: Array, sizes: Array, mode: Array | None = None) -> Array | None:
-    """Projection onto the states with the spatial symmetries of an orbit, in units of the states' ``sizes``.
+    """Projection onto the states with the spatial symmetries of an orbit, and of a ``mode`` along which a branch
+    leaves it if there is one, in units of the states' ``sizes``, shape (n, n); None if there are no symmetries.
 
     Among these its branch is regular where others leave it that break the symmetries (Golubitsky, Stewart & Schaeffer,
     *Singularities and Groups in Bifurcation Theory* II, 1988, section XIII.3).
-
-    Parameters
-    ----------
-    system, state
-        The system and a state on the orbit, shape (n,).
-    sizes
-        Sizes of the states, shape (n,).
-    mode
-        In units, shape (n,): the symmetries are those that it has as well, which are those of what branches off along
-        it.
-
-    Returns
-    -------
-    Shape (n, n); None if there are no symmetries.
     """
     if system.symmetry is not None or not spatial_symmetries(system):
         return None

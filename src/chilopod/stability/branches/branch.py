@@ -13,7 +13,7 @@ import math
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,7 +26,7 @@ from chilopod.stability.branches.branch_starts import IN_FOLD, Start, anchored, 
 from chilopod.stability.branches.curve import PRECISION, Curve
 from chilopod.stability.branches.inspection import Found, inspect
 from chilopod.stability.budget import Budget
-from chilopod.stability.capabilities import Family, given_scale
+from chilopod.stability.capabilities import Family
 from chilopod.stability.orbits import Orbit
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.shown import Result, axes_for, columns, dataset, mark, rows, said
@@ -287,16 +287,9 @@ def proceed(
             "does not go on beyond the branch's last point", field="between", value=between,
             allowed=f"{end.value!r} well within",
         )  # fmt: skip
-    curve = Curve(
-        family,
-        branch.scale,
-        branch.sizes,
-        between=between,
-        periods=branch.periods,
-        symmetric=branch.symmetric,
-        precision=precision,
-        budget=Budget(budget, seconds),
-    )
+    orbits: dict[str, Any] = {"periods": branch.periods, "symmetric": branch.symmetric, "precision": precision}
+    allowed = Budget(budget, seconds)
+    curve = Curve(family, branch.scale, branch.sizes, between=between, budget=allowed, **orbits)
     first = branch.points[0]
     last, *earlier = [point for point in reversed(branch.points) if point.special is None or point is first]
     leaving = last.special is not None
@@ -327,66 +320,37 @@ def _anchored(
         raise ParameterError(
             "is a bifurcation point", field="start", value=start.kind.label, allowed="what switch(family, point) gives"
         )
-    if isinstance(start, Orbit):
-        start = begin(family, low, start.state, symmetric=curve.symmetric)
-    elif not isinstance(start, Start | BranchPoint):
-        start = begin(family, low, start, symmetric=curve.symmetric)
+    if not isinstance(start, Start | BranchPoint):
+        guess = start.state if isinstance(start, Orbit) else start
+        start = begin(family, low, guess, symmetric=curve.symmetric)
     if not curve.between[0] <= start.value <= curve.between[1]:
         raise ParameterError("does not hold the start", field="between", value=curve.between, allowed=f"{start.value}")
     if isinstance(start, Start):
         curve.periods = start.periods
-        section = curve.section_at(start.orbit, start.value, start.period)
-        curve.sizes = branch_sizes(curve, start.orbit, start.value, section)
-        if start.outward is not None and given_scale(curve.system(start.value)) is None:
-            # A small cycle tells nothing of those that it grows into, by the root of the parameter.
-            grown = np.abs(start.outward) * math.sqrt(curve.scale)
-            curve.sizes = curve.sizes * max(1.0, float((grown / curve.sizes).max()))
+        curve.sizes = branch_sizes(curve, start)
         return anchored(curve, start, step)
-    section = curve.section_at(start.orbit, start.value, start.period)
-    curve.sizes = branch_sizes(curve, start.orbit, start.value, section)
+    curve.sizes = branch_sizes(curve, start)
     units = curve.units(start.orbit.size)
     tangent = start.tangent * (1.0 if start.units is None else start.units) / units
     return curve.anchor(replace(start, tangent=tangent / np.linalg.norm(tangent), units=units, special=None))
-
-
-@dataclass
-class _Followed:
-    """A branch that is being followed: a client of the tracer."""
-
-    equations: Curve
-    points: list[BranchPoint]
-    remarks: list[str]
-    closely: bool
-    progress: Progress
-
-    def look(self, step: Step[Anchor, OnCurve], ending: Ending | None) -> tuple[_Looked, Ending | None]:
-        """What happens within a step."""
-        return _Looked(step, inspect(self.equations, step, self.closely)), ending
-
-    def keep(self, found: _Looked, count: int) -> None:
-        """Keep a step, with what happens within it."""
-        self.points += [*found.within.points, found.step.end.last]
-        self.remarks += found.within.remarks
-        self.progress(count, self.points[-1])
-
-
-class _Looked(NamedTuple):
-    step: Step[Anchor, OnCurve]
-    within: Found
 
 
 def _followed(
     curve: Curve, branch: Branch, anchor: Anchor, points: int | None, longest: float, closely: bool, progress: Progress
 ) -> Branch:
     curve.first = branch.points[0]
-    client = _Followed(curve, list(branch.points), list(branch.remarks), closely, progress)
+    found, remarks = list(branch.points), list(branch.remarks)
+
+    def look(step: Step[Anchor, OnCurve], ending: Ending | None) -> tuple[tuple[Found, BranchPoint], Ending | None]:
+        return (inspect(curve, step, closely), step.end.last), ending
+
+    def keep(looked: tuple[Found, BranchPoint], count: int) -> None:
+        within, end = looked
+        found.extend([*within.points, end])
+        remarks.extend(within.remarks)
+        progress(count, end)
+
     with curve.budget:
-        ending, reason, size = trace(client, anchor, branch.step, longest, points)
-    return replace(
-        branch,
-        points=tuple(client.points),
-        ending=ending,
-        step=size,
-        reason=reason,
-        remarks=tuple(dict.fromkeys(client.remarks)),
-    )
+        ending, reason, size = trace(curve, anchor, (branch.step, longest), points, look, keep)
+    said = tuple(dict.fromkeys(remarks))
+    return replace(branch, points=tuple(found), ending=ending, step=size, reason=reason, remarks=said)

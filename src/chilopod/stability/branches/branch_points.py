@@ -65,33 +65,18 @@ class BranchPoint(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class Anchor(ReadOnlyArrays):
-    """A point from which steps start: see :class:`chilopod.stability.tracing.step.Anchor`.
+    """A point from which steps start: see :class:`chilopod.stability.tracing.step.Anchor`."""
 
-    Attributes
-    ----------
-    last
-        The point.
-    matrix
-        Jacobian of [H - x; tangent . step] there with respect to state and parameter in units, shape (n+1, n+1).
-    before
-        The point before it, seen from here.
-    section
-        Section on which returns end during the step, for a system without a period of its own.
-    space
-        Projection onto the states with the orbit's spatial symmetries, shape (n, n); None if there are none.
-    leaving
-        True if the point is one where branches meet: the matrix is then one taken ahead.
-    lengthening
-        Relative change of the period along the curve.
-    """
-
-    last: BranchPoint
+    last: BranchPoint  # the point
+    # Jacobian of [H - x; tangent . step] there with respect to state and parameter in units, shape (n+1, n+1).
     matrix: Array
-    before: Before | None = None
+    before: Before | None = None  # the point before it, seen from here
+    # Section on which returns end during the step, for a system without a period of its own.
     section: Section | None = None
+    # Projection onto the states with the orbit's spatial symmetries, shape (n, n); None if there are none.
     space: Array | None = None
-    leaving: bool = False
-    lengthening: float = 0.0
+    leaving: bool = False  # True if the point is one where branches meet: the matrix is then one taken ahead
+    lengthening: float = 0.0  # relative change of the period along the curve
 
     @property
     def tangent(self) -> Array:

@@ -19,7 +19,7 @@ from chilopod.stability.branches.bordered_matrices import null_vector, symmetric
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve, Returned
 from chilopod.stability.branches.family_returns import FamilyReturns
 from chilopod.stability.budget import SpentError, UserCode
-from chilopod.stability.capabilities import Family, SystemLike, is_autonomous, returns_per_period
+from chilopod.stability.capabilities import Family, is_autonomous, returns_per_period
 from chilopod.stability.convergence import CURVE
 from chilopod.stability.floquet import full_period
 from chilopod.stability.returns import ReturnMap, Section, return_duration, section_at
@@ -45,23 +45,10 @@ _PARTS = 64  # of a period, in which the states on an orbit are looked at
 _SAME, _ALONG, _SAME_PERIOD = 1e-5, 0.9, 1e-3  # in units; cosine; relative: a curve is back at its first point
 
 
-class Curve(FamilyReturns, Equations[Anchor, OnCurve]):
-    """The curve H(x, p) = x of a family.
+class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
+    """The curve H(x, p) = x of a family, solved for to a precision relative to the sizes of the states."""
 
-    Parameters
-    ----------
-    family, scale, sizes, returns
-        See :class:`FamilyReturns`.
-    precision
-        Precision to which orbits are solved for, relative to the sizes of the states.
-
-    Attributes
-    ----------
-    first
-        First point of a curve that is followed.
-    """
-
-    first: BranchPoint
+    first: BranchPoint  # of a curve that is followed
 
     def __init__(
         self, family: Family, scale: float, sizes: Array | None = None, *, precision: float = PRECISION, **returns: Any

@@ -13,7 +13,6 @@ A determinant that changes its sign where no branches meet tells of a step that 
 
 from __future__ import annotations
 
-import functools
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,15 +22,14 @@ from scipy.optimize import brentq
 from chilopod.errors import AnalysisError
 from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve
 from chilopod.stability.branches.curve import Curve
-from chilopod.stability.branches.special_points import Place, blocks_along, special_point
+from chilopod.stability.branches.special_points import Place, special_point
+from chilopod.stability.branches.within import Within
 from chilopod.stability.capabilities import flows_with_error
-from chilopod.stability.orbit_blocks import Blocks, crossings_in
+from chilopod.stability.orbit_blocks import crossings_in
 from chilopod.stability.returns import ReturnMap
 from chilopod.stability.spectrum.eigenvalues import counts_outside, spectrum
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.tracing.step import Step
-from chilopod.stability.tracing.tolerances import AWAY
-from chilopod.stability.tracing.tracer import Parts
 from chilopod.stability.unit_circle.critical import Crossing
 from chilopod.stability.unit_circle.crossings import Crossings, SearchStatus, find_crossings
 from chilopod.stability.unit_circle.interpolation import DEGREE, PLACES, interpolated
@@ -41,12 +39,9 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 _CLEAR = 4.0  # times what a polynomial is uncertain by
-_OFF = 1e-5  # of a step: an orbit that the cubic misses by more is solved for
-_LEAVING = 0.05  # of a step off a point where branches meet, where the search begins
 _BUDGET = 400  # orbits that are solved for within one step
 _ERROR = 1e-10  # relative, of the return map's derivative at an orbit that was solved for
 _CLOSE = 1e-9  # of a step: how closely a point is located along the curve
-_SIDE = 1e-3  # of a step: how far beside a crossing the curve's sides are looked at
 _BRANCHING = 1e-4  # smallest singular value of [H' - 1, dH/dp], in units, where branches meet
 _CONFIRMING = 1e-3, 1e-2, 0.1, 0.3  # of a step: how far beside a place its sides are told apart
 _SURE = 3.0  # times its error: so far from the circle a multiplier is on one side of it
@@ -55,69 +50,15 @@ _EVENTS = (Event.MINUS, Event.PLUS, Event.PAIR)
 
 @dataclass(frozen=True)
 class Found:
-    """Events within a step: the special points in order, and a sentence for each thing that could not be made
-    out."""
+    """Events within a step: the special points in order, with an ordinary one between any two, and a sentence for each
+    thing that could not be made out."""
 
     points: tuple[BranchPoint, ...] = ()
     remarks: tuple[str, ...] = ()
 
 
-class Within(Parts[Anchor, OnCurve]):
-    """Orbits within a step, each solved for once."""
-
-    def __init__(self, curve: Curve, step: Step[Anchor, OnCurve]) -> None:
-        super().__init__(curve, step)
-        self.curve = curve
-        self.low = _LEAVING * step.size if step.start.leaving else 0.0
-
-    @functools.cached_property
-    def blocks(self) -> Blocks:
-        """Blocks of the return map along the step, as the orbits' spatial symmetries make them."""
-        return blocks_along(self.curve, self.step.end.last)
-
-    def sides(self, place: float) -> tuple[Step[Anchor, OnCurve], Step[Anchor, OnCurve]]:
-        """Parts of the step that end a little before and a little after a place."""
-        beside = _SIDE * self.step.size
-        return self.at(max(place - beside, self.low)), self.at(min(place + beside, self.step.size))
-
-    def jacobian(self, place: float) -> Array:
-        """Derivative of the return map at a place."""
-        if place > 0.0:
-            return self.at(place).found.image.jacobian
-        matrix = self.step.start.matrix[:-1, :-1]
-        sizes = self.curve.units(len(matrix))[:-1]
-        return np.asarray((matrix + np.eye(len(matrix))) * sizes[:, None] / sizes)
-
-    def near_jacobian(self, place: float) -> Array:
-        """The same, on the cubic through the ends of the step where that is close enough."""
-        step, start = self.step, self.step.start
-        if place in (0.0, step.size):
-            return self.jacobian(place)
-        moved, matrix = step.between(place)
-        matrix[-1] = start.tangent
-        x, value = self.curve.reached(start.last, moved)
-        try:
-            image = self.curve.image(x, value, start.section)
-            off = np.append((image.state - x) / self.curve.units(x.size)[:-1], 0.0)
-            if float(np.abs(np.linalg.solve(matrix, off)).max()) <= _OFF * step.size:
-                return image.jacobian
-        except (AnalysisError, np.linalg.LinAlgError):  # a return may magnify what the cubic misses
-            pass
-        exact = self.at(place)
-        if not float(np.linalg.norm(exact.moved - moved)) <= AWAY * step.size:
-            raise AnalysisError("the curve is not smooth within the step", field="step")
-        return exact.found.image.jacobian
-
-
 def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Found:
-    """Find what happens within a step.
-
-    Parameters
-    ----------
-    curve, step
-        The step and its curve.
-    closely
-        True to look between its ends even where these give no reason to.
+    """Find what happens within a step, between its ends even where these give no reason to if ``closely``.
 
     Raises
     ------
@@ -136,19 +77,25 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Found:
     places, remarks = _places(within, crossed, turned)
     if flipped and not any(place.branching for place in places):
         raise AnalysisError("the step landed on another curve", field="step")
-    between = within.low, step.size
     sure = flows_with_error(curve.system(step.found.value))
-    points: list[BranchPoint] = []
+    found: list[tuple[float, BranchPoint]] = []
     for place in places:
         near, event = within.at(place.crossing.value).found.value, place.crossing.event
         if (sure or (leaving and event is Event.PLUS)) and not _confirmed(within, place):
             remarks += (f"near {near:.9g}: {event.sentence} by no more than its error, which is no event",)
             continue
-        point = special_point(curve, within.at, place, between, within.blocks)
+        point = special_point(within, place)
         if point is None:
             remarks += (f"near {near:.9g}: {event.sentence}, but no multiplier of the orbit found there is critical",)
         else:
-            points.append(point)
+            found.append((place.crossing.value, point))
+    points: list[BranchPoint] = []
+    last = np.inf
+    for at, special in found:
+        if last < at:  # stability between two special points is that of an ordinary one
+            points.append(within.ordinary(0.5 * (last + at)))
+        points.append(special)
+        last = at
     return Found(tuple(points), remarks)
 
 
@@ -245,7 +192,7 @@ def _fold(within: Within, a: float, b: float) -> Place:
     return Place(Crossing(place, (place, place), Event.PLUS, 1, 1, 1.0 + 0.0j), fold=True)
 
 
-def _branches_meet(step: Step) -> bool:
+def _branches_meet(step: Step[Anchor, OnCurve]) -> bool:
     """True if the curve is not the only one through the end of a step."""
     return bool(np.linalg.svd(step.matrix[:-1], compute_uv=False)[-1] <= _BRANCHING)
 

@@ -60,30 +60,15 @@ class Frame(ReadOnlyArrays):
     """Units and borders that the equations are written in; adapted from point to point of a curve.
 
     With m directions that the orbit may move in (none if it is known) and k = 1 critical multiplier or k = 2:
-
-    Attributes
-    ----------
-    size
-        Size of the states, shape (n,).
-    widths
-        Widths of the parameters' intervals, shape (2,).
-    basis
-        Orthonormal directions, in units of ``size``, shape (n, m).
-    column, row
-        Borders b and c, shape (n, k).
-    mixture
-        Makes the k equations of the entries of G, shape (k, k * k).
-    section
-        Section on which a return ends, for a system that does not depend on time.
     """
 
-    size: Array
-    widths: Array
-    basis: Array
-    column: Array
+    size: Array  # size of the states, shape (n,)
+    widths: Array  # widths of the parameters' intervals, shape (2,)
+    basis: Array  # orthonormal directions, in units of ``size``, shape (n, m)
+    column: Array  # borders b and c, shape (n, k)
     row: Array
-    mixture: Array
-    section: Section | None
+    mixture: Array  # makes the k equations of the entries of G, shape (k, k * k)
+    section: Section | None  # section on which a return ends, for a system that does not depend on time
 
     def between(self, start: Place, end: Place) -> Array:
         """Coordinates of one place seen from another: state, parameters, and cosine where there is one."""
@@ -116,55 +101,27 @@ class Frame(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class Evaluated(ReadOnlyArrays):
-    """The equations at a place.
+    """The equations at a place."""
 
-    Attributes
-    ----------
-    place, image
-        Place, and the return map there.
-    jacobian
-        Jacobian of the return map in units of the frame, shape (n, n).
-    residual
-        Left sides of the equations, shape (m + k,).
-    right, left
-        v and w, shape (n, k), which are null vectors where the residual is zero; in units of the frame.
-    reach
-        Norm of the inverse of the bordered matrix.
-    """
-
-    place: Place
+    place: Place  # place, and the return map there
     image: ReturnMap
-    jacobian: Array
-    residual: Array
-    right: Array
+    jacobian: Array  # Jacobian of the return map in units of the frame, shape (n, n)
+    residual: Array  # left sides of the equations, shape (m + k,)
+    right: Array  # v and w, shape (n, k), which are null vectors where the residual is zero; in units of the frame
     left: Array
-    reach: float
+    reach: float  # norm of the inverse of the bordered matrix
 
 
 @dataclass(frozen=True)
 class Spot(ReadOnlyArrays):
-    """A point of a curve from which steps start: see :class:`chilopod.stability.tracing.step.Anchor`.
+    """A point of a curve from which steps start: see :class:`chilopod.stability.tracing.step.Anchor`."""
 
-    Attributes
-    ----------
-    at, frame
-        The equations there, and the frame they are written in, adapted to this point.
-    matrix
-        Derivative of the equations, with the tangent below, shape (m + k + 1, m + k + 1).
-    tangent
-        Unit tangent, shape (m + k + 1,).
-    uncertainty
-        Bounds on the errors of the left sides of the equations, shape (m + k,).
-    before
-        The point before it, seen from here.
-    """
-
-    at: Evaluated
+    at: Evaluated  # the equations there, and the frame they are written in, adapted to this point
     frame: Frame
-    matrix: Array
-    tangent: Array
-    uncertainty: Array
-    before: Before | None = None
+    matrix: Array  # derivative of the equations, with the tangent below, shape (m + k + 1, m + k + 1)
+    tangent: Array  # unit tangent, shape (m + k + 1,)
+    uncertainty: Array  # bounds on the errors of the left sides of the equations, shape (m + k,)
+    before: Before | None = None  # the point before it, seen from here
 
     @property
     def place(self) -> Place:
@@ -187,30 +144,11 @@ class Spot(ReadOnlyArrays):
         return replace(self, tangent=tangent, matrix=np.vstack([self.matrix[:-1], tangent]))
 
 
-class CriticalCurve(Equations[Spot, Evaluated]):
-    """The equations of a curve.
+class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
+    """The curve along which a multiplier ``target``, +1 or -1, or a pair (0) is critical, of orbits that are no unknowns
+    if they are ``known``. Widths of the box are the parameters' units."""
 
-    Parameters
-    ----------
-    family2
-        The systems.
-    target
-        The critical multiplier of the return map: +1 or -1, or 0 for a pair.
-    known
-        True to take the orbit that the systems know, which is then no unknown.
-    box
-        Lower and upper ends of both parameters' intervals, shape (2, 2): one row for each parameter. Their widths are
-        the parameters' units.
-    budget
-        Return maps and time that may be taken.
-
-    Attributes
-    ----------
-    first
-        First point of a curve that is followed.
-    """
-
-    first: Spot
+    first: Spot  # of a curve that is followed
 
     def __init__(self, family2: Family2, target: int, known: bool, box: Array, budget: Budget) -> None:
         self._family2 = family2
@@ -281,9 +219,7 @@ class CriticalCurve(Equations[Spot, Evaluated]):
         """The point of the curve near a guess."""
         solved = self.corrected(anchor, guess, plane)
         missed = float(np.linalg.norm(solved.moved - guess.moved))
-        return Step(
-            anchor, solved.moved, solved.found, anchor.tangent, anchor.matrix, solved.corrections, missed
-        )
+        return Step(anchor, solved.moved, solved.found, anchor.tangent, anchor.matrix, solved.corrections, missed)
 
     def along(self, spot: Spot, size: float) -> Evaluated:
         """The equations at the point of the curve so far along the tangent of another one, which is near."""

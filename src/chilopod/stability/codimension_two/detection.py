@@ -72,36 +72,17 @@ class _NoValue(AnalysisError):
 
 @dataclass(frozen=True)
 class Critical(ReadOnlyArrays):
-    """A place of a curve with its multipliers.
+    """A place of a curve with its multipliers."""
 
-    Attributes
-    ----------
-    at, frame
-        The equations there and the frame they are written in.
-    shift
-        How far the coordinates may be off, if the image has error bounds; else None.
-    spectrum
-        All multipliers of the return map.
-    others
-        Numbers of those that are not critical, shape (others,).
-    multiplier
-        The critical one: +1, -1, or on the unit circle with positive imaginary part.
-    mode, left
-        Unit right eigenvector and left one with left^H mode = 1, shape (n,).
-    overlap
-        Overlap of the two where both have unit length in units of the frame: 0 where the multiplier is double. NaN for
-        a pair.
-    """
-
-    at: Evaluated
+    at: Evaluated  # the equations there and the frame they are written in
     frame: Frame
-    shift: Array | None
-    spectrum: Spectrum
-    others: NDArray[np.intp]
-    multiplier: complex
-    mode: ComplexArray
+    shift: Array | None  # how far the coordinates may be off, if the image has error bounds; else None
+    spectrum: Spectrum  # all multipliers of the return map
+    others: NDArray[np.intp]  # numbers of those that are not critical, shape (others,)
+    multiplier: complex  # the critical one: +1, -1, or on the unit circle with positive imaginary part
+    mode: ComplexArray  # unit right eigenvector and left one with left^H mode = 1, shape (n,)
     left: ComplexArray
-    overlap: float
+    overlap: float  # of the two, of unit length in units of the frame: 0 where the multiplier is double, NaN for a pair
 
     @property
     def error(self) -> Array:
@@ -145,17 +126,8 @@ class Station:
 
 
 class Detector:
-    """Test functions along a curve.
-
-    Parameters
-    ----------
-    curve
-        The curve.
-    kind
-        Kind of the bifurcation along it.
-    coefficients
-        True if normal forms are computed.
-    """
+    """Test functions along a curve of bifurcations of some kind, that of the normal form among them if its coefficients
+    are asked for."""
 
     def __init__(self, curve: CriticalCurve, kind: Kind, coefficients: bool) -> None:
         self._curve, self._kind, self._coefficients = curve, kind, coefficients
@@ -238,7 +210,9 @@ class Detector:
             return _product(nu[first] * nu[second] - 1.0, 1.0 + sizes[first] * sizes[second], off)
         return _product(nu - TARGETS[signal], 1.0 + np.abs(nu), errors)
 
-    def _located(self, signal: Signal, parts: Parts[Spot, Evaluated]) -> list[tuple[float, Spot, SpecialPoint2]]:
+    def _located(
+        self, signal: Signal, parts: Parts[Spot, Evaluated, Evaluated]
+    ) -> list[tuple[float, Spot, SpecialPoint2]]:
         """The point where a test function vanishes within a step, with how far along it that is; none if it means
         nothing."""
         curve, start, length = self._curve, parts.step.start, parts.step.size
@@ -379,7 +353,7 @@ def across(spot: Spot) -> Array:
 
 
 def _along(
-    test: Callable[[float], float], parts: Parts[Spot, Evaluated], root: float, h: float, error: float
+    test: Callable[[float], float], parts: Parts[Spot, Evaluated, Evaluated], root: float, h: float, error: float
 ) -> Array:
     """How far both parameters move, shape (2,), as far along the curve as a test function leaves open; from
     differences over h."""

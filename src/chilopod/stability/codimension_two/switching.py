@@ -93,29 +93,16 @@ def switch2(
 
 @dataclass(frozen=True)
 class _Unfolding:
-    """Unfolding of a degenerate point on a curve.
+    """Unfolding of a degenerate point on a curve."""
 
-    Attributes
-    ----------
-    equations, spot, at
-        The curve, the point, and its critical orbit.
-    fifth
-        Terms of fifth order.
-    slope
-        Change of the cubic coefficient along the curve, by the length of ``spot.tangent``.
-    response
-        Change of the orbit and of the parameters, in coordinates of the frame, with the modulus of the multiplier.
-    times
-        Number of returns that the coefficients are of.
-    """
-
-    equations: CriticalCurve
+    equations: CriticalCurve  # the curve, the point, and its critical orbit
     spot: Spot
     at: CriticalOrbit
-    fifth: Quintic
-    slope: float
+    fifth: Quintic  # terms of fifth order
+    slope: float  # change of the cubic coefficient along the curve, by the length of ``spot.tangent``
+    # Change of the orbit and of the parameters, in coordinates of the frame, with the modulus of the multiplier.
     response: Array
-    times: int
+    times: int  # number of returns that the coefficients are of
 
     def fold(self, a: float) -> Place | None:
         """Where a fold is predicted at an amplitude along the mode, negative against it; None if that is too far."""

@@ -113,10 +113,10 @@ def follow2(
         origin = detector.station(first)
 
         def half(sign: float) -> _Half:
-            client = _Half(curve, detector, replace(origin, spot=first.towards(sign)), progress)
-            curve.first = client.last.spot
-            client.ending, client.reason, _ = trace(client, client.last.spot, step, longest, points)
-            return client
+            curve.first = spot = first.towards(sign)
+            found = _Half(curve, detector, replace(origin, spot=spot), progress)
+            found.ending, found.reason, _ = trace(curve, spot, (step, longest), points, found.look, found.keep)
+            return found
 
         nothing = _Half(curve, detector, origin, progress)
         if outward is not None:
@@ -179,9 +179,9 @@ class _Looked(NamedTuple):
 
 @dataclass
 class _Half:
-    """A curve in one direction, without its start: a client of the tracer."""
+    """A curve in one direction, without its start: what the tracer finds."""
 
-    equations: CriticalCurve
+    curve: CriticalCurve
     detector: Detector
     last: Station
     progress: Progress2
@@ -196,7 +196,7 @@ class _Half:
         special: tuple[SpecialPoint2, ...] = ()
         for spot, point in self.detector.events(step, self.last.signals, station.signals):
             special += (point,)
-            if self.equations.target == 0 and point.kind in _MEETINGS:
+            if self.curve.target == 0 and point.kind in _MEETINGS:
                 return _Looked(self.detector.station(spot), special), Ending.RESONANCE
         return _Looked(None if ending is Ending.CLOSED else station, special), ending
 

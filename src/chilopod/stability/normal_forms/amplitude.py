@@ -59,21 +59,11 @@ class NormalFormStatus(Labelled):
 
 @dataclass(frozen=True)
 class Fit:
-    """Terms of one return on the centre manifold.
+    """Terms of one return on the centre manifold."""
 
-    Attributes
-    ----------
-    status
-        FOUND or LINEAR.
-    sampled
-        The map where it shows most.
-    cubic, cubic_error
-        Coefficient of the resonant cubic term.
-    """
-
-    status: NormalFormStatus
-    sampled: Sampled
-    cubic: complex
+    status: NormalFormStatus  # FOUND or LINEAR
+    sampled: Sampled  # the map where it shows most
+    cubic: complex  # coefficient of the resonant cubic term
     cubic_error: float
 
 

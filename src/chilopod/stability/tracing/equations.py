@@ -6,7 +6,7 @@ import contextlib
 import itertools
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Generic, NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from chilopod.stability.tracing import tolerances
 from chilopod.stability.tracing.step import A, Guess, S, Step
 
 Array = NDArray[np.float64]
+R = TypeVar("R")
 
 
 class OutsideBoxError(AnalysisError):
@@ -38,19 +39,19 @@ class Plane(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Corrected(Generic[S]):
+class Corrected(Generic[R]):
     """A solution: displacement, what was computed there, values of the parameters, the residual that is left, the
     inverse of the matrix, and how many corrections it took."""
 
     moved: Array
-    found: S
+    found: R
     values: Array
     residual: Array
     inverse: Array
     corrections: int
 
 
-class Equations(ABC, Generic[A, S]):
+class Equations(ABC, Generic[A, S, R]):
     """N equations with N+1 unknowns, in coordinates of the anchor that a solution is seen from.
 
     Attributes
@@ -72,15 +73,15 @@ class Equations(ABC, Generic[A, S]):
         """Where the parameters stand among the coordinates, and their units."""
 
     @abstractmethod
-    def residual(self, anchor: A, moved: Array, values: Array) -> tuple[S, Array]:
+    def residual(self, anchor: A, moved: Array, values: Array) -> tuple[R, Array]:
         """What is computed at a displacement, with given values of the parameters, and the residual, shape (N,)."""
 
     @abstractmethod
-    def off(self, found: S, residual: Array, move: Array) -> float:
+    def off(self, found: R, residual: Array, move: Array) -> float:
         """How far a solution is off, by the residual and the correction that it asks for."""
 
     @abstractmethod
-    def met(self, anchor: A, found: S, off: float, stalled: int, singular: bool) -> bool:
+    def met(self, anchor: A, found: R, off: float, stalled: int, singular: bool) -> bool:
         """True if corrections end that far off, the last so many of which have not halved it; ``singular``: along some
         direction they cannot."""
 
@@ -108,11 +109,11 @@ class Equations(ABC, Generic[A, S]):
     def is_first(self, step: Step[A, S]) -> bool:
         """True if a step ends in the first point of the curve, in its direction."""
 
-    def exact(self, anchor: A, found: S, row: Array) -> Array | None:
+    def exact(self, anchor: A, found: R, row: Array) -> Array | None:
         """The matrix at a solution, where that which it was found with may be weak; else None."""
         return None
 
-    def corrected(self, anchor: A, guess: Guess, plane: Plane) -> Corrected[S]:
+    def corrected(self, anchor: A, guess: Guess, plane: Plane) -> Corrected[R]:
         """Correct a guess to a solution.
 
         Broyden's updates keep the matrix of the last point good enough for the whole step.
@@ -132,9 +133,7 @@ class Equations(ABC, Generic[A, S]):
             strays = (wanted - values) / widths
             self._check_inside(strays, values, wanted, tolerances.STRAYS * float(np.linalg.norm(guess.moved)))
             found, equations = self.residual(anchor, moved, values)
-            residual = np.append(
-                equations + matrix[:-1, parameters] @ strays, plane.row @ moved - plane.target
-            )
+            residual = np.append(equations + matrix[:-1, parameters] @ strays, plane.row @ moved - plane.target)
             updated = _updated(inverse, move, inverse @ (residual - last)) if rounds else inverse
             off = self.off(found, residual, updated @ residual)
             if not np.isfinite(off) or (off > tolerances.DIVERGING * best and off > CURVE.settled):

@@ -22,8 +22,8 @@ class Before(NamedTuple):
 class Anchor(Protocol):
     """A point of a curve from which steps start, in coordinates of its own.
 
-    With N equations, ``tangent`` is a unit vector of shape (N+1,), and ``matrix`` has the derivative of the equations in
-    its first N rows, and in its last one the tangent.
+    With N equations, ``tangent`` is a unit vector of shape (N+1,), and ``matrix`` has the derivative of the equations
+    in its first N rows, and in its last one the tangent.
     """
 
     @property
@@ -33,6 +33,7 @@ class Anchor(Protocol):
     @property
     def values(self) -> Array:
         """Values of the parameters."""
+
     @property
     def before(self) -> Before | None: ...
 
@@ -66,34 +67,16 @@ def predicted(anchor: Anchor, size: float) -> Guess:
 
 @dataclass(frozen=True)
 class Step(Generic[A, S]):
-    """A step, or a part of one: a solution of the equations as it is seen from an anchor.
+    """A step, or a part of one: a solution of the equations as it is seen from an anchor."""
 
-    Attributes
-    ----------
-    start
-        The anchor.
-    moved
-        Displacement, shape (N+1,).
-    found
-        The solution.
-    tangent, matrix
-        Tangent and matrix at the end, in the coordinates of the start.
-    corrections
-        Number of corrections that were needed.
-    missed
-        Distance from where it was predicted to end.
-    end
-        The anchor at the end; None for a part of a step.
-    """
-
-    start: A
-    moved: Array
-    found: S
-    tangent: Array
+    start: A  # the anchor
+    moved: Array  # displacement, shape (N+1,)
+    found: S  # the solution
+    tangent: Array  # tangent and matrix at the end, in the coordinates of the start
     matrix: Array
-    corrections: int = 0
-    missed: float = 0.0
-    end: Any = None
+    corrections: int = 0  # number of corrections that were needed
+    missed: float = 0.0  # distance from where it was predicted to end
+    end: Any = None  # the anchor at the end; None for a part of a step
 
     @property
     def size(self) -> float:

@@ -6,8 +6,10 @@ Applied Bifurcation Theory*, section 10.2), and cut off at an edge of the box or
 
 from __future__ import annotations
 
+import contextlib
 import itertools
-from typing import Generic, Protocol, TypeVar
+from collections.abc import Callable
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,47 +18,43 @@ from scipy.optimize import brentq
 from chilopod.errors import AnalysisError, ChilopodError
 from chilopod.stability.tracing import tolerances
 from chilopod.stability.tracing.ending import Ending
-from chilopod.stability.tracing.equations import Equations, OutsideBoxError, Plane
+from chilopod.stability.tracing.equations import Equations, OutsideBoxError, Plane, R
 from chilopod.stability.tracing.step import A, Guess, S, Step, predicted
 
 Array = NDArray[np.float64]
 F = TypeVar("F")
 
 
-class Client(Protocol[A, S, F]):
-    """What a curve is followed for."""
-
-    equations: Equations[A, S]
-
-    def look(self, step: Step[A, S], ending: Ending | None) -> tuple[F, Ending | None]:
-        """What happens within a step, and why the curve ends with it, if it does; raises a ChilopodError where a
-        shorter step may succeed."""
-
-    def keep(self, found: F, count: int) -> None:
-        """Keep the step with number ``count``, with what happens within it."""
-
-
 def trace(
-    client: Client[A, S, F], anchor: A, size: float, longest: float, points: int | None
+    equations: Equations[A, S, R],
+    anchor: A,
+    sizes: tuple[float, float],
+    points: int | None,
+    look: Callable[[Step[A, S], Ending | None], tuple[F, Ending | None]],
+    keep: Callable[[F, int], None],
 ) -> tuple[Ending, str, float]:
     """Follow a curve.
 
     Parameters
     ----------
-    client
-        The client, with the equations of the curve.
-    anchor
-        Point to start from.
-    size, longest
+    equations, anchor
+        The curve, and the point to start from.
+    sizes
         First and longest step.
     points
         Number of steps at most; None for any number.
+    look
+        ``look(step, ending)`` finds what happens within a step, and why the curve ends with it, if it does; it raises a
+        ChilopodError where a shorter step may succeed.
+    keep
+        ``keep(found, count)`` is told what was found within the step with number ``count``, which is taken.
 
     Returns
     -------
     Why it ends, what stood in the way if it was lost, and the step to go on with.
     """
-    equations, size = client.equations, min(size, longest)
+    longest = sizes[1]
+    size = min(sizes)
     if outward(equations.box, anchor.values, anchor.tangent[equations.parameters(anchor)[0]]):
         return Ending.LEFT_INTERVAL, "", size
     for count in itertools.count(1) if points is None else range(1, points + 1):
@@ -66,7 +64,7 @@ def trace(
                 return Ending.BUDGET, "", size
             try:
                 step, ending = _taken(equations, anchor, size, count)
-                found, ending = client.look(step, ending)
+                found, ending = look(step, ending)
                 break
             except (ChilopodError, ArithmeticError, ValueError) as error:
                 # A parameter may step out of what the systems can have, whatever these then raise.
@@ -78,7 +76,7 @@ def trace(
             few, many = step.corrections <= tolerances.FEW, step.corrections > tolerances.MANY
             size *= tolerances.GROWTH if few else tolerances.FALL if many else 1.0
         size = min(longest, size)
-        client.keep(found, count)
+        keep(found, count)
         if ending is not None:
             return ending, "", size
         anchor = step.end
@@ -90,10 +88,10 @@ def outward(box: Array, values: Array, ahead: Array) -> bool:
     return bool((((values <= box[:, 0]) & (ahead < 0.0)) | ((values >= box[:, 1]) & (ahead > 0.0))).any())
 
 
-class Parts(Generic[A, S]):
+class Parts(Generic[A, S, R]):
     """Parts of a step, each solved for once."""
 
-    def __init__(self, equations: Equations[A, S], step: Step[A, S]) -> None:
+    def __init__(self, equations: Equations[A, S, R], step: Step[A, S]) -> None:
         self.equations, self.step = equations, step
         self._known = {step.size: step}
 
@@ -105,7 +103,7 @@ class Parts(Generic[A, S]):
         return self._known[place]
 
 
-def _taken(equations: Equations[A, S], anchor: A, size: float, count: int) -> tuple[Step[A, S], Ending | None]:
+def _taken(equations: Equations[A, S, R], anchor: A, size: float, count: int) -> tuple[Step[A, S], Ending | None]:
     """A step of a size, or a shorter one to an edge of the box or to the start of the curve."""
     guess, ahead = predicted(anchor, size), Plane(anchor.tangent, size)
     edge, step = _edge(equations, anchor, guess), None
@@ -116,10 +114,8 @@ def _taken(equations: Equations[A, S], anchor: A, size: float, count: int) -> tu
             edge = error.edge
     ending = None
     if edge is not None:
-        try:
+        with contextlib.suppress(AnalysisError):  # it may turn back just before the edge, or in it
             step, ending = _to_edge(equations, anchor, size, edge), Ending.LEFT_INTERVAL
-        except AnalysisError:
-            pass  # It may turn back just before the edge, or in it.
     step = equations.arrived(equations.step(anchor, guess, ahead, bounded=True) if step is None else step)
     length = float(np.linalg.norm(step.moved))
     if not step.size >= tolerances.STRAIGHT * length:
@@ -132,7 +128,7 @@ def _taken(equations: Equations[A, S], anchor: A, size: float, count: int) -> tu
     return (step, ending) if closed is None else (closed, Ending.CLOSED)
 
 
-def _edge(equations: Equations[A, S], anchor: A, guess: Guess) -> tuple[int, float] | None:
+def _edge(equations: Equations[A, S, R], anchor: A, guess: Guess) -> tuple[int, float] | None:
     """The edge of the box that is crossed first on the way to a guess: the number of a parameter, and its value."""
     parameters, widths = equations.parameters(anchor)
     way = widths * guess.moved[parameters]
@@ -144,7 +140,7 @@ def _edge(equations: Equations[A, S], anchor: A, guess: Guess) -> tuple[int, flo
     return j, float(ends[j])
 
 
-def _to_edge(equations: Equations[A, S], anchor: A, size: float, edge: tuple[int, float]) -> Step[A, S]:
+def _to_edge(equations: Equations[A, S, R], anchor: A, size: float, edge: tuple[int, float]) -> Step[A, S]:
     """A step that ends on an edge of the box, about as long as it was to be."""
     for _ in equations.box:
         try:
@@ -158,7 +154,7 @@ def _to_edge(equations: Equations[A, S], anchor: A, size: float, edge: tuple[int
     raise AnalysisError("the curve does not reach the end of the interval so soon", field="step")
 
 
-def _on_edge(equations: Equations[A, S], anchor: A, size: float, edge: tuple[int, float]) -> Step[A, S]:
+def _on_edge(equations: Equations[A, S, R], anchor: A, size: float, edge: tuple[int, float]) -> Step[A, S]:
     """The point of the curve where it is predicted to reach an edge first."""
     parameters, widths = equations.parameters(anchor)
     j = parameters.start + edge[0]
@@ -174,7 +170,7 @@ def _on_edge(equations: Equations[A, S], anchor: A, size: float, edge: tuple[int
     return equations.step(anchor, guess, Plane(np.eye(guess.moved.size)[j], target, edge), bounded=True)
 
 
-def _closed(equations: Equations[A, S], step: Step[A, S]) -> Step[A, S] | None:
+def _closed(equations: Equations[A, S, R], step: Step[A, S]) -> Step[A, S] | None:
     """The part of a step up to where the curve passes its first point again; None if it does not."""
     first, seen = equations.first_from(step.start)
     row = np.zeros(step.moved.size)
