@@ -32,7 +32,7 @@ from chilopod.stability.orbits import from_known, known_state
 from chilopod.stability.returns import ReturnMap, Section, return_map, section_at
 from chilopod.stability.scales import sizes
 from chilopod.stability.symmetry.mirrored import symmetric_states
-from chilopod.stability.tracing.equations import Equations, Plane
+from chilopod.stability.tracing.equations import Equations, OutsideBoxError, Plane
 from chilopod.stability.tracing.step import Before, Guess, Step
 
 Array = NDArray[np.float64]
@@ -145,7 +145,7 @@ class Spot(ReadOnlyArrays):
 
 
 class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
-    """The curve along which a multiplier ``target``, +1 or -1, or a pair (0) is critical, of orbits that are no unknowns
+    """The curve along which a multiplier ``target``, +1 or -1, or a pair (0) is critical, of orbits that are no unknown
     if they are ``known``. Widths of the box are the parameters' units."""
 
     first: Spot  # of a curve that is followed
@@ -174,13 +174,24 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         frame = self._framed(system, place, image, size, None)
         anchor = self.spot(place, frame, None)
         try:
-            found = self.along(anchor, 0.0)
+            found = self._nearest(anchor)
         except AnalysisError as error:
             if error.field != "step":
                 raise
             allowed = "a point that was located in this family at `second`"
             raise AnalysisError("the curve was not found", field="start", allowed=allowed) from error
         return self.spot(found.place, anchor.frame, None)
+
+    def _nearest(self, anchor: Spot) -> Evaluated:
+        """The equations at the point of the curve nearest to a spot that is not on it; on an edge of the box if it is
+        not within."""
+        try:
+            return self.along(anchor, 0.0)
+        except OutsideBoxError as error:
+            j, end = error.edge
+            row = np.eye(anchor.tangent.size)[anchor.frame.parameters.start + j]
+            plane = Plane(row, float((end - anchor.values[j]) / self.widths[j]), error.edge)
+            return self.step(anchor, Guess(plane.target * row, anchor.matrix), plane).found
 
     def spot(self, place: Place, frame: Frame, before: Array | None) -> Spot:
         """Description of a point on the curve, in a frame of its own; its tangent goes the same way as the

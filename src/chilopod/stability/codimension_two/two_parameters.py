@@ -63,7 +63,8 @@ def follow2(
         :func:`chilopod.stability.switch2` gives, from which the curve goes away from the point that it leaves, and
         which knows its q.
     between
-        Intervals of both parameters: the box in which the curve is followed. Their widths are the parameters' units.
+        Intervals of both parameters: the box in which the curve is followed; the family is asked for no values outside.
+        Their widths are the parameters' units.
     second
         The value of q at the start.
     rising
@@ -191,7 +192,7 @@ class _Half:
     reason: str = ""
 
     def look(self, step: Step[Spot, Evaluated], ending: Ending | None) -> tuple[_Looked, Ending | None]:
-        """What happens within a step; the curve of a pair ends where it meets."""
+        """Station at the end of a step, and events within it; the curve of a pair ends where it meets."""
         station = self.detector.station(step.end)
         special: tuple[SpecialPoint2, ...] = ()
         for spot, point in self.detector.events(step, self.last.signals, station.signals):

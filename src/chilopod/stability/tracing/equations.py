@@ -61,7 +61,7 @@ class Equations(ABC, Generic[A, S, R]):
     budget
         Flows and time that may be taken.
     precision
-        What is left of an equation that is solved, at best.
+        Residual, in units of the parameters, that counts as none.
     """
 
     box: Array
@@ -74,7 +74,8 @@ class Equations(ABC, Generic[A, S, R]):
 
     @abstractmethod
     def residual(self, anchor: A, moved: Array, values: Array) -> tuple[R, Array]:
-        """What is computed at a displacement, with given values of the parameters, and the residual, shape (N,)."""
+        """Result of evaluating the equations at a displacement, with given values of the parameters, and the residual,
+        shape (N,)."""
 
     @abstractmethod
     def off(self, found: R, residual: Array, move: Array) -> float:

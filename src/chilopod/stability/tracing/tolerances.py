@@ -13,7 +13,7 @@ FEW, MANY = 4, 7
 """Corrections up to which a step grows, and above which the next one is shorter."""
 
 COUNTED = 1e-10
-"""What is left to correct, above which a correction counts: beyond it rounding decides how many there are."""
+"""Error above which a correction counts: below it rounding decides how many there are."""
 
 MOST_CORRECTIONS = 12
 """Corrections after which a shorter step is cheaper."""
