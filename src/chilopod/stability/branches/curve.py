@@ -241,14 +241,15 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         """How far off the derivative at an orbit is because the orbit is: by ``off`` from the residual that is left,
         and by ``weakest`` times the error of the flow."""
         n = x.size
-        size = self._relative_size(x)
         # Units may be much larger than the orbit.
         reach = max(_SMALLEST, float(np.linalg.norm(moved[:n])), float(np.linalg.norm(x / self.units(n)[:n])))
         length = max(min(reach, float(np.linalg.norm(moved))), float(np.finfo(float).tiny))
         bend = float(np.linalg.norm(matrix[:n] - anchor.matrix[:n])) / length
         # The flow's error, relative to what it may magnify, is a bound already.
-        flow = float(self._scaled(image.error, n).max()) / max(1.0, float(np.linalg.norm(matrix[:n, :n])))
-        return bend * (off + weakest * flow * max(1.0, size))
+        sizes = self.units(n)[:-1]
+        error = np.broadcast_to(image.error, (n, n)) * sizes / sizes[:, None]
+        flow = float(error.max()) / max(1.0, float(np.linalg.norm(matrix[:n, :n])))
+        return bend * (off + weakest * flow * max(1.0, self._relative_size(x)))
 
     def arrived(self, step: Step[Anchor, OnCurve]) -> Step[Anchor, OnCurve]:
         """A step with the anchor at its end, on the section there.
@@ -342,11 +343,6 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
         found = full_period(spec.values, spec.error, image.returns, image.state, image.period)
         moduli = np.abs(spec.values)
         return found.values, float(found.error_bounds[moduli >= min(_NOT_SMALL, float(moduli.max()))].max())
-
-    def _scaled(self, matrix: Array | float, n: int) -> Array:
-        """A derivative of the return map, or the bound of its error, in units, shape (n, n)."""
-        sizes = self.units(n)[:-1]
-        return np.asarray(np.broadcast_to(matrix, (n, n)) * sizes / sizes[:, None])
 
     def _relative_size(self, x: Array) -> float:
         return float(np.abs(x / self.units(x.size)[:-1]).max())

@@ -1,9 +1,8 @@
 """Events within a step along a curve of periodic orbits.
 
 The return map is looked at in the ends of a step and at nine places in between. Where polynomials of degree eight
-through what vanishes at an event fit, and stay clear of zero or pass it once, nothing else happens; elsewhere the step
-is searched, on orbits that are solved for, for all crossings of the unit circle
-(:mod:`~chilopod.stability.unit_circle.crossings`).
+through what vanishes at an event fit, and stay clear of zero, nothing happens; elsewhere the step is searched, on
+orbits that are solved for, for all crossings of the unit circle (:mod:`~chilopod.stability.unit_circle.crossings`).
 What is guaranteed is that of an interpolation: a course of the multipliers that the places show is followed however
 close its crossings lie; one that is confined between two places, which are a sixth of a step apart at most, is not
 seen.
@@ -25,7 +24,7 @@ from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.special_points import Place, special_point
 from chilopod.stability.branches.within import Within
 from chilopod.stability.capabilities import flows_with_error
-from chilopod.stability.orbit_blocks import crossings_in
+from chilopod.stability.orbit_blocks import block_of, crossings_in
 from chilopod.stability.returns import ReturnMap
 from chilopod.stability.spectrum.eigenvalues import counts_outside, spectrum
 from chilopod.stability.symmetry.isotypic import Block
@@ -33,7 +32,7 @@ from chilopod.stability.tracing.step import Step
 from chilopod.stability.unit_circle.critical import Crossing
 from chilopod.stability.unit_circle.crossings import Crossings, SearchStatus, find_crossings
 from chilopod.stability.unit_circle.interpolation import DEGREE, PLACES, interpolated
-from chilopod.stability.unit_circle.spectra import TARGETS, Event, Matrices, factors
+from chilopod.stability.unit_circle.spectra import TARGETS, Event, Matrices, distances, factors
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -45,6 +44,7 @@ _CLOSE = 1e-9  # of a step: how closely a point is located along the curve
 _BRANCHING = 1e-4  # smallest singular value of [H' - 1, dH/dp], in units, where branches meet
 _CONFIRMING = 1e-3, 1e-2, 0.1, 0.3  # of a step: how far beside a place its sides are told apart
 _SURE = 3.0  # times its error: so far from the circle a multiplier is on one side of it
+_COMPLEX = 1e-5  # imaginary part from which a multiplier on the circle is one of a pair
 _EVENTS = (Event.MINUS, Event.PLUS, Event.PAIR)
 
 
@@ -71,10 +71,10 @@ def inspect(curve: Curve, step: Step[Anchor, OnCurve], closely: bool) -> Found:
     # What starts at a fold does not find it again.
     turned = not leaving and abs(rising) > _CLOSE and rising * float(step.tangent[-1]) < 0.0
     flipped = not leaving and _sign(step.start.matrix) != _sign(step.matrix)
-    crossed = _crossed_within(within) if closely else _crossed_between_ends(within, turned)
+    crossed, single = (_crossed_within(within), None) if closely else _crossed_between_ends(within, turned)
     if not (crossed or turned or flipped):
         return Found()
-    places, remarks = _places(within, crossed, turned)
+    places, remarks = _places(within, crossed, single, turned)
     if flipped and not any(place.branching for place in places):
         raise AnalysisError("the step landed on another curve", field="step")
     sure = flows_with_error(curve.system(step.found.value))
@@ -153,12 +153,16 @@ def _side(within: Within, at: float, place: Place) -> tuple[float, ...]:
     return tuple(np.where(np.abs(away) > uncertain, np.sign(away), 0.0).tolist())
 
 
-def _places(within: Within, crossed: bool, turned: bool) -> tuple[list[Place], tuple[str, ...]]:
+def _places(within: Within, crossed: bool, single: Event | None, turned: bool) -> tuple[list[Place], tuple[str, ...]]:
     """Where something happens within a step, in order: multipliers cross the circle, or the curve turns."""
     step = within.step
     remarks: tuple[str, ...] = ()
     places = []
-    for block, found in _searched(within) if crossed else ():
+    root = None if single is None else _root(within, single)
+    if root is not None and root.value > _CLOSE * step.size:
+        block = block_of(within.blocks, within.jacobian(root.value), root.multiplier)
+        places.append(_placed(within, root, block))
+    for block, found in _searched(within) if crossed and root is None else ():
         if found.status in (SearchStatus.BUDGET, SearchStatus.INCOMPLETE):
             remarks += tuple(f"near {step.found.value:.6g}: {remark}" for remark in found.remarks)
         places += [_placed(within, each, block) for each in found.crossings if each.value > _CLOSE * step.size]
@@ -238,11 +242,37 @@ def _crossed_within(within: Within) -> bool:
     return bool((np.abs(fine) <= _CLEAR * uncertain).any() or (fine[1:] * fine[:-1] <= 0.0).any())
 
 
-def _crossed_between_ends(within: Within, turned: bool) -> bool:
-    """True if the multipliers at both ends of a step tell that some have crossed the circle."""
+def _crossed_between_ends(within: Within, turned: bool) -> tuple[bool, Event | None]:
+    """Whether the multipliers at both ends of a step tell that some have crossed the circle, and of which event there
+    is but one, if so."""
     start, end = (np.linalg.eigvals(within.jacobian(place)) for place in (0.0, within.step.size))
     if within.step.start.leaving:
         start, end = (np.delete(nu, int(np.abs(nu - 1.0).argmin())) for nu in (start, end))
     before, after = counts_outside(start.astype(np.complex128)), counts_outside(end.astype(np.complex128))
-    changed = [event for event, a, b in zip(_EVENTS, before, after, strict=True) if a != b]
-    return changed not in ([], [Event.PLUS] if turned else [])  # the fold itself
+    changed = {event: abs(a - b) for event, a, b in zip(_EVENTS, before, after, strict=True) if a != b}
+    if turned:
+        changed.pop(Event.PLUS, None)  # the fold itself
+    single = list(changed.values()) == [1] and not within.step.start.leaving
+    return bool(changed), next(iter(changed)) if single else None
+
+
+def _root(within: Within, event: Event) -> Crossing | None:
+    """Where one multiplier, or one pair, crosses within a step; None if the test function does not tell, as where two
+    real ones cross as one."""
+
+    def multipliers(place: float) -> ComplexArray:
+        return np.linalg.eigvals(within.jacobian(place)).astype(np.complex128)
+
+    def test(place: float) -> float:
+        return float(_tests(multipliers(place)[None])[0, _EVENTS.index(event)])
+
+    if not test(0.0) * test(within.step.size) < 0.0:
+        return None
+    root = float(brentq(test, 0.0, within.step.size, xtol=1e-3 * _CLOSE * within.step.size))
+    nu = multipliers(root)
+    nu = nu[nu.imag > _COMPLEX] if event is Event.PAIR else nu
+    away = distances(nu, event)
+    if not away.min(initial=np.inf) <= (_COMPLEX if event is Event.PAIR else np.inf):
+        return None
+    pair = 2 if event is Event.PAIR else 1
+    return Crossing(root, (root, root), event, pair, 1, complex(nu[away.argmin()]))
