@@ -19,14 +19,7 @@ from chilopod.flows.arguments import finite_array
 from chilopod.flows.balance import numerical_balance
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.budget import UserCode
-from chilopod.stability.capabilities import (
-    Autonomous,
-    Family,
-    SystemLike,
-    expands_velocity,
-    given_scale,
-    is_autonomous,
-)
+from chilopod.stability.capabilities import Autonomous, Family, SystemLike, expands_velocity, given_scale, is_autonomous
 from chilopod.stability.normal_forms.extrapolation import radii, series
 from chilopod.stability.orbits import Orbit, find_orbit
 from chilopod.stability.points import BifurcationPoint, Criticality

@@ -23,14 +23,7 @@ from chilopod.stability.branches.fold import Fold
 from chilopod.stability.budget import UserCode
 from chilopod.stability.capabilities import Autonomous, Family, SystemLike, expands_velocity, given_scale
 from chilopod.stability.crossing_points.place import Course, place_error
-from chilopod.stability.equilibria import (
-    ROUNDING,
-    Equilibrium,
-    autonomous,
-    equilibrium_at,
-    hopf_form,
-    linear_part,
-)
+from chilopod.stability.equilibria import ROUNDING, Equilibrium, autonomous, equilibrium_at, hopf_form, linear_part
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
 from chilopod.stability.search.locate import checked_interval
 from chilopod.stability.search.located import Found, Located, located
@@ -229,11 +222,7 @@ def _resting(system: SystemLike, duration: float, scale: Array | None) -> Period
         return x + units * power[:n, n], power[:n, :n] * ratios, error * ratios
 
     return PeriodicSystem(
-        n,
-        duration,
-        lambda x, t0, t1: flow_with_error(x, t0, t1)[:2],
-        scale=scale,
-        flow_with_error=flow_with_error,
+        n, duration, lambda x, t0, t1: flow_with_error(x, t0, t1)[:2], scale=scale, flow_with_error=flow_with_error
     )
 
 

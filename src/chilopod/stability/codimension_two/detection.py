@@ -297,15 +297,7 @@ def _point(here: Critical, bound: Array, coefficient: tuple[float, float] = (np.
     value, error = (None, None) if np.isnan(coefficient[0]) else coefficient
     frequency = abs(float(np.angle(here.multiplier**image.returns))) / image.period
     return Point2(
-        place.values,
-        bound,
-        place.state,
-        here.mode,
-        here.multiplier,
-        here.spectrum.values,
-        frequency,
-        value,
-        error,
+        place.values, bound, place.state, here.mode, here.multiplier, here.spectrum.values, frequency, value, error
     )
 
 
