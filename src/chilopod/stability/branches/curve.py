@@ -20,14 +20,13 @@ from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCur
 from chilopod.stability.branches.family_returns import FamilyReturns
 from chilopod.stability.budget import SpentError, UserCode
 from chilopod.stability.capabilities import Family, is_autonomous, returns_per_period
-from chilopod.stability.convergence import CURVE
 from chilopod.stability.floquet import full_period
 from chilopod.stability.returns import ReturnMap, Section, return_duration, section_at
 from chilopod.stability.shooting import FEW_ROUNDS, Free, node_count, nodes_along, shot
 from chilopod.stability.spectrum.eigenvalues import return_multipliers, spectrum
 from chilopod.stability.tracing.equations import Corrected, Equations, OutsideBoxError, Plane
 from chilopod.stability.tracing.step import Before, Guess, Step
-from chilopod.stability.tracing.tolerances import SHARPEST_TURN
+from chilopod.stability.tracing.tolerances import SETTLED, SHARPEST_TURN
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -42,7 +41,7 @@ _SOONER, _LATER = 0.2, 0.5  # of a return: the time of the next one is foreseen 
 _SHRUNK = 10.0  # cube roots of the precision, of the largest motion so far
 _NOT_SMALL = 0.5  # modulus of a multiplier
 _PARTS = 64  # of a period, in which the states on an orbit are looked at
-_SAME, _ALONG, _SAME_PERIOD = 1e-5, 0.9, 1e-3  # in units; cosine; relative: a curve is back at its first point
+_SAME_PERIOD = 1e-3  # relative difference of the periods of the same orbit
 
 
 class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
@@ -136,7 +135,7 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
             return True
         size = self._relative_size(found.x)
         residual = off * max(_SMALLEST, size)
-        if singular or not stalled or residual > CURVE.settled * max(1.0, size):
+        if singular or not stalled or residual > SETTLED * max(1.0, size):
             return False
         return residual <= _CLEAR * self.noise(found.x, found.value, anchor.section)
 
@@ -308,22 +307,19 @@ class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
                 states.append(system.flow(np.array(states[-1]), 0.0, duration / _PARTS)[0])
         return np.array(states)
 
-    def first_from(self, anchor: Anchor) -> tuple[Array, slice]:
-        """Displacement of the first point, and the coordinates by which it is known again: any state of its orbit
-        will do where any is time 0."""
+    def first_from(self, anchor: Anchor) -> tuple[Array, Array, slice]:
+        """Displacement of the first point, its tangent, and the coordinates by which it is known again: any
+        state of its orbit will do where any is time 0."""
         moved = self.moved(anchor.last, self.first.orbit, self.first.value)
-        return moved, slice(None) if anchor.section is None else slice(moved.size - 1, None)
+        seen = slice(None) if anchor.section is None else slice(moved.size - 1, None)
+        return moved, self.first.tangent, seen
 
     def is_first(self, step: Step[Anchor, OnCurve]) -> bool:
-        """True if a step ends in the first orbit, in its direction."""
+        """True if a state of the first orbit is on the orbit that a step ends in, where any is time 0."""
         first, point = self.first, step.end.last
         if step.start.section is None:
-            away = self.first_from(step.start)[0]
-            near = float(np.linalg.norm(step.moved - away)) <= _SAME
-            return near and float(step.tangent @ first.tangent) >= _ALONG
+            return True
         if first.period is None or abs(point.period - first.period) > _SAME_PERIOD * first.period:
-            return False
-        if float(step.tangent[-1] * first.tangent[-1]) <= 0.0:
             return False
         path = (self._path(point.orbit, point.value, point.period) - first.orbit) / self.units(point.orbit.size)[:-1]
         chords = np.diff(path, axis=0)

@@ -243,8 +243,8 @@ def _crossed_within(within: Within) -> bool:
 
 
 def _crossed_between_ends(within: Within, turned: bool) -> tuple[bool, Event | None]:
-    """Whether the multipliers at both ends of a step tell that some have crossed the circle, and of which event there
-    is but one, if so."""
+    """True if the multipliers at both ends of a step tell that some have crossed the circle; and the event, where it is
+    but one."""
     start, end = (np.linalg.eigvals(within.jacobian(place)) for place in (0.0, within.step.size))
     if within.step.start.leaving:
         start, end = (np.delete(nu, int(np.abs(nu - 1.0).argmin())) for nu in (start, end))

@@ -27,13 +27,13 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.budget import Budget, UserCode
 from chilopod.stability.capabilities import KnowsOrbit, Scaled, SystemLike
-from chilopod.stability.convergence import BORDERED
 from chilopod.stability.orbits import from_known, known_state
 from chilopod.stability.returns import ReturnMap, Section, return_map, section_at
 from chilopod.stability.scales import sizes
 from chilopod.stability.symmetry.mirrored import symmetric_states
 from chilopod.stability.tracing.equations import Equations, OutsideBoxError, Plane
 from chilopod.stability.tracing.step import Before, Guess, Step
+from chilopod.stability.tracing.tolerances import ROUND_OFF, SETTLED, SHARPEST_TURN_UNSEEN
 
 Array = NDArray[np.float64]
 
@@ -41,9 +41,7 @@ Family2 = Callable[[float, float], SystemLike]
 """``family2(p, q)`` is the system at values of two parameters."""
 
 _STEP = 1e-6  # of differences, in units of the frame: it sets how fast Newton's method converges, not where to
-_SHARPEST_TURN = 0.9  # cosine between tangents at both ends of a step, which are all that events are told by
 _STALLED = 3  # corrections that have not halved a small residual: Broyden's method may rest that long
-_SAME = 1e-6  # of a step: how near a curve comes to its start to be closed
 
 
 @dataclass(frozen=True)
@@ -157,7 +155,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         self.box = box
         self.widths = box[:, 1] - box[:, 0]
         self.budget = budget
-        self.precision = BORDERED.round_off
+        self.precision = ROUND_OFF
 
     def system(self, values: Array) -> SystemLike:
         """The system at values of both parameters."""
@@ -224,7 +222,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
 
     def met(self, anchor: Spot, found: Evaluated, off: float, stalled: int, singular: bool) -> bool:
         """True if what is left to correct is round-off, or small and no longer falls."""
-        return off <= BORDERED.round_off or (off <= BORDERED.settled and stalled >= _STALLED)
+        return off <= ROUND_OFF or (off <= SETTLED and stalled >= _STALLED)
 
     def step(self, anchor: Spot, guess: Guess, plane: Plane, *, bounded: bool = False) -> Step[Spot, Evaluated]:
         """The point of the curve near a guess."""
@@ -242,7 +240,7 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         end = self.spot(step.found.place, frame, start.tangent)
         ahead = frame.carried(end.tangent, end.frame)
         ahead /= np.linalg.norm(ahead)
-        if not ahead @ start.tangent >= _SHARPEST_TURN:
+        if not ahead @ start.tangent >= SHARPEST_TURN_UNSEEN:
             raise AnalysisError("the curve turns too sharply", field="step")
         back, tangent = end.frame.between(end.place, start.place), end.frame.carried(start.tangent, frame)
         before = Before(self._onto(end, back), self._onto(end, tangent), None)
@@ -258,19 +256,12 @@ class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
         state -= image.velocity * float(image.normal @ state) / float(image.normal @ image.velocity)
         return np.concatenate([frame.basis.T @ (state / frame.size), direction[m:]])
 
-    def first_from(self, anchor: Spot) -> tuple[Array, slice]:
-        """Displacement of the first point, and the coordinates by which it is known again: the same orbit may be met at
-        another instant where the system does not depend on time."""
-        frame = anchor.frame
+    def first_from(self, anchor: Spot) -> tuple[Array, Array, slice]:
+        """Displacement of the first point, its tangent, and the coordinates by which it is known again: the same orbit
+        may be met at another instant where the system does not depend on time."""
+        frame, first = anchor.frame, self.first
         seen = slice(0 if frame.section is None else frame.parameters.start, None)
-        return frame.between(anchor.place, self.first.place), seen
-
-    def is_first(self, step: Step[Spot, Evaluated]) -> bool:
-        """True if a step ends in the first point, in its direction."""
-        first, seen = self.first_from(step.start)
-        ahead = step.start.frame.carried(self.first.tangent, self.first.frame)
-        near = float(np.abs(step.moved - first)[seen].max()) <= _SAME * step.size
-        return near and float(step.tangent[seen] @ ahead[seen]) > 0.0
+        return frame.between(anchor.place, first.place), frame.carried(first.tangent, first.frame), seen
 
     def evaluated(self, place: Place, frame: Frame) -> Evaluated:
         """The equations at a place, without error bounds."""

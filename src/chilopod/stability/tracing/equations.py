@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.stability.budget import Budget
-from chilopod.stability.convergence import CURVE
 from chilopod.stability.tracing import tolerances
 from chilopod.stability.tracing.step import A, Guess, S, Step
 
@@ -103,12 +102,12 @@ class Equations(ABC, Generic[A, S, R]):
         """A step with the anchor at its end."""
 
     @abstractmethod
-    def first_from(self, anchor: A) -> tuple[Array, slice]:
-        """Displacement of the curve's first point, and by which coordinates it is known again."""
+    def first_from(self, anchor: A) -> tuple[Array, Array, slice]:
+        """Displacement of the curve's first point, its tangent, and by which coordinates it is known again."""
 
-    @abstractmethod
     def is_first(self, step: Step[A, S]) -> bool:
-        """True if a step ends in the first point of the curve, in its direction."""
+        """True if a step to where the first point is, by these coordinates, ends there indeed."""
+        return True
 
     def exact(self, anchor: A, found: R, row: Array) -> Array | None:
         """The matrix at a solution, where that which it was found with may be weak; else None."""
@@ -137,7 +136,7 @@ class Equations(ABC, Generic[A, S, R]):
             residual = np.append(equations + matrix[:-1, parameters] @ strays, plane.row @ moved - plane.target)
             updated = _updated(inverse, move, inverse @ (residual - last)) if rounds else inverse
             off = self.off(found, residual, updated @ residual)
-            if not np.isfinite(off) or (off > tolerances.DIVERGING * best and off > CURVE.settled):
+            if not np.isfinite(off) or (off > tolerances.DIVERGING * best and off > tolerances.SETTLED):
                 raise AnalysisError("corrections diverge", field="step")
             stalled = stalled + 1 if off > 0.5 * best else 0
             met = self.met(anchor, found, off, stalled, singular)

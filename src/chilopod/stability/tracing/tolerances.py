@@ -15,6 +15,12 @@ FEW, MANY = 4, 7
 COUNTED = 1e-10
 """Error above which a correction counts: below it rounding decides how many there are."""
 
+SETTLED = 1e-8
+"""Error that may no longer fall, for the equations are good to no more: a flow errs by many times its tolerance."""
+
+ROUND_OFF = 4e-15
+"""Correction of a critical orbit that is but rounding: its equations are nearly singular where the multiplier is."""
+
 MOST_CORRECTIONS = 12
 """Corrections after which a shorter step is cheaper."""
 
@@ -36,6 +42,9 @@ STRAIGHT = 0.7
 SHARPEST_TURN = 0.5
 """Least cosine between the tangents at both ends of a step, for the same reason."""
 
+SHARPEST_TURN_UNSEEN = 0.9
+"""The same where the ends are all that events within a step are told by."""
+
 SURPRISE = 0.3
 """Part of a step by which its end may miss the prediction before the curve is looked at half-way too."""
 
@@ -47,3 +56,6 @@ OVER = 2.0
 
 NEAR = 0.05
 """Part of a step by which the cubic passes the start of the curve, for the curve to be solved for there."""
+
+SAME = 1e-5
+"""Part of a step by which a curve may miss its start to be closed: other curves pass at more."""

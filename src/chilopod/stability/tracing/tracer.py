@@ -172,7 +172,7 @@ def _on_edge(equations: Equations[A, S, R], anchor: A, size: float, edge: tuple[
 
 def _closed(equations: Equations[A, S, R], step: Step[A, S]) -> Step[A, S] | None:
     """The part of a step up to where the curve passes its first point again; None if it does not."""
-    first, seen = equations.first_from(step.start)
+    first, ahead, seen = equations.first_from(step.start)
     row = np.zeros(step.moved.size)
     row[seen] = step.moved[seen]
     length = float(np.linalg.norm(row))
@@ -188,4 +188,6 @@ def _closed(equations: Equations[A, S, R], step: Step[A, S]) -> Step[A, S] | Non
         part = equations.arrived(equations.step(step.start, guess, Plane(row, target), bounded=True))
     except ChilopodError:
         return None
-    return part if equations.is_first(part) else None
+    near = float(np.abs(part.moved - first)[seen].max()) <= tolerances.SAME * step.size
+    same = near and float(part.tangent[seen] @ ahead[seen]) > 0.0 and equations.is_first(part)
+    return part if same else None
