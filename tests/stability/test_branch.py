@@ -101,6 +101,20 @@ def test_special_points_on_the_way_are_named_and_located(matrix, kind):
         assert point.value == pytest.approx(0.0, abs=1e-9)
 
 
+def test_stability_is_known_between_two_special_points_of_a_step():
+    """Multipliers -1 - mu and -0.5 - 10 mu cross at 0 and at 0.05."""
+
+    def family(mu):
+        m = np.diag([-1.0 - mu, -0.5 - 10.0 * mu])
+        return PeriodicSystem(2, 1.0, lambda x, *_: (m @ x, m), flow_with_error=lambda x, *_: (m @ x, m, 1e-15))
+
+    branch = follow(family, begin(family, -0.09, np.zeros(2)), (-0.1, 0.137), longest=0.5, step=0.5)
+    first, second = branch.special_points
+    assert [first.value, second.value] == pytest.approx([0.0, 0.05], abs=1e-9)
+    between = [point for point in branch.points if first.value < point.value < second.value]
+    assert [point.stable for point in between] == [False]
+
+
 def test_a_step_out_of_what_the_system_can_have_is_shortened():
     def family(mu):
         if mu > 0.2 - 1e-6:

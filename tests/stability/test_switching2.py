@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.stability import BifurcationPoint, Codimension2, CodimensionTwo, Kind, PeriodicSystem, follow2, switch2
+from chilopod.stability import BifurcationPoint, CodimensionTwo, Kind, PeriodicSystem, SpecialPoint2, follow2, switch2
 
 BOX = ((-1.0, 1.0), (-1.0, 1.0))
 
@@ -63,7 +63,8 @@ def test_a_coefficient_of_fifth_order_that_vanishes_too():
     ],
 )
 def test_what_no_curve_is_switched_to_from(kind, why):
-    point = Codimension2(kind, np.zeros(2), np.zeros(2), np.zeros(1), np.ones(1, complex))
+    one = np.ones(1, complex)
+    point = SpecialPoint2(np.zeros(2), np.zeros(2), np.zeros(1), one, -1.0 + 0j, one, np.pi, kind=kind)
     with pytest.raises(ParameterError, match=why):
         switch2(family2(0.5), point, BOX)
 

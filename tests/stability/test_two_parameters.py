@@ -65,6 +65,22 @@ def test_edges_of_the_box_are_met_exactly():
     assert (curve.values >= [0.3, -0.7]).all()
 
 
+@pytest.mark.parametrize("off", [0.0, 1e-9, -1e-9])
+def test_no_values_outside_the_box_are_asked_for(off):
+    """Of a start on its edge, which may be off by its error, either."""
+    asked = []
+
+    def family2(p, q):
+        asked.append(q)
+        return circle()(p, q)
+
+    point, second = start_at(0.4)
+    point = replace(point, value=point.value + off)
+    curve = follow2(family2, point, ((-2.0, 2.0), (second, 2.0)), second=second, coefficients=False)
+    assert curve.endings == (Ending.LEFT_INTERVAL, Ending.LEFT_INTERVAL)
+    assert curve.values[0][1] == curve.values[-1][1] == min(asked) == second
+
+
 def test_a_direction_is_kept():
     point, second = start_at(0.4)
     up = follow2(circle(), point, ((0.3, 2.0), (-0.7, 2.0)), second=second, rising=True)

@@ -27,8 +27,7 @@ from chilopod.stability.capabilities import (
     SpatiallySymmetric,
     SystemLike,
 )
-from chilopod.stability.codimension_two.codimension2 import Codimension2, CodimensionTwo, Start2
-from chilopod.stability.codimension_two.curve2 import Curve2, Point2
+from chilopod.stability.codimension_two.curve2 import CodimensionTwo, Curve2, Point2, SpecialPoint2, Start2
 from chilopod.stability.codimension_two.switching import switch2
 from chilopod.stability.codimension_two.two_parameters import follow2
 from chilopod.stability.equilibria import Equilibrium, find_equilibrium
@@ -56,7 +55,6 @@ __all__ = [
     "Branch",
     "BranchPoint",
     "Budget",
-    "Codimension2",
     "CodimensionTwo",
     "Criticality",
     "Curve2",
@@ -87,6 +85,7 @@ __all__ = [
     "SearchStatus",
     "Section",
     "SpatiallySymmetric",
+    "SpecialPoint2",
     "Start",
     "Start2",
     "Stretched",

@@ -1,4 +1,4 @@
-"""Where corrections of a solution end: one rule, and its tolerances in one table."""
+"""Where corrections of an orbit end: one rule, and its tolerances (those of curves are in the tracer's table)."""
 
 from __future__ import annotations
 
@@ -24,18 +24,10 @@ class Rule(NamedTuple):
 
     def met(self, off: float, best: float) -> bool:
         """True if a residual, after others of which the best is given, ends the corrections."""
-        return off <= self.round_off or self.stays(off, best)
-
-    def stays(self, off: float, best: float) -> bool:
-        """True if a residual is small and no longer falls."""
-        return off <= self.settled and off >= _FALLING * best
+        return off <= self.round_off or (off <= self.settled and off >= _FALLING * best)
 
 
 RETURN = Rule(8e-16, 1e-10)
 """Residual of a return: a few units in the last place; a flow may err by a thousand times its tolerance."""
 NODES = Rule(1e-13, 1e-9)
 """Residual at any of the nodes of an orbit, of which there are many, and whose flows are longer than a step."""
-BORDERED = Rule(4e-15, 1e-8)
-"""Correction of a critical orbit: of equations that are nearly singular where the multiplier is."""
-CURVE = Rule(0.0, 1e-8)
-"""Residual on a curve, whose own precision stands for round-off; held against two computations of the flow."""

@@ -19,14 +19,7 @@ from chilopod.flows.arguments import finite_array
 from chilopod.flows.balance import numerical_balance
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.budget import UserCode
-from chilopod.stability.capabilities import (
-    Autonomous,
-    Family,
-    SystemLike,
-    expands_velocity,
-    given_scale,
-    is_autonomous,
-)
+from chilopod.stability.capabilities import Autonomous, Family, SystemLike, expands_velocity, given_scale, is_autonomous
 from chilopod.stability.normal_forms.extrapolation import radii, series
 from chilopod.stability.orbits import Orbit, find_orbit
 from chilopod.stability.points import BifurcationPoint, Criticality
@@ -88,24 +81,13 @@ class Equilibrium(ReadOnlyArrays):
 class HopfForm:
     """The motion on the centre manifold of a Hopf point, z' = lambda z + cubic z |z|^2, and that manifold, the state
     x + 2 Re(z mode + z^2 second) + mean |z|^2 (Kuznetsov, *Elements of Applied Bifurcation Theory*, section 8.7).
-
-    Attributes
-    ----------
-    eigenvalue
-        lambda, with a positive imaginary part.
-    mode
-        Unit eigenvector, shape (n,).
-    second, mean
-        Coefficients of the manifold, shape (n,).
-    cubic, error
-        Coefficient, and a bound on the error of its real part.
     """
 
-    eigenvalue: complex
-    mode: ComplexArray
-    second: ComplexArray
+    eigenvalue: complex  # lambda, with a positive imaginary part
+    mode: ComplexArray  # unit eigenvector, shape (n,)
+    second: ComplexArray  # coefficients of the manifold, shape (n,)
     mean: Array
-    cubic: complex
+    cubic: complex  # coefficient, and a bound on the error of its real part
     error: float
 
 
@@ -141,6 +123,13 @@ def find_equilibrium(system: SystemLike, guess: ArrayLike) -> Equilibrium:
     values = values[np.lexsort((-values.imag, -values.real))]
     off = np.inf if singular else matrix_error(checked, x, matrix, error)
     return Equilibrium(x, error, matrix, values, eigenvalue_errors(values, matrix, np.zeros_like(matrix) + off))
+
+
+def equilibrium_at(family: Family, value: float, guess: ArrayLike) -> tuple[Autonomous, Equilibrium]:
+    """The system of a family at a value of the parameter, and its equilibrium near a guess."""
+    with UserCode("family", value):
+        system = autonomous(family(value))
+        return system, find_equilibrium(system, guess)
 
 
 def autonomous(system: SystemLike) -> Autonomous:
@@ -203,13 +192,7 @@ def _velocity(system: Autonomous, x: Array) -> Array:
 
 
 def linear_part(system: Autonomous, x: Array) -> tuple[Array, Array, Array]:
-    """dx/dt in a state, shape (n,), its derivative, shape (n, n), and bounds on what differences make that err by.
-
-    Raises
-    ------
-    AnalysisError
-        If they are not finite.
-    """
+    """dx/dt in a state, shape (n,), its derivative, shape (n, n), and bounds on what differences make that err by."""
     size = np.where(x == 0.0, float(np.abs(x).max()) or 1.0, np.abs(x))
     size = size if given_scale(system) is None else np.asarray(given_scale(system))
     curves = np.stack([np.broadcast_to(x, (x.size, x.size)), np.diag(size)], axis=1)
@@ -257,17 +240,8 @@ def _expanded(system: Autonomous, curves: Array) -> tuple[Array, Array]:
 
 
 def hopf_form(system: Autonomous, x: Array, error: Array, frequency: float) -> HopfForm:
-    """The normal form at a Hopf point, with its error by what the state's and the derivative's make of it.
-
-    Parameters
-    ----------
-    system
-        At the point.
-    x, error
-        The equilibrium and how far it may be off, shape (n,).
-    frequency
-        Near that of the critical pair.
-    """
+    """The normal form at a Hopf point, of a pair near a frequency, with its error by what that of the equilibrium,
+    shape (n,), and that of the derivative make of it."""
     matrix = linear_part(system, x)[1]
     off = matrix_error(system, x, matrix, error)
     random = np.random.default_rng(1)
@@ -320,15 +294,7 @@ def _hopf_form(system: Autonomous, x: Array, matrix: Array, frequency: float, dr
 
 def hopf_cycle(family: Family, point: BifurcationPoint) -> tuple[float, Orbit, Array]:
     """A small cycle beside a Hopf point, with the parameter that it is at, and the displacement of its state from the
-    equilibrium over the root of that of the parameter, shape (n,).
-
-    Raises
-    ------
-    ParameterError
-        If it is not known on which side the cycles are.
-    AnalysisError
-        If there is no cycle where it is foreseen.
-    """
+    equilibrium over the root of that of the parameter, shape (n,)."""
     rate = point.rate
     if rate is None or point.criticality in (None, Criticality.UNDECIDED):
         raise ParameterError(
@@ -336,8 +302,7 @@ def hopf_cycle(family: Family, point: BifurcationPoint) -> tuple[float, Orbit, A
             field="point",
             value=point.value,
         )
-    with UserCode("family", point.value):
-        here = autonomous(family(point.value))
+    here, _ = equilibrium_at(family, point.value, point.orbit)
     form = hopf_form(here, point.orbit, np.zeros(point.orbit.size), point.frequency)
     units = numerical_balance(linear_part(here, point.orbit)[1])
     for share in _FIRST:
@@ -359,9 +324,9 @@ def _cycle(
     shift = -form.cubic.real / point.rate.real * square
     value = point.value + shift
     duration = 2.0 * np.pi / (point.frequency + form.cubic.imag * square + point.rate.imag * shift)
+    system, at_rest = equilibrium_at(family, value, point.orbit)
+    rest = at_rest.state
     with UserCode("family", value):
-        system = autonomous(family(value))
-        rest = find_equilibrium(system, point.orbit).state
         moved = 2.0 * (np.sqrt(square) * form.mode + square * form.second).real + square * form.mean
         size = np.maximum(np.abs(rest + moved), np.sqrt(square) * mode * units)
         section = section_at(system, rest + moved, size, duration)

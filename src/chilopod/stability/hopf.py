@@ -23,14 +23,7 @@ from chilopod.stability.branches.fold import Fold
 from chilopod.stability.budget import UserCode
 from chilopod.stability.capabilities import Autonomous, Family, SystemLike, expands_velocity, given_scale
 from chilopod.stability.crossing_points.place import Course, place_error
-from chilopod.stability.equilibria import (
-    ROUNDING,
-    Equilibrium,
-    autonomous,
-    find_equilibrium,
-    hopf_form,
-    linear_part,
-)
+from chilopod.stability.equilibria import ROUNDING, Equilibrium, autonomous, equilibrium_at, hopf_form, linear_part
 from chilopod.stability.points import BifurcationPoint, Criticality, Kind
 from chilopod.stability.search.locate import checked_interval
 from chilopod.stability.search.located import Found, Located, located
@@ -98,9 +91,7 @@ def locate_hopf(
     """
     low, high = checked_interval(between)
     family = functools.lru_cache(_KEPT)(family)
-    with UserCode("family", low):
-        system = autonomous(family(low))
-        start = find_equilibrium(system, equilibrium)
+    system, start = equilibrium_at(family, low, equilibrium)
     duration, scale = _duration(start, system.guess_period), _scale(system, start)
     samples = Samples(lambda v: _resting(family(v), duration, scale), start.state, low, high, budget, seconds)
 
@@ -231,11 +222,7 @@ def _resting(system: SystemLike, duration: float, scale: Array | None) -> Period
         return x + units * power[:n, n], power[:n, :n] * ratios, error * ratios
 
     return PeriodicSystem(
-        n,
-        duration,
-        lambda x, t0, t1: flow_with_error(x, t0, t1)[:2],
-        scale=scale,
-        flow_with_error=flow_with_error,
+        n, duration, lambda x, t0, t1: flow_with_error(x, t0, t1)[:2], scale=scale, flow_with_error=flow_with_error
     )
 
 
@@ -245,11 +232,11 @@ def _hopf_point(
     """A Hopf point from that of the map: its value by f itself, its error, its rate and coefficient."""
     low, high = between
     value, state = point.value, point.orbit
-    rate, frequency = _rate(family, between, point, duration)
+    values = np.clip(value + _BESIDE * (high - low) * np.array([-1.0, 1.0]), low, high)
+    beside = [equilibrium_at(family, each, state) for each in values.tolist()]
+    rate, frequency = _rate(values, [here for _, here in beside], between, point, duration)
     for correcting in (True, True, False):  # the search has found it almost to the last digit
-        with UserCode("family", value):
-            system = autonomous(family(value))
-            here = find_equilibrium(system, state)
+        system, here = equilibrium_at(family, value, state)
         index = int(np.abs(here.eigenvalues - 1j * frequency).argmin())
         state, frequency = here.state, float(here.eigenvalues[index].imag)
         off = float(here.eigenvalues[index].real)
@@ -259,7 +246,9 @@ def _hopf_point(
     if not bound <= _KNOWN * (high - low):
         raise AnalysisError("its eigenvalues are not known well enough", field="family", value=value)
     form = hopf_form(system, here.state, here.error, frequency)
-    wrong = form.error + bound * _change(family, between, value, form.eigenvalue, here.state)
+    with UserCode("family", value):
+        cubics = [hopf_form(there, each.state, each.error, frequency).cubic.real for there, each in beside]
+    wrong = form.error + bound * abs(cubics[1] - cubics[0]) / float(values[1] - values[0])
     coefficient, error = form.cubic.real / frequency, wrong / frequency
     decided = Criticality.SUPERCRITICAL if coefficient < 0.0 else Criticality.SUBCRITICAL
     return BifurcationPoint(
@@ -279,26 +268,11 @@ def _hopf_point(
     )
 
 
-def _beside(
-    family: Family, between: tuple[float, float], value: float, state: Array
-) -> tuple[Array, list[tuple[Autonomous, Equilibrium]]]:
-    """Values of the parameter to both sides of one, shape (2,), with the systems and their equilibria there."""
-    values = np.clip(value + _BESIDE * (between[1] - between[0]) * np.array([-1.0, 1.0]), *between)
-    found = []
-    for each in values.tolist():
-        with UserCode("family", each):
-            system = autonomous(family(each))
-            found.append((system, find_equilibrium(system, state)))
-    return values, found
-
-
 def _rate(
-    family: Family, between: tuple[float, float], point: BifurcationPoint, duration: float
+    values: Array, found: list[Equilibrium], between: tuple[float, float], point: BifurcationPoint, duration: float
 ) -> tuple[complex, float]:
     """How fast the critical eigenvalue moves, left^H dA mode, which holds however near others are, and its imaginary
-    part."""
-    values, pair = _beside(family, between, point.value, point.orbit)
-    found = [here for _, here in pair]
+    part, by the equilibria to both sides of the point."""
     matrices = [each.jacobian for each in found]
     matrix = 0.5 * (matrices[0] + matrices[1])
     units = numerical_balance(matrix)
@@ -313,14 +287,6 @@ def _rate(
     left, right = lefts[:, index].conj(), rights[:, index]
     change = left @ ((matrices[1] - matrices[0]) * ratios) @ right / (left @ right)
     return complex(change / (values[1] - values[0])), frequency
-
-
-def _change(family: Family, between: tuple[float, float], value: float, eigenvalue: complex, state: Array) -> float:
-    """How fast the real part of the cubic coefficient changes with the parameter."""
-    values, found = _beside(family, between, value, state)
-    with UserCode("family", value):
-        low, high = (hopf_form(system, here.state, here.error, eigenvalue.imag).cubic.real for system, here in found)
-    return abs(high - low) / float(values[1] - values[0])
 
 
 def _of_equilibria(remark: str) -> str:

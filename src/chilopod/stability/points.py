@@ -182,11 +182,7 @@ class BifurcationPoint(Shown, ReadOnlyArrays):
             lines.append(f"{name} coefficient: {self.coefficient:.6g} ± {self.coefficient_error:.1e}")
         real = np.abs(self.mode.imag).max() < _REAL
         mode = in_one_line(self.mode.real if real else self.mode)
-        return [
-            *lines,
-            f"{state}: {in_one_line(self.orbit)}",
-            f"critical mode: {mode}",
-        ]
+        return [*lines, f"{state}: {in_one_line(self.orbit)}", f"critical mode: {mode}"]
 
 
 def with_coefficients(point: BifurcationPoint, form: NormalForm) -> BifurcationPoint:

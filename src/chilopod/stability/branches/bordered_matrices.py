@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,29 +11,15 @@ from chilopod.stability.symmetry.mirrored import symmetric_states
 
 Array = NDArray[np.float64]
 
-_SINGULAR = 1e-9  # singular value, relative to the largest, that counts as zero in corrections
-_UNCERTAIN = 1e-6  # the same where a direction is wanted: the derivative by the parameter is a difference over that
+_UNCERTAIN = 1e-6  # singular value, relative to the largest, that counts as zero: as uncertain as a difference is
 
 
 def symmetric_space(system: SystemLike, state: Array, sizes: Array, mode: Array | None = None) -> Array | None:
-    """Projection onto the states with the spatial symmetries of an orbit, in units of the states' ``sizes``.
+    """Projection onto the states with the spatial symmetries of an orbit, and of a ``mode`` along which a branch
+    leaves it if there is one, in units of the states' ``sizes``, shape (n, n); None if there are no symmetries.
 
     Among these its branch is regular where others leave it that break the symmetries (Golubitsky, Stewart & Schaeffer,
     *Singularities and Groups in Bifurcation Theory* II, 1988, section XIII.3).
-
-    Parameters
-    ----------
-    system, state
-        The system and a state on the orbit, shape (n,).
-    sizes
-        Sizes of the states, shape (n,).
-    mode
-        In units, shape (n,): the symmetries are those that it has as well, which are those of what branches off along
-        it.
-
-    Returns
-    -------
-    Shape (n, n); None if there are no symmetries.
     """
     if system.symmetry is not None or not spatial_symmetries(system):
         return None
@@ -55,22 +39,6 @@ def within_space(space: Array | None, matrix: Array) -> Array:
     result[:n] = space @ result[:n]
     result[:n, :n] -= result[:n, :n] @ across + across
     return result
-
-
-def inverted(matrix: Array) -> tuple[Array, bool]:
-    """Inverse of the matrix of a curve, shape (n+1, n+1), or that of shortest solutions, and whether it is the latter.
-
-    Where branches meet rounding decides how near to singular the matrix is, and a solution with its inverse may end on
-    the other branch. The shortest one leaves a residual as it is in a direction in which the matrix is singular.
-    """
-    with contextlib.suppress(np.linalg.LinAlgError):
-        found = np.linalg.inv(matrix)
-        if np.abs(found).max() * np.abs(matrix).max() < 1.0 / _SINGULAR:
-            return np.asarray(found), False
-    try:
-        return np.asarray(np.linalg.pinv(matrix, rcond=_SINGULAR)), True
-    except np.linalg.LinAlgError:
-        raise AnalysisError("the curve has no direction here", field="step") from None
 
 
 def null_vector(bordered: Array) -> Array:

@@ -13,7 +13,7 @@ import math
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,20 +21,19 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import ParameterError
 from chilopod.flows.arguments import checked_count
 from chilopod.notebook import picture
-from chilopod.stability.branches.branch_points import Anchor, BranchPoint, Step
+from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve
 from chilopod.stability.branches.branch_starts import IN_FOLD, Start, anchored, begin, branch_sizes, switch
-from chilopod.stability.branches.closure import closes
 from chilopod.stability.branches.curve import PRECISION, Curve
 from chilopod.stability.branches.inspection import Found, inspect
-from chilopod.stability.branches.stepping import taken
 from chilopod.stability.budget import Budget
-from chilopod.stability.capabilities import Family, given_scale
+from chilopod.stability.capabilities import Family
 from chilopod.stability.orbits import Orbit
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.shown import Result, axes_for, columns, dataset, mark, rows, said
 from chilopod.stability.spectrum.errors import VERDICTS
 from chilopod.stability.tracing.ending import Ending
-from chilopod.stability.tracing.tracer import Pace, trace
+from chilopod.stability.tracing.step import Step
+from chilopod.stability.tracing.tracer import outward, trace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,7 +49,6 @@ LONGEST = 0.15
 BUDGET = 200_000
 """Flows that a branch may ask for by default."""
 
-_FEW, _MANY = 4, 7  # corrections after which steps grow, and shrink
 _STYLES = {True: "-", False: "--", None: ":"}  # of lines, by stability
 _NARROWEST = 1e-9  # width of an interval, relative to the values in it
 
@@ -284,21 +282,14 @@ def proceed(
     if not isinstance(branch, Branch):
         raise ParameterError("is no branch", field="branch", value=branch, allowed="what `follow` gives")
     end = branch.points[-1]
-    if not low <= end.value <= high or _outward(end, between):
+    if not low <= end.value <= high or outward(np.array([between]), np.array([end.value]), end.tangent[-1:]):
         raise ParameterError(
             "does not go on beyond the branch's last point", field="between", value=between,
             allowed=f"{end.value!r} well within",
         )  # fmt: skip
-    curve = Curve(
-        family,
-        branch.scale,
-        branch.sizes,
-        between=between,
-        periods=branch.periods,
-        symmetric=branch.symmetric,
-        precision=precision,
-        budget=Budget(budget, seconds),
-    )
+    orbits: dict[str, Any] = {"periods": branch.periods, "symmetric": branch.symmetric, "precision": precision}
+    allowed = Budget(budget, seconds)
+    curve = Curve(family, branch.scale, branch.sizes, between=between, budget=allowed, **orbits)
     first = branch.points[0]
     last, *earlier = [point for point in reversed(branch.points) if point.special is None or point is first]
     leaving = last.special is not None
@@ -329,95 +320,37 @@ def _anchored(
         raise ParameterError(
             "is a bifurcation point", field="start", value=start.kind.label, allowed="what switch(family, point) gives"
         )
-    if isinstance(start, Orbit):
-        start = begin(family, low, start.state, symmetric=curve.symmetric)
-    elif not isinstance(start, Start | BranchPoint):
-        start = begin(family, low, start, symmetric=curve.symmetric)
+    if not isinstance(start, Start | BranchPoint):
+        guess = start.state if isinstance(start, Orbit) else start
+        start = begin(family, low, guess, symmetric=curve.symmetric)
     if not curve.between[0] <= start.value <= curve.between[1]:
         raise ParameterError("does not hold the start", field="between", value=curve.between, allowed=f"{start.value}")
     if isinstance(start, Start):
         curve.periods = start.periods
-        section = curve.section_at(start.orbit, start.value, start.period)
-        curve.sizes = branch_sizes(curve, start.orbit, start.value, section)
-        if start.outward is not None and given_scale(curve.system(start.value)) is None:
-            # A small cycle tells nothing of those that it grows into, by the root of the parameter.
-            grown = np.abs(start.outward) * math.sqrt(curve.scale)
-            curve.sizes = curve.sizes * max(1.0, float((grown / curve.sizes).max()))
+        curve.sizes = branch_sizes(curve, start)
         return anchored(curve, start, step)
-    section = curve.section_at(start.orbit, start.value, start.period)
-    curve.sizes = branch_sizes(curve, start.orbit, start.value, section)
+    curve.sizes = branch_sizes(curve, start)
     units = curve.units(start.orbit.size)
     tangent = start.tangent * (1.0 if start.units is None else start.units) / units
     return curve.anchor(replace(start, tangent=tangent / np.linalg.norm(tangent), units=units, special=None))
 
 
-def _outward(point: BranchPoint, between: tuple[float, float]) -> bool:
-    """True if a curve leaves the interval where it is."""
-    ahead = float(point.tangent[-1])
-    return bool((point.value <= between[0] and ahead < 0.0) or (point.value >= between[1] and ahead > 0.0))
-
-
-@dataclass
-class _Orbits:
-    """A branch that is being followed: see :class:`chilopod.stability.tracing.tracer.Traced`."""
-
-    curve: Curve
-    anchor: Anchor
-    found: list[BranchPoint]
-    remarks: list[str]
-    closely: bool
-    progress: Progress
-
-    def advance(self, size: float, count: int) -> tuple[_Advance, int]:
-        """A step, cut off where the curve has come back to its start."""
-        step, left = taken(self.curve, self.anchor, size)
-        within, closed = inspect(self.curve, step, self.closely), None
-        if count > 2 and not left:
-            closed = closes(self.curve, self.found[0], step)
-        ending = Ending.LEFT_INTERVAL if left else None
-        if closed is not None:
-            points = tuple(point for point in within.points if _before(point, closed, step))
-            return _Advance(closed, replace(within, points=points), Ending.CLOSED), step.corrections
-        return _Advance(step, within, ending), step.corrections
-
-    def arrive(self, step: _Advance, count: int) -> Ending | None:
-        """Go on to the end of a step."""
-        self.found += [*step.within.points, step.taken.end.last]
-        self.remarks += step.within.remarks
-        self.anchor = step.taken.end
-        self.progress(count, self.found[-1])
-        return step.ending
-
-
-class _Advance(NamedTuple):
-    """A step, what happens within it, and why the branch ends with it, if it does."""
-
-    taken: Step
-    within: Found
-    ending: Ending | None
-
-
 def _followed(
     curve: Curve, branch: Branch, anchor: Anchor, points: int | None, longest: float, closely: bool, progress: Progress
 ) -> Branch:
-    orbits = _Orbits(curve, anchor, list(branch.points), list(branch.remarks), closely, progress)
-    ending, reason, size = Ending.LEFT_INTERVAL, "", branch.step
-    if not _outward(orbits.found[-1], curve.between):
-        with curve.budget:
-            ending, reason, size = trace(orbits, branch.step, Pace(longest, _FEW, _MANY), points, curve.budget)
-    return replace(
-        branch,
-        points=tuple(orbits.found),
-        ending=ending,
-        step=size,
-        reason=reason,
-        remarks=tuple(dict.fromkeys(orbits.remarks)),
-    )
+    curve.first = branch.points[0]
+    found, remarks = list(branch.points), list(branch.remarks)
 
+    def look(step: Step[Anchor, OnCurve], ending: Ending | None) -> tuple[tuple[Found, BranchPoint], Ending | None]:
+        return (inspect(curve, step, closely), step.end.last), ending
 
-def _before(point: BranchPoint, closed: Step, step: Step) -> bool:
-    """True if a special point within a step comes before the place where the curve closes."""
-    start = step.start.last
-    assert start.units is not None
-    moved = np.append(point.orbit - start.orbit, point.value - start.value) / start.units
-    return float(start.tangent @ moved) <= closed.size
+    def keep(looked: tuple[Found, BranchPoint], count: int) -> None:
+        within, end = looked
+        found.extend([*within.points, end])
+        remarks.extend(within.remarks)
+        progress(count, end)
+
+    with curve.budget:
+        ending, reason, size = trace(curve, anchor, (branch.step, longest), points, look, keep)
+    said = tuple(dict.fromkeys(remarks))
+    return replace(branch, points=tuple(found), ending=ending, step=size, reason=reason, remarks=said)

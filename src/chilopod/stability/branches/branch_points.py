@@ -1,8 +1,9 @@
-"""Points along a branch of periodic orbits, and the steps between them."""
+"""Points along a branch of periodic orbits, and what steps from one of them need."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.returns import ReturnMap, Section
 from chilopod.stability.spectrum.errors import stable_within
+from chilopod.stability.tracing.step import Before
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -63,71 +65,44 @@ class BranchPoint(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class Anchor(ReadOnlyArrays):
-    """Where a step starts.
+    """A point from which steps start: see :class:`chilopod.stability.tracing.step.Anchor`."""
 
-    Attributes
-    ----------
-    last
-        The point it starts from.
-    matrix
-        Jacobian of [H - x; tangent . step] there with respect to state and parameter in units, shape (n+1, n+1).
-    before
-        The point before it with its matrix, if there is one.
-    section
-        Section on which returns end during the step, for a system without a period of its own.
-    leaving
-        True if the point is one where branches meet: the matrix is then one taken ahead.
-    """
-
-    last: BranchPoint
+    last: BranchPoint  # the point
+    # Jacobian of [H - x; tangent . step] there with respect to state and parameter in units, shape (n+1, n+1).
     matrix: Array
-    before: tuple[BranchPoint, Array] | None = None
+    before: Before | None = None  # the point before it, seen from here
+    # Section on which returns end during the step, for a system without a period of its own.
     section: Section | None = None
-    leaving: bool = False
+    # Projection onto the states with the orbit's spatial symmetries, shape (n, n); None if there are none.
+    space: Array | None = None
+    leaving: bool = False  # True if the point is one where branches meet: the matrix is then one taken ahead
+    lengthening: float = 0.0  # relative change of the period along the curve
+
+    @property
+    def tangent(self) -> Array:
+        """Unit tangent."""
+        return self.last.tangent
+
+    @property
+    def values(self) -> Array:
+        """Value of the parameter, shape (1,)."""
+        return np.array([self.last.value])
 
 
-@dataclass(frozen=True)
-class Step(ReadOnlyArrays):
-    """A step that was taken.
+class Returned(NamedTuple):
+    """A state and the value of the parameter; the return of the state, and that at a neighbouring value if known."""
 
-    Attributes
-    ----------
-    start, end
-        Anchors where it started and where the next one starts.
-    size
-        Its length along the first tangent.
-    moved
-        From start to end, in units, shape (n+1,).
-    tangent, matrix
-        Tangent and matrix of the curve at the end, on the section of the start; the matrix has the tangent as its last
-        row.
-    image
-        The return map at the end, on the section of the start.
-    corrections
-        Number of corrections that were needed.
-    missed
-        Distance from where it was predicted to end, in units.
-    """
+    x: Array
+    value: float
+    mapped: Array
+    beside: Array | None
 
-    start: Anchor
-    end: Anchor
-    size: float
-    moved: Array
-    tangent: Array
-    matrix: Array
+
+class OnCurve(NamedTuple):
+    """An orbit on the curve: state, value of the parameter, return map on the section of the step's start, and by how
+    much its derivative is wrong, in units, beside its own error (infinite if nobody asked)."""
+
+    x: Array
+    value: float
     image: ReturnMap
-    corrections: int
-    missed: float
-
-    def between(self, place: float) -> tuple[Array, Array]:
-        """Displacement from the start at a place (along the first tangent), by the cubic through both ends along their
-        tangents, and the matrix there by the straight line."""
-        t, size = place / self.size, self.size
-        first = self.start.last.tangent
-        last = self.tangent / float(first @ self.tangent)
-        moved = (
-            size * t * (1.0 - t) ** 2 * first + t * t * (3.0 - 2.0 * t) * self.moved - size * t * t * (1.0 - t) * last
-        )
-        matrix = self.start.matrix + t * (self.matrix - self.start.matrix)
-        matrix[-1] = first
-        return moved, matrix
+    wrong: float

@@ -34,6 +34,13 @@ _BENT = 0.3  # of a change of state: by so much a map departs from its linear pa
 _PARTS = 2.0**-8, 2.0**-4  # of a return
 _DECADES, _HALVINGS = 12, 12  # of the size, on its logarithm
 
+_LEFT_BY_NONE = {
+    Kind.FOLD: "is a fold: the branch itself goes round it, with follow",
+    Kind.NEIMARK_SACKER: "is a Neimark-Sacker point: what leaves it is a torus, which is announced but not followed",
+    Kind.KREIN_COLLISION: "is a Krein collision: no periodic orbits leave it",
+}
+"""Kinds of points that no branch is switched to from, and why."""
+
 
 @dataclass(frozen=True)
 class Start(ReadOnlyArrays):
@@ -169,21 +176,11 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
     if not isinstance(point, BifurcationPoint):
         raise ParameterError("is no located point", field="point", value=point, allowed="one that `locate` gives")
     kind = point.kind
+    if kind in _LEFT_BY_NONE:
+        raise ParameterError(_LEFT_BY_NONE[kind], field="point", value=point.value)
     if kind is Kind.HOPF:
         value, cycle, outward = hopf_cycle(family, point)
         return (Start(value, cycle.state, value > point.value, period=cycle.period, outward=outward),)
-    if kind is Kind.FOLD:
-        raise ParameterError(
-            "is a fold: the branch itself goes round it", field="point", value=point.value, allowed="follow"
-        )
-    if kind is Kind.NEIMARK_SACKER:
-        raise ParameterError(
-            "is a Neimark-Sacker point: what leaves it is a torus, which is announced but not followed",
-            field="point",
-            value=point.value,
-        )
-    if kind is Kind.KREIN_COLLISION:
-        raise ParameterError("is a Krein collision: no periodic orbits leave it", field="point", value=point.value)
     modes = point.mode.real[None] if point.modes is None else point.modes.real.T
     system = family(point.value)
     period = None
@@ -206,13 +203,25 @@ def switch(family: Family, point: BifurcationPoint | BranchPoint, *, periods: in
     )
 
 
-def branch_sizes(curve: Curve, x: Array, value: float, section: Section | None) -> Array:
+def branch_sizes(curve: Curve, start: Start | BranchPoint) -> Array:
     """Sizes of the states along a branch, shape (n,): the system's own, or how far from the orbit its return map is no
     longer linear, or what the interval makes of the orbit, with ratios that the orbit tells."""
-    system = curve.system(value)
+    x, value = start.orbit, start.value
+    system, section = curve.system(value), curve.section_at(x, value, start.period)
     given = given_scale(system)
     if given is not None:
         return given
+    found = _linear_within(curve, x, value, section)
+    if not isinstance(start, Start) or start.outward is None:
+        return found
+    # A small cycle tells nothing of those that it grows into, by the root of the parameter.
+    grown = np.abs(start.outward) * math.sqrt(curve.scale)
+    return found * max(1.0, float((grown / found).max()))
+
+
+def _linear_within(curve: Curve, x: Array, value: float, section: Section | None) -> Array:
+    """Sizes of the states, shape (n,), within which returns from an orbit are linear."""
+    system = curve.system(value)
     image = curve.image(x, value, section)
     base = sizes(system, x, image.period / image.returns)
     direction = np.cos(1.0 + 3.0 * np.arange(x.size))
@@ -295,7 +304,7 @@ def anchored(curve: Curve, start: Start, ahead: float) -> Anchor:
     )
     leaving = start.mode is not None
     if not leaving:
-        return Anchor(point, np.vstack([matrix, tangent]), None, section)
+        return curve.anchored(point, np.vstack([matrix, tangent]), section)
     return curve.anchor(point, ahead=ahead, leaving=True)
 
 

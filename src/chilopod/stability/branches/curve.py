@@ -1,15 +1,13 @@
-"""One step along a curve of periodic orbits.
+"""The curve of periodic orbits of a family: equations for the tracer.
 
-The curve is H(x, p) = x, parametrised by its arclength in units: x in the sizes of the states, p in a scale. A step is
-predicted from the last two points and their tangents, and corrected at right angles to the last tangent (Keller 1977;
-Kuznetsov, *Elements of Applied Bifurcation Theory*, section 10.2). Of a system without a period of its own, every step
-has the section across the motion where it starts.
+The curve is H(x, p) = x, in units: x in the sizes of the states, p in a scale. Of a system without a period of its own,
+every step has the section across the motion where it starts.
 """
 
 from __future__ import annotations
 
 import contextlib
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,25 +15,18 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import read_only
-from chilopod.stability.branches.bordered_matrices import inverted, null_vector, symmetric_space, within_space
-from chilopod.stability.branches.branch_points import Anchor, BranchPoint, Step
+from chilopod.stability.branches.bordered_matrices import null_vector, symmetric_space, within_space
+from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCurve, Returned
 from chilopod.stability.branches.family_returns import FamilyReturns
 from chilopod.stability.budget import SpentError, UserCode
-from chilopod.stability.capabilities import (
-    Family,
-    is_autonomous,
-    returns_per_period,
-)
-from chilopod.stability.convergence import CURVE
+from chilopod.stability.capabilities import Family, is_autonomous, returns_per_period
 from chilopod.stability.floquet import full_period
-from chilopod.stability.returns import (
-    ReturnMap,
-    Section,
-    return_duration,
-    section_at,
-)
+from chilopod.stability.returns import ReturnMap, Section, return_duration, section_at
 from chilopod.stability.shooting import FEW_ROUNDS, Free, node_count, nodes_along, shot
 from chilopod.stability.spectrum.eigenvalues import return_multipliers, spectrum
+from chilopod.stability.tracing.equations import Corrected, Equations, OutsideBoxError, Plane
+from chilopod.stability.tracing.step import Before, Guess, Step
+from chilopod.stability.tracing.tolerances import SETTLED, SHARPEST_TURN
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -43,36 +34,27 @@ ComplexArray = NDArray[np.complex128]
 PRECISION = 1e-12
 """How closely orbits are solved for by default, of the sizes of the states; where the flow is not as good, as it is."""
 
-_COUNTED = 1e-10  # residuals above it count as corrections, by which steps grow or shrink
 _CLEAR = 10.0  # times the difference of two computations: a residual that may be the flow's error
 _SMALLEST = 1e-3  # of the units: an orbit that is smaller is solved for no more closely
-_LOOSE = 1e-6  # of a step: an orbit that may be so far off is corrected with a matrix of its own
-_MOST_CORRECTIONS = 12
 _FEWEST_NODES, _MANY_NODES = 3, 6  # a return that magnifies less is as good in one; that magnifies more is none
-_STRAYS = 0.1  # of a step: so far beyond the interval a curve is sought that ends within it
 _SOONER, _LATER = 0.2, 0.5  # of a return: the time of the next one is foreseen to differ by so much at most
-_SHARPEST_TURN = 0.5  # cosine between two tangents: beyond it the step may have landed on another curve
 _SHRUNK = 10.0  # cube roots of the precision, of the largest motion so far
-_PARTS = 32  # of a return, in which the extent of an orbit is taken
 _NOT_SMALL = 0.5  # modulus of a multiplier
+_PARTS = 64  # of a period, in which the states on an orbit are looked at
+_SAME_PERIOD = 1e-3  # relative difference of the periods of the same orbit
 
 
-class Curve(FamilyReturns):
-    """The curve H(x, p) = x of a family.
+class Curve(FamilyReturns, Equations[Anchor, OnCurve, Returned]):
+    """The curve H(x, p) = x of a family, solved for to a precision relative to the sizes of the states."""
 
-    Parameters
-    ----------
-    family, scale, sizes, returns
-        See :class:`FamilyReturns`.
-    precision
-        Precision to which orbits are solved for, relative to the sizes of the states.
-    """
+    first: BranchPoint  # of a curve that is followed
 
     def __init__(
         self, family: Family, scale: float, sizes: Array | None = None, *, precision: float = PRECISION, **returns: Any
     ) -> None:
         super().__init__(family, scale, sizes, **returns)
         self.precision = precision
+        self.box = np.array([self.between])
         self._motion = 0.0  # the largest within a period so far
 
     def matrix(self, jacobian: Array, derivative: Array, tangent: Array) -> Array:
@@ -81,159 +63,154 @@ class Curve(FamilyReturns):
         scaled = jacobian * sizes / sizes[:, None] - np.eye(len(jacobian))
         return np.block([[scaled, (derivative / sizes)[:, None]], [tangent[None]]])
 
+    def moved(self, start: BranchPoint, x: Array, value: float) -> Array:
+        """Displacement of an orbit from a point, in units, shape (n+1,)."""
+        return np.append(x - start.orbit, value - start.value) / self.units(x.size)
+
+    def reached(self, start: BranchPoint, moved: Array) -> tuple[Array, float]:
+        """State and parameter at a displacement from a point; the inverse of :meth:`moved`."""
+        total = self.units(start.orbit.size) * moved
+        return start.orbit + total[:-1], start.value + float(total[-1])
+
     def anchor(
         self, last: BranchPoint, before: BranchPoint | None = None, ahead: float = 0.0, leaving: bool = False
     ) -> Anchor:
-        """Where a step from a point starts, its matrix taken so far ``ahead`` along the tangent."""
-        section = self.section(last)
+        """The anchor of a point, its matrix taken so far ``ahead`` along the tangent."""
+        section = self.section_at(last.orbit, last.value, last.period)
         matrix = self._matrix_at(last, ahead, section)
         # The matrix of a point where branches meet was not its own, so it tells nothing about the next one.
         if before is None or before.special is not None:
-            return Anchor(last, matrix, None, section, leaving)
-        return Anchor(last, matrix, (before, read_only(self._matrix_at(before, 0.0, section))), section)
+            return self.anchored(last, matrix, section, leaving=leaving)
+        return self.anchored(last, matrix, section, before, read_only(self._matrix_at(before, 0.0, section)))
 
-    def section(self, point: BranchPoint) -> Section | None:
-        """Across the motion in a point, where returns need one."""
-        return self.section_at(point.orbit, point.value, point.period)
-
-    def _matrix_at(self, point: BranchPoint, ahead: float, section: Section | None) -> Array:
-        x = point.orbit + ahead * point.tangent[:-1] * self.units(point.orbit.size)[:-1]
-        # As at the end of a step, to the bit.
-        jacobian = self.image(x, point.value, section, with_error=True).jacobian
-        derivative = self.parameter_derivative(x, point.value, section)
-        return self.matrix(jacobian, derivative, point.tangent)
-
-    def step(self, anchor: Anchor, size: float) -> Step:
-        """A step so far along the tangent.
-
-        Raises
-        ------
-        AnalysisError
-            If the corrections do not converge, or end where the curve would have turned too sharply.
-        """
-        moved, matrix = self.predicted(anchor, size)
-        return self._stepped(anchor, moved, matrix, anchor.last.tangent, size, bounded=True)
-
-    def within(self, step: Step, place: float, *, bounded: bool = False) -> Step:
-        """As much of a step as leads to a place within it; ``bounded``: with a bound on its multipliers."""
-        moved, matrix = step.between(place)
-        return self._stepped(step.start, moved, matrix, step.start.last.tangent, place, bounded=bounded)
-
-    def to_value(self, anchor: Anchor, value: float, guess: Array, matrix: Array) -> Step:
-        """A step that ends at a value of the parameter exactly, from a guess of the displacement."""
-        row = np.zeros(guess.size)
-        row[-1] = 1.0
-        target = (value - anchor.last.value) / self.scale
-        return self._stepped(anchor, guess, matrix, row, target, value, bounded=True)
-
-    def predicted(self, anchor: Anchor, size: float) -> tuple[Array, Array]:
-        """Displacement at which a step should end, in units, and the matrix there: by the cubic through the last two
-        points along their tangents and by the straight line through their matrices; by the tangent and the matrix where
-        there is but one point."""
-        last = anchor.last
-        if anchor.before is None:
-            return size * last.tangent, np.array(anchor.matrix)
-        before, matrix_before = anchor.before
-        units = self.units(last.orbit.size)
-        back = np.append(last.orbit - before.orbit, last.value - before.value) / units
-        earlier = np.array(before.tangent)
-        if anchor.section is not None:
-            along = self._onto(anchor)
-            back[:-1], earlier[:-1] = along @ back[:-1], along @ earlier[:-1]
-        length = float(np.linalg.norm(back))
-        # Newton's form over the nodes 0, 0, -length, -length.
-        slope = back / length
-        second = (last.tangent - slope) / length
-        third = (second - (slope - earlier) / length) / length
-        matrix = anchor.matrix + (size / length) * (anchor.matrix - matrix_before)
-        matrix[-1] = last.tangent
-        return size * (last.tangent + size * (second + (size + length) * third)), matrix
-
-    def _onto(self, anchor: Anchor) -> Array:
-        """Projection along the motion onto the section of a step, in units, shape (n, n)."""
-        assert anchor.section is not None
-        system = self.system(anchor.last.value)
-        assert is_autonomous(system)
-        return self._projection(np.asarray(system.velocity(anchor.section.point)), anchor.section)
-
-    def _projection(self, velocity: Array, section: Section) -> Array:
-        sizes = self.units(velocity.size)[:-1]
-        normal = section.normal * sizes
-        return np.eye(velocity.size) - np.outer(velocity / sizes, normal) / float(section.normal @ velocity)
-
-    def _stepped(
+    def anchored(
         self,
-        anchor: Anchor,
-        guess: Array,
+        last: BranchPoint,
         matrix: Array,
-        row: Array,
-        target: float,
-        value: float | None = None,
-        *,
-        bounded: bool = False,
-    ) -> Step:
-        """Correct a guess to H = x and row . moved = target; by multiple shooting where a return magnifies so much that
-        the guess is none, or that rounding is magnified to more than an orbit is solved for. ``bounded``: with a bound
-        on the error of the multipliers at its end."""
-        last, n = anchor.last, anchor.last.orbit.size
+        section: Section | None,
+        before: BranchPoint | None = None,
+        matrix_before: Array | None = None,
+        leaving: bool = False,
+    ) -> Anchor:
+        """The anchor of a point with its matrix, and the point before it with the matrix there."""
+        n = last.orbit.size
+        space = symmetric_space(
+            self.system(last.value), last.orbit, self.units(n)[:n], last.tangent[:n] if leaving else None
+        )
+        if before is None:
+            return Anchor(last, matrix, None, section, space, leaving)
+        back, tangent, lengthening = self.moved(last, before.orbit, before.value), np.array(before.tangent), 0.0
+        if section is not None:
+            system = self.system(last.value)
+            assert is_autonomous(system)
+            assert last.period is not None
+            assert before.period is not None
+            lengthening = (last.period - before.period) / last.period / float(np.linalg.norm(back))
+            along = self._projection(np.asarray(system.velocity(section.point)), section)
+            back[:-1], tangent[:-1] = along @ back[:-1], along @ tangent[:-1]
+        return Anchor(last, matrix, Before(back, tangent, matrix_before), section, space, leaving, lengthening)
+
+    def parameters(self, anchor: Anchor) -> tuple[slice, Array]:
+        """Where the parameter stands among the coordinates, and its unit."""
+        n = anchor.last.orbit.size
+        return slice(n, n + 1), np.array([self.scale])
+
+    def residual(self, anchor: Anchor, moved: Array, values: Array) -> tuple[Returned, Array]:
+        """The return of a state, and H - x in units."""
+        sizes, space, value = self.units(moved.size - 1)[:-1], anchor.space, float(values[0])
+        x = anchor.last.orbit + sizes * moved[:-1]
+        if space is not None:
+            x = sizes * (space @ (x / sizes))
+        mapped, beside = self.mapped(x, value, anchor.section)
+        residual = (mapped - x) / sizes
+        return Returned(x, value, mapped, beside), residual if space is None else space @ residual
+
+    def off(self, found: Returned, residual: Array, move: Array) -> float:
+        """Largest residual, relative to the orbit unless that is small."""
+        return float(np.abs(residual).max()) / max(_SMALLEST, self._relative_size(found.x))
+
+    def met(self, anchor: Anchor, found: Returned, off: float, stalled: int, singular: bool) -> bool:
+        """True if an orbit is solved for: a residual that no longer falls is what the flow is good to."""
+        if off <= self.precision:
+            return True
+        size = self._relative_size(found.x)
+        residual = off * max(_SMALLEST, size)
+        if singular or not stalled or residual > SETTLED * max(1.0, size):
+            return False
+        return residual <= _CLEAR * self.noise(found.x, found.value, anchor.section)
+
+    def exact(self, anchor: Anchor, found: Returned, row: Array) -> Array | None:
+        """The matrix at an orbit, where the branch leaves another one."""
+        if not anchor.leaving:
+            return None
+        jacobian = self.image(found.x, found.value, anchor.section).jacobian
+        derivative = self.difference(found.x, found.value, anchor.section, found.mapped, found.beside)
+        return within_space(anchor.space, self.matrix(jacobian, derivative, row))
+
+    def step(self, anchor: Anchor, guess: Guess, plane: Plane, *, bounded: bool = False) -> Step[Anchor, OnCurve]:
+        """The orbit near a guess; by multiple shooting where a return magnifies so much that the guess is none, or that
+        rounding is magnified to more than an orbit is solved for. ``bounded``: with a bound on the error of the
+        multipliers at its end."""
+        last, n, space = anchor.last, anchor.last.orbit.size, anchor.space
         self.steepness = max(1.0, float(np.abs(anchor.matrix[:n, n]).max()))
-        section = self._timed(anchor, float(np.linalg.norm(guess)))
-        mode = last.tangent[:n] if anchor.leaving else None
-        fixed = symmetric_space(self.system(last.value), last.orbit, self.units(n)[:n], mode)
-        where = _Where(anchor, section, fixed, row, target, value)
-        count = node_count(matrix[:n, :n] + np.eye(n), np.ones(n)) if fixed is None else 0
-        rounds, off, weakest = 0, self.precision, 0.0
+        timed = self._timed(anchor, float(np.linalg.norm(guess.moved)))
+        count = node_count(guess.matrix[:n, :n] + np.eye(n), np.ones(n)) if space is None else 0
+        off, weakest, corrections = self.precision, 0.0, 0
         if count >= _MANY_NODES:
-            moved, x, here, image, derivative = self._shot(where, count)
+            moved, x, value, image, derivative = self._shot(anchor, timed, plane, count)
             if bounded:
                 with contextlib.suppress(AnalysisError):  # over the whole return the flow may magnify too much
-                    image = replace(image, error=self.image(x, here, section, with_error=True).error)
+                    image = replace(image, error=self.image(x, value, timed.section, with_error=True).error)
         else:
-            try:
-                found = self._corrected(where, guess, matrix)
-            except (OutsideIntervalError, SpentError):
-                raise
-            except AnalysisError:
-                if count < _FEWEST_NODES:
-                    raise
-                there = self._shot(where, count)
-                if section is not None:
-                    duration = there[3].period / there[3].returns
-                    where = replace(where, section=replace(section, duration=duration))
-                found = self._corrected(where, there[0], matrix)
-            moved, x, here, rounds = found.moved, found.x, found.value, found.rounds
-            off, weakest = found.off, found.weakest
-            image = self.image(x, here, where.section, bounded)
-            derivative = self.difference(x, here, where.section, found.mapped, found.beside)
-        bordered = self.matrix(image.jacobian, derivative, last.tangent)
-        tangent = null_vector(within_space(fixed, bordered))
-        if not tangent @ last.tangent >= _SHARPEST_TURN:
+            timed, solved = self._solved(anchor, timed, guess, plane, count)
+            (x, value, mapped, beside), moved, corrections = solved.found, solved.moved, solved.corrections
+            # The residual shows one direction.
+            off = _CLEAR * float(np.linalg.norm(solved.inverse @ solved.residual))
+            weakest = float(np.linalg.norm(solved.inverse, 2))
+            image = self.image(x, value, timed.section, bounded)
+            derivative = self.difference(x, value, timed.section, mapped, beside)
+        matrix = self.matrix(image.jacobian, derivative, last.tangent)
+        tangent = null_vector(within_space(space, matrix))
+        if not tangent @ last.tangent >= SHARPEST_TURN:
             raise AnalysisError("the curve turns too sharply", field="step")
-        bordered[n] = tangent
-        # The derivative is that of a state so far off; units may be much larger than the orbit.
-        reach = max(_SMALLEST, float(np.linalg.norm(moved[:n])), float(np.linalg.norm(x / self.units(n)[:n])))
-        length = max(min(reach, float(np.linalg.norm(moved))), float(np.finfo(float).tiny))
-        bend = float(np.linalg.norm(bordered[:n] - anchor.matrix[:n])) / length
-        # The flow's error, relative to what it may magnify, is a bound already.
-        flow = float(self._scaled(image.error, n).max()) / max(1.0, float(np.linalg.norm(bordered[:n, :n])))
-        off += weakest * flow * max(1.0, float(np.abs(x / self.units(n)[:n]).max()))
-        end = self._end(anchor, x, here, image, tangent, bordered, bend * off if bounded else np.inf)
-        missed = float(np.linalg.norm(moved - guess))
-        return Step(anchor, end, float(last.tangent @ moved), moved, tangent, bordered, image, rounds, missed)
+        matrix[n] = tangent
+        wrong = self._wrong(anchor, x, image, moved, matrix, off, weakest) if bounded else np.inf
+        missed = float(np.linalg.norm(moved - guess.moved))
+        return Step(anchor, moved, OnCurve(x, value, image, wrong), tangent, matrix, corrections, missed)
 
-    def _shot(self, where: _Where, count: int) -> tuple[Array, Array, float, ReturnMap, Array]:
+    def _solved(
+        self, anchor: Anchor, timed: Anchor, guess: Guess, plane: Plane, count: int
+    ) -> tuple[Anchor, Corrected[Returned]]:
+        """The orbit near a guess, or near what multiple shooting finds where that leads nowhere; and the anchor with
+        the time that a return takes there."""
+        matrix = within_space(anchor.space, guess.matrix)
+        try:
+            return timed, self.corrected(timed, Guess(guess.moved, matrix), plane)
+        except (OutsideBoxError, SpentError):
+            raise
+        except AnalysisError:
+            if count < _FEWEST_NODES:
+                raise
+        moved, _, _, image, _ = self._shot(anchor, timed, plane, count)
+        if timed.section is not None:
+            timed = replace(timed, section=replace(timed.section, duration=image.period / image.returns))
+        return timed, self.corrected(timed, Guess(moved, matrix), plane)
+
+    def _shot(
+        self, anchor: Anchor, timed: Anchor, plane: Plane, count: int
+    ) -> tuple[Array, Array, float, ReturnMap, Array]:
         """Displacement in units, state, parameter, return map and its derivative by the parameter, per scale, by
-        multiple shooting from the last point."""
-        last, section = where.anchor.last, where.section
+        multiple shooting from an anchor."""
+        last, section = anchor.last, timed.section
         system, units = self.system(last.value), self.units(last.orbit.size)
-        duration = return_duration(system) if where.anchor.section is None else where.anchor.section.duration
+        duration = return_duration(system) if anchor.section is None else anchor.section.duration
         start = np.append(last.orbit, last.value)
         self.budget.take(2 * FEW_ROUNDS)  # each in parts
         with UserCode("flow", last.value):
             nodes = nodes_along(system, last.orbit, duration, count, last.value)
-            free = Free(where.row, where.target, start, self.scale)
-            found = shot(lambda value: self.system(self._inside(value)), nodes, units[:-1], where.anchor.section, free)
-        x, value = found.nodes.states[0], self._inside(found.nodes.value) if where.value is None else where.value
+            free = Free(plane.row, plane.target, start, self.scale)
+            found = shot(lambda value: self.system(self._inside(value)), nodes, units[:-1], anchor.section, free)
+        x, value = found.nodes.states[0], self._inside(found.nodes.value) if plane.edge is None else plane.edge[1]
         system = self.system(value)
         count, velocity, across = returns_per_period(system), None, np.eye(x.size)
         if section is not None and is_autonomous(system):
@@ -254,96 +231,43 @@ class Curve(FamilyReturns):
         """A value of the parameter that the family may be asked for; on the interval's end but for rounding, that."""
         inside = min(max(value, self.between[0]), self.between[1])
         if not abs(value - inside) <= self.precision * self.scale:
-            raise OutsideIntervalError("leaves the interval", field="parameter", value=value)
+            raise OutsideBoxError(0, inside, value)
         return inside
 
-    def _corrected(self, where: _Where, guess: Array, matrix: Array) -> _Corrected:
-        """Correct a guess by Broyden's method."""
-        anchor, section, fixed, row = where.anchor, where.section, where.fixed, where.row
-        last, n = anchor.last, anchor.last.orbit.size
-        units = self.units(n)
-        moved, matrix = np.array(guess), np.array(matrix)
-        matrix[-1] = row
-        matrix = within_space(fixed, matrix)
-        by_parameter = matrix[:n, n]
-        inverse, singular = inverted(matrix)
-        largest = np.inf
-        move = residual_before = np.zeros(n + 1)
-        rounds = corrections = 0
-        exact = False
-        while True:
-            x = last.orbit + units[:n] * moved[:n]
-            if fixed is not None:
-                x = units[:n] * (fixed @ (x / units[:n]))
-            wanted = last.value + self.scale * float(moved[n]) if where.value is None else where.value
-            here = min(max(wanted, self.between[0]), self.between[1])
-            # A curve that turns back at the end of the interval is sought beyond it on the way there.
-            strays = (wanted - here) / self.scale
-            if abs(strays) > _STRAYS * float(np.linalg.norm(guess)):
-                raise OutsideIntervalError("leaves the interval", field="parameter", value=wanted)
-            mapped, beside = self.mapped(x, here, section)
-            off = (mapped - x) / units[:n]
-            if fixed is not None:
-                off = fixed @ off
-            residual = np.append(off + strays * by_parameter, row @ moved - where.target)
-            now = float(np.abs(residual).max())
-            if not np.isfinite(now) or (now > 10.0 * largest and now > CURVE.settled):
-                raise AnalysisError("corrections diverge", field="step")
-            size = max(_SMALLEST, float(np.abs(x / units[:n]).max()))
-            closed = now <= self.precision * size
-            # A residual that no longer falls is what the flow is good to, if the matrix can make it fall.
-            settled = not closed and CURVE.stays(now / max(1.0, size), largest / max(1.0, size)) and not singular
-            settled = settled and now <= _CLEAR * self.noise(x, here, section)
-            if closed or settled:
-                # Where it leaves another curve the matrix is so weak that a small residual is far from an orbit.
-                far = float(np.linalg.norm(inverse @ residual)) > _LOOSE * float(np.linalg.norm(moved))
-                if exact or not (anchor.leaving and far):
-                    break
-            if rounds == _MOST_CORRECTIONS:
-                raise AnalysisError("corrections do not converge", field="step")
-            if closed or settled:
-                jacobian, exact = self.image(x, here, section).jacobian, True
-                here_matrix = self.matrix(jacobian, self.difference(x, here, section, mapped, beside), row)
-                inverse, singular = inverted(within_space(fixed, here_matrix))
-            elif rounds:
-                # Broyden's update keeps the matrix of the last point good enough for the whole step.
-                inverse = _updated(inverse, move, inverse @ (residual - residual_before))
-            move = -inverse @ residual
-            residual_before, largest = residual, now
-            moved = moved + move
-            rounds += 1
-            corrections += now > _COUNTED * size
-        if abs(strays) > self.precision:
-            raise OutsideIntervalError("leaves the interval", field="parameter", value=wanted)
-        # The residual shows one direction.
-        left, weakest = float(np.linalg.norm(inverse @ residual)), float(np.linalg.norm(inverse, 2))
-        return _Corrected(x, here, moved, mapped, beside, corrections, _CLEAR * left, weakest)
+    def _wrong(
+        self, anchor: Anchor, x: Array, image: ReturnMap, moved: Array, matrix: Array, off: float, weakest: float
+    ) -> float:
+        """How far off the derivative at an orbit is because the orbit is: by ``off`` from the residual that is left,
+        and by ``weakest`` times the error of the flow."""
+        n = x.size
+        # Units may be much larger than the orbit.
+        reach = max(_SMALLEST, float(np.linalg.norm(moved[:n])), float(np.linalg.norm(x / self.units(n)[:n])))
+        length = max(min(reach, float(np.linalg.norm(moved))), float(np.finfo(float).tiny))
+        bend = float(np.linalg.norm(matrix[:n] - anchor.matrix[:n])) / length
+        # The flow's error, relative to what it may magnify, is a bound already.
+        sizes = self.units(n)[:-1]
+        error = np.broadcast_to(image.error, (n, n)) * sizes / sizes[:, None]
+        flow = float(error.max()) / max(1.0, float(np.linalg.norm(matrix[:n, :n])))
+        return bend * (off + weakest * flow * max(1.0, self._relative_size(x)))
 
-    def _end(
-        self, anchor: Anchor, x: Array, value: float, image: ReturnMap, tangent: Array, matrix: Array, wrong: float
-    ) -> Anchor:
-        """Where the next step starts; the derivative is ``wrong`` by so much, in units, beside its own error."""
+    def arrived(self, step: Step[Anchor, OnCurve]) -> Step[Anchor, OnCurve]:
+        """A step with the anchor at its end, on the section there.
+
+        Raises
+        ------
+        AnalysisError
+            If the orbit shrinks into an equilibrium there.
+        """
+        anchor, (x, value, image, wrong) = step.start, step.found
         values, bound = self.multipliers(image, wrong)
-        before = None if anchor.leaving or anchor.last.special is not None else (anchor.last, anchor.matrix)
-        section = None
+        tangent, matrix, section = step.tangent, step.matrix, None
         if anchor.section is not None:
             system = self.system(value)
             section = section_at(system, x, self.sizes, image.period / image.returns)
             assert section is not None
             assert is_autonomous(system)
             velocity = np.asarray(system.velocity(x))
-            motion = float(np.linalg.norm(velocity / self.units(x.size)[:-1])) * image.period
-            self._motion = max(self._motion, motion)
-            # Past an equilibrium come the same orbits again, half a period later. Before it, a part f of the largest
-            # motion is a parameter f^2 away from the Hopf point, which the precision leaves uncertain by its f-th part.
-            passed = not float(anchor.section.normal @ velocity) > 0.0
-            if passed or motion < _SHRUNK * np.cbrt(self.precision) * self._motion:
-                raise AnalysisError(
-                    "the orbit shrinks into an equilibrium: a Hopf point"
-                    if self._extent(x, value, image) <= motion
-                    else "the orbit nearly rests in its section, and the next step has no direction",
-                    field="orbit",
-                )
+            self._check_moving(anchor.section, velocity, step.found)
             along = self._projection(velocity, section)
             tangent, matrix = np.array(tangent), np.array(matrix)
             tangent[:-1] = along @ tangent[:-1]
@@ -353,28 +277,61 @@ class Curve(FamilyReturns):
             matrix[:-1, :-1] += along - np.eye(x.size)
             matrix[-1] = tangent
         point = BranchPoint(value, x, values, tangent, units=self.units(x.size), period=image.period, error_bound=bound)
-        return Anchor(point, matrix, before, section)
+        before = None if anchor.leaving or anchor.last.special is not None else anchor.last
+        return replace(step, end=self.anchored(point, matrix, section, before, anchor.matrix))
 
-    def _extent(self, x: Array, value: float, image: ReturnMap) -> float:
-        """Largest distance of an orbit from a state on it, in units; a small cycle is smaller than its velocity in any
-        state times its period."""
+    def _check_moving(self, section: Section, velocity: Array, found: OnCurve) -> None:
+        """See that an orbit has not shrunk into an equilibrium: past one come the same orbits again, half a period
+        later. Before it, a part f of the largest motion is a parameter f^2 away from the Hopf point, which the
+        precision leaves uncertain by its f-th part."""
+        motion = float(np.linalg.norm(velocity / self.units(velocity.size)[:-1])) * found.image.period
+        self._motion = max(self._motion, motion)
+        if float(section.normal @ velocity) > 0.0 and motion >= _SHRUNK * np.cbrt(self.precision) * self._motion:
+            return
+        # A small cycle is smaller than its velocity in any state times its period.
+        path = self._path(found.x, found.value, found.image.period / found.image.returns)
+        extent = float(np.linalg.norm((path - found.x) / self.units(velocity.size)[:-1], axis=1).max())
+        raise AnalysisError(
+            "the orbit shrinks into an equilibrium: a Hopf point"
+            if extent <= motion
+            else "the orbit nearly rests in its section, and the next step has no direction",
+            field="orbit",
+        )
+
+    def _path(self, x: Array, value: float, duration: float) -> Array:
+        """States on an orbit, at even times over some duration, shape (times, n)."""
         system, states = self.system(value), [x]
         self.budget.take()
         with UserCode("flow", value):
             for _ in range(_PARTS):
-                states.append(system.flow(np.array(states[-1]), 0.0, image.period / image.returns / _PARTS)[0])
-        return float(np.linalg.norm((np.array(states) - x) / self.units(x.size)[:-1], axis=1).max())
+                states.append(system.flow(np.array(states[-1]), 0.0, duration / _PARTS)[0])
+        return np.array(states)
+
+    def first_from(self, anchor: Anchor) -> tuple[Array, Array, slice]:
+        """Displacement of the first point, its tangent, and the coordinates by which it is known again: any
+        state of its orbit will do where any is time 0."""
+        moved = self.moved(anchor.last, self.first.orbit, self.first.value)
+        seen = slice(None) if anchor.section is None else slice(moved.size - 1, None)
+        return moved, self.first.tangent, seen
+
+    def is_first(self, step: Step[Anchor, OnCurve]) -> bool:
+        """True if a state of the first orbit is on the orbit that a step ends in, where any is time 0."""
+        first, point = self.first, step.end.last
+        if step.start.section is None:
+            return True
+        if first.period is None or abs(point.period - first.period) > _SAME_PERIOD * first.period:
+            return False
+        path = (self._path(point.orbit, point.value, point.period) - first.orbit) / self.units(point.orbit.size)[:-1]
+        chords = np.diff(path, axis=0)
+        lengths = np.maximum((chords**2).sum(axis=1), 1e-300)
+        share = np.clip(-(path[:-1] * chords).sum(axis=1) / lengths, 0.0, 1.0)
+        distance = np.linalg.norm(path[:-1] + share[:, None] * chords, axis=1)
+        # Chords run inside the curve by an eighth of the square of the part, times its bend.
+        return bool(distance.min() <= np.abs(np.diff(path, n=2, axis=0)).max())
 
     def multipliers(self, image: ReturnMap, wrong: float = 0.0) -> tuple[ComplexArray, float]:
-        """Multipliers of the full period, by falling modulus, and a bound on the errors of those that are not small.
-
-        Parameters
-        ----------
-        image
-            Return map on the orbit.
-        wrong
-            Error of its derivative beside its own, in units; infinite if no bound is wanted.
-        """
+        """Multipliers of the full period, by falling modulus, and a bound on the errors of those that are not small,
+        for a derivative that is wrong by so much, in units, beside its own error; infinite if no bound is wanted."""
         if not (np.isfinite(wrong) and np.isfinite(image.error).all()):
             return return_multipliers(image) ** image.returns, np.inf
         sizes = self.units(image.state.size)[:-1]
@@ -383,59 +340,25 @@ class Curve(FamilyReturns):
         moduli = np.abs(spec.values)
         return found.values, float(found.error_bounds[moduli >= min(_NOT_SMALL, float(moduli.max()))].max())
 
-    def _scaled(self, matrix: Array | float, n: int) -> Array:
-        """A derivative of the return map, or the bound of its error, in units, shape (n, n)."""
-        sizes = self.units(n)[:-1]
-        return np.asarray(np.broadcast_to(matrix, (n, n)) * sizes / sizes[:, None])
+    def _relative_size(self, x: Array) -> float:
+        return float(np.abs(x / self.units(x.size)[:-1]).max())
 
-    def _timed(self, anchor: Anchor, ahead: float) -> Section | None:
-        """The section of a step, with the time of a return so far ahead by those of the last two points."""
-        section = anchor.section
-        if section is None or anchor.before is None:
-            return section
-        last, (before, _) = anchor.last, anchor.before
-        assert last.period is not None
-        assert before.period is not None
-        away = np.append(last.orbit - before.orbit, last.value - before.value) / self.units(last.orbit.size)
-        change = (last.period - before.period) / last.period * ahead / float(np.linalg.norm(away))
-        return replace(section, duration=section.duration * (1.0 + min(max(change, -_SOONER), _LATER)))
+    def _projection(self, velocity: Array, section: Section) -> Array:
+        """Projection along the motion onto a section, in units, shape (n, n)."""
+        sizes = self.units(velocity.size)[:-1]
+        normal = section.normal * sizes
+        return np.eye(velocity.size) - np.outer(velocity / sizes, normal) / float(section.normal @ velocity)
 
+    def _timed(self, anchor: Anchor, ahead: float) -> Anchor:
+        """An anchor with the time of a return so far ahead, by those of the last two points."""
+        if anchor.section is None:
+            return anchor
+        longer = 1.0 + min(max(anchor.lengthening * ahead, -_SOONER), _LATER)
+        return replace(anchor, section=replace(anchor.section, duration=anchor.section.duration * longer))
 
-@dataclass(frozen=True)
-class _Where:
-    """Equations of a step: where it starts, the section that returns end in, the projection onto states with the
-    symmetries (or None), ``row . moved = target``, and the parameter's value where that is given."""
-
-    anchor: Anchor
-    section: Section | None
-    fixed: Array | None
-    row: Array
-    target: float
-    value: float | None
-
-
-@dataclass(frozen=True)
-class _Corrected:
-    """A solution: state, parameter, displacement in units, return of the state, that beside it, corrections needed, how
-    far off it may be by the residual that is left, in units, and how much more by any other one."""
-
-    x: Array
-    value: float
-    moved: Array
-    mapped: Array
-    beside: Array | None
-    rounds: int
-    off: float
-    weakest: float
-
-
-def _updated(inverse: Array, move: Array, change: Array) -> Array:
-    """Broyden's update of an inverse matrix, from a move and what the inverse makes of the residual's change."""
-    along = float(move @ change)
-    if along == 0.0:
-        raise AnalysisError("corrections do not converge", field="step")
-    return inverse + np.outer(move - change, move @ inverse) / along
-
-
-class OutsideIntervalError(AnalysisError):
-    """A step asked for a value of the parameter outside the interval."""
+    def _matrix_at(self, last: BranchPoint, ahead: float, section: Section | None) -> Array:
+        x = last.orbit + ahead * last.tangent[:-1] * self.units(last.orbit.size)[:-1]
+        # As at the end of a step, to the bit.
+        jacobian = self.image(x, last.value, section, with_error=True).jacobian
+        derivative = self.parameter_derivative(x, last.value, section)
+        return self.matrix(jacobian, derivative, last.tangent)

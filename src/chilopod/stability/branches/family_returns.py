@@ -33,27 +33,11 @@ _KEPT = 8  # systems: making one may cost more than a flow
 
 
 class FamilyReturns:
-    """Return maps of the systems of a family.
+    """Return maps of the systems of a family, with the scale of the parameter and the sizes of the states along a curve
+    (None: their own units), of orbits that take a number of periods, or have the systems' symmetry in time.
 
-    Where these flow each (see :class:`chilopod.stability.capabilities.FlowsEach`), the derivative with respect to the
-    parameter costs next to nothing on two cores.
-
-    Parameters
-    ----------
-    family
-        ``family(value)`` is the system.
-    scale
-        Scale of the parameter along the curve.
-    sizes
-        Sizes of the states along the curve, shape (n,); None: their own units.
-    between
-        Values of the parameter that the family is asked for at most.
-    periods
-        Number of periods that an orbit takes.
-    symmetric
-        True to stay among the orbits that have the systems' symmetry in time.
-    budget
-        Flows and time that may be taken; None for any.
+    Where systems flow each (see :class:`chilopod.stability.capabilities.FlowsEach`), the derivative with respect to the
+    parameter costs next to nothing on two cores. The family is asked for values of an interval at most.
     """
 
     def __init__(

@@ -25,36 +25,18 @@ _STEP = 0.01  # along the curve, in units of the states' sizes and the parameter
 
 @dataclass(frozen=True)
 class Fold:
-    """A fold of periodic orbits.
+    """A fold of periodic orbits."""
 
-    Attributes
-    ----------
-    value
-        Value of the parameter.
-    error_bound
-        Bound on its error.
-    image
-        Return map at the critical orbit.
-    """
-
-    value: float
-    error_bound: float
-    image: ReturnMap
+    value: float  # value of the parameter
+    error_bound: float  # bound on its error
+    image: ReturnMap  # return map at the critical orbit
 
 
 def find_fold(family: Family, value: float, orbit: Array, scale: float, rising: bool = True) -> Fold | None:
-    """Follow an orbit round the fold next to it; None if there is none.
+    """Follow an orbit, with the systems' symmetry in time, round the fold next to it; None if there is none.
 
-    Parameters
-    ----------
-    family
-        ``family(value)`` is the system; orbits with its symmetry in time are looked at.
-    value, orbit
-        Parameter and orbit to start from, near the fold but not in it: a curve that starts in a fold does not pass it.
-    scale
-        Scale of the parameter: the fold is looked for as far away as that.
-    rising
-        True if it is looked for at higher values, or at lower ones.
+    The orbit must not be in the fold: a curve that starts there does not pass it. The fold is looked for as far away as
+    ``scale``, at higher values if ``rising``, else at lower ones.
     """
     between = value - scale, value + scale
     try:

@@ -27,11 +27,13 @@ from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.budget import Budget, UserCode
 from chilopod.stability.capabilities import KnowsOrbit, Scaled, SystemLike
-from chilopod.stability.convergence import BORDERED
 from chilopod.stability.orbits import from_known, known_state
 from chilopod.stability.returns import ReturnMap, Section, return_map, section_at
 from chilopod.stability.scales import sizes
 from chilopod.stability.symmetry.mirrored import symmetric_states
+from chilopod.stability.tracing.equations import Equations, OutsideBoxError, Plane
+from chilopod.stability.tracing.step import Before, Guess, Step
+from chilopod.stability.tracing.tolerances import ROUND_OFF, SETTLED, SHARPEST_TURN_UNSEEN
 
 Array = NDArray[np.float64]
 
@@ -39,7 +41,7 @@ Family2 = Callable[[float, float], SystemLike]
 """``family2(p, q)`` is the system at values of two parameters."""
 
 _STEP = 1e-6  # of differences, in units of the frame: it sets how fast Newton's method converges, not where to
-_ROUNDS = 14
+_STALLED = 3  # corrections that have not halved a small residual: Broyden's method may rest that long
 
 
 @dataclass(frozen=True)
@@ -56,30 +58,15 @@ class Frame(ReadOnlyArrays):
     """Units and borders that the equations are written in; adapted from point to point of a curve.
 
     With m directions that the orbit may move in (none if it is known) and k = 1 critical multiplier or k = 2:
-
-    Attributes
-    ----------
-    size
-        Size of the states, shape (n,).
-    widths
-        Widths of the parameters' intervals, shape (2,).
-    basis
-        Orthonormal directions, in units of ``size``, shape (n, m).
-    column, row
-        Borders b and c, shape (n, k).
-    mixture
-        Makes the k equations of the entries of G, shape (k, k * k).
-    section
-        Section on which a return ends, for a system that does not depend on time.
     """
 
-    size: Array
-    widths: Array
-    basis: Array
-    column: Array
+    size: Array  # size of the states, shape (n,)
+    widths: Array  # widths of the parameters' intervals, shape (2,)
+    basis: Array  # orthonormal directions, in units of ``size``, shape (n, m)
+    column: Array  # borders b and c, shape (n, k)
     row: Array
-    mixture: Array
-    section: Section | None
+    mixture: Array  # makes the k equations of the entries of G, shape (k, k * k)
+    section: Section | None  # section on which a return ends, for a system that does not depend on time
 
     def between(self, start: Place, end: Place) -> Array:
         """Coordinates of one place seen from another: state, parameters, and cosine where there is one."""
@@ -112,52 +99,27 @@ class Frame(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class Evaluated(ReadOnlyArrays):
-    """The equations at a place.
+    """The equations at a place."""
 
-    Attributes
-    ----------
-    place, image
-        Place, and the return map there.
-    jacobian
-        Jacobian of the return map in units of the frame, shape (n, n).
-    residual
-        Left sides of the equations, shape (m + k,).
-    right, left
-        v and w, shape (n, k), which are null vectors where the residual is zero; in units of the frame.
-    reach
-        Norm of the inverse of the bordered matrix.
-    """
-
-    place: Place
+    place: Place  # place, and the return map there
     image: ReturnMap
-    jacobian: Array
-    residual: Array
-    right: Array
+    jacobian: Array  # Jacobian of the return map in units of the frame, shape (n, n)
+    residual: Array  # left sides of the equations, shape (m + k,)
+    right: Array  # v and w, shape (n, k), which are null vectors where the residual is zero; in units of the frame
     left: Array
-    reach: float
+    reach: float  # norm of the inverse of the bordered matrix
 
 
 @dataclass(frozen=True)
 class Spot(ReadOnlyArrays):
-    """A point of a curve, with what the next step needs.
+    """A point of a curve from which steps start: see :class:`chilopod.stability.tracing.step.Anchor`."""
 
-    Attributes
-    ----------
-    at, frame
-        The equations there, and the frame they are written in, adapted to this point.
-    matrix
-        Derivative of the equations, shape (m + k, m + k + 1).
-    tangent
-        Unit null vector of ``matrix``, shape (m + k + 1,).
-    uncertainty
-        Bounds on the errors of the left sides of the equations, shape (m + k,).
-    """
-
-    at: Evaluated
+    at: Evaluated  # the equations there, and the frame they are written in, adapted to this point
     frame: Frame
-    matrix: Array
-    tangent: Array
-    uncertainty: Array
+    matrix: Array  # derivative of the equations, with the tangent below, shape (m + k + 1, m + k + 1)
+    tangent: Array  # unit tangent, shape (m + k + 1,)
+    uncertainty: Array  # bounds on the errors of the left sides of the equations, shape (m + k,)
+    before: Before | None = None  # the point before it, seen from here
 
     @property
     def place(self) -> Place:
@@ -165,34 +127,35 @@ class Spot(ReadOnlyArrays):
         return self.at.place
 
     @property
+    def values(self) -> Array:
+        """Values of both parameters, shape (2,)."""
+        return self.at.place.values
+
+    @property
     def shift(self) -> Array:
         """How far every coordinate may be off, at right angles to the curve, shape (m + k + 1,)."""
-        return np.asarray(np.abs(np.linalg.pinv(self.matrix)) @ self.uncertainty)
+        return np.asarray(np.abs(np.linalg.pinv(self.matrix[:-1])) @ self.uncertainty)
+
+    def towards(self, sign: float) -> Spot:
+        """The same point, with its tangent if the sign is positive, else against it."""
+        tangent = sign * self.tangent
+        return replace(self, tangent=tangent, matrix=np.vstack([self.matrix[:-1], tangent]))
 
 
-class Equations:
-    """The equations of a curve.
+class CriticalCurve(Equations[Spot, Evaluated, Evaluated]):
+    """The curve along which a multiplier ``target``, +1 or -1, or a pair (0) is critical, of orbits that are no unknown
+    if they are ``known``. Widths of the box are the parameters' units."""
 
-    Parameters
-    ----------
-    family2
-        The systems.
-    target
-        The critical multiplier of the return map: +1 or -1, or 0 for a pair.
-    known
-        True to take the orbit that the systems know, which is then no unknown.
-    box
-        Lower and upper ends of both parameters' intervals, shape (2, 2): one row for each parameter.
-    budget
-        Return maps and time that may be taken.
-    """
+    first: Spot  # of a curve that is followed
 
     def __init__(self, family2: Family2, target: int, known: bool, box: Array, budget: Budget) -> None:
         self._family2 = family2
         self.target = target
         self.known = known
         self.box = box
+        self.widths = box[:, 1] - box[:, 0]
         self.budget = budget
+        self.precision = ROUND_OFF
 
     def system(self, values: Array) -> SystemLike:
         """The system at values of both parameters."""
@@ -207,21 +170,26 @@ class Equations:
         place, image = self._mapped(place, section, False)
         size = self._size(system, place, image, section)
         frame = self._framed(system, place, image, size, None)
-        best = np.inf
-        for _ in range(_ROUNDS):
-            at = self.evaluated(place, frame)
-            matrix = self._derivative(at, frame)
-            move = np.asarray(-np.linalg.lstsq(matrix, at.residual)[0], dtype=np.float64)
-            off = float(np.abs(move).max())
-            if BORDERED.met(off, best):
-                return self.spot(place, frame, None)
-            if not off < 1.0:
-                break
-            best = min(best, off)
-            place = frame.moved(place, move)
-        raise AnalysisError(
-            "the curve was not found", field="start", allowed="a point that was located in this family at `second`"
-        )
+        anchor = self.spot(place, frame, None)
+        try:
+            found = self._nearest(anchor)
+        except AnalysisError as error:
+            if error.field != "step":
+                raise
+            allowed = "a point that was located in this family at `second`"
+            raise AnalysisError("the curve was not found", field="start", allowed=allowed) from error
+        return self.spot(found.place, anchor.frame, None)
+
+    def _nearest(self, anchor: Spot) -> Evaluated:
+        """The equations at the point of the curve nearest to a spot that is not on it; on an edge of the box if it is
+        not within."""
+        try:
+            return self.along(anchor, 0.0)
+        except OutsideBoxError as error:
+            j, end = error.edge
+            row = np.eye(anchor.tangent.size)[anchor.frame.parameters.start + j]
+            plane = Plane(row, float((end - anchor.values[j]) / self.widths[j]), error.edge)
+            return self.step(anchor, Guess(plane.target * row, anchor.matrix), plane).found
 
     def spot(self, place: Place, frame: Frame, before: Array | None) -> Spot:
         """Description of a point on the curve, in a frame of its own; its tangent goes the same way as the
@@ -237,36 +205,63 @@ class Equations:
         tangent = np.linalg.svd(matrix)[2][-1]
         if before is not None:
             tangent = tangent * np.sign(tangent @ own.carried(before, frame))
-        return Spot(at, own, matrix, tangent, self._uncertainty(at, own))
+        return Spot(at, own, np.vstack([matrix, tangent]), tangent, self._uncertainty(at, own))
 
-    def corrected(self, spot: Spot, guess: Place, row: Array, target: float) -> tuple[Evaluated, int]:
-        """The point of the curve near a guess that is ``target`` away from a spot, as measured by a row of its
-        coordinates; and how many corrections that took.
+    def parameters(self, anchor: Spot) -> tuple[slice, Array]:
+        """Where the parameters stand among the coordinates, and their units."""
+        return anchor.frame.parameters, anchor.frame.widths
 
-        Raises
-        ------
-        AnalysisError
-            If Newton's method (with Broyden's updates) does not converge.
-        """
-        frame = spot.frame
-        inverse = np.linalg.inv(np.vstack([spot.matrix, row]))
-        at, best = self.evaluated(guess, frame), np.inf
-        residual = np.append(at.residual, row @ frame.between(spot.place, at.place) - target)
-        for corrections in range(_ROUNDS):
-            move = -inverse @ residual
-            off = float(np.abs(move).max())
-            if BORDERED.met(off, best):
-                return at, corrections
-            if not off < 10.0 * best:
-                break
-            best = min(best, off)
-            at = self.evaluated(frame.moved(at.place, move), frame)
-            new = np.append(at.residual, row @ frame.between(spot.place, at.place) - target)
-            change = inverse @ (new - residual)
-            if move @ change != 0.0:
-                inverse = inverse + np.outer(move - change, move @ inverse) / (move @ change)
-            residual = new
-        raise AnalysisError("corrections do not converge", field="step")
+    def residual(self, anchor: Spot, moved: Array, values: Array) -> tuple[Evaluated, Array]:
+        """The equations at a displacement."""
+        at = self.evaluated(replace(anchor.frame.moved(anchor.place, moved), values=values), anchor.frame)
+        return at, at.residual
+
+    def off(self, found: Evaluated, residual: Array, move: Array) -> float:
+        """Largest correction."""
+        return float(np.abs(move).max())
+
+    def met(self, anchor: Spot, found: Evaluated, off: float, stalled: int, singular: bool) -> bool:
+        """True if what is left to correct is round-off, or small and no longer falls."""
+        return off <= ROUND_OFF or (off <= SETTLED and stalled >= _STALLED)
+
+    def step(self, anchor: Spot, guess: Guess, plane: Plane, *, bounded: bool = False) -> Step[Spot, Evaluated]:
+        """The point of the curve near a guess."""
+        solved = self.corrected(anchor, guess, plane)
+        missed = float(np.linalg.norm(solved.moved - guess.moved))
+        return Step(anchor, solved.moved, solved.found, anchor.tangent, anchor.matrix, solved.corrections, missed)
+
+    def along(self, spot: Spot, size: float) -> Evaluated:
+        """The equations at the point of the curve so far along the tangent of another one, which is near."""
+        return self.step(spot, Guess(size * spot.tangent, spot.matrix), Plane(spot.tangent, size)).found
+
+    def arrived(self, step: Step[Spot, Evaluated]) -> Step[Spot, Evaluated]:
+        """A step with the point at its end, in a frame of its own."""
+        start, frame = step.start, step.start.frame
+        end = self.spot(step.found.place, frame, start.tangent)
+        ahead = frame.carried(end.tangent, end.frame)
+        ahead /= np.linalg.norm(ahead)
+        if not ahead @ start.tangent >= SHARPEST_TURN_UNSEEN:
+            raise AnalysisError("the curve turns too sharply", field="step")
+        back, tangent = end.frame.between(end.place, start.place), end.frame.carried(start.tangent, frame)
+        before = Before(self._onto(end, back), self._onto(end, tangent), None)
+        return replace(step, tangent=ahead, end=replace(end, before=before))
+
+    def _onto(self, spot: Spot, direction: Array) -> Array:
+        """A direction with its state along the motion onto the section of a spot, if it has one."""
+        image, frame = spot.at.image, spot.frame
+        if image.velocity is None or image.normal is None or not frame.basis.size:
+            return direction
+        m = frame.basis.shape[1]
+        state = frame.size * (frame.basis @ direction[:m])
+        state -= image.velocity * float(image.normal @ state) / float(image.normal @ image.velocity)
+        return np.concatenate([frame.basis.T @ (state / frame.size), direction[m:]])
+
+    def first_from(self, anchor: Spot) -> tuple[Array, Array, slice]:
+        """Displacement of the first point, its tangent, and the coordinates by which it is known again: the same orbit
+        may be met at another instant where the system does not depend on time."""
+        frame, first = anchor.frame, self.first
+        seen = slice(0 if frame.section is None else frame.parameters.start, None)
+        return frame.between(anchor.place, first.place), frame.carried(first.tangent, first.frame), seen
 
     def evaluated(self, place: Place, frame: Frame) -> Evaluated:
         """The equations at a place, without error bounds."""
@@ -287,19 +282,17 @@ class Equations:
         if self.known or place.state.any() or (isinstance(system, Scaled) and system.scale is not None):
             return size
         # An orbit that rests at zero is as large as the parameters make it.
-        widths = self.box[:, 1] - self.box[:, 0]
         reach = 0.0
         for j in range(2):
             values = place.values.copy()
-            values[j] += self._inward(place, j) * widths[j]
+            values[j] += self._inward(place, j) * self.widths[j]
             moved = self._mapped(replace(place, values=values), section, False)[1].state - image.state
             reach = max(reach, float((np.abs(moved) / size).max()) / _STEP)
         return size * reach if reach > 0.0 else size
 
     def _inward(self, place: Place, j: int) -> float:
         """A step of one parameter, in units of its interval, that stays within it."""
-        low, high = self.box[j]
-        return _STEP if place.values[j] + _STEP * (high - low) <= high else -_STEP
+        return _STEP if place.values[j] + _STEP * self.widths[j] <= self.box[j, 1] else -_STEP
 
     def _framed(self, system: SystemLike, place: Place, image: ReturnMap, size: Array, before: Frame | None) -> Frame:
         """The frame at a place; its borders from those of the one before, so that they change continuously."""
@@ -317,7 +310,7 @@ class Equations:
             units = size[:, None] / before.size[:, None]
             row, column, _ = _bordered(critical, before.column / units, before.row * units)
         column, row = _orthonormal(column), _orthonormal(row)
-        frame = Frame(size, self.box[:, 1] - self.box[:, 0], basis, column, row, np.eye(k, k * k), section)
+        frame = Frame(size, self.widths, basis, column, row, np.eye(k, k * k), section)
         if k == 1:
             return frame
         right, left, _ = _bordered(critical, column, row)

@@ -1,4 +1,5 @@
-"""Points of a curve of bifurcation points in two parameters, and why it ends."""
+"""Curves of bifurcation points in two parameters, and their points of codimension two, where something else becomes
+critical as well (Kuznetsov, *Elements of Applied Bifurcation Theory*, sections 9.1 to 9.6)."""
 
 from __future__ import annotations
 
@@ -9,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.codimension_two.codimension2 import Codimension2
-from chilopod.stability.points import Kind
+from chilopod.labels import Labelled
+from chilopod.stability.points import BifurcationPoint, Kind
 from chilopod.stability.shown import Result, axes_for, bounded, columns, dataset, mark, rows
 from chilopod.stability.tracing.ending import Ending
 
@@ -20,6 +21,41 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
+
+
+class CodimensionTwo(Labelled):
+    """Kind of a point of codimension two; each member's ``sentence`` describes it in words."""
+
+    CUSP = "cusp", "two curves of folds meet and vanish: beyond it one orbit is left of three"
+    DEGENERATE_PITCHFORK = (
+        "degenerate pitchfork",
+        "the pitchfork turns from super- to subcritical: a curve of folds of the orbits that branch off ends here",
+    )
+    DEGENERATE_TRANSCRITICAL = (
+        "degenerate transcritical",
+        "the quadratic term vanishes: the two orbits exchange stability as in a pitchfork",
+    )
+    GENERALISED_PERIOD_DOUBLING = (
+        "generalised period doubling",
+        "the period doubling turns from super- to subcritical: a curve of folds of the doubled orbit ends here",
+    )
+    CHENCINER = (
+        "Chenciner",
+        "the Neimark-Sacker bifurcation turns from super- to subcritical: tori that meet and vanish begin here",
+    )
+    RESONANCE_1_1 = "1:1 resonance", "two multipliers of the return map are +1: the curve of Neimark-Sacker ends here"
+    RESONANCE_1_2 = "1:2 resonance", "two multipliers of the return map are -1: the curve of Neimark-Sacker ends here"
+    RESONANCE_1_3 = "1:3 resonance", "the pair of the return map is at 120 degrees: orbits of three returns are near"
+    RESONANCE_1_4 = "1:4 resonance", "the pair of the return map is at 90 degrees: orbits of four returns are near"
+    FOLD_FLIP = "fold-flip", "a fold and a period doubling at once"
+    FOLD_NEIMARK_SACKER = "fold-Neimark-Sacker", "a fold and a Neimark-Sacker bifurcation at once"
+    FLIP_NEIMARK_SACKER = "flip-Neimark-Sacker", "a period doubling and a Neimark-Sacker bifurcation at once"
+    DOUBLE_NEIMARK_SACKER = "double Neimark-Sacker", "two pairs of multipliers are on the unit circle at once"
+    PITCHFORK_FOLD = "pitchfork-fold", "a pitchfork and a fold at once"
+    PITCHFORK_FLIP = "pitchfork-flip", "a pitchfork and a period doubling at once"
+    PITCHFORK_NEIMARK_SACKER = "pitchfork-Neimark-Sacker", "a pitchfork and a Neimark-Sacker bifurcation at once"
+    DOUBLE_PITCHFORK = "double pitchfork", "two pitchforks at once"
+    SEVERAL_CRITICAL = "several critical", "another multiplier becomes critical as well"
 
 
 @dataclass(frozen=True)
@@ -59,6 +95,28 @@ class Point2(ReadOnlyArrays):
     coefficient_error: float | None = None
 
 
+@dataclass(frozen=True, kw_only=True)
+class SpecialPoint2(Point2):
+    """A point of codimension two on a curve.
+
+    Attributes
+    ----------
+    kind
+        Kind of the point. The error of its ``values`` is also that of the test function over its rate of change along
+        the curve.
+    next_coefficient, next_coefficient_error
+        Next coefficient where that of the curve's normal form vanishes: the first one after it, of the same map and in
+        the same amplitude, and a bound on its error. That is c of a -> a + c a^3 at a cusp and a degenerate
+        transcritical point; e of a -> a + e a^5 at a degenerate pitchfork and, over two periods, at a generalised
+        period doubling; the second Lyapunov coefficient e of |a| -> |a| + e |a|^5 over one period at a Chenciner point.
+        None elsewhere.
+    """
+
+    kind: CodimensionTwo
+    next_coefficient: float | None = None
+    next_coefficient_error: float | None = None
+
+
 @dataclass(frozen=True)
 class Curve2(Result):
     """A curve of bifurcation points.
@@ -81,7 +139,7 @@ class Curve2(Result):
 
     kind: Kind
     points: tuple[Point2, ...]
-    special: tuple[Codimension2, ...]
+    special: tuple[SpecialPoint2, ...]
     endings: tuple[Ending, Ending]
     reasons: tuple[str, str] = ("", "")
     periods: int = 1
@@ -117,7 +175,7 @@ class Curve2(Result):
     def to_dataset(self) -> xr.Dataset:
         """The points as a dataset over ``point``, in their order along the curve, those of codimension two among them;
         ``special`` is empty at ordinary ones. Multipliers are those of the return map."""
-        points, scale = list[Point2 | Codimension2](self.points), np.ptp(self.values, axis=0)
+        points, scale = list(self.points), np.ptp(self.values, axis=0)
         scale[scale == 0.0] = 1.0
         for each in self.special:
             places = np.array([point.values for point in points]) / scale
@@ -128,3 +186,51 @@ class Curve2(Result):
         names = ("values", "error_bound", "coefficient", "coefficient_error", "frequency", "orbit", "multipliers")
         first, last = (end.label for end in self.endings)
         return dataset("point", columns(points, *names) | kinds, kind=self.kind.label, first_end=first, last_end=last)
+
+
+@dataclass(frozen=True)
+class Start2(ReadOnlyArrays):
+    """Where a curve starts that leaves a point of codimension two.
+
+    Attributes
+    ----------
+    point
+        A bifurcation point on the curve, beside the one that is left.
+    second
+        The value of the second parameter there.
+    outward
+        Direction in which the curve leaves, shape (n + 2,): of the state, and of both parameters.
+    periods
+        Number of periods that its orbits take. They need not have the systems' symmetry in time.
+    """
+
+    point: BifurcationPoint
+    second: float
+    outward: Array
+    periods: int
+
+
+DEGENERATE = {
+    Kind.FOLD: CodimensionTwo.CUSP,
+    Kind.PITCHFORK: CodimensionTwo.DEGENERATE_PITCHFORK,
+    Kind.TRANSCRITICAL: CodimensionTwo.DEGENERATE_TRANSCRITICAL,
+    Kind.PERIOD_DOUBLING: CodimensionTwo.GENERALISED_PERIOD_DOUBLING,
+    Kind.NEIMARK_SACKER: CodimensionTwo.CHENCINER,
+}
+"""Kind of the point where the coefficient of a curve's normal form vanishes."""
+
+_TOGETHER = {
+    frozenset({Kind.FOLD, Kind.PERIOD_DOUBLING}): CodimensionTwo.FOLD_FLIP,
+    frozenset({Kind.FOLD, Kind.NEIMARK_SACKER}): CodimensionTwo.FOLD_NEIMARK_SACKER,
+    frozenset({Kind.PERIOD_DOUBLING, Kind.NEIMARK_SACKER}): CodimensionTwo.FLIP_NEIMARK_SACKER,
+    frozenset({Kind.NEIMARK_SACKER}): CodimensionTwo.DOUBLE_NEIMARK_SACKER,
+    frozenset({Kind.PITCHFORK, Kind.FOLD}): CodimensionTwo.PITCHFORK_FOLD,
+    frozenset({Kind.PITCHFORK, Kind.PERIOD_DOUBLING}): CodimensionTwo.PITCHFORK_FLIP,
+    frozenset({Kind.PITCHFORK, Kind.NEIMARK_SACKER}): CodimensionTwo.PITCHFORK_NEIMARK_SACKER,
+    frozenset({Kind.PITCHFORK}): CodimensionTwo.DOUBLE_PITCHFORK,
+}
+
+
+def together(one: Kind, other: Kind) -> CodimensionTwo:
+    """Kind of the point where two bifurcations happen at once."""
+    return _TOGETHER.get(frozenset({one, other}), CodimensionTwo.SEVERAL_CRITICAL)

@@ -17,8 +17,8 @@ from scipy.optimize import brentq
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.codimension_two.bordered import Equations, Evaluated, Frame, Spot
-from chilopod.stability.codimension_two.codimension2 import DEGENERATE, Codimension2, CodimensionTwo, together
+from chilopod.stability.codimension_two.bordered import CriticalCurve, Evaluated, Frame, Spot
+from chilopod.stability.codimension_two.curve2 import DEGENERATE, CodimensionTwo, Point2, SpecialPoint2, together
 from chilopod.stability.normal_forms.amplitude import NormalFormStatus
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, ReturnedStates
 from chilopod.stability.normal_forms.normal_form import NormalForm, normal_form
@@ -27,6 +27,9 @@ from chilopod.stability.points import WITHOUT_CRITICALITY, Kind
 from chilopod.stability.returns import returned_states
 from chilopod.stability.spectrum.eigenvalues import Spectrum, spectrum
 from chilopod.stability.symmetry.mirrored import reverses
+from chilopod.stability.tracing.step import Step
+from chilopod.stability.tracing.tracer import Parts
+from chilopod.stability.unit_circle.spectra import TARGETS, Event
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -38,143 +41,148 @@ _POLE = 0.1  # of its values at the ends of a step: where a test function change
 _RESOLVED = 3.0  # times the error of a test function that it has to reach within a step to mean anything
 _COMPLEX = 1e-6  # imaginary part from which a pair counts as one
 _OVERLAP = 1e-5  # of the two critical eigenvectors, below which a multiplier is double
+_EPSILON = float(np.finfo(float).eps)
 
 
-class Signal(enum.Enum):
-    """A test function along a curve."""
+class Own(enum.Enum):
+    """Test functions of the critical multiplier itself: the coefficient of the normal form, and w . v, which is zero
+    where the multiplier is double."""
 
-    COEFFICIENT = enum.auto()  # of the normal form
-    DOUBLE = enum.auto()  # w . v, zero where a critical multiplier is double
-    PLUS = enum.auto()  # another multiplier +1
-    MINUS = enum.auto()  # another multiplier -1
-    PAIR = enum.auto()  # another pair on the unit circle
-    AT_PLUS = enum.auto()  # the pair itself at +1, -1, and the two resonances in between
-    AT_MINUS = enum.auto()
-    AT_THIRD = enum.auto()
-    AT_QUARTER = enum.auto()
+    COEFFICIENT = enum.auto()
+    DOUBLE = enum.auto()
+
+
+Signal = Own | Event | CodimensionTwo
+"""Test functions: those above; of other multipliers, +1, -1 or a pair on the circle; of a pair, one resonance each."""
+
+Signals = dict[Signal, tuple[float, float]]
+"""Test functions and their errors."""
+
+_COSINES = {
+    CodimensionTwo.RESONANCE_1_1: 1.0,
+    CodimensionTwo.RESONANCE_1_2: -1.0,
+    CodimensionTwo.RESONANCE_1_3: -0.5,
+    CodimensionTwo.RESONANCE_1_4: 0.0,
+}
 
 
 class _NoValue(AnalysisError):
     """A test function has no value at a place."""
 
 
-Signals = dict[Signal, tuple[float, float]]
-"""Test functions and their errors."""
-
-_COSINES = {Signal.AT_PLUS: 1.0, Signal.AT_MINUS: -1.0, Signal.AT_THIRD: -0.5, Signal.AT_QUARTER: 0.0}
-
-_RESONANCES = {
-    Signal.AT_PLUS: CodimensionTwo.RESONANCE_1_1,
-    Signal.AT_MINUS: CodimensionTwo.RESONANCE_1_2,
-    Signal.AT_THIRD: CodimensionTwo.RESONANCE_1_3,
-    Signal.AT_QUARTER: CodimensionTwo.RESONANCE_1_4,
-}
-
-
-def _signals(target: int, coefficients: bool) -> tuple[Signal, ...]:
-    own = (Signal.DOUBLE,) if target else tuple(_COSINES)
-    form = (Signal.COEFFICIENT,) if coefficients else ()
-    return (*form, *own, Signal.PLUS, Signal.MINUS, Signal.PAIR)
-
-
 @dataclass(frozen=True)
 class Critical(ReadOnlyArrays):
-    """The critical multiplier at a place of a curve, and the others.
+    """A place of a curve with its multipliers."""
 
-    Attributes
-    ----------
-    spectrum
-        All multipliers of the return map.
-    others
-        Numbers of those that are not critical, shape (others,).
-    multiplier
-        The critical one: +1, -1, or on the unit circle with positive imaginary part.
-    mode, left
-        Unit right eigenvector and left one with left^H mode = 1, shape (n,).
-    overlap
-        Overlap of the two where both have unit length in units of the frame: 0 where the multiplier is double. NaN for
-        a pair.
-    """
-
-    spectrum: Spectrum
-    others: NDArray[np.intp]
-    multiplier: complex
-    mode: ComplexArray
+    at: Evaluated  # the equations there and the frame they are written in
+    frame: Frame
+    shift: Array | None  # how far the coordinates may be off, if the image has error bounds; else None
+    spectrum: Spectrum  # all multipliers of the return map
+    others: NDArray[np.intp]  # numbers of those that are not critical, shape (others,)
+    multiplier: complex  # the critical one: +1, -1, or on the unit circle with positive imaginary part
+    mode: ComplexArray  # unit right eigenvector and left one with left^H mode = 1, shape (n,)
     left: ComplexArray
-    overlap: float
+    overlap: float  # of the two, of unit length in units of the frame: 0 where the multiplier is double, NaN for a pair
+
+    @property
+    def error(self) -> Array:
+        """Bounds on the errors of the return map's derivative in units of the frame, shape (n, n)."""
+        size = self.frame.size
+        return np.asarray(np.broadcast_to(self.at.image.error, self.at.jacobian.shape) * size / size[:, None])
 
 
-def critical(target: int, at: Evaluated, frame: Frame) -> Critical:
-    """Multipliers at a place of a curve, the critical ones apart."""
+def critical(target: int, at: Evaluated, frame: Frame, shift: Array | None = None) -> Critical:
+    """A place of a curve, the critical multipliers apart from the others."""
     spec = spectrum(at.image)
     if target:
         own = [int(np.abs(spec.values - target).argmin())]
         v, w = at.right[:, 0], at.left[:, 0]
         overlap = float(w @ v / (np.linalg.norm(w) * np.linalg.norm(v)))
-        mode = (frame.size * v).astype(np.complex128)
+        nu, mode, left = complex(target), (frame.size * v).astype(np.complex128), (w / frame.size).astype(np.complex128)
         mode /= np.linalg.norm(mode)
-        left = (w / frame.size).astype(np.complex128)
         with np.errstate(divide="ignore", invalid="ignore"):
             left /= left @ mode
-        return Critical(spec, _without(spec, own), complex(target), mode, left, overlap)
-    cosine = at.place.cosine
-    nu = cosine + 1j * np.sqrt(complex(1.0 - cosine * cosine))
-    first = int(np.abs(spec.values - nu).argmin())
-    distance = np.abs(spec.values - 1.0 / nu)
-    distance[first] = np.inf
-    own = [first, int(distance.argmin())]
-    mode, left = spec.right[:, first], spec.left[:, first]
-    turn = np.abs(mode).max() / mode[np.abs(mode).argmax()]
-    return Critical(spec, _without(spec, own), complex(nu), mode * turn, left * turn, np.nan)
+    else:
+        cosine, overlap = at.place.cosine, np.nan
+        nu = complex(cosine + 1j * np.sqrt(complex(1.0 - cosine * cosine)))
+        first = int(np.abs(spec.values - nu).argmin())
+        distance = np.abs(spec.values - 1.0 / nu)
+        distance[first] = np.inf
+        own = [first, int(distance.argmin())]
+        mode, left = spec.right[:, first], spec.left[:, first]
+        turn = np.abs(mode).max() / mode[np.abs(mode).argmax()]
+        mode, left = mode * turn, left * turn
+    others = np.delete(np.arange(spec.values.size), own)
+    return Critical(at, frame, shift, spec, others, nu, mode, left, overlap)
 
 
-def _without(spec: Spectrum, own: list[int]) -> NDArray[np.intp]:
-    return np.delete(np.arange(spec.values.size), own)
+@dataclass(frozen=True)
+class Station:
+    """A spot of a curve with the point there, and the test functions."""
+
+    spot: Spot
+    point: Point2
+    signals: Signals
 
 
 class Detector:
-    """Test function that is watched along a curve.
+    """Test functions along a curve of bifurcations of some kind, that of the normal form among them if its coefficients
+    are asked for."""
 
-    Parameters
-    ----------
-    equations
-        Equations of the curve.
-    kind
-        Kind of the bifurcation along it.
-    coefficients
-        True if normal forms are computed.
-    """
+    def __init__(self, curve: CriticalCurve, kind: Kind, coefficients: bool) -> None:
+        self._curve, self._kind, self._coefficients = curve, kind, coefficients
+        form = (Own.COEFFICIENT,) if coefficients else ()
+        self._signals: tuple[Signal, ...] = (*form, *((Own.DOUBLE,) if curve.target else _COSINES), *Event)
 
-    def __init__(self, equations: Equations, kind: Kind, coefficients: bool) -> None:
-        self._equations = equations
-        self._kind = kind
-        self._signals = _signals(equations.target, coefficients)
+    def station(self, spot: Spot) -> Station:
+        """A spot with the point there, and the test functions."""
+        here = critical(self._curve.target, spot.at, spot.frame, spot.shift)
+        form = self.form(here) if self._coefficients and abs(spot.place.cosine) < 1.0 else None
+        signals = {signal: self._measured(signal, here, form) for signal in self._signals}
+        bound = across(spot) + 4.0 * _EPSILON * np.abs(spot.values)
+        return Station(spot, _point(here, bound, (np.nan, np.nan) if form is None else self._decides(form)), signals)
 
-    def form(self, own: Critical, at: Evaluated, frame: Frame, shift: Array | None) -> NormalForm:
-        """The normal form at a place; ``shift`` is how far its coordinates may be off, if that is to count."""
-        orbit_error = 0.0
-        if shift is not None:
-            orbit_error = float(np.abs(own.left) @ (frame.size * (np.abs(frame.basis) @ shift[: frame.basis.shape[1]])))
-        error = 0.0 if shift is None else float(np.max(at.image.error * frame.size / frame.size[:, None]))
+    def events(self, step: Step[Spot, Evaluated], before: Signals, after: Signals) -> list[tuple[Spot, SpecialPoint2]]:
+        """Points of codimension two within a step, in order."""
+        parts, found = Parts(self._curve, step), []
+        for signal in self._signals:
+            one, other = before[signal][0], after[signal][0]
+            if not (one * other < 0.0 or (other == 0.0 and one != 0.0)):
+                continue
+            # What vanishes all along a curve changes its sign as well.
+            if any(abs(value) > _RESOLVED * error for value, error in (before[signal], after[signal])):
+                found += self._located(signal, parts)
+        return [(spot, point) for _, spot, point in sorted(found, key=lambda each: each[0])]
+
+    def form(self, here: Critical) -> NormalForm:
+        """The normal form at a place."""
+        orbit_error = error = 0.0
+        if here.shift is not None:
+            frame, m = here.frame, here.frame.basis.shape[1]
+            orbit_error = float(np.abs(here.left) @ (frame.size * (np.abs(frame.basis) @ here.shift[:m])))
+            error = float(here.error.max())
         return normal_form(
-            *self.sampled(own, at, frame),
-            uncertainty=error / float(np.linalg.norm(at.jacobian)),
-            scale=frame.size,
+            *self.sampled(here),
+            uncertainty=error / float(np.linalg.norm(here.at.jacobian)),
+            scale=here.frame.size,
             orbit_error=orbit_error,
         )
 
-    def sampled(self, own: Critical, at: Evaluated, frame: Frame) -> tuple[ReturnedStates, CriticalOrbit]:
-        """Samples at a place that a normal form is computed from."""
-        system, image = self._equations.system(at.place.values), at.image
-        orbit = CriticalOrbit(at.place.state, image.jacobian, own.multiplier, own.mode, own.left, image.returns)
-        return lambda states: returned_states(system, states, frame.section), orbit
+    def sampled(self, here: Critical) -> tuple[ReturnedStates, CriticalOrbit]:
+        """Return map and critical orbit that a normal form is computed from."""
+        at, section = here.at, here.frame.section
+        system = self._curve.system(at.place.values)
+        orbit = CriticalOrbit(
+            at.place.state, at.image.jacobian, here.multiplier, here.mode, here.left, at.image.returns
+        )
+        return lambda states: returned_states(system, states, section), orbit
 
-    def fifth(self, own: Critical, at: Evaluated, frame: Frame, *forms: NormalForm) -> Quintic | None:
+    def fifth(self, here: Critical, *forms: NormalForm) -> Quintic | None:
         """The terms of fifth order at a place, given those of third order there or beside it."""
         amplitude = next((form.amplitude for form in forms if np.isfinite(form.amplitude)), np.nan)
-        return None if np.isnan(amplitude) else quintic(*self.sampled(own, at, frame), amplitude)
+        return None if np.isnan(amplitude) else quintic(*self.sampled(here), amplitude)
 
-    def coefficient(self, form: NormalForm) -> tuple[float, float]:
+    def _decides(self, form: NormalForm) -> tuple[float, float]:
         """The coefficient that decides what happens on a curve of this kind, and its error; NaN where there is none."""
         if form.status not in (NormalFormStatus.FOUND, NormalFormStatus.LINEAR):
             return np.nan, np.nan
@@ -182,154 +190,90 @@ class Detector:
             return form.quadratic, form.quadratic_error
         return form.cubic, form.cubic_error
 
-    def measured(self, spot: Spot, own: Critical, form: NormalForm | None) -> Signals:
-        """The test functions at a point of the curve, with their errors."""
-        return {signal: self._measure(signal, own, spot.at, spot.frame, spot.shift, form) for signal in self._signals}
-
-    def between(
-        self, before: Spot, there: Signals, after: Spot, here: Signals
-    ) -> list[tuple[float, Spot, Codimension2]]:
-        """Points of codimension two within a step, in order, with how far along it they are."""
-        found = []
-        for signal in self._signals:
-            one, other = there[signal][0], here[signal][0]
-            if not (one * other < 0.0 or (other == 0.0 and one != 0.0)):
-                continue
-            # What vanishes all along a curve changes its sign as well.
-            if not any(abs(value) > _RESOLVED * error for value, error in (there[signal], here[signal])):
-                continue
-            located = self._located(signal, before, after)
-            if located is not None:
-                found.append(located)
-        return sorted(found, key=lambda each: each[0])
-
-    def _measure(
-        self,
-        signal: Signal,
-        own: Critical,
-        at: Evaluated,
-        frame: Frame,
-        shift: Array | None,
-        form: NormalForm | None = None,
-    ) -> tuple[float, float]:
-        """A test function and its error, which takes an image with error bounds and ``shift``."""
-        if signal in _COSINES:
-            return at.place.cosine - _COSINES[signal], 0.0 if shift is None else float(shift[-1])
-        if signal is Signal.DOUBLE:
-            wrong = np.asarray(at.image.error * frame.size / frame.size[:, None])
-            return own.overlap, 2.0 * at.reach * float(np.linalg.norm(np.broadcast_to(wrong, at.jacobian.shape)))
-        if signal is Signal.COEFFICIENT:
-            if not self._equations.target and abs(at.place.cosine) >= 1.0:
+    def _measured(self, signal: Signal, here: Critical, form: NormalForm | None = None) -> tuple[float, float]:
+        """A test function and its error, which takes an image with error bounds, and that of the coordinates."""
+        if isinstance(signal, CodimensionTwo):
+            return here.at.place.cosine - _COSINES[signal], 0.0 if here.shift is None else float(here.shift[-1])
+        if signal is Own.DOUBLE:
+            return here.overlap, 2.0 * here.at.reach * float(np.linalg.norm(here.error))
+        if signal is Own.COEFFICIENT:
+            if not self._curve.target and abs(here.at.place.cosine) >= 1.0:
                 return np.nan, np.nan  # past the end of the curve: two real multipliers with product 1
-            form = self.form(own, at, frame, shift) if form is None else form
-            value, error = self.coefficient(form)
+            value, error = self._decides(self.form(here) if form is None else form)
             # A fold's is positive for one sense of its mode; where the multiplier is double it has a pole.
-            factor = own.overlap if self._equations.target else 1.0
+            factor = here.overlap if self._curve.target else 1.0
             return value * factor, error * abs(factor)
-        nu, errors = own.spectrum.values[own.others], own.spectrum.error[own.others]
-        if signal is Signal.PAIR:
+        nu, errors = here.spectrum.values[here.others], here.spectrum.error[here.others]
+        if signal is Event.PAIR:
             first, second = np.triu_indices(nu.size, 1)
             sizes, off = np.abs(nu), errors[first] * np.abs(nu[second]) + errors[second] * np.abs(nu[first])
             return _product(nu[first] * nu[second] - 1.0, 1.0 + sizes[first] * sizes[second], off)
-        return _product(nu - (1.0 if signal is Signal.PLUS else -1.0), 1.0 + np.abs(nu), errors)
+        return _product(nu - TARGETS[signal], 1.0 + np.abs(nu), errors)
 
-    def _located(self, signal: Signal, before: Spot, after: Spot) -> tuple[float, Spot, Codimension2] | None:
-        equations, frame = self._equations, before.frame
-        whole = frame.between(before.place, after.place)
-        length = float(before.tangent @ whole)
-
-        def at(place: float) -> Evaluated:
-            guess = frame.moved(before.place, whole * (place / length))
-            return equations.corrected(before, guess, before.tangent, place)[0]
-
+    def _located(
+        self, signal: Signal, parts: Parts[Spot, Evaluated, Evaluated]
+    ) -> list[tuple[float, Spot, SpecialPoint2]]:
+        """The point where a test function vanishes within a step, with how far along it that is; none if it means
+        nothing."""
+        curve, start, length = self._curve, parts.step.start, parts.step.size
         seen: dict[float, tuple[float, float]] = {}
 
         def test(place: float) -> float:
             if place not in seen:
-                there = at(place)
-                seen[place] = self._measure(signal, critical(equations.target, there, frame), there, frame, None)
+                seen[place] = self._measured(signal, critical(curve.target, parts.at(place).found, start.frame))
             if np.isnan(seen[place][0]):
                 raise _NoValue("the test function does not exist", field="special")
             return seen[place][0]
 
-        def resolved(place: float) -> float:
-            value = test(place)
-            # Of an image without bounds the error is none.
-            return 0.0 if abs(value) <= seen[place][1] < np.inf else value
-
-        beside, unsure = _BESIDE * length, 0.0
-        try:
-            ends = test(0.0), test(length)
-            if ends[0] * ends[1] > 0.0:
-                return None
-            root = float(brentq(resolved, 0.0, length, xtol=1e-15 * length, rtol=8.9e-16, maxiter=60, disp=False))
-        except _NoValue:
-            # A coefficient that is zero may be harder to find than those beside it, which then bracket it.
-            (gap,) = (place for place, (value, _) in seen.items() if np.isnan(value))
-            for share in _NEARER:
-                place = gap + share * length
-                if 0.0 < place < length:
-                    with contextlib.suppress(_NoValue):
-                        test(place)
-            known = {place: value for place, (value, _) in seen.items() if not np.isnan(value)}
-            if not known.keys() >= {0.0, length}:
-                return None
-            low = max(place for place, value in known.items() if value * known[0.0] > 0.0)
-            high = min(place for place in known if place > low)
-            root, beside = 0.5 * (low + high), 0.5 * (high - low)
-            unsure = max(abs(known[low]), abs(known[high]))
-        spot = equations.spot(at(root).place, frame, before.tangent)
-        own = critical(equations.target, spot.at, spot.frame)
-        value, error = self._measure(signal, own, spot.at, spot.frame, spot.shift)
+        zero = _zero(test, seen, length)
+        if zero is None:
+            return []
+        root, beside, unsure = zero
+        spot = curve.spot(parts.at(root).found.place, start.frame, start.tangent)
+        here = critical(curve.target, spot.at, spot.frame, spot.shift)
+        value, error = self._measured(signal, here)
         if np.isnan(value):
             value, error = 0.0, max(error for _, error in seen.values() if not np.isnan(error))
-        if not unsure and abs(value) > _POLE * max(map(abs, ends)):
-            return None
-        kind = self._named(signal, spot, own)
-        if kind is None:
-            return None
-        along = _along(test, at, root, beside, abs(value) + error + unsure)
+        if not unsure and abs(value) > _POLE * max(abs(test(0.0)), abs(test(length))):
+            return []
+        kind = self._named(signal, here)
+        along = _along(test, parts, root, beside, abs(value) + error + unsure)
         off = _SAFETY * spot.frame.widths * spot.shift[spot.frame.parameters]
-        bound = off + along + 4.0 * np.finfo(float).eps * np.abs(spot.place.values)
-        if not (bound < np.ptp(equations.box, axis=1)).all():  # which tells nothing
-            return None
-        found = Codimension2(kind, spot.place.values, bound, spot.place.state, own.spectrum.values)
-        if signal is Signal.COEFFICIENT:
+        bound = off + along + 4.0 * _EPSILON * np.abs(spot.values)
+        if kind is None or not (bound < np.ptp(curve.box, axis=1)).all():  # which tells nothing
+            return []
+        point = SpecialPoint2(**vars(_point(here, bound)), kind=kind)
+        if signal is Own.COEFFICIENT:
             slope = abs(test(root + beside) - test(root - beside)) / 2.0
-            share = _SAFETY * (abs(value) + error + unsure) / slope
-            found = self._with_next_term(found, spot, at(root + beside), frame, share)
-        return root, spot, found
+            there = critical(curve.target, parts.at(root + beside).found, start.frame)
+            point = self._with_next_term(point, here, there, _SAFETY * (abs(value) + error + unsure) / slope)
+        return [(root, spot, point)]
 
-    def _with_next_term(
-        self, found: Codimension2, spot: Spot, beside: Evaluated, frame: Frame, share: float
-    ) -> Codimension2:
+    def _with_next_term(self, point: SpecialPoint2, here: Critical, beside: Critical, share: float) -> SpecialPoint2:
         """A point with the coefficient that does not vanish there, whose error has a share of its change to a place
         ``beside``: the point itself may be as far off."""
-        target, terms = self._equations.target, []
-        places = ((spot.at, spot.frame, spot.shift), (beside, frame, None))
-        critical_there = [critical(target, at, written) for at, written, _ in places]
-        forms = [self.form(own, *place) for own, place in zip(critical_there, places, strict=True)]
-        for own, (at, written, _), form in zip(critical_there, places, forms, strict=True):
+        terms, forms = [], [self.form(each) for each in (here, beside)]
+        for each, form in zip((here, beside), forms, strict=True):
             value, error = form.cubic, form.cubic_error
             if self._kind not in WITHOUT_CRITICALITY:
-                fifth = self.fifth(own, at, written, form, *forms)
+                fifth = self.fifth(each, form, *forms)
                 value, error = (np.nan, np.nan) if fifth is None else (fifth.coefficient, fifth.error)
             terms.append((value, error))
         (value, error), (other, unsure) = terms
         error += share * (abs(other - value) + error + unsure)
-        return replace(found, next_coefficient=value, next_coefficient_error=error) if np.isfinite(error) else found
+        return replace(point, next_coefficient=value, next_coefficient_error=error) if np.isfinite(error) else point
 
-    def _named(self, signal: Signal, spot: Spot, own: Critical) -> CodimensionTwo | None:
+    def _named(self, signal: Signal, here: Critical) -> CodimensionTwo | None:
         """Kind of the point at a zero of a test function; None where it means nothing."""
-        target = self._equations.target
-        if signal is Signal.COEFFICIENT:
+        target = self._curve.target
+        if isinstance(signal, CodimensionTwo):
+            return signal
+        if signal is Own.COEFFICIENT:
             return DEGENERATE.get(self._kind)
-        if signal in _RESONANCES:
-            return _RESONANCES[signal]
-        if signal is Signal.DOUBLE:
+        if signal is Own.DOUBLE:
             return CodimensionTwo.RESONANCE_1_1 if target > 0 else CodimensionTwo.RESONANCE_1_2
-        nu = own.spectrum.values[own.others]
-        if signal is Signal.PAIR:
+        nu = here.spectrum.values[here.others]
+        if signal is Event.PAIR:
             complex_ones = np.abs(np.abs(nu) - 1.0)[np.abs(nu.imag) > _COMPLEX]
             # Two real multipliers with product 1 are nothing.
             reals = nu[np.abs(nu.imag) <= _COMPLEX].real
@@ -337,41 +281,77 @@ class Detector:
             if not complex_ones.size or (products.size and products.min() < complex_ones.min()):
                 return None
             return together(self._kind, Kind.NEIMARK_SACKER)
-        sign = 1 if signal is Signal.PLUS else -1
-        if sign == target and abs(own.overlap) < _OVERLAP:
+        sign = TARGETS[signal]
+        if sign == target and abs(here.overlap) < _OVERLAP:
             return None  # of a double multiplier the overlap tells
-        index = own.others[int(np.abs(nu - sign).argmin())]
-        mode = own.spectrum.right[:, index]
-        system = self._equations.system(spot.place.values)
-        if reverses(system, mode, spot.frame.size):
-            kind = Kind.PITCHFORK
-        elif sign < 0:
-            kind = Kind.PITCHFORK if spot.at.image.returns == 2 else Kind.PERIOD_DOUBLING
-        else:
-            kind = Kind.BRANCH_POINT if self._equations.known else Kind.FOLD
-        return together(self._kind, kind)
+        mode = here.spectrum.right[:, here.others[int(np.abs(nu - sign).argmin())]]
+        if reverses(self._curve.system(here.at.place.values), mode, here.frame.size):
+            return together(self._kind, Kind.PITCHFORK)
+        if sign < 0:
+            return together(self._kind, Kind.PITCHFORK if here.at.image.returns == 2 else Kind.PERIOD_DOUBLING)
+        return together(self._kind, Kind.BRANCH_POINT if self._curve.known else Kind.FOLD)
+
+
+def _point(here: Critical, bound: Array, coefficient: tuple[float, float] = (np.nan, np.nan)) -> Point2:
+    image, place = here.at.image, here.at.place
+    value, error = (None, None) if np.isnan(coefficient[0]) else coefficient
+    frequency = abs(float(np.angle(here.multiplier**image.returns))) / image.period
+    return Point2(
+        place.values, bound, place.state, here.mode, here.multiplier, here.spectrum.values, frequency, value, error
+    )
+
+
+def _zero(
+    test: Callable[[float], float], seen: dict[float, tuple[float, float]], length: float
+) -> tuple[float, float, float] | None:
+    """Zero of a test function within a step, how far beside it the function is known, and how large it may be there;
+    None if there is none. ``seen``: its values and errors, NaN where it has none."""
+
+    def resolved(place: float) -> float:
+        value = test(place)
+        # Of an image without bounds the error is none.
+        return 0.0 if abs(value) <= seen[place][1] < np.inf else value
+
+    try:
+        if test(0.0) * test(length) > 0.0:
+            return None
+        root = brentq(resolved, 0.0, length, xtol=1e-15 * length, rtol=8.9e-16, maxiter=60, disp=False)
+        return float(root), _BESIDE * length, 0.0
+    except _NoValue:
+        # A coefficient that is zero may be harder to find than those beside it, which then bracket it.
+        (gap,) = (place for place, (value, _) in seen.items() if np.isnan(value))
+    for share in _NEARER:
+        if 0.0 < gap + share * length < length:
+            with contextlib.suppress(_NoValue):
+                test(gap + share * length)
+    known = {place: value for place, (value, _) in seen.items() if not np.isnan(value)}
+    if not known.keys() >= {0.0, length}:
+        return None
+    low = max(place for place, value in known.items() if value * known[0.0] > 0.0)
+    high = min(place for place in known if place > low)
+    return 0.5 * (low + high), 0.5 * (high - low), max(abs(known[low]), abs(known[high]))
 
 
 def across(spot: Spot) -> Array:
     """How far both parameters may be off, shape (2,), at right angles to the curve in the plane of the parameters."""
     frame = spot.frame
-    response = np.linalg.pinv(spot.matrix)[frame.parameters]
+    response = np.linalg.pinv(spot.matrix[:-1])[frame.parameters]
     tangent = spot.tangent[frame.parameters]
     length = float(np.linalg.norm(tangent))
-    if length > np.sqrt(np.finfo(float).eps):  # else a cusp, of which no direction is along
+    if length > np.sqrt(_EPSILON):  # else a cusp, of which no direction is along
         normal = np.array([-tangent[1], tangent[0]]) / length
         response = np.outer(normal, normal @ response)
     return np.asarray(_SAFETY * frame.widths * (np.abs(response) @ spot.uncertainty))
 
 
 def _along(
-    test: Callable[[float], float], at: Callable[[float], Evaluated], root: float, h: float, error: float
+    test: Callable[[float], float], parts: Parts[Spot, Evaluated, Evaluated], root: float, h: float, error: float
 ) -> Array:
     """How far both parameters move, shape (2,), as far along the curve as a test function leaves open; from
     differences over h."""
     try:
         slope = abs(test(root + h) - test(root - h)) / (2.0 * h)
-        low, middle, high = (at(root + s).place.values for s in (-h, 0.0, h))
+        low, middle, high = (parts.at(root + s).found.place.values for s in (-h, 0.0, h))
     except AnalysisError:
         return np.full(2, np.inf)
     if not slope > 0.0:

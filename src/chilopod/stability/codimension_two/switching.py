@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError, ChilopodError, ParameterError
 from chilopod.stability.budget import Budget, SpentError
-from chilopod.stability.codimension_two.bordered import Equations, Family2, Place, Spot, knows_orbit
-from chilopod.stability.codimension_two.codimension2 import Codimension2, CodimensionTwo, Start2
+from chilopod.stability.codimension_two.bordered import CriticalCurve, Family2, Place, Spot, knows_orbit
+from chilopod.stability.codimension_two.curve2 import CodimensionTwo, SpecialPoint2, Start2
 from chilopod.stability.codimension_two.detection import Detector, across, critical
 from chilopod.stability.codimension_two.two_parameters import BUDGET, checked_box, over_periods
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit, displacements
@@ -44,7 +44,7 @@ _OTHERS = {
 
 def switch2(
     family2: Family2,
-    point: Codimension2,
+    point: SpecialPoint2,
     between: tuple[tuple[float, float], tuple[float, float]],
     *,
     budget: int = BUDGET,
@@ -74,7 +74,7 @@ def switch2(
         If the coefficient of fifth order is zero within its error, or no fold is found where it says that there is one.
     """
     box = checked_box(between)
-    if not isinstance(point, Codimension2):
+    if not isinstance(point, SpecialPoint2):
         raise ParameterError(
             "is no point of codimension two", field="point", value=point, allowed="one of `curve.special`"
         )
@@ -84,7 +84,7 @@ def switch2(
         raise ParameterError(why, field="point", allowed="a generalised period doubling or a degenerate pitchfork")
     allowed = Budget(budget, seconds)
     periods = 2 if kind is Kind.PERIOD_DOUBLING else 1
-    folds = Equations(over_periods(family2, periods), 1, False, box, allowed)
+    folds = CriticalCurve(over_periods(family2, periods), 1, False, box, allowed)
     signs = (1.0,) if kind is Kind.PERIOD_DOUBLING else (1.0, -1.0)
     with allowed:
         there = _unfolding(family2, point, kind, box, allowed)
@@ -93,29 +93,16 @@ def switch2(
 
 @dataclass(frozen=True)
 class _Unfolding:
-    """Unfolding of a degenerate point on a curve.
+    """Unfolding of a degenerate point on a curve."""
 
-    Attributes
-    ----------
-    equations, spot, at
-        The curve, the point, and its critical orbit.
-    fifth
-        Terms of fifth order.
-    slope
-        Change of the cubic coefficient along the curve, by the length of ``spot.tangent``.
-    response
-        Change of the orbit and of the parameters, in coordinates of the frame, with the modulus of the multiplier.
-    times
-        Number of returns that the coefficients are of.
-    """
-
-    equations: Equations
+    equations: CriticalCurve  # the curve, the point, and its critical orbit
     spot: Spot
     at: CriticalOrbit
-    fifth: Quintic
-    slope: float
+    fifth: Quintic  # terms of fifth order
+    slope: float  # change of the cubic coefficient along the curve, by the length of ``spot.tangent``
+    # Change of the orbit and of the parameters, in coordinates of the frame, with the modulus of the multiplier.
     response: Array
-    times: int
+    times: int  # number of returns that the coefficients are of
 
     def fold(self, a: float) -> Place | None:
         """Where a fold is predicted at an amplitude along the mode, negative against it; None if that is too far."""
@@ -124,29 +111,27 @@ class _Unfolding:
         across = fifth.coefficient * a**4 / self.times
         if not (abs(away) <= _FARTHEST and np.abs(across * self.response).max() <= _FARTHEST):
             return None
-        guess = spot.frame.moved(spot.place, away * spot.tangent)
-        base = self.equations.corrected(spot, guess, spot.tangent, away)[0].place
-        place = spot.frame.moved(base, across * self.response)
+        base = self.equations.along(spot, away)
+        place = spot.frame.moved(base.place, across * self.response)
         bent = displacements(self.at, fifth.curve, np.array(a, dtype=np.complex128))
         return Place(place.state + bent, place.values, 0.0)
 
 
-def _unfolding(family2: Family2, point: Codimension2, kind: Kind, box: Array, budget: Budget) -> _Unfolding:
+def _unfolding(family2: Family2, point: SpecialPoint2, kind: Kind, box: Array, budget: Budget) -> _Unfolding:
     system = family2(*point.values.tolist())
     targets = (-1,) if kind is Kind.PERIOD_DOUBLING else (1,) if system.symmetry is None else (1, -1)
     target = min(targets, key=lambda one: float(np.abs(point.multipliers - one).min()))
-    equations = Equations(family2, target, knows_orbit(system), box, budget)
+    equations = CriticalCurve(family2, target, knows_orbit(system), box, budget)
+    # A point on the edge of the box has another side too.
+    equations.box = box + 2.0 * _FARTHEST * equations.widths[:, None] * [-1.0, 1.0]
     spot = equations.begin(Place(point.orbit, point.values, 0.0))
     detector = Detector(equations, kind, True)
-    own = critical(target, spot.at, spot.frame)
-    forms = [detector.form(own, spot.at, spot.frame, None)]
-    for s in (-_BESIDE, _BESIDE):
-        at, _ = equations.corrected(spot, spot.frame.moved(spot.place, s * spot.tangent), spot.tangent, s)
-        forms.append(detector.form(critical(target, at, spot.frame), at, spot.frame, None))
-    low, high = forms[1:]
+    here = critical(target, spot.at, spot.frame)
+    beside = [critical(target, equations.along(spot, size), spot.frame) for size in (-_BESIDE, _BESIDE)]
+    low, high = forms = [detector.form(each) for each in beside]
     if not abs(high.cubic - low.cubic) > low.cubic_error + high.cubic_error:
         raise AnalysisError("the cubic coefficient is not seen to change along the curve", field="point")
-    fifth = detector.fifth(own, spot.at, spot.frame, *forms)
+    fifth = detector.fifth(here, detector.form(here), *forms)
     if fifth is None:
         raise AnalysisError("no coefficient of fifth order was found", field="point")
     if abs(fifth.coefficient) <= fifth.error:
@@ -154,8 +139,7 @@ def _unfolding(family2: Family2, point: Codimension2, kind: Kind, box: Array, bu
     returns = spot.at.image.returns
     times = returns if target > 0 or returns % 2 == 0 else 2 * returns
     slope = (high.cubic - low.cubic) / (2.0 * _BESIDE)
-    _, orbit = detector.sampled(own, spot.at, spot.frame)
-    return _Unfolding(equations, spot, orbit, fifth, slope, _across(spot, target), times)
+    return _Unfolding(equations, spot, detector.sampled(here)[1], fifth, slope, _across(spot, target), times)
 
 
 def _across(spot: Spot, target: int) -> Array:
@@ -169,7 +153,7 @@ def _across(spot: Spot, target: int) -> Array:
     return np.concatenate([orbit @ along, along])
 
 
-def _start(there: _Unfolding, folds: Equations, sign: float, periods: int) -> Start2:
+def _start(there: _Unfolding, folds: CriticalCurve, sign: float, periods: int) -> Start2:
     """The fold at the largest amplitude at which it is found near where it was predicted."""
     left, widths = there.at.left.real, there.spot.frame.widths
     cause: Exception | None = None

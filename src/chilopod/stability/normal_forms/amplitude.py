@@ -50,30 +50,17 @@ class NormalFormStatus(Labelled):
     FOUND = "found", "the coefficients hold within their errors"
     LINEAR = "linear", "no nonlinear term was seen along the mode, however large the amplitude"
     OUT_OF_REACH = "out of reach", "at no amplitude does the return map follow a power series"
-    STRONG_RESONANCE = (
-        "strong resonance",
-        "the pair is at a root of unity of order 1 to 4, where more terms decide",
-    )
+    STRONG_RESONANCE = ("strong resonance", "the pair is at a root of unity of order 1 to 4, where more terms decide")
     SEVERAL_CRITICAL = "several critical", "another multiplier is on the unit circle as well"
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Terms of one return on the centre manifold.
+    """Terms of one return on the centre manifold."""
 
-    Attributes
-    ----------
-    status
-        FOUND or LINEAR.
-    sampled
-        The map where it shows most.
-    cubic, cubic_error
-        Coefficient of the resonant cubic term.
-    """
-
-    status: NormalFormStatus
-    sampled: Sampled
-    cubic: complex
+    status: NormalFormStatus  # FOUND or LINEAR
+    sampled: Sampled  # the map where it shows most
+    cubic: complex  # coefficient of the resonant cubic term
     cubic_error: float
 
 

@@ -42,28 +42,15 @@ _WRONG = 0.3  # how far off they are, of what the states move
 
 @dataclass(frozen=True)
 class CriticalOrbit(ReadOnlyArrays):
-    """A fixed point of a return map, and the multiplier that is critical there.
+    """A fixed point of a return map, and the multiplier that is critical there."""
 
-    Attributes
-    ----------
-    state
-        The fixed point, shape (n,).
-    jacobian
-        Jacobian of the return map there, shape (n, n).
-    multiplier
-        nu: exactly +1, exactly -1, or the one of a complex pair whose mode is ``right``.
-    right, left
-        Critical eigenvectors, shape (n,), ``right`` of unit length in the user's units, left^H right = 1.
-    returns
-        Number of returns in a full period.
-    """
-
-    state: Array
-    jacobian: Array
-    multiplier: complex
+    state: Array  # the fixed point, shape (n,)
+    jacobian: Array  # Jacobian of the return map there, shape (n, n)
+    multiplier: complex  # nu: exactly +1, exactly -1, or the one of a complex pair whose mode is ``right``
+    # Critical eigenvectors, shape (n,), ``right`` of unit length in the user's units, left^H right = 1.
     right: ComplexArray
     left: ComplexArray
-    returns: int = 1
+    returns: int = 1  # number of returns in a full period
 
     @property
     def real(self) -> bool:
@@ -73,37 +60,18 @@ class CriticalOrbit(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class Sampled:
-    """Chebyshev series of the harmonics of H(W(z)) - x.
+    """Chebyshev series of the harmonics of H(W(z)) - x."""
 
-    Attributes
-    ----------
-    harmonics
-        Harmonic h at index h, negative ones from the end; entries are the n states and, last, the projection
-        left^H (H(W(z)) - x).
-    noise
-        Bounds on the errors of the samples, shape (n + 1,).
-    blur
-        Error of the projection at x itself, from round-off and what is known of the map's.
-    shrink
-        Factor of the radius at which the series of the projection would fall to the noise that was to be expected.
-    falling
-        True if they still fall at their end; noise would not.
-    size
-        Largest distance from x, on the curve or of its image, of every state: shape (n,).
-    radius
-        Largest |z|.
-    outermost
-        Harmonics of the projection at the largest of the :func:`radii`, shape (angles,).
-    """
-
+    # Harmonic h at index h, negative ones from the end, of the n states and, last, of left^H (H(W(z)) - x).
     harmonics: tuple[Series, ...]
-    noise: Array
-    blur: float
+    noise: Array  # bounds on the errors of the samples, shape (n + 1,)
+    blur: float  # error of the projection at x itself, from round-off and what is known of the map's
+    # Factor of the radius at which the series of the projection would fall to the noise that was to be expected.
     shrink: float
-    falling: bool
-    size: Array
-    radius: float
-    outermost: ComplexArray
+    falling: bool  # True if they still fall at their end; noise would not
+    size: Array  # largest distance from x, on the curve or of its image, of every state: shape (n,)
+    radius: float  # largest |z|
+    outermost: ComplexArray  # harmonics of the projection at the largest of the :func:`radii`, shape (angles,)
 
     def taylor(self, powers: Powers) -> tuple[ComplexArray, Array]:
         """Coefficient of a monomial in H(W(z)), and its error: shape (n + 1,)."""
@@ -176,16 +144,8 @@ class Manifold:
 
     It has no part along q at resonant monomials. What it should be follows from H(W(z)) = W(g(z)), with the return map
     H and the map g on the critical space (Kuznetsov, *Elements of Applied Bifurcation Theory*, sections 9.3 and 9.4;
-    Govaerts, Ghaziani, Kuznetsov & Meijer, SIAM J. Sci. Comput. 29, 2007).
-
-    Parameters
-    ----------
-    mapped, at, noise
-        As for :func:`chilopod.stability.normal_forms.normal_form.normal_form`.
-    order
-        Order of the coefficient: 3 or 5.
-    resonance
-        3 where the conjugate of the multiplier is its square.
+    Govaerts, Ghaziani, Kuznetsov & Meijer, SIAM J. Sci. Comput. 29, 2007). The order of the coefficient is 3 or 5; the
+    resonance 3 is where the conjugate of the multiplier is its square.
     """
 
     def __init__(

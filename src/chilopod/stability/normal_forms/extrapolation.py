@@ -36,18 +36,10 @@ def radii() -> Array:
 
 @dataclass(frozen=True)
 class Series(ReadOnlyArrays):
-    """Chebyshev coefficients over [-1, 1] of functions that are even or odd.
+    """Chebyshev coefficients over [-1, 1] of functions that are even or odd."""
 
-    Attributes
-    ----------
-    coefficients
-        Coefficients of T_parity, T_(parity + 2), ..., shape (RADII, entries).
-    parity
-        0 for even functions, 1 for odd ones.
-    """
-
-    coefficients: ComplexArray
-    parity: int
+    coefficients: ComplexArray  # coefficients of T_parity, T_(parity + 2), ..., shape (RADII, entries)
+    parity: int  # 0 for even functions, 1 for odd ones
 
     @property
     def roughness(self) -> Array:
@@ -63,15 +55,8 @@ class Series(ReadOnlyArrays):
         return np.asarray(before > _FALL * self.roughness)
 
     def taylor(self, order: int, noise: Array) -> tuple[ComplexArray, Array]:
-        """Taylor coefficients of one order, and bounds on their errors, shape (entries,).
-
-        Parameters
-        ----------
-        order
-            Order of the parity of the functions, at most RADII.
-        noise
-            Bounds on the errors of the samples, shape (entries,).
-        """
+        """Taylor coefficients of one order (of the parity of the functions, at most RADII), and bounds on their errors,
+        shape (entries,), from those on the errors of the samples."""
         weights, gains = _weights(order, self.parity)
         terms = weights[:, None] * self.coefficients
         sizes = np.abs(terms)

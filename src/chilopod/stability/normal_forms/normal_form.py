@@ -86,25 +86,15 @@ def normal_form(
 
     Parameters
     ----------
-    mapped
-        The return map, of states of shape (k, n) at once.
-    at
-        The critical orbit.
-    noise
-        Relative error of the map: an image's entries are off by at most ``noise`` of the largest value they take
-        near the orbit. What is seen in the samples, and round-off, is allowed for anyway.
-    uncertainty
-        Relative error of the jacobian: how near to a root of unity, or to the unit circle, a multiplier is on it.
+    mapped, at
+        The return map, of states of shape (k, n) at once, and the critical orbit.
+    noise, uncertainty
+        Relative errors of the map, beside what is seen in the samples and round-off, and of its derivative.
     scale
-        Sizes of the states, shape (n,), in their units: where the search for an amplitude starts. Without it, it
-        starts from the size of the orbit, if that has one.
+        Sizes of the states, shape (n,), where the search for an amplitude starts; by default the size of the orbit.
     orbit_error
-        Error of ``at.state`` along the mode (in the amplitude's unit); 0 where it is exact. Without it, what
-        its residual and the noise allow: beside a singular H - 1 that is much.
-
-    Returns
-    -------
-    The normal form, with a status that says why where there is none.
+        Error of the orbit along the mode; by default what its residual and the noise allow, much beside a singular
+        H - 1.
     """
     values, errors = _uncertainties(at.jacobian, max(uncertainty, noise, 16.0 * np.finfo(float).eps))
     own = [int(np.abs(values - one).argmin()) for one in (at.multiplier, at.multiplier.conjugate())]

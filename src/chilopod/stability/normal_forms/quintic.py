@@ -19,40 +19,20 @@ Term = tuple[complex, float]
 
 @dataclass(frozen=True)
 class Quintic:
-    """The map over the full period on the centre manifold, where its cubic coefficient vanishes.
+    """The map over the full period on the centre manifold, where its cubic coefficient vanishes."""
 
-    Attributes
-    ----------
-    coefficient, error
-        Coefficient e of a -> a + e a^5 (a pair: |a| -> |a| + e |a|^5), of the map that the cubic coefficient of a
-        :class:`~chilopod.stability.normal_forms.normal_form.NormalForm` is of, and a bound on its error.
-    curve
-        The centre manifold, up to fourth order.
-    amplitude
-        Largest amplitude at which the return map was sampled.
-    """
-
+    # Coefficient e of a -> a + e a^5 (a pair: |a| -> |a| + e |a|^5), of the map that the cubic coefficient of a
+    # :class:`~chilopod.stability.normal_forms.normal_form.NormalForm` is of, and a bound on its error.
     coefficient: float
     error: float
-    curve: Curve
-    amplitude: float
+    curve: Curve  # the centre manifold, up to fourth order
+    amplitude: float  # largest amplitude at which the return map was sampled
 
 
 def quintic(mapped: ReturnedStates, at: CriticalOrbit, amplitude: float, noise: float = 0.0) -> Quintic | None:
-    """The coefficient of fifth order at a critical orbit.
-
-    Parameters
-    ----------
-    mapped, at, noise
-        As for :func:`chilopod.stability.normal_forms.normal_form.normal_form`. A multiplier +1 is that of a pitchfork:
-        a symmetry keeps terms of even order away.
-    amplitude
-        Amplitude of the normal form of third order, where the search for a better one starts.
-
-    Returns
-    -------
-    The coefficient from the amplitude at which its error is smallest; None if the map exists at none.
-    """
+    """The coefficient of fifth order at a critical orbit, from the amplitude at which its error is smallest, which is
+    sought from that of the normal form of third order on; None if the map exists at none. A multiplier +1 is that of a
+    pitchfork: a symmetry keeps terms of even order away."""
     best: Quintic | None = None
     manifold = Manifold(mapped, at, noise, 5)
     curve: Curve = manifold.curve

@@ -1,0 +1,185 @@
+"""The equations of a curve, and the corrector: Broyden's method for them, within the box of the parameters."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Generic, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.errors import AnalysisError
+from chilopod.stability.budget import Budget
+from chilopod.stability.tracing import tolerances
+from chilopod.stability.tracing.step import A, Guess, S, Step
+
+Array = NDArray[np.float64]
+R = TypeVar("R")
+
+
+class OutsideBoxError(AnalysisError):
+    """A step asked for a value of a parameter outside the box: beyond the end of which one."""
+
+    def __init__(self, parameter: int, end: float, value: float) -> None:
+        super().__init__("leaves the interval", field="parameter", value=value)
+        self.edge = parameter, end
+
+
+class Plane(NamedTuple):
+    """The equation that ends a step, ``row . moved = target``; on an edge of the box the number of a parameter, and the
+    value that it has there exactly."""
+
+    row: Array
+    target: float
+    edge: tuple[int, float] | None = None
+
+
+@dataclass(frozen=True)
+class Corrected(Generic[R]):
+    """A solution: displacement, what was computed there, values of the parameters, the residual that is left, the
+    inverse of the matrix, and how many corrections it took."""
+
+    moved: Array
+    found: R
+    values: Array
+    residual: Array
+    inverse: Array
+    corrections: int
+
+
+class Equations(ABC, Generic[A, S, R]):
+    """N equations with N+1 unknowns, in coordinates of the anchor that a solution is seen from.
+
+    Attributes
+    ----------
+    box
+        Intervals of the parameters, shape (parameters, 2): no value outside is asked for.
+    budget
+        Flows and time that may be taken.
+    precision
+        Residual, in units of the parameters, that counts as none.
+    """
+
+    box: Array
+    budget: Budget
+    precision: float
+
+    @abstractmethod
+    def parameters(self, anchor: A) -> tuple[slice, Array]:
+        """Where the parameters stand among the coordinates, and their units."""
+
+    @abstractmethod
+    def residual(self, anchor: A, moved: Array, values: Array) -> tuple[R, Array]:
+        """Result of evaluating the equations at a displacement, with given values of the parameters, and the residual,
+        shape (N,)."""
+
+    @abstractmethod
+    def off(self, found: R, residual: Array, move: Array) -> float:
+        """How far a solution is off, by the residual and the correction that it asks for."""
+
+    @abstractmethod
+    def met(self, anchor: A, found: R, off: float, stalled: int, singular: bool) -> bool:
+        """True if corrections end that far off, the last so many of which have not halved it; ``singular``: along some
+        direction they cannot."""
+
+    @abstractmethod
+    def step(self, anchor: A, guess: Guess, plane: Plane, *, bounded: bool = False) -> Step[A, S]:
+        """The solution near a guess, with tangent and matrix; ``bounded``: with the errors that its end has.
+
+        Raises
+        ------
+        OutsideBoxError
+            If it lies outside the box.
+        AnalysisError
+            If there is none near the guess.
+        """
+
+    @abstractmethod
+    def arrived(self, step: Step[A, S]) -> Step[A, S]:
+        """A step with the anchor at its end."""
+
+    @abstractmethod
+    def first_from(self, anchor: A) -> tuple[Array, Array, slice]:
+        """Displacement of the curve's first point, its tangent, and by which coordinates it is known again."""
+
+    def is_first(self, step: Step[A, S]) -> bool:
+        """True if a step to where the first point is, by these coordinates, ends there indeed."""
+        return True
+
+    def exact(self, anchor: A, found: R, row: Array) -> Array | None:
+        """The matrix at a solution, where that which it was found with may be weak; else None."""
+        return None
+
+    def corrected(self, anchor: A, guess: Guess, plane: Plane) -> Corrected[R]:
+        """Correct a guess to a solution.
+
+        Broyden's updates keep the matrix of the last point good enough for the whole step.
+        """
+        parameters, widths = self.parameters(anchor)
+        moved, matrix = np.array(guess.moved), np.array(guess.matrix)
+        matrix[-1] = plane.row
+        inverse, singular = inverted(matrix)
+        move = last = np.zeros(moved.size)
+        best, stalled, corrections, exact = np.inf, 0, 0, False
+        for rounds in itertools.count():
+            wanted = anchor.values + widths * moved[parameters]
+            if plane.edge is not None:
+                wanted[plane.edge[0]] = plane.edge[1]
+            values = np.clip(wanted, *self.box.T)
+            # A curve that turns back at an edge of the box is sought beyond it on the way there.
+            strays = (wanted - values) / widths
+            self._check_inside(strays, values, wanted, tolerances.STRAYS * float(np.linalg.norm(guess.moved)))
+            found, equations = self.residual(anchor, moved, values)
+            residual = np.append(equations + matrix[:-1, parameters] @ strays, plane.row @ moved - plane.target)
+            updated = _updated(inverse, move, inverse @ (residual - last)) if rounds else inverse
+            off = self.off(found, residual, updated @ residual)
+            if not np.isfinite(off) or (off > tolerances.DIVERGING * best and off > tolerances.SETTLED):
+                raise AnalysisError("corrections diverge", field="step")
+            stalled = stalled + 1 if off > 0.5 * best else 0
+            met = self.met(anchor, found, off, stalled, singular)
+            again = None
+            if met and not exact and np.linalg.norm(inverse @ residual) > tolerances.LOOSE * np.linalg.norm(moved):
+                again = self.exact(anchor, found, plane.row)
+            if met and again is None:
+                break
+            if rounds == tolerances.MOST_CORRECTIONS:
+                raise AnalysisError("corrections do not converge", field="step")
+            inverse = updated
+            if again is not None:
+                (inverse, singular), exact = inverted(again), True
+            move = -inverse @ residual
+            last, best, moved = residual, min(best, off), moved + move
+            corrections += off > tolerances.COUNTED
+        self._check_inside(strays, values, wanted, self.precision)
+        return Corrected(moved, found, values, residual, inverse, corrections)
+
+    @staticmethod
+    def _check_inside(strays: Array, values: Array, wanted: Array, allowed: float) -> None:
+        j = int(np.abs(strays).argmax())
+        if abs(strays[j]) > allowed:
+            raise OutsideBoxError(j, float(values[j]), float(wanted[j]))
+
+
+def inverted(matrix: Array) -> tuple[Array, bool]:
+    """Inverse of the matrix of a curve, shape (N+1, N+1), or that of shortest solutions, and whether it is the latter.
+
+    Where branches meet rounding decides how near to singular the matrix is, and a solution with its inverse may end on
+    the other branch. The shortest one leaves a residual as it is in a direction in which the matrix is singular.
+    """
+    with contextlib.suppress(np.linalg.LinAlgError):
+        found = np.linalg.inv(matrix)
+        if np.abs(found).max() * np.abs(matrix).max() < 1.0 / tolerances.SINGULAR:
+            return np.asarray(found), False
+    try:
+        return np.asarray(np.linalg.pinv(matrix, rcond=tolerances.SINGULAR)), True
+    except np.linalg.LinAlgError:
+        raise AnalysisError("the curve has no direction here", field="step") from None
+
+
+def _updated(inverse: Array, move: Array, change: Array) -> Array:
+    """Broyden's update of an inverse matrix, from a move and what the inverse makes of the residual's change."""
+    along = float(move @ change)
+    return inverse + np.outer(move - change, move @ inverse) / along if along else inverse
