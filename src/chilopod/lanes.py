@@ -26,6 +26,9 @@ from chilopod.numba_internals import Conversion, cgutils, ir, signature
 LANES = 8
 """Lanes of double precision that fill the widest registers there are; narrower ones are used two or four at a time."""
 
+HALF = LANES // 2
+"""Lanes for what has few numbers side by side."""
+
 _CACHE_LINE = 8  # numbers
 _INDEX = ir.IntType(32)
 
@@ -36,7 +39,7 @@ class LanesType(types.Type):  # type: ignore[misc]
     Parameters
     ----------
     width
-        Number of lanes, 1 or ``LANES``.
+        Number of lanes, 1, ``HALF`` or ``LANES``.
     """
 
     def __init__(self, width: int) -> None:
@@ -49,7 +52,7 @@ class LanesType(types.Type):  # type: ignore[misc]
         return Conversion.safe if isinstance(other, types.Float) else None
 
 
-_TYPES = {width: LanesType(width) for width in (1, LANES)}
+_TYPES = {width: LanesType(width) for width in (1, HALF, LANES)}
 
 
 @register_model(LanesType)

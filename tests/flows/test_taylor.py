@@ -250,6 +250,24 @@ def test_many_states_each_with_its_parameters():
     np.testing.assert_allclose(states[:, 0], np.cos(2.0 * np.sqrt(k)), atol=1e-14)
 
 
+@pytest.mark.parametrize("a", [2.0, -2.0])
+def test_switches_of_parameters_alone(a):
+    flow, params = flow_of(lambda t, x, a: [np.sign(a) * x[0] + np.maximum(a, 0.5) * x[1], 0.0 * x[1]], 2, (a,))
+    state = flow.advance([1.0, 1.0], 0.0, 1.0, params).state
+    sign, drive = np.sign(a), max(a, 0.5)
+    np.testing.assert_allclose(state, [np.exp(sign) + sign * drive * np.expm1(sign), 1.0], rtol=1e-14)
+
+
+def test_a_reset_that_switches():
+    events = [(lambda t, x: x[0] - 1.0, lambda t, x: [x[0], -np.maximum(x[1], 0.5)])]
+    traced = trace(lambda t, x: [x[1], 0.0 * x[0]], 2, events=events)
+    flow = TaylorFlow(traced.tape, directions=(1.0,))
+    for speed in (2.0, 1.5, 0.75, 0.4):
+        passage = flow.advance([0.0, speed], 0.0, 3.0, traced.params)
+        back = max(speed, 0.5)
+        np.testing.assert_allclose(passage.state, [1.0 - back * (3.0 - 1.0 / speed), -back], rtol=1e-14)
+
+
 def test_what_goes_through_switches_is_compiled_only_where_there_are_any():
     """It takes as long to compile as the rest. Numba leaves out what it knows not to run for the types it is given."""
 

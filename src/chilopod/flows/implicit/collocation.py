@@ -25,7 +25,7 @@ import numpy as np
 
 from chilopod.compiled import fused_njit
 from chilopod.flows.implicit.stages import Method, Problem, Step, at, estimated, stages, turn
-from chilopod.flows.tracing.series import LANES, Series, load
+from chilopod.flows.tracing.series import loaded
 
 __all__ = ["Control", "Interval", "Method", "Outcome", "advance"]
 
@@ -158,12 +158,9 @@ def _take(x: Any, step: Any, last: Any, result: Any) -> None:
 @fused_njit(error_model="numpy")
 def _prepared(tape: Any, units: Any, params: Any, branches: Any, largest: Any) -> Any:
     """A right-hand side with its parameters loaded and room for its values."""
-    n = tape.layout[0]
-    lanes = (n + LANES - 1) // LANES * LANES
-    series = Series(np.zeros((tape.layout[5], 1)), np.zeros((tape.layout[5], 1, lanes)), branches)
-    for i in range(n):
+    series = loaded(tape, params, 1, units.size, branches)
+    for i in range(units.size):
         series.tangents[i, 0, i] = 1.0
-    load(tape, params, series)
     return Problem(tape, units, series, largest)
 
 

@@ -16,7 +16,7 @@ from chilopod.flows import deadline
 from chilopod.flows.balance import numerical_balance
 from chilopod.flows.taylor.flow import RESOLUTION, pieces
 from chilopod.flows.tracing import tape as ops
-from chilopod.flows.tracing.evaluation import evaluate, evaluate_jacobian
+from chilopod.flows.tracing.evaluation import branches_at, evaluate_jacobian
 from chilopod.flows.tracing.tape import Tape
 from chilopod.frozen import ReadOnlyArrays
 
@@ -220,17 +220,11 @@ def can_be_implicit(tape: Tape) -> bool:
 
 def _branches(tape: Tape, params: Array, times: Array) -> Array:
     """Branches of switches that know only time, shape (switches, times)."""
-    if tape.switches.shape[1] == 0:
-        return np.zeros((0, times.size))
-    values = evaluate(tape, times, np.zeros((tape.dimension, 1)), params)[tape.switches[1]]
-    floor = tape.switches[0][:, None] == ops.FLOOR
-    return np.where(floor, np.floor(values), np.where(values >= 0.0, 1.0, -1.0))
+    return branches_at(tape, times, np.zeros((tape.dimension, 1)), params)[1]
 
 
 def _switch_instants(tape: Tape, params: Array, period: float) -> Array:
     """When the switches that know only time leave their branches, by bisection from a grid over the period."""
-    if tape.switches.shape[1] == 0:
-        return np.zeros(0)
     times = np.linspace(0.0, period, RESOLUTION + 1)
     found = []
     for s, branches in enumerate(_branches(tape, params, times)):

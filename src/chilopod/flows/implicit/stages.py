@@ -136,8 +136,8 @@ def at(problem: Any, x: Any, t: float, slope: Any, jacobian: Any) -> bool:
     for i in range(n):
         values[i, 0] = x[i] * units[i]
     values[n, 0] = t
-    values_at(tape.program, tape.terms, first, stop, 0, values, branches)
-    tangents_at(tape.program, tape.terms, first, stop, 0, values, tangents)
+    values_at(tape.program, tape.terms, tape.slopes, first, stop, 0, 1.0, values, branches)
+    tangents_at(tape.program, tape.terms, tape.slopes, first, stop, 0, 1.0, values, tangents)
     s = 0.0
     for i in range(n):
         slope[i] = values[tape.slopes[i], 0] / units[i]

@@ -37,7 +37,7 @@ from chilopod.flows.taylor.switching import (
     start,
 )
 from chilopod.flows.tracing import tape as ops
-from chilopod.flows.tracing.series import LANES, Series, expand, load
+from chilopod.flows.tracing.series import expand, loaded
 
 _ROUNDING = 2.0**-53
 _FIRST = 0.37  # of the interval: the first step of the second of two computations is no longer
@@ -285,12 +285,10 @@ def _spent(control: Any, steps: int, done: float, whole: float) -> int:
 @fused_njit(error_model="numpy")
 def _begun(tape: Any, params: Any, x: Any, control: Any, derivative: Any) -> Any:
     """The motion at its start, with room for its series."""
-    n, order, nodes, switches = tape.layout[0], control.order, tape.layout[5], tape.switches.shape[1]
-    columns = derivative.shape[1]
-    lanes = (columns + LANES - 1) // LANES * LANES
-    series = Series(np.zeros((nodes, order + 1)), np.zeros((nodes, order + 1, lanes)), np.zeros(switches))
-    load(tape, params, series)
-    return Motion(x, np.eye(n) if control.stepwise and columns > 0 else derivative, series, np.zeros(switches))
+    columns, switches = derivative.shape[1], tape.switches.shape[1]
+    series = loaded(tape, params, control.order + 1, columns, np.zeros(switches))
+    seeds = np.eye(x.size) if control.stepwise and columns > 0 else derivative
+    return Motion(x, seeds, series, np.zeros(switches))
 
 
 @fused_njit(error_model="numpy")

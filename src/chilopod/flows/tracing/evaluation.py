@@ -3,7 +3,6 @@ equilibria, not for integration."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,73 +14,37 @@ from chilopod.flows.tracing.tape import Tape
 
 Array = NDArray[np.float64]
 
-_VALUES: dict[int, Callable[..., Any]] = {
-    ops.PRODUCT: np.multiply,
-    ops.SQUARE: np.square,
-    ops.QUOTIENT: np.divide,
-    ops.STEP: lambda a: np.where(a >= 0.0, 1.0, -1.0),
-    ops.FLOOR: np.floor,
-    ops.SELECT: lambda a, b, c: np.where(a > 0.0, b, c),
-    ops.EXP: np.exp,
-    ops.SIN: np.sin,
-    ops.COS: np.cos,
-    ops.TAN: np.tan,
-    ops.SINH: np.sinh,
-    ops.COSH: np.cosh,
-    ops.TANH: np.tanh,
-    ops.LOG: np.log,
-    ops.SQRT: np.sqrt,
-    ops.POWER: np.power,
-    ops.ATAN: np.arctan,
-    ops.ASIN: np.arcsin,
-}
-_OPERANDS = {ops.PRODUCT: 2, ops.QUOTIENT: 2, ops.POWER: 2, ops.SELECT: 3}
+
+def _loaded(tape: Tape, params: Array, orders: int, directions: int = 0) -> Any:
+    """Series of all nodes with the values of the parameters, and compiled code for it."""
+    from chilopod.flows.tracing import series  # numba takes half a second to import
+
+    branches = np.zeros(tape.switches.shape[1])
+    # A copy, because compiled code is compiled anew for arrays that are read-only.
+    return series.loaded(tape, np.array(params, dtype=np.float64), orders, directions, branches), series
 
 
 def evaluate(tape: Tape, t: Any, x: Any, params: Array) -> Array:
-    """The values of all nodes, shape (nodes, ...), at times of shape (...) and states of shape (n, ...)."""
-    n, parameters, first = (int(i) for i in tape.layout[:3])
+    """Values of all nodes but those of resets, shape (nodes, ...), at times of shape (...) and states of shape (n,
+    ...)."""
     t, x = np.asarray(t, dtype=np.float64), np.asarray(x, dtype=np.float64)
-    values = np.zeros((tape.program.shape[1], *np.broadcast_shapes(t.shape, x.shape[1:])))
-    values[:n] = x if x.ndim == values.ndim else x.reshape(n, *([1] * (values.ndim - 1)))
-    values[n] = t
-    values[n + 1 : n + 1 + parameters] = params.reshape(-1, *([1] * (values.ndim - 1)))
-    values[n + 1 + parameters : first] = tape.numbers.reshape(-1, *([1] * (values.ndim - 1)))
-    program = tape.program
-    with np.errstate(all="ignore"):
-        for i in range(first, program.shape[1]):
-            code = int(program[0, i])
-            if code == ops.LINEAR:
-                for weight, node in tape.terms[:, program[1, i] : program[2, i]].T:
-                    values[i] += values[weight] * values[node]
-            else:
-                values[i] = _VALUES[code](*(values[program[1 + j, i]] for j in range(_OPERANDS.get(code, 1))))
-    return values
+    shape = np.broadcast_shapes(t.shape, x.shape[1:])
+    times = np.array(np.broadcast_to(t, shape)).reshape(-1)
+    states = np.array(np.broadcast_to(x.reshape(len(x), *x.shape[1:] or [1] * len(shape)), (len(x), *shape)))
+    found = np.empty((tape.program.shape[1], times.size))
+    loaded, kernels = _loaded(tape, params, 1)
+    kernels.sample(tape, times, np.ascontiguousarray(states.reshape(len(x), -1).T), loaded, found)
+    return found.reshape(-1, *shape)
 
 
 def evaluate_jacobian(tape: Tape, t: float, x: Array, params: Array) -> tuple[Array, Array]:
     """dx/dt, shape (n,), and its derivative with respect to the state, shape (n, n)."""
     n = tape.dimension
-    values = evaluate(tape, t, x, params)
-    tangents = np.zeros((values.size, n))
-    tangents[:n] = np.eye(n)
-    with np.errstate(all="ignore"):
-        for i in np.flatnonzero(tape.program[4] != 0):
-            code, a, b, c = (int(part) for part in tape.program[:4, i])
-            if code == ops.LINEAR:
-                weights, nodes = tape.terms[:, a:b]
-                tangents[i] = values[weights] @ tangents[nodes]
-            elif code == ops.PRODUCT:
-                tangents[i] = values[a] * tangents[b] + values[b] * tangents[a]
-            elif code == ops.SQUARE:
-                tangents[i] = 2.0 * values[a] * tangents[a]
-            elif code == ops.QUOTIENT:
-                tangents[i] = (tangents[a] - values[i] * tangents[b]) / values[b]
-            elif code == ops.SELECT:
-                tangents[i] = tangents[b] if values[a] > 0.0 else tangents[c]
-            elif code != ops.STATE:
-                tangents[i] = (-values[c] if code == ops.COS else values[c]) * tangents[a]
-    return values[tape.slopes], tangents[tape.slopes]
+    loaded, kernels = _loaded(tape, params, 1, n)
+    loaded.tangents[:n, 0, :n] = np.eye(n)
+    kernels.sample(tape, np.array([t], dtype=np.float64), np.array([x]), loaded, np.empty((tape.program.shape[1], 1)))
+    kernels.differentiate(tape, loaded)
+    return loaded.values[tape.slopes, 0], loaded.tangents[tape.slopes, 0, :n]
 
 
 def evaluate_series(tape: Tape, curves: Array, params: Array) -> Array:
@@ -93,33 +56,35 @@ def evaluate_series(tape: Tape, curves: Array, params: Array) -> Array:
     AnalysisError
         If a curve starts on a switching surface, where f has no series.
     """
-    from chilopod.flows.tracing import series  # numba takes half a second to import
-
     n, first, last = (int(tape.layout[i]) for i in (0, 3, 4))
-    values = np.zeros((tape.program.shape[1], curves.shape[1]))
-    coefficients = series.Series(values, np.empty((0, 0, 0)), np.zeros(tape.switches.shape[1]))
+    loaded, kernels = _loaded(tape, params, curves.shape[1])
+    given = np.empty(0, dtype=np.int64)  # no states follow from f
     result = np.empty_like(curves)
-    with np.errstate(all="ignore"):
-        # A copy, because compiled code is compiled anew for arrays that are read-only.
-        series.load(tape, np.array(params, dtype=np.float64), coefficients)
-        for curve, out in zip(curves, result, strict=True):
-            if tape.switches.shape[1]:
-                coefficients.branches[:] = _branches(tape, curve[0], params)
-            values[:n] = curve.T
-            for k in range(curves.shape[1]):
-                series.values_at(tape.program, tape.terms, first, last, k, values, coefficients.branches)
-            out[:] = values[tape.slopes].T
+    for curve, out in zip(curves, result, strict=True):
+        if tape.switches.shape[1]:
+            loaded.branches[:] = _branches(tape, curve[0], params)
+        loaded.values[:n] = curve.T
+        kernels.values_at(
+            tape.program, tape.terms, given, first, last, curve.shape[0] - 1, 1.0, loaded.values, loaded.branches
+        )
+        out[:] = loaded.values[tape.slopes].T
     return result
+
+
+def branches_at(tape: Tape, t: Any, x: Array, params: Array) -> tuple[Array, Array]:
+    """Functions and branches of all switches, shapes (switches, ...), at times and states as of :func:`evaluate`."""
+    kinds, nodes = tape.switches[:2]
+    functions = evaluate(tape, t, x, params)[nodes]
+    floors = (kinds == ops.FLOOR).reshape(-1, *[1] * (functions.ndim - 1))
+    return functions, np.where(floors, np.floor(functions), np.where(functions >= 0.0, 1.0, -1.0))
 
 
 def _branches(tape: Tape, x: Array, params: Array) -> Array:
     """The branch of every switch of f at a state."""
-    kinds, nodes = tape.switches[:2]
-    functions = evaluate(tape, 0.0, x, params)[nodes]
-    floors = kinds == ops.FLOOR
-    branches = np.where(floors, np.floor(functions), np.where(functions >= 0.0, 1.0, -1.0))
-    if ((functions == np.where(floors, branches, 0.0)) & (kinds != ops.GUARD)).any():
+    kinds = tape.switches[0]
+    functions, branches = branches_at(tape, 0.0, x, params)
+    if ((functions == np.where(kinds == ops.FLOOR, branches, 0.0)) & (kinds != ops.GUARD)).any():
         raise AnalysisError(
             "has no derivatives in a state on a switching surface", field="rhs", allowed="an equilibrium away from it"
         )
-    return np.asarray(branches)
+    return branches

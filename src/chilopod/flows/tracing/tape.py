@@ -44,8 +44,8 @@ class Tape(NamedTuple):
     ----------
     program
         Shape (6, nodes): operation, its three operands (of ``LINEAR`` the first and past-last of its terms; of ``STEP``
-        and ``FLOOR`` the second is the number of the switch; of functions the third is w), whether tangents of the
-        node are needed, and whether it is linear in time.
+        and ``FLOOR`` the second is the number of the switch, -1 of one that parameters or a state at an event settle;
+        of functions the third is w), whether tangents of the node are needed, and whether it is linear in time.
     terms
         Shape (2, terms): weight and node of each term of the ``LINEAR`` operations.
     numbers
@@ -55,8 +55,8 @@ class Tape(NamedTuple):
     slopes
         Nodes of f, shape (n,).
     switches
-        Shape (3, switches): kind (``STEP``, ``FLOOR`` or ``GUARD``), node of the switching function, and for guards the
-        number of the event, else the node of the switch.
+        Shape (3, switches): kind (``STEP`` or ``FLOOR`` in the order of their nodes, then ``GUARD``), node of the
+        switching function, and for guards the number of the event, else the node of the switch.
     resets
         Nodes of the resets, shape (events, n).
     clocks
