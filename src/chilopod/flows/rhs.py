@@ -181,7 +181,7 @@ class RightHandSide:
         tape, params = traced.tape, traced.params
 
         def slopes(t: Array, x: Array) -> Array:
-            return evaluate(tape, t, x, params)[tape.slopes]
+            return evaluate(tape, tape.slopes, t, x, params)
 
         @functools.cache
         def implicit() -> ImplicitFlow:

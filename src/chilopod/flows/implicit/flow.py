@@ -16,7 +16,7 @@ from chilopod.flows import deadline
 from chilopod.flows.balance import numerical_balance
 from chilopod.flows.taylor.flow import RESOLUTION, pieces
 from chilopod.flows.tracing import tape as ops
-from chilopod.flows.tracing.evaluation import branches_at, evaluate_jacobian
+from chilopod.flows.tracing.evaluation import branches_of, evaluate, evaluate_jacobian
 from chilopod.flows.tracing.tape import Tape
 from chilopod.frozen import ReadOnlyArrays
 
@@ -220,7 +220,7 @@ def can_be_implicit(tape: Tape) -> bool:
 
 def _branches(tape: Tape, params: Array, times: Array) -> Array:
     """Branches of switches that know only time, shape (switches, times)."""
-    return branches_at(tape, times, np.zeros((tape.dimension, 1)), params)[1]
+    return branches_of(tape, evaluate(tape, tape.switches[1], times, np.zeros((tape.dimension, 1)), params))
 
 
 def _switch_instants(tape: Tape, params: Array, period: float) -> Array:

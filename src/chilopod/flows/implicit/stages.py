@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from chilopod.compiled import fused_njit
-from chilopod.flows.tracing.series import tangents_at, values_at
+from chilopod.flows.tracing.series import slope_at
 
 _MOST_ROUNDS = 10
 _CLOSE = 1e-7
@@ -130,20 +130,14 @@ class Step(NamedTuple):
 @fused_njit(error_model="numpy")
 def at(problem: Any, x: Any, t: float, slope: Any, jacobian: Any) -> bool:
     """f and its jacobian in a state; False if they are not finite."""
-    tape, units = problem.tape, problem.units
-    values, tangents, branches = problem.series.values, problem.series.tangents, problem.series.branches
-    n, first, stop = tape.layout[0], tape.layout[3], tape.layout[4]
-    for i in range(n):
-        values[i, 0] = x[i] * units[i]
-    values[n, 0] = t
-    values_at(tape.program, tape.terms, tape.slopes, first, stop, 0, 1.0, values, branches)
-    tangents_at(tape.program, tape.terms, tape.slopes, first, stop, 0, 1.0, values, tangents)
+    units = problem.units
+    slope_at(problem.tape, problem.series, t, x * units, slope, jacobian)
     s = 0.0
-    for i in range(n):
-        slope[i] = values[tape.slopes[i], 0] / units[i]
+    for i in range(x.size):
+        slope[i] /= units[i]
         s += abs(slope[i])
-        for j in range(n):
-            jacobian[i, j] = tangents[tape.slopes[i], 0, j] * (units[j] / units[i])
+        for j in range(x.size):
+            jacobian[i, j] *= units[j] / units[i]
             s += abs(jacobian[i, j])
     return s < math.inf
 

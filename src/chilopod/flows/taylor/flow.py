@@ -282,7 +282,7 @@ _NO_CLOCK = (np.zeros((0, 0)), 1.0)
 
 def _clock_table(tape: Tape, period: float, params: Array) -> Array:
     times = period * np.arange(RESOLUTION) / RESOLUTION
-    values = evaluate(tape, times, np.zeros((tape.dimension, 1)), params)[tape.clocks]
+    values = evaluate(tape, tape.clocks, times, np.zeros((tape.dimension, 1)), params)
     values = np.where(np.isfinite(values), values, 0.0)
     return np.ascontiguousarray(np.column_stack([values, np.abs(values).max(axis=1)]))
 

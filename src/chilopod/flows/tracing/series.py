@@ -227,24 +227,61 @@ def choose(tape: Any, series: Any) -> None:
 
 
 @fused_njit(error_model="numpy")
-def sample(tape: Any, times: Any, states: Any, series: Any, found: Any) -> None:
-    """Values of all nodes at times and states, shapes (samples,), (samples, n) and (nodes, samples)."""
-    n = tape.layout[0]
-    values = series.values
-    for m in range(times.size):
+def sample(tape: Any, params: Any, times: Any, states: Any, nodes: Any, found: Any) -> None:
+    """Values of some nodes at times and states, shapes (samples,), (n, samples) and (nodes, samples), the branches
+    chosen; of the times or states there may be one for all samples."""
+    series = loaded(tape, params, 1, 0, np.zeros(tape.switches.shape[1]))
+    n, values = tape.layout[0], series.values
+    for m in range(found.shape[1]):
         for i in range(n):
-            values[i, 0] = states[m, i]
-        values[n, 0] = times[m]
+            values[i, 0] = states[i, m % states.shape[1]]
+        values[n, 0] = times[m % times.size]
         choose(tape, series)
-        for i in range(values.shape[0]):
-            found[i, m] = values[i, 0]
+        for i in range(nodes.size):
+            found[i, m] = values[nodes[i], 0]
 
 
 @fused_njit(error_model="numpy")
-def differentiate(tape: Any, series: Any) -> None:
-    """Tangents of f and the guards where the values are known, those of the states given."""
-    program, terms, first, stop = tape.program, tape.terms, tape.layout[3], tape.layout[4]
-    tangents_at(program, terms, tape.slopes, first, stop, 0, 1.0, series.values, series.tangents)
+def slope_at(tape: Any, series: Any, t: float, x: Any, slope: Any, jacobian: Any) -> None:
+    """f and its jacobian at a state, with the branches as they are, and the tangents of the states at 1."""
+    program, terms, slopes, first, stop = tape.program, tape.terms, tape.slopes, tape.layout[3], tape.layout[4]
+    values, tangents = series.values, series.tangents
+    for i in range(x.size):
+        values[i, 0] = x[i]
+    values[x.size, 0] = t
+    values_at(program, terms, slopes, first, stop, 0, 1.0, values, series.branches)
+    tangents_at(program, terms, slopes, first, stop, 0, 1.0, values, tangents)
+    for i in range(x.size):
+        slope[i] = values[slopes[i], 0]
+        for j in range(x.size):
+            jacobian[i, j] = tangents[slopes[i], 0, j]
+
+
+@fused_njit(error_model="numpy")
+def differentiate(tape: Any, params: Any, t: float, x: Any, slope: Any, jacobian: Any) -> None:
+    """f and its jacobian at a state, the branches chosen."""
+    series = loaded(tape, params, 1, x.size, np.zeros(tape.switches.shape[1]))
+    for i in range(x.size):
+        series.values[i, 0] = x[i]
+        series.tangents[i, 0, i] = 1.0
+    series.values[x.size, 0] = t
+    choose(tape, series)
+    slope_at(tape, series, t, x, slope, jacobian)
+
+
+@fused_njit(error_model="numpy")
+def compose(tape: Any, params: Any, curve: Any, branches: Any, found: Any) -> None:
+    """Coefficients of f at time 0 along a curve, shapes (orders, n)."""
+    orders, n = curve.shape
+    series = loaded(tape, params, orders, 0, branches)
+    for k in range(orders):
+        for i in range(n):
+            series.values[i, k] = curve[k, i]
+    nothing, first, stop = np.empty(0, np.int64), tape.layout[3], tape.layout[4]  # no states follow from f
+    values_at(tape.program, tape.terms, nothing, first, stop, orders - 1, 1.0, series.values, branches)
+    for k in range(orders):
+        for i in range(n):
+            found[k, i] = series.values[tape.slopes[i], k]
 
 
 @fused_njit(error_model="numpy", inline="always")

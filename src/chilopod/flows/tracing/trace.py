@@ -186,10 +186,9 @@ def _verify(
                 real = np.asarray(rhs(t, x.copy(), *args), dtype=np.float64)
         except Exception:  # not defined at this state
             continue
-        own = evaluate(tape, t, x, params)[tape.slopes]
-        near = evaluate(tape, t * (1 + _NEAR), x * (1 + _NEAR * np.cos(np.arange(n))), params * (1 - _NEAR))[
-            tape.slopes
-        ]
+        own = evaluate(tape, tape.slopes, t, x, params)
+        x = x * (1 + _NEAR * np.cos(np.arange(n)))
+        near = evaluate(tape, tape.slopes, t * (1 + _NEAR), x, params * (1 - _NEAR))
         pairs.append((real, own, np.abs(near - own)))
     if not pairs:
         raise Untraceable("it could not be evaluated at any state it was tried at")
