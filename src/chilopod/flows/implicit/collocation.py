@@ -24,13 +24,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from chilopod.compiled import fused_njit
-from chilopod.flows.implicit.stages import Method, Problem, Step, at, estimated, stages, turn
-from chilopod.flows.tracing.series import loaded
+from chilopod.flows.carrying import BUDGET, DONE, NOT_FINITE, STALLED, TIME_OVER
+from chilopod.flows.implicit.stages import Method, Problem, Step, estimated, stages, turn
+from chilopod.flows.tracing.series import loaded, slope_at
 
 __all__ = ["Control", "Interval", "Method", "Outcome", "advance"]
-
-DONE, NOT_FINITE, BUDGET, STALLED, TIME_OVER = range(5)
-"""How an integration ends."""
 
 _FASTEST_FALL, _FASTEST_GROWTH, _SAFETY = 0.1, 6.0, 0.9
 
@@ -205,7 +203,7 @@ def advance(tape: Any, method: Any, params: Any, x: Any, interval: Any, control:
     fresh = True
     while t < t1:
         if fresh:
-            if not at(problem, x, t, step.slope, step.jacobian):
+            if not slope_at(tape, problem.series, problem.units, t, x, step.slope, step.jacobian):
                 status = NOT_FINITE
                 break
             for i in range(n):

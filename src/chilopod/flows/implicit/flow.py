@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import functools
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-from chilopod.cores import cores
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows import deadline
 from chilopod.flows.balance import numerical_balance
-from chilopod.flows.taylor.flow import RESOLUTION, pieces
+from chilopod.flows.carrying import RESOLUTION, carry_all, failure, pieces
 from chilopod.flows.tracing import tape as ops
 from chilopod.flows.tracing.evaluation import branches_of, evaluate, evaluate_jacobian
 from chilopod.flows.tracing.tape import Tape
@@ -32,12 +31,6 @@ _OWN = 10.0  # two independent errors differ by less than a tenth of them rarely
 _FINER = 0.2
 _SHAKE = 2.0**-52
 _ROUNDING = 2.0**-49
-
-_REASONS = {
-    1: "the motion diverges, or the right-hand side is not finite, at t = {t:g}",
-    2: "takes too many steps, and came to t = {t:g} only",
-    3: "cannot be continued beyond t = {t:.17g}: a singularity, or rates beyond the resolution of time",
-}
 
 
 @dataclass(frozen=True)
@@ -134,14 +127,11 @@ class ImplicitFlow(ReadOnlyArrays):
         """Many states, shape (states, n), without derivatives."""
         states, stop = np.array(states, dtype=np.float64), deadline.stop()
 
-        def carry(i: int) -> Array:
-            return self._run(states[i], (t0, t1), _STAGES, self.tolerance, derived=False, stop=stop)[0]
+        def carry(i: int) -> None:
+            states[i] = self._run(states[i], (t0, t1), _STAGES, self.tolerance, derived=False, stop=stop)[0]
 
-        threads = min(cores(), len(states) // _FEWEST_PER_THREAD)
-        if threads > 1:
-            with ThreadPoolExecutor(threads) as pool:
-                return np.array(list(pool.map(carry, range(len(states)))))
-        return np.array([carry(i) for i in range(len(states))]).reshape(states.shape)
+        carry_all(carry, len(states), _FEWEST_PER_THREAD)
+        return states
 
     def flow_frame(self, x: Array, units: Array, frame: Array, t0: float, t1: float) -> Stretched:
         """See :class:`chilopod.stability.capabilities.FlowsFrames`."""
@@ -189,10 +179,8 @@ class ImplicitFlow(ReadOnlyArrays):
             interval = kernels.Interval(a, b, self._longest(a, b), self._branches(a, b))
             control = kernels.Control(tolerance, budget, units, near, stop)
             status = kernels.advance(self.tape, method, params, x, interval, control, result)
-            if status not in _REASONS and status:
-                raise deadline.over()
             if status:
-                raise AnalysisError(_REASONS[status].format(t=report[1]), field="rhs")
+                raise failure(status, report[1])
             budget -= int(report[0])
         return x * units, derivative * (units[:, None] / units if derived else 1.0)
 
@@ -242,10 +230,18 @@ def _switch_instants(tape: Tape, params: Array, period: float) -> Array:
 
 @functools.cache
 def _method(stages: int) -> Any:
-    from chilopod.flows.implicit.radau import radau  # scipy.special takes its time to import
+    """Radau IIA with an odd number of stages."""
+    from scipy.special import roots_jacobi  # takes its time to import
 
-    found = radau(stages)
-    return _compiled().Method(found.nodes.copy(), found.matrix.copy(), found.start.copy(), found.filter)
+    nodes = np.append(0.5 * (1.0 + roots_jacobi(stages - 1, 1.0, 0.0)[0]), 1.0)
+    # In Legendre polynomials, whose integrals are known: Lagrange polynomial j is the sum over k of inverse[k, j] P_k.
+    inverse = np.linalg.inv(legendre.legvander(2.0 * nodes - 1.0, stages - 1))
+    integrals = np.array([legendre.legval(2.0 * nodes - 1.0, legendre.legint(row, lbnd=-1)) for row in np.eye(stages)])
+    matrix = np.ascontiguousarray(0.5 * integrals.T @ inverse)
+    values = np.linalg.eigvals(np.linalg.inv(matrix))
+    real = values[np.abs(values.imag).argmin()].real
+    start = legendre.legvander(np.array([-1.0]), stages - 1)[0] @ inverse
+    return _compiled().Method(nodes, matrix, start, float(1.0 / real))
 
 
 @functools.cache

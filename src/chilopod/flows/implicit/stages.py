@@ -89,7 +89,20 @@ class Problem(NamedTuple):
 
 
 class Method(NamedTuple):
-    """A formula of collocation: nodes, matrix, start and filter of :class:`chilopod.flows.implicit.radau.Radau`."""
+    """Coefficients of Radau IIA.
+
+    Attributes
+    ----------
+    nodes
+        c, rising to 1, shape (s,).
+    weights
+        a, shape (s, s); the last row has the weights.
+    start
+        Values at 0 of the Lagrange polynomials on the nodes, shape (s,): f there as the stages have it.
+    gamma
+        Of the filter 1 / (1 - h gamma J) in the estimate of the error: the inverse of the real eigenvalue of the
+        inverse of ``weights`` (Hairer and Wanner, equation IV.8.18).
+    """
 
     nodes: Any
     weights: Any
@@ -125,21 +138,6 @@ class Step(NamedTuple):
     order: Any
     columns: Any
     reached: Any
-
-
-@fused_njit(error_model="numpy")
-def at(problem: Any, x: Any, t: float, slope: Any, jacobian: Any) -> bool:
-    """f and its jacobian in a state; False if they are not finite."""
-    units = problem.units
-    slope_at(problem.tape, problem.series, t, x * units, slope, jacobian)
-    s = 0.0
-    for i in range(x.size):
-        slope[i] /= units[i]
-        s += abs(slope[i])
-        for j in range(x.size):
-            jacobian[i, j] *= units[j] / units[i]
-            s += abs(jacobian[i, j])
-    return s < math.inf
 
 
 @fused_njit(error_model="numpy")
@@ -185,7 +183,9 @@ def stages(problem: Any, method: Any, x: Any, t: float, h: float, step: Any) -> 
         for j in range(s):
             for i in range(n):
                 y[i] = x[i] + moved[j, i]
-            if not at(problem, y, t + nodes[j] * h, slopes[j], step.jacobians[j]):
+            if not slope_at(
+                problem.tape, problem.series, problem.units, t + nodes[j] * h, y, slopes[j], step.jacobians[j]
+            ):
                 return False
         for i in range(s):
             for k in range(n):

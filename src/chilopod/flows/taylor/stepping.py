@@ -19,23 +19,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from chilopod.compiled import fused_njit
+from chilopod.flows.carrying import BUDGET, CHATTERS, DONE, GRAZES, NOT_FINITE, STALLED, TIME_OVER
 from chilopod.flows.taylor.exits import first_exit
 from chilopod.flows.taylor.step_length import agrees, step_size
-from chilopod.flows.taylor.switching import (
-    BUDGET,
-    CHATTERS,
-    DONE,
-    GRAZES,
-    NOT_FINITE,
-    STALLED,
-    TIME_OVER,
-    Motion,
-    await_events,
-    cross,
-    is_timed,
-    settle,
-    start,
-)
+from chilopod.flows.taylor.switching import Motion, await_events, cross, is_timed, settle, start
 from chilopod.flows.tracing import tape as ops
 from chilopod.flows.tracing.series import expand, loaded
 
@@ -87,15 +74,12 @@ class Outcome(NamedTuple):
         Shape (n, columns), multiplied by the derivative; shape (n, 0) for none.
     bound
         Bound of its error where steps compute their own derivatives, shape (n, n); shape (0, 0) for none.
-    events
-        Time and number of the events, shape (most, 2).
     report
-        Number of steps, of crossings, of events, and the time reached, shape (4,).
+        Number of steps, and the time reached, shape (2,).
     """
 
     derivative: Any
     bound: Any
-    events: Any
     report: Any
 
 
@@ -291,17 +275,6 @@ def _begun(tape: Any, params: Any, x: Any, control: Any, derivative: Any) -> Any
     return Motion(x, seeds, series, np.zeros(switches))
 
 
-@fused_njit(error_model="numpy")
-def _noted(events: Any, passed: int, t: float, event: int) -> int:
-    """Note an event, if there is room and it is one; returns how many there have been."""
-    if event < 0:
-        return passed
-    if passed < events.shape[0]:
-        events[passed, 0] = t
-        events[passed, 1] = event
-    return passed + 1
-
-
 @fused_njit(error_model="numpy", nogil=True)
 def advance(tape: Any, directions: Any, clock: Any, params: Any, x: Any, span: Any, control: Any, outcome: Any) -> int:
     """Carry a state over an interval in place.
@@ -331,7 +304,7 @@ def advance(tape: Any, directions: Any, clock: Any, params: Any, x: Any, span: A
     factor, work = np.empty((n, columns)), np.empty(order + 1)
     t, last, unit = t0, t0 - (t1 - t0), (t1 - t0) / 8.0
     status = DONE
-    steps, crossings, passed, in_place, in_block, noise = 0, 0, 0, 0, 0, 1
+    steps, in_place, in_block, noise = 0, 0, 0, 1
     at_once = _AT_ONCE * max(abs(t0), abs(t1))
     if directions is not None:
         start(tape, motion, t)
@@ -367,17 +340,14 @@ def advance(tape: Any, directions: Any, clock: Any, params: Any, x: Any, span: A
         t = reached
         unit *= min(max(h, 1e-3), 1e3) if h > 0.0 else 1.0
         if directions is not None and crossing >= 0:
-            crossings += 1
-            status, event = cross(tape, directions, motion, crossing, direction, unit, t, factor)
+            status = cross(tape, directions, motion, crossing, direction, unit, t, factor)
             if status == GRAZES and t - last <= 1e-6 * (t - t0):
                 status = CHATTERS
             last = t
-            passed = _noted(outcome.events, passed, t, event)
             if with_bound:
                 _assign(block.errors[in_block], 16.0 * _ROUNDING * np.abs(factor))
             in_block = _multiply(block, in_block, factor, control.stepwise, outcome)
     if with_bound and in_block > 0:
         _absorb(block, in_block, outcome.derivative, outcome.bound)
-    report = outcome.report
-    report[0], report[1], report[2], report[3] = steps, crossings, passed, t
+    outcome.report[0], outcome.report[1] = steps, t
     return status

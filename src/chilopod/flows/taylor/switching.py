@@ -7,10 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from chilopod.compiled import fused_njit
+from chilopod.flows.carrying import DONE, GRAZES, SLIDES
 from chilopod.flows.tracing.series import FLOOR, GUARD, Series, branch_at, choose, expand, expand_values, values_at
-
-DONE, NOT_FINITE, BUDGET, STALLED, SLIDES, CHATTERS, GRAZES, TIME_OVER = range(8)
-"""How an integration ends."""
 
 _ZERO = 1e-13
 """A switching function this small, relative to what it was before, is zero."""
@@ -117,13 +115,9 @@ def _reset(tape: Any, motion: Any, event: int, before: Any, jump: Any) -> bool:
 
 
 @fused_njit(error_model="numpy")
-def cross(
-    tape: Any, directions: Any, motion: Any, s: int, direction: float, unit: float, t: float, jump: Any
-) -> tuple[int, int]:
-    """Go through a switch or an event: the state after it in ``x``, its derivative times ``seeds`` in ``jump``.
-
-    Returns the status, and the number of the event or -1.
-    """
+def cross(tape: Any, directions: Any, motion: Any, s: int, direction: float, unit: float, t: float, jump: Any) -> int:
+    """Go through a switch or an event: the state after it in ``x``, its derivative times ``seeds`` in ``jump``; how it
+    ends."""
     n, switches = tape.layout[0], tape.switches
     values, branches = motion.series.values, motion.series.branches
     g = switches[1, s]
@@ -146,14 +140,14 @@ def cross(
     if moves:
         status = settle(tape, motion, unit)
         if status != DONE:
-            return status, event
+            return status
     elif switches[0, s] == GUARD:
-        return DONE, event  # f does not switch here
+        return DONE  # f does not switch here
     else:
         _carry_over(tape, motion, s, surfaces)
     expand_values(tape, 1, tape.layout[4], unit, motion.series)
     if not moves and values[g, 1] * direction < 0.0:
-        return SLIDES, event
+        return SLIDES
     steepest = 0.0
     for j in range(gradient.size):
         steepest = max(steepest, abs(gradient[j]))
@@ -163,13 +157,13 @@ def cross(
             if values[i, 1] != before[i]:
                 differs = True
         if differs and slope * direction <= 0.0:
-            return GRAZES, event
+            return GRAZES
         if differs:
             for i in range(n):
                 f = (values[i, 1] - before[i]) / slope
                 for j in range(jump.shape[1]):
                     jump[i, j] += f * gradient[j]
-    return DONE, event
+    return DONE
 
 
 @fused_njit(error_model="numpy")

@@ -242,19 +242,23 @@ def sample(tape: Any, params: Any, times: Any, states: Any, nodes: Any, found: A
 
 
 @fused_njit(error_model="numpy")
-def slope_at(tape: Any, series: Any, t: float, x: Any, slope: Any, jacobian: Any) -> None:
-    """f and its jacobian at a state, with the branches as they are, and the tangents of the states at 1."""
+def slope_at(tape: Any, series: Any, units: Any, t: float, x: Any, slope: Any, jacobian: Any) -> bool:
+    """f and its jacobian in a state, all in units of the states, with the branches as they are; False if not finite."""
     program, terms, slopes, first, stop = tape.program, tape.terms, tape.slopes, tape.layout[3], tape.layout[4]
     values, tangents = series.values, series.tangents
     for i in range(x.size):
-        values[i, 0] = x[i]
+        values[i, 0] = x[i] * units[i]
     values[x.size, 0] = t
     values_at(program, terms, slopes, first, stop, 0, 1.0, values, series.branches)
     tangents_at(program, terms, slopes, first, stop, 0, 1.0, values, tangents)
+    s = 0.0
     for i in range(x.size):
-        slope[i] = values[slopes[i], 0]
+        slope[i] = values[slopes[i], 0] / units[i]
+        s += abs(slope[i])
         for j in range(x.size):
-            jacobian[i, j] = tangents[slopes[i], 0, j]
+            jacobian[i, j] = tangents[slopes[i], 0, j] * (units[j] / units[i])
+            s += abs(jacobian[i, j])
+    return s < math.inf
 
 
 @fused_njit(error_model="numpy")
@@ -266,7 +270,7 @@ def differentiate(tape: Any, params: Any, t: float, x: Any, slope: Any, jacobian
         series.tangents[i, 0, i] = 1.0
     series.values[x.size, 0] = t
     choose(tape, series)
-    slope_at(tape, series, t, x, slope, jacobian)
+    slope_at(tape, series, np.ones(x.size), t, x, slope, jacobian)
 
 
 @fused_njit(error_model="numpy")
