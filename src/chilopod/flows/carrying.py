@@ -49,7 +49,9 @@ def failure(status: int, t: float) -> AnalysisError:
 
 
 def pieces(edges: Array, period: float, t0: float, t1: float) -> list[tuple[float, float]]:
-    """Cut [t0, t1] at times that come again every period; ``edges`` run from 0 to the period."""
+    """Cut [t0, t1] at times that come again every period; ``edges`` run from 0 to the period, or are none."""
+    if edges.size == 0:
+        return [(t0, t1)] if t1 > t0 else []
     first, last = int(np.floor(t0 / period)), int(np.ceil(t1 / period))
     switches = [float(k * period + e) for k in range(first, last + 1) for e in edges[:-1]]
     inside = [t for t in switches if t0 + 1e-12 * period < t < t1 - 1e-12 * period]

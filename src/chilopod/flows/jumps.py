@@ -18,6 +18,7 @@ _PROBES = 257
 _GRID = 4096
 _FAST = 0.02
 _MARGIN = 8
+_STEPS_IN_FAST_PART = 16
 _SETTLED = 3  # zooms after which only a jump is left of a change that had smooth parts too
 
 
@@ -45,6 +46,13 @@ def fast_parts(slopes: Slopes, base: Array, edges: Array) -> Array:
     near = np.convolve(change.max(axis=0) > _FAST, np.ones(2 * _MARGIN + 1), mode="same") > 0.0
     borders = np.flatnonzero(np.diff(np.concatenate([[False], near, [False]]).astype(int)))
     return np.asarray(borders.reshape(-1, 2) * (period / _GRID))
+
+
+def longest_step(fast: Array, period: float, a: float, b: float) -> float:
+    """Longest step from a to b, which no border of the fast parts divides."""
+    middle = (0.5 * (a + b)) % period
+    inside = (fast[:, 0] < middle) & (middle < fast[:, 1])
+    return (b - a) / _STEPS_IN_FAST_PART if inside.any() else np.inf
 
 
 def warn_of_jumps(

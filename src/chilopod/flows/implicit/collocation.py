@@ -34,73 +34,38 @@ _FASTEST_FALL, _FASTEST_GROWTH, _SAFETY = 0.1, 6.0, 0.9
 
 
 class Interval(NamedTuple):
-    """An interval of time on which the right-hand side is smooth.
+    """An interval of time on which the right-hand side is smooth."""
 
-    Attributes
-    ----------
-    t0, t1
-        Start and end.
-    longest
-        Longest step.
-    branches
-        Branches of the switches, shape (switches,).
-    """
-
+    # start and end
     t0: float
     t1: float
-    longest: float
-    branches: Any
+    longest: float  # longest step
+    branches: Any  # branches of the switches, shape (switches,)
 
 
 class Control(NamedTuple):
-    """How an integration steps.
+    """How an integration steps."""
 
-    Attributes
-    ----------
-    tolerance
-        Estimated error of a step over the size of every state and entry of the derivative.
-    most_steps
-        Budget of steps in an interval.
-    units
-        Units of the states, shape (n,), positive.
-    near
-        Entries of the derivative that are under step control, shape (n, n).
-    stop
-        Shape (1,); not zero once there is no more time.
-    """
-
-    tolerance: float
-    most_steps: int
-    units: Any
-    near: Any
-    stop: Any
+    tolerance: float  # estimated error of a step over the size of every state and entry of the derivative
+    most_steps: int  # budget of steps in an interval
+    units: Any  # units of the states, shape (n,), positive
+    near: Any  # entries of the derivative that are under step control, shape (n, n)
+    stop: Any  # shape (1,); not zero once there is no more time
 
 
 class Outcome(NamedTuple):
-    """Results that an integration fills in, in units of the states.
+    """Results that an integration fills in, in units of the states."""
 
-    Attributes
-    ----------
-    derivative
-        Shape (n, n), multiplied by the derivative; shape (0, 0) for none.
-    largest, extent
-        Largest moduli of the states and of the entries of the derivative so far, shapes (n,) and as ``derivative``.
-    frame
-        Orthonormal, shape (n, n), carried along (:func:`.stages.turn`); shape (0, 0) for none.
-    stretch, turned
-        Logarithm of the growth of each direction of the frame, which is added, and cosine of the largest angle it turns
-        by in a step, shape (n,).
-    report
-        Number of steps, and the time reached, shape (2,).
-    """
-
-    derivative: Any
+    derivative: Any  # shape (n, n), multiplied by the derivative; shape (0, 0) for none
+    # largest moduli of the states and of the entries of the derivative so far, shapes (n,) and as `derivative`
     largest: Any
     extent: Any
-    frame: Any
+    frame: Any  # orthonormal, shape (n, n), carried along (:func:`.stages.turn`); shape (0, 0) for none
+    # logarithm of the growth of each direction of the frame, which is added, and cosine of the largest angle it turns
+    # by in a step, shape (n,)
     stretch: Any
     turned: Any
-    report: Any
+    report: Any  # number of steps, and the time reached, shape (2,)
 
 
 @fused_njit(error_model="numpy")

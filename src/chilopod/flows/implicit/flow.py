@@ -14,6 +14,7 @@ from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows import deadline
 from chilopod.flows.balance import numerical_balance
 from chilopod.flows.carrying import RESOLUTION, carry_all, failure, pieces
+from chilopod.flows.jumps import longest_step
 from chilopod.flows.tracing import tape as ops
 from chilopod.flows.tracing.evaluation import branches_of, evaluate, evaluate_jacobian
 from chilopod.flows.tracing.tape import Tape
@@ -26,7 +27,6 @@ _NEAREST = 3  # couplings between two states up to which the derivative of one b
 _MOST_WORK = 3e9  # multiplications
 _FEWEST_STEPS = 2000
 _FEWEST_PER_THREAD = 4
-_STEPS_IN_FAST_PART = 16
 _OWN = 10.0  # two independent errors differ by less than a tenth of them rarely enough
 _FINER = 0.2
 _SHAKE = 2.0**-52
@@ -63,31 +63,19 @@ class Stretched(ReadOnlyArrays):
 class ImplicitFlow(ReadOnlyArrays):
     """The flow of a tape that is stiff.
 
-    Attributes
-    ----------
-    tape
-        The right-hand side, without events; it may switch in time, not in the state.
-    params
-        Values of its parameters.
-    edges
-        Times from 0 to the period that no step may straddle.
-    fast
-        Borders of the parts of the period in which the function changes fast, shape (parts, 2): the step is limited
-        there.
-    tolerance
-        Estimated error of a step relative to the size of each state and entry of the derivative. The estimate is that
-        of a formula of order s, so the error itself is far smaller where steps are short for the fast states too.
-
     Raises
     ------
     ParameterError
         If the right-hand side has events, or switches in the state.
     """
 
-    tape: Tape
-    params: Array
-    edges: Array
+    tape: Tape  # the right-hand side, without events; it may switch in time, not in the state
+    params: Array  # values of its parameters
+    edges: Array  # times from 0 to the period that no step may straddle
+    # borders of the parts of the period in which the function changes fast, shape (parts, 2): the step is limited there
     fast: Array
+    # estimated error of a step relative to the size of each state and entry of the derivative. The estimate is that of
+    # a formula of order s, so the error itself is far smaller where steps are short for the fast states too.
     tolerance: float
     _cuts: Array = field(init=False, repr=False, compare=False)
 
@@ -176,7 +164,8 @@ class ImplicitFlow(ReadOnlyArrays):
         result = kernels.Outcome(derivative, np.zeros(n), np.eye(size), *carried, report)
         budget = max(_FEWEST_STEPS, int(_MOST_WORK / (n * stages) ** 3))
         for a, b in pieces(self._cuts, float(self.edges[-1]), *span):
-            interval = kernels.Interval(a, b, self._longest(a, b), self._branches(a, b))
+            branches = _branches(self.tape, params, np.array([0.5 * (a + b)]))[:, 0].copy()
+            interval = kernels.Interval(a, b, longest_step(self.fast, float(self.edges[-1]), a, b), branches)
             control = kernels.Control(tolerance, budget, units, near, stop)
             status = kernels.advance(self.tape, method, params, x, interval, control, result)
             if status:
@@ -191,14 +180,6 @@ class ImplicitFlow(ReadOnlyArrays):
         n = x.size
         links = (jacobian > 0.0) | np.eye(n, dtype=bool)
         return numerical_balance(jacobian), np.linalg.matrix_power(links.astype(np.int64), _NEAREST) > 0
-
-    def _longest(self, a: float, b: float) -> float:
-        middle = (0.5 * (a + b)) % float(self.edges[-1])
-        inside = (self.fast[:, 0] < middle) & (middle < self.fast[:, 1])
-        return (b - a) / _STEPS_IN_FAST_PART if inside.any() else np.inf
-
-    def _branches(self, a: float, b: float) -> Array:
-        return _branches(self.tape, self.params, np.array([0.5 * (a + b)]))[:, 0].copy()
 
 
 def can_be_implicit(tape: Tape) -> bool:

@@ -67,77 +67,42 @@ def substitute(matrix: Any, order: Any, columns: Any) -> None:
 
 
 class Problem(NamedTuple):
-    """A right-hand side on an interval, in units of the states.
+    """A right-hand side on an interval, in units of the states."""
 
-    Attributes
-    ----------
-    tape
-        Its operations.
-    units
-        Units of the states, shape (n,), positive; everything else here is in these units.
-    series
-        Values and tangents of the tape, the tangents of the states at 1, and the branches of its switches, which hold
-        on the interval.
-    largest
-        Largest moduli of the states so far, shape (n,).
-    """
-
-    tape: Any
-    units: Any
+    tape: Any  # its operations
+    units: Any  # units of the states, shape (n,), positive; everything else here is in these units
+    # values and tangents of the tape, the tangents of the states at 1, and the branches of its switches, which hold on
+    # the interval
     series: Any
-    largest: Any
+    largest: Any  # largest moduli of the states so far, shape (n,)
 
 
 class Method(NamedTuple):
-    """Coefficients of Radau IIA.
+    """Coefficients of Radau IIA."""
 
-    Attributes
-    ----------
-    nodes
-        c, rising to 1, shape (s,).
-    weights
-        a, shape (s, s); the last row has the weights.
-    start
-        Values at 0 of the Lagrange polynomials on the nodes, shape (s,): f there as the stages have it.
-    gamma
-        Of the filter 1 / (1 - h gamma J) in the estimate of the error: the inverse of the real eigenvalue of the
-        inverse of ``weights`` (Hairer and Wanner, equation IV.8.18).
-    """
-
-    nodes: Any
-    weights: Any
-    start: Any
+    nodes: Any  # c, rising to 1, shape (s,)
+    weights: Any  # a, shape (s, s); the last row has the weights
+    start: Any  # values at 0 of the Lagrange polynomials on the nodes, shape (s,): f there as the stages have it
+    # of the filter 1 / (1 - h gamma J) in the estimate of the error: the inverse of the real eigenvalue of the inverse
+    # of `weights` (Hairer and Wanner, equation IV.8.18)
     gamma: float
 
 
 class Step(NamedTuple):
-    """A step with s stages.
+    """A step with s stages."""
 
-    Attributes
-    ----------
-    slope, jacobian
-        f and its jacobian at the start, shapes (n,) and (n, n).
-    moved
-        States of the stages less the state at the start, shape (s, n).
-    slopes, jacobians
-        f and its jacobian in the stages, shapes (s, n) and (s, n, n).
-    matrix, order
-        Decomposed matrix of Newton's method, shape (s n, s n), and the exchanges of its rows.
-    columns
-        Derivative of the stages with respect to the state at the start, shape (s n, n).
-    reached
-        Derivative of the stages with respect to the start of the interval, shape (s, n, n).
-    """
-
+    # f and its jacobian at the start, shapes (n,) and (n, n)
     slope: Any
     jacobian: Any
-    moved: Any
+    moved: Any  # states of the stages less the state at the start, shape (s, n)
+    # f and its jacobian in the stages, shapes (s, n) and (s, n, n)
     slopes: Any
     jacobians: Any
+    # decomposed matrix of Newton's method, shape (s n, s n), and the exchanges of its rows
     matrix: Any
     order: Any
-    columns: Any
-    reached: Any
+    columns: Any  # derivative of the stages with respect to the state at the start, shape (s n, n)
+    reached: Any  # derivative of the stages with respect to the start of the interval, shape (s, n, n)
 
 
 @fused_njit(error_model="numpy")

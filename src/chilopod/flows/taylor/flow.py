@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,7 +28,6 @@ from chilopod.flows import deadline
 from chilopod.flows.carrying import RESOLUTION, carry_all, failure, pieces
 from chilopod.flows.tracing.evaluation import evaluate
 from chilopod.flows.tracing.tape import Tape
-from chilopod.frozen import ReadOnlyArrays, read_only
 
 Array = NDArray[np.float64]
 
@@ -48,31 +46,18 @@ _NOTHING = np.empty((0, 0))
 
 
 class Passage(NamedTuple):
-    """Result of a flow over an interval.
+    """Result of a flow over an interval."""
 
-    Attributes
-    ----------
-    state
-        At the end, shape (n,).
-    derivative
-        With respect to the state at the start, shape (n, n).
-    bound
-        Bound on the error of each entry of ``derivative``, shape (n, n); empty if it was not asked for.
-    steps
-        Number of steps.
-    """
-
-    state: Array
-    derivative: Array
-    bound: Array
-    steps: int
+    state: Array  # at the end, shape (n,)
+    derivative: Array  # with respect to the state at the start, shape (n, n)
+    bound: Array  # bound on the error of each entry of `derivative`, shape (n, n); empty if it was not asked for
+    steps: int  # number of steps
 
 
-@dataclass(frozen=True)
-class TaylorFlow(ReadOnlyArrays):
+class TaylorFlow:
     """The flow of a tape.
 
-    Attributes
+    Parameters
     ----------
     tape
         The right-hand side, with guards and resets.
@@ -90,40 +75,25 @@ class TaylorFlow(ReadOnlyArrays):
         0 for none: then a motion that is slow only at first gets to its end.
     """
 
-    tape: Tape
-    edges: tuple[float, ...] = ()
-    period: float = math.inf
-    directions: tuple[float, ...] = ()
-    tolerance: float = _LEAST_TOLERANCE
-    patience: int = 0
-    _clocks: dict[bytes, Array] = field(init=False, repr=False, compare=False, default_factory=dict)
-
-    @functools.cached_property
-    def _shape(self) -> tuple[int, int]:
-        return self.tape.dimension, self.tape.parameters
-
-    @functools.cached_property
-    def _directions(self) -> Array | None:
-        return np.array(self.directions, dtype=np.float64) if self.tape.switches.size else None
-
-    @functools.cached_property
-    def order(self) -> int:
-        """Order of the series, near the one of least work for its tolerance."""
-        return max(8, math.ceil(-0.65 * math.log(self._epsilon)))
-
-    @functools.cached_property
-    def most_steps(self) -> int:
-        """Budget of an integration: a few seconds."""
-        nodes = self.tape.program.shape[1]
-        return max(_FEWEST_STEPS, int(_MOST_WORK / (nodes * (1 + self.tape.dimension))))
-
-    @functools.cached_property
-    def _epsilon(self) -> float:
-        return max(self.tolerance, _LEAST_TOLERANCE)
-
-    @functools.cached_property
-    def _shaken(self) -> Array:
-        return read_only(1.0 + _SHAKE * np.sign(np.cos(3.0 * np.arange(self.tape.dimension) + 1.0)))
+    def __init__(
+        self,
+        tape: Tape,
+        *,
+        edges: tuple[float, ...] = (),
+        period: float = math.inf,
+        directions: tuple[float, ...] = (),
+        tolerance: float = _LEAST_TOLERANCE,
+        patience: int = 0,
+    ) -> None:
+        n = tape.dimension
+        self.tape, self.edges, self.period, self.patience = tape, np.array(edges), period, patience
+        self.most_steps = max(_FEWEST_STEPS, int(_MOST_WORK / (tape.program.shape[1] * (1 + n))))  # a few seconds
+        self._epsilon = max(tolerance, _LEAST_TOLERANCE)
+        self.order = max(8, math.ceil(-0.65 * math.log(self._epsilon)))  # about that of least work
+        self._shape = n, tape.parameters
+        self._directions = np.array(directions, dtype=np.float64) if tape.switches.size else None
+        self._shaken = 1.0 + _SHAKE * np.sign(np.cos(3.0 * np.arange(n) + 1.0))
+        self._clocks: dict[bytes, Array] = {}
 
     def advance(
         self, x: Array, t0: float, t1: float, params: Array, *, derived: bool = True, bounded: bool = False
@@ -210,7 +180,7 @@ class TaylorFlow(ReadOnlyArrays):
         control = kernels.Control(self._epsilon, order, self.most_steps, self.patience, shake, stepwise, stop)
         outcome = kernels.Outcome(derivative, bound, report)
         clock = self._clock(params)
-        for span in self._pieces(*interval):
+        for span in pieces(self.edges, self.period, float(interval[0]), float(interval[1])):
             status = kernels.advance(self.tape, self._directions, clock, params, x, span, control, outcome)
             if status:
                 raise failure(status, report[1])
@@ -228,13 +198,6 @@ class TaylorFlow(ReadOnlyArrays):
                 self._clocks.clear()
             self._clocks[key] = table
         return table, self.period
-
-    def _pieces(self, t0: float, t1: float) -> list[tuple[float, float]]:
-        """[t0, t1] cut at the edges."""
-        t0, t1 = float(t0), float(t1)
-        if len(self.edges) == 0:
-            return [(t0, t1)] if t1 > t0 else []
-        return pieces(np.asarray(self.edges), self.period, t0, t1)
 
 
 _NO_CLOCK = (np.zeros((0, 0)), 1.0)

@@ -34,53 +34,27 @@ _AT_ONCE = 1e-13
 
 
 class Control(NamedTuple):
-    """How an integration steps.
+    """How an integration steps."""
 
-    Attributes
-    ----------
-    epsilon
-        Truncation error of a step relative to the size of each state and entry of the derivative.
-    order
-        Order of the series.
-    most_steps
-        Budget of steps in an interval.
-    patience
-        Number of steps after which, and at every doubling, the budget has to suffice for the rest of the interval at
-        the mean length of a step so far; 0 for never.
-    shake
-        Relative error made in every state after every step, and in the time before it: round-off, enlarged.
-    stepwise
-        True if every step computes its own derivative, by which that so far is then multiplied; else it carries the
-        columns of the derivative along, of which there may be any number: directions.
-    stop
-        Shape (1,); not zero once there is no more time.
-    """
-
-    epsilon: float
-    order: int
-    most_steps: int
+    epsilon: float  # truncation error of a step relative to the size of each state and entry of the derivative
+    order: int  # order of the series
+    most_steps: int  # budget of steps in an interval
+    # number of steps after which, and at every doubling, the budget has to suffice for the rest of the interval at the
+    # mean length of a step so far; 0 for never
     patience: int
-    shake: float
+    shake: float  # relative error made in every state after every step, and in the time before it: round-off, enlarged
+    # true if every step computes its own derivative, by which that so far is then multiplied; else it carries the
+    # columns of the derivative along, of which there may be any number: directions
     stepwise: bool
-    stop: Any
+    stop: Any  # shape (1,); not zero once there is no more time
 
 
 class Outcome(NamedTuple):
-    """Results that an integration fills in.
+    """Results that an integration fills in."""
 
-    Attributes
-    ----------
-    derivative
-        Shape (n, columns), multiplied by the derivative; shape (n, 0) for none.
-    bound
-        Bound of its error where steps compute their own derivatives, shape (n, n); shape (0, 0) for none.
-    report
-        Number of steps, and the time reached, shape (2,).
-    """
-
-    derivative: Any
-    bound: Any
-    report: Any
+    derivative: Any  # shape (n, columns), multiplied by the derivative; shape (n, 0) for none
+    bound: Any  # bound of its error where steps compute their own derivatives, shape (n, n); shape (0, 0) for none
+    report: Any  # number of steps, and the time reached, shape (2,)
 
 
 class _Block(NamedTuple):

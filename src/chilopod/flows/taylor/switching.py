@@ -15,24 +15,12 @@ _ZERO = 1e-13
 
 
 class Motion(NamedTuple):
-    """A state on its way, and its series there.
+    """A state on its way, and its series there."""
 
-    Attributes
-    ----------
-    x
-        State, shape (n,).
-    seeds
-        Directions of the tangents, shape (n, columns).
-    series
-        Series of all nodes from the state.
-    scales
-        Largest value of every switching function so far, shape (switches,).
-    """
-
-    x: Any
-    seeds: Any
-    series: Any
-    scales: Any
+    x: Any  # state, shape (n,)
+    seeds: Any  # directions of the tangents, shape (n, columns)
+    series: Any  # series of all nodes from the state
+    scales: Any  # largest value of every switching function so far, shape (switches,)
 
 
 @fused_njit(error_model="numpy", inline="always")

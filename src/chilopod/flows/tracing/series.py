@@ -22,22 +22,13 @@ LOG, SQRT, POWER, ATAN, ASIN = ops.LOG, ops.SQRT, ops.POWER, ops.ATAN, ops.ASIN
 
 
 class Series(NamedTuple):
-    """Taylor coefficients of all nodes of a tape along a motion.
+    """Taylor coefficients of all nodes of a tape along a motion."""
 
-    Attributes
-    ----------
-    values
-        Coefficients, shape (nodes, orders).
-    tangents
-        Derivatives of the coefficients along some directions of the state at the start, shape (nodes, orders, lanes);
-        the lanes are the directions, padded to a multiple of ``HALF``.
-    branches
-        Branch of every switch, shape (switches,).
-    """
-
-    values: Any
+    values: Any  # coefficients, shape (nodes, orders)
+    # derivatives of the coefficients along some directions of the state at the start, shape (nodes, orders, lanes); the
+    # lanes are the directions, padded to a multiple of `HALF`
     tangents: Any
-    branches: Any
+    branches: Any  # branch of every switch, shape (switches,)
 
 
 @fused_njit(error_model="numpy")

@@ -29,21 +29,11 @@ _NEAR = 1e-13
 
 @dataclass(frozen=True)
 class Trace:
-    """A tape and the values of its parameters for one function with its arguments.
+    """A tape and the values of its parameters for one function with its arguments."""
 
-    Attributes
-    ----------
-    tape
-        The operations, shared by all functions that differ in floats only.
-    params
-        Values of the parameters, shape (parameters,).
-    derived
-        Whatever follows from the tape alone, kept with it.
-    """
-
-    tape: Tape
-    params: Array
-    derived: dict[Any, Any]
+    tape: Tape  # the operations, shared by all functions that differ in floats only
+    params: Array  # values of the parameters, shape (parameters,)
+    derived: dict[Any, Any]  # whatever follows from the tape alone, kept with it
 
 
 _Kept = dict[Any, tuple[tuple[int, ...], dict[tuple[float, ...], tuple[Tape, dict[Any, Any]]]]]
