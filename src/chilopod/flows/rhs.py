@@ -155,10 +155,13 @@ class RightHandSide:
         def slopes(t: Array, x: Array) -> Array:
             return evaluate(tape, tape.slopes, t, x, params)
 
-        @functools.cache
+        made: list[ImplicitFlow] = []  # at first use, for it looks at the whole period
+
         def implicit() -> ImplicitFlow:
-            fast = fast_parts(slopes, self.base, self.edges) if tape.clocks.size else np.empty((0, 2))
-            return ImplicitFlow(tape, params, self.edges, fast, _ESTIMATED * self.tolerance)
+            if not made:
+                fast = fast_parts(slopes, self.base, self.edges) if tape.clocks.size else np.empty((0, 2))
+                made.append(ImplicitFlow(tape, params, self.edges, fast, _ESTIMATED * self.tolerance))
+            return made[0]
 
         if self.method == "implicit":
             stiff = implicit()
