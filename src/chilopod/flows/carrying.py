@@ -61,10 +61,14 @@ def pieces(edges: Array, period: float, t0: float, t1: float) -> list[tuple[floa
 
 def carry_all(carry: Callable[[int], None], count: int, fewest: int) -> None:
     """Call a function for all numbers below ``count``, in several threads if each has at least ``fewest`` of them."""
+
+    def carry_some(numbers: range) -> None:
+        for i in numbers:
+            carry(i)
+
     threads = min(cores(), count // fewest)
     if threads > 1:
         with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(lambda first: [carry(i) for i in range(first, count, threads)], range(threads)))
+            list(pool.map(carry_some, (range(first, count, threads) for first in range(threads))))
     else:
-        for i in range(count):
-            carry(i)
+        carry_some(range(count))

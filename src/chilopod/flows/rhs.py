@@ -144,7 +144,7 @@ class RightHandSide:
 
     def _called(self, reason: str) -> Flows:
         slopes = sampled(self.rhs, self.args, self.dimension)
-        warn_of_jumps(self.rhs, self.args, self.dimension, self.edges, self.start)
+        warn_of_jumps(slopes, self.dimension, self.edges, self.start)
         fast = fast_parts(slopes, self.base, self.edges)
         called = CalledFlow(self.rhs, self.args, self.jacobian, self.edges, fast, self.times, reason, self.tolerance)
         return Flows(slopes, called.flow, called.flow_with_error, called.flow_states)

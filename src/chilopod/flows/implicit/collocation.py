@@ -25,10 +25,8 @@ import numpy as np
 
 from chilopod.compiled import fused_njit
 from chilopod.flows.carrying import BUDGET, DONE, NOT_FINITE, STALLED, TIME_OVER
-from chilopod.flows.implicit.stages import Method, Problem, Step, estimated, stages, turn
+from chilopod.flows.implicit.stages import Problem, Step, estimated, stages, turn
 from chilopod.flows.tracing.series import loaded, slope_at
-
-__all__ = ["Control", "Interval", "Method", "Outcome", "advance"]
 
 _FASTEST_FALL, _FASTEST_GROWTH, _SAFETY = 0.1, 6.0, 0.9
 
@@ -66,18 +64,6 @@ class Outcome(NamedTuple):
     stretch: Any
     turned: Any
     report: Any  # number of steps, and the time reached, shape (2,)
-
-
-@fused_njit(error_model="numpy")
-def _first_step(jacobian: Any, longest: float) -> float:
-    """A step as long as the fastest rate allows."""
-    rate = 0.0
-    for i in range(jacobian.shape[0]):
-        total = 0.0
-        for j in range(jacobian.shape[0]):
-            total += abs(jacobian[i, j])
-        rate = max(rate, total)
-    return min(longest, 1.0 / rate) if rate > 0.0 else longest
 
 
 @fused_njit(error_model="numpy")
@@ -145,19 +131,7 @@ def _room(n: int, s: int) -> Any:
 
 @fused_njit(error_model="numpy", nogil=True)
 def advance(tape: Any, method: Any, params: Any, x: Any, interval: Any, control: Any, result: Any) -> int:
-    """Carry a state over an interval in place.
-
-    Parameters
-    ----------
-    tape
-        :class:`chilopod.flows.tracing.tape.Tape`.
-    method
-        :class:`chilopod.flows.implicit.stages.Method`.
-    params, x
-        Values of the parameters; the state, shape (n,), in units.
-    interval, control, result
-        :class:`Interval`, :class:`Control` and :class:`Outcome`.
-    """
+    """Carry a state x, shape (n,), in units, over an interval in place; how it ends."""
     n, s, t1 = x.size, method.nodes.size, interval.t1
     problem = _prepared(tape, control.units, params, interval.branches, result.largest)
     step = _room(n, s)
@@ -173,7 +147,9 @@ def advance(tape: Any, method: Any, params: Any, x: Any, interval: Any, control:
                 break
             for i in range(n):
                 result.largest[i] = max(result.largest[i], abs(x[i]))
-            h = h if h > 0.0 else _first_step(step.jacobian, t1 - t)
+            if h == 0.0:  # at first as long as the fastest rate allows
+                rate = np.abs(step.jacobian).sum(axis=1).max()
+                h = min(t1 - t, 1.0 / rate) if rate > 0.0 else t1 - t
             fresh = False
         steps += 1
         if steps > control.most_steps:

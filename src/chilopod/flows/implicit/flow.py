@@ -123,17 +123,12 @@ class ImplicitFlow(ReadOnlyArrays):
 
     def flow_frame(self, x: Array, units: Array, frame: Array, t0: float, t1: float) -> Stretched:
         """See :class:`chilopod.stability.capabilities.FlowsFrames`."""
-        other, _ = self._turned(x, units, frame, t0, t1, _OTHER_STAGES)
-        stretch, (state, end, turned) = self._turned(x, units, frame, t0, t1, _STAGES)
-        return Stretched(state, end, stretch, other, turned)
-
-    def _turned(
-        self, x: Array, units: Array, frame: Array, t0: float, t1: float, stages: int
-    ) -> tuple[Array, tuple[Array, Array, Array]]:
-        n = x.size
-        frame, stretch, turned = np.array(frame, order="C"), np.zeros(n), np.ones(n)
-        state, _ = self._run(x, (t0, t1), stages, self.tolerance, units=units, carried=(frame, stretch, turned))
-        return stretch, (state, frame, turned)
+        stretches = []
+        for stages in (_OTHER_STAGES, _STAGES):
+            end, stretch, turned = np.array(frame, order="C"), np.zeros(x.size), np.ones(x.size)
+            state, _ = self._run(x, (t0, t1), stages, self.tolerance, units=units, carried=(end, stretch, turned))
+            stretches.append(stretch)
+        return Stretched(state, end, stretches[1], stretches[0], turned)
 
     def _run(
         self,
@@ -214,6 +209,8 @@ def _method(stages: int) -> Any:
     """Radau IIA with an odd number of stages."""
     from scipy.special import roots_jacobi  # takes its time to import
 
+    from chilopod.flows.implicit.stages import Method
+
     nodes = np.append(0.5 * (1.0 + roots_jacobi(stages - 1, 1.0, 0.0)[0]), 1.0)
     # In Legendre polynomials, whose integrals are known: Lagrange polynomial j is the sum over k of inverse[k, j] P_k.
     inverse = np.linalg.inv(legendre.legvander(2.0 * nodes - 1.0, stages - 1))
@@ -222,7 +219,7 @@ def _method(stages: int) -> Any:
     values = np.linalg.eigvals(np.linalg.inv(matrix))
     real = values[np.abs(values.imag).argmin()].real
     start = legendre.legvander(np.array([-1.0]), stages - 1)[0] @ inverse
-    return _compiled().Method(nodes, matrix, start, float(1.0 / real))
+    return Method(nodes, matrix, start, float(1.0 / real))
 
 
 @functools.cache

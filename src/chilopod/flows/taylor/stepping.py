@@ -251,22 +251,14 @@ def _begun(tape: Any, params: Any, x: Any, control: Any, derivative: Any) -> Any
 
 @fused_njit(error_model="numpy", nogil=True)
 def advance(tape: Any, directions: Any, clock: Any, params: Any, x: Any, span: Any, control: Any, outcome: Any) -> int:
-    """Carry a state over an interval in place.
+    """Carry a state x, shape (n,), over an interval from the start to the end of a span in place; how it ends.
 
     Parameters
     ----------
-    tape
-        :class:`chilopod.flows.tracing.tape.Tape`.
     directions
-        Directions of its events; None where the tape has no switches, and what goes through them is not compiled.
+        Directions of the events; None where the tape has no switches, and what goes through them is not compiled.
     clock
         Values of the functions of time on a grid over the period, the last of each the largest modulus, and the period.
-    params, x
-        Values of the parameters, and the state, shape (n,).
-    span
-        Start and end of the interval.
-    control, outcome
-        :class:`Control` and :class:`Outcome`.
     """
     t0, t1 = span
     n, order, switches = tape.layout[0], control.order, tape.switches.shape[1]

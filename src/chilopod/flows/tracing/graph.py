@@ -26,6 +26,15 @@ _FUNCTIONS = {
 }
 
 
+_DERIVATIVES = {
+    ops.EXP: ops.EXP,
+    **{ops.SIN: ops.COS, ops.COS: ops.SIN, ops.SINH: ops.COSH, ops.COSH: ops.SINH},
+}
+"""Functions w of the same operand with c' = w a'; that of the cosine has a sign of its own."""
+
+LEAVES = {ops.STATE: ops.MOVING, ops.TIME: ops.TIMED, ops.PARAMETER: ops.CONSTANT, ops.NUMBER: ops.CONSTANT}
+
+
 class Graph:
     """Operations under construction; nodes are numbers, in the order in which they came."""
 
@@ -37,36 +46,22 @@ class Graph:
         self.states = [self._new(ops.STATE, (i,)) for i in range(dimension)]
         self.time = self._new(ops.TIME, ())
         self.parameters = [self._new(ops.PARAMETER, (i,)) for i in range(parameters)]
-        self._values: list[float] = []
 
     def _new(self, code: int, operands: tuple[int, ...]) -> int:
         node = (code, operands)
         found = self._known.get(node)
         if found is not None:
             return found
-        if code == ops.STATE:
-            depends = ops.MOVING
-        elif code == ops.TIME:
-            depends = ops.TIMED
-        elif code in (ops.PARAMETER, ops.NUMBER):
-            depends = ops.CONSTANT
-        else:
-            depends = max((self.depends[i] for i in operands), default=ops.CONSTANT)
+        depends = LEAVES.get(code)
         self.nodes.append(node)
-        self.depends.append(depends)
+        self.depends.append(max(self.depends[i] for i in operands) if depends is None else depends)
         self._known[node] = len(self.nodes) - 1
         return len(self.nodes) - 1
 
     def number(self, value: float) -> int:
         """The node of a number."""
-        value = float(value)
         # The bits, because NaN equals nothing and 0.0 equals -0.0.
-        bits = int(np.float64(value).view(np.int64))
-        known = len(self.nodes)
-        node = self._new(ops.NUMBER, (bits,))
-        if node == known:
-            self._values.append(value)
-        return node
+        return self._new(ops.NUMBER, (int(np.float64(value).view(np.int64)),))
 
     def value(self, node: int) -> float | None:
         """The value of a number node, None of any other."""
@@ -98,17 +93,16 @@ class Graph:
             if node in kept:
                 other = self.value(kept[node])
                 if w is not None and other is not None:
+                    kept[node] = self.number(w + other)
                     if w + other == 0.0:
                         del kept[node]
-                    else:
-                        kept[node] = self.number(w + other)
                     continue
                 weight = self.linear([(self.number(1.0), kept[node]), (self.number(1.0), weight)])
             kept[node] = weight
         one = self.number(1.0)
-        if constant != 0.0 or not kept:
-            if not kept:
-                return self.number(constant)
+        if not kept:
+            return self.number(constant)
+        if constant != 0.0:
             kept[self.number(constant)] = one
         if len(kept) == 1:
             ((node, weight),) = kept.items()
@@ -150,14 +144,11 @@ class Graph:
                 return self.linear([(operands[0], self.multiply(operands[1], other))])
         for one, other in ((a, b), (b, a)):
             if self.depends[one] == ops.MOVING and self.nodes[other] == (ops.SQUARE, (one,)):
-                return self._cube(one, other)
+                # A cube is a function with w = 3 a^2, which saves two of three products in the tangents.
+                node = self._new(ops.POWER, (one, self.number(3.0)))
+                self.weights[node] = self.linear([(self.number(3.0), other)])
+                return node
         return self._new(ops.PRODUCT, (a, b))
-
-    def _cube(self, a: int, square: int) -> int:
-        """As a function with w = 3 a^2, which saves two of three products in the tangents."""
-        node = self._new(ops.POWER, (a, self.number(3.0)))
-        self.weights[node] = self.linear([(self.number(3.0), square)])
-        return node
 
     def divide(self, a: int, b: int) -> int:
         """a / b."""
@@ -221,12 +212,8 @@ class Graph:
             return node
         one = self.number(1.0)
         self.weights[node] = -1  # w may be made of the node itself
-        if code == ops.EXP:
-            weight = node
-        elif code in (ops.SIN, ops.COS):
-            weight = self.function(ops.COS if code == ops.SIN else ops.SIN, a)
-        elif code in (ops.SINH, ops.COSH):
-            weight = self.function(ops.COSH if code == ops.SINH else ops.SINH, a)
+        if code in _DERIVATIVES:
+            weight = self.function(_DERIVATIVES[code], a)
         elif code == ops.TAN:
             weight = self.add(one, self.multiply(node, node))
         elif code == ops.TANH:
@@ -250,12 +237,10 @@ class Graph:
         code, operands = self.nodes[a]
         if code == ops.STEP:
             return a
-        if code == ops.LINEAR and len(operands) == 2:  # one switch for every multiple of a switching function
-            weight = self.value(operands[0])
-            if weight is not None:
-                return self.multiply(self.number(math.copysign(1.0, weight)), self.step(operands[1]))
         if code == ops.LINEAR:
             weight = self.value(operands[0])
+            if weight is not None and len(operands) == 2:  # one switch for every multiple of a switching function
+                return self.multiply(self.number(math.copysign(1.0, weight)), self.step(operands[1]))
             if weight is not None and weight < 0:
                 minus = self.number(-1.0)
                 turned = self.linear([(self.multiply(minus, weight), node) for weight, node in self.terms(a)])
@@ -283,7 +268,7 @@ class Graph:
     def operands(self, node: int) -> list[int]:
         """The nodes a node is computed from, weights included."""
         code, operands = self.nodes[node]
-        return [] if code in (ops.STATE, ops.TIME, ops.PARAMETER, ops.NUMBER) else list(operands)
+        return [] if code in LEAVES else list(operands)
 
     def parameters_below(self, node: int) -> frozenset[int]:
         """Numbers of the parameters that a node depends on."""

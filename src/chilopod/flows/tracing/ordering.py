@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from chilopod.flows.tracing import tape as ops
-from chilopod.flows.tracing.graph import Graph
+from chilopod.flows.tracing.graph import LEAVES, Graph
 from chilopod.flows.tracing.tape import Tape
 from chilopod.frozen import read_only
 
@@ -22,9 +22,8 @@ def ordered(graph: Graph, slopes: Sequence[int], guards: Sequence[int], resets: 
     flat = _flattened(graph, ends)
     flow = set(_reached(graph, [*slopes, *guards], flat))
     every = _reached(graph, ends, flat)
-    leaves = (ops.STATE, ops.TIME, ops.PARAMETER)
     numbers = [i for i in every if graph.nodes[i][0] == ops.NUMBER]
-    operations = [i for i in every if graph.nodes[i][0] not in (*leaves, ops.NUMBER)]
+    operations = [i for i in every if graph.nodes[i][0] not in LEAVES]
     constant = [i for i in operations if graph.depends[i] == ops.CONSTANT]
     moving = [i for i in operations if graph.depends[i] != ops.CONSTANT and i in flow]
     later = [i for i in operations if graph.depends[i] != ops.CONSTANT and i not in flow]
@@ -48,7 +47,7 @@ def ordered(graph: Graph, slopes: Sequence[int], guards: Sequence[int], resets: 
             if node in flow and graph.depends[node] != ops.CONSTANT:
                 program[2, i] = len(switches)
                 switches.append((code, place[operands[0]], i))
-        elif code not in (*leaves, ops.NUMBER):
+        elif code not in LEAVES:
             program[1 : 1 + len(operands), i] = [place[operand] for operand in operands]
             if node in graph.weights and graph.depends[node] != ops.CONSTANT:
                 program[3, i] = place[graph.weights[node]]

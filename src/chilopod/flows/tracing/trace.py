@@ -53,13 +53,9 @@ def trace(
 
     Parameters
     ----------
-    rhs
-        ``rhs(t, x, *args)`` -> dx/dt, shape (n,). Python code of arithmetic and elementary functions, with numpy, math
-        or neither, also one that numba has compiled.
-    dimension
-        n.
-    args
-        Its parameters. Floats, arrays of floats, and those inside tuples and lists are parameters of the tape.
+    rhs, dimension, args
+        As of :func:`chilopod.stability.from_rhs`. Floats in ``args``, arrays of them, and those inside tuples and lists
+        are parameters of the tape.
     times, base
         Between which times and around which state the tape is compared with the function.
     events
