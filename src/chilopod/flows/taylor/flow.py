@@ -87,13 +87,17 @@ class TaylorFlow:
     ) -> None:
         n = tape.dimension
         self.tape, self.edges, self.period, self.patience = tape, np.array(edges), period, patience
-        self.most_steps = max(_FEWEST_STEPS, int(_MOST_WORK / (tape.program.shape[1] * (1 + n))))  # a few seconds
         self._epsilon = max(tolerance, _LEAST_TOLERANCE)
         self.order = max(8, math.ceil(-0.65 * math.log(self._epsilon)))  # about that of least work
         self._shape = n, tape.parameters
         self._directions = np.array(directions, dtype=np.float64) if tape.switches.size else None
         self._shaken = 1.0 + _SHAKE * np.sign(np.cos(3.0 * np.arange(n) + 1.0))
         self._clocks: dict[bytes, Array] = {}
+
+    @functools.cached_property
+    def most_steps(self) -> int:
+        """Budget of an integration: a few seconds."""
+        return max(_FEWEST_STEPS, int(_MOST_WORK / (self.tape.program.shape[1] * (1 + self.tape.dimension))))
 
     def advance(
         self, x: Array, t0: float, t1: float, params: Array, *, derived: bool = True, bounded: bool = False

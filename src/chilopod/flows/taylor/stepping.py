@@ -110,9 +110,7 @@ def _absorb(block: Any, count: int, total: Any, bound: Any) -> None:
     """
     n = total.shape[0]
     before = np.empty((count + 1, n, n))
-    for i in range(n):
-        for j in range(n):
-            before[0, i, j] = 1.0 if i == j else 0.0
+    _assign(before[0], np.eye(n))
     for s in range(count):
         _assign(before[s + 1], block.factors[s] @ before[s])
     after = np.eye(n)
@@ -184,13 +182,13 @@ def _step(tape: Any, motion: Any, control: Any, h: float, noise: int, factor: An
 @fused_njit(error_model="numpy", inline="always")
 def _bound_step(tangents: Any, order: int, h: float, error: Any) -> None:
     """Bound on the error of the derivative of a step: the round-off of its terms, and the last of them."""
-    n = error.shape[0]
+    n, last = error.shape[0], h**order
     for i in range(n):
         for j in range(n):
             s = 0.0
             for k in range(order, 0, -1):
                 s = (s + abs(tangents[i, k, j])) * h
-            error[i, j] = 4.0 * _ROUNDING * s + abs(tangents[i, order, j]) * h**order
+            error[i, j] = 4.0 * _ROUNDING * s + abs(tangents[i, order, j]) * last
         error[i, i] += 2.0 * _ROUNDING
 
 
