@@ -92,7 +92,7 @@ class TaylorFlow:
         self._shape = n, tape.parameters
         self._directions = np.array(directions, dtype=np.float64) if tape.switches.size else None
         self._shaken = 1.0 + _SHAKE * np.sign(np.cos(3.0 * np.arange(n) + 1.0))
-        self._clocks: dict[bytes, Array] = {}
+        self._clock = functools.lru_cache(_MOST_CLOCKS)(self._clock_table)
 
     @functools.cached_property
     def most_steps(self) -> int:
@@ -183,7 +183,7 @@ class TaylorFlow:
         order, shake = (self.order - _OTHER_ORDER, _SHAKE) if other else (self.order, 0.0)
         control = kernels.Control(self._epsilon, order, self.most_steps, self.patience, shake, stepwise, stop)
         outcome = kernels.Outcome(derivative, bound, report)
-        clock = self._clock(params)
+        clock = self._clock(params.tobytes())
         for span in pieces(self.edges, self.period, float(interval[0]), float(interval[1])):
             status = kernels.advance(self.tape, self._directions, clock, params, x, span, control, outcome)
             if status:
@@ -191,27 +191,15 @@ class TaylorFlow:
             steps += int(report[0])
         return steps
 
-    def _clock(self, params: Array) -> tuple[Array, float]:
-        if self.tape.clocks.size == 0:
-            return _NO_CLOCK
-        key = params.tobytes()
-        table = self._clocks.get(key)
-        if table is None:
-            table = _clock_table(self.tape, self.period, params)
-            if len(self._clocks) >= _MOST_CLOCKS:
-                self._clocks.clear()
-            self._clocks[key] = table
-        return table, self.period
-
-
-_NO_CLOCK = (np.zeros((0, 0)), 1.0)
-
-
-def _clock_table(tape: Tape, period: float, params: Array) -> Array:
-    times = period * np.arange(RESOLUTION) / RESOLUTION
-    values = evaluate(tape, tape.clocks, times, np.zeros((tape.dimension, 1)), params)
-    values = np.where(np.isfinite(values), values, 0.0)
-    return np.ascontiguousarray(np.column_stack([values, np.abs(values).max(axis=1)]))
+    def _clock_table(self, params: bytes) -> tuple[Array, float]:
+        """Functions of time on a grid over the period, the last of each the largest modulus, and the period."""
+        tape = self.tape
+        if tape.clocks.size == 0:
+            return np.zeros((0, 0)), 1.0
+        times, anywhere = self.period * np.arange(RESOLUTION) / RESOLUTION, np.zeros((tape.dimension, 1))
+        values = evaluate(tape, tape.clocks, times, anywhere, np.frombuffer(params))
+        values = np.where(np.isfinite(values), values, 0.0)
+        return np.ascontiguousarray(np.column_stack([values, np.abs(values).max(axis=1)])), self.period
 
 
 @functools.cache
