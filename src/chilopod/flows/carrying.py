@@ -1,4 +1,4 @@
-"""What the compiled flows share: how they end, where intervals are cut, and many states at once."""
+"""Ends of integrations, cuts of intervals and loops over many states, which the compiled flows share."""
 
 from __future__ import annotations
 
