@@ -26,12 +26,15 @@ from chilopod.numba_internals import Conversion, cgutils, ir, signature
 LANES = 8
 """Lanes of double precision that fill the widest registers there are; narrower ones are used two or four at a time."""
 
+HALF = LANES // 2
+"""Lanes for what has few numbers side by side."""
+
 _CACHE_LINE = 8  # numbers
 _INDEX = ir.IntType(32)
 
 
 class LanesType(types.Type):  # type: ignore[misc]
-    """The type of a number in lanes: 1 of them, or ``LANES``."""
+    """The type of a number in lanes: 1 of them, ``HALF`` or ``LANES``."""
 
     def __init__(self, width: int) -> None:
         self.width = width
@@ -43,7 +46,7 @@ class LanesType(types.Type):  # type: ignore[misc]
         return Conversion.safe if isinstance(other, types.Float) else None
 
 
-_TYPES = {width: LanesType(width) for width in (1, LANES)}
+_TYPES = {width: LanesType(width) for width in (1, HALF, LANES)}
 
 
 @register_model(LanesType)

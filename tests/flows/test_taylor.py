@@ -204,7 +204,6 @@ def test_a_ball_bounces():
     passage = flow.advance(np.array([h, 0.0]), 0.0, t1, params, bounded=True)
     fall = math.sqrt(2 * h / GRAVITY)
     speed = e * GRAVITY * fall
-    assert passage.events == pytest.approx(np.array([[fall, 0.0]]), rel=1e-15)
     left = t1 - fall
     assert passage.state == pytest.approx([speed * left - GRAVITY * left**2 / 2, speed - GRAVITY * left], rel=1e-13)
     slope = 1 / math.sqrt(2 * h * GRAVITY)  # d fall / dh
@@ -220,13 +219,13 @@ def test_zeno_is_named():
 
 
 def test_directions_count():
-    events = [(lambda t, x: x[0], None)]
+    events = [(lambda t, x: x[0], lambda t, x: [x[0], x[1], x[2] + t])]  # the third state sums the times
     for direction, times in ((1.0, [1.5]), (-1.0, [0.5, 2.5]), (0.0, [0.5, 1.5, 2.5])):
-        traced = trace(lambda t, x: [math.pi * x[1], -math.pi * x[0]], 2, events=events)
+        traced = trace(lambda t, x: [math.pi * x[1], -math.pi * x[0], 0.0 * x[2]], 3, events=events)
         flow = TaylorFlow(traced.tape, directions=(direction,))
-        passage = flow.advance(np.array([1.0, 0.0]), 0.0, 3.0, traced.params)
-        np.testing.assert_allclose(passage.events[:, 0], times, rtol=1e-14)
-        np.testing.assert_allclose(passage.derivative, -np.eye(2), atol=1e-13)
+        passage = flow.advance(np.array([1.0, 0.0, 0.0]), 0.0, 3.0, traced.params)
+        assert passage.state[2] == pytest.approx(sum(times), rel=1e-14)
+        np.testing.assert_allclose(passage.derivative[:2], -np.eye(3)[:2], atol=1e-13)
 
 
 def test_a_reset_that_depends_on_time():
@@ -248,6 +247,24 @@ def test_many_states_each_with_its_parameters():
     k = np.linspace(0.5, 4.0, 70)
     states = flow.states(np.tile([1.0, 0.0], (70, 1)), 0.0, 2.0, k[:, None])
     np.testing.assert_allclose(states[:, 0], np.cos(2.0 * np.sqrt(k)), atol=1e-14)
+
+
+@pytest.mark.parametrize("a", [2.0, -2.0])
+def test_switches_of_parameters_alone(a):
+    flow, params = flow_of(lambda t, x, a: [np.sign(a) * x[0] + np.maximum(a, 0.5) * x[1], 0.0 * x[1]], 2, (a,))
+    state = flow.advance([1.0, 1.0], 0.0, 1.0, params).state
+    sign, drive = np.sign(a), max(a, 0.5)
+    np.testing.assert_allclose(state, [np.exp(sign) + sign * drive * np.expm1(sign), 1.0], rtol=1e-14)
+
+
+def test_a_reset_that_switches():
+    events = [(lambda t, x: x[0] - 1.0, lambda t, x: [x[0], -np.maximum(x[1], 0.5)])]
+    traced = trace(lambda t, x: [x[1], 0.0 * x[0]], 2, events=events)
+    flow = TaylorFlow(traced.tape, directions=(1.0,))
+    for speed in (2.0, 1.5, 0.75, 0.4):
+        passage = flow.advance([0.0, speed], 0.0, 3.0, traced.params)
+        back = max(speed, 0.5)
+        np.testing.assert_allclose(passage.state, [1.0 - back * (3.0 - 1.0 / speed), -back], rtol=1e-14)
 
 
 def test_what_goes_through_switches_is_compiled_only_where_there_are_any():

@@ -178,7 +178,7 @@ def test_a_family_is_traced_once():
     first, again = trace(family(1.0, 2.0), 2), trace(family(3.0, 4.0), 2)
     assert again.tape is first.tape
     assert sorted(again.params) == [3.0, 4.0]
-    assert evaluate(again.tape, 0.0, np.array([1.0, 0.0]), again.params)[again.tape.slopes].tolist() == [0.0, 1.0]
+    assert evaluate(again.tape, again.tape.slopes, 0.0, np.array([1.0, 0.0]), again.params).tolist() == [0.0, 1.0]
 
 
 def test_changed_globals_and_whole_numbers_are_seen():
@@ -189,7 +189,7 @@ def test_changed_globals_and_whole_numbers_are_seen():
     values = []
     for box["k"], box["n"] in ((1.0, 2), (5.0, 2), (5.0, 3)):
         traced = trace(box["rhs"], 1)
-        values.append(evaluate(traced.tape, 0.0, np.array([2.0]), traced.params)[traced.tape.slopes][0])
+        values.append(evaluate(traced.tape, traced.tape.slopes, 0.0, np.array([2.0]), traced.params)[0])
     assert values == [-4.0, -20.0, -40.0]
 
 
@@ -202,7 +202,7 @@ def test_objects_that_may_change_are_read_anew():
     values = []
     for box.k in (1.0, 3.0):
         traced = trace(rhs, 1)
-        values.append(evaluate(traced.tape, 0.0, np.array([2.0]), traced.params)[traced.tape.slopes][0])
+        values.append(evaluate(traced.tape, traced.tape.slopes, 0.0, np.array([2.0]), traced.params)[0])
     assert values == [-2.0, -6.0]
 
 
@@ -245,7 +245,7 @@ def test_random_expressions(data):
         assume(False)
     x = np.array([0.613, -1.371])
     np.testing.assert_allclose(
-        evaluate(traced.tape, 0.517, x, traced.params)[traced.tape.slopes],
+        evaluate(traced.tape, traced.tape.slopes, 0.517, x, traced.params),
         np.array(rhs(0.517, x, 0.37), dtype=float),
         rtol=1e-10,
         atol=1e-10,
@@ -257,4 +257,4 @@ def test_functions_without_a_module():
     names = {}
     exec("def double(x):\n    return 2.0 * x\n\ndef rhs(t, x):\n    return [double(x[0])]\n", names)
     traced = trace(names["rhs"], 1)
-    assert evaluate(traced.tape, np.zeros(1), np.full((1, 1), 3.0), traced.params).max() == 6.0
+    assert evaluate(traced.tape, traced.tape.slopes, np.zeros(1), np.full((1, 1), 3.0), traced.params).max() == 6.0

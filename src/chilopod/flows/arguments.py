@@ -16,7 +16,7 @@ from chilopod.frozen import read_only
 Array = NDArray[np.float64]
 
 _COARSEST = 1e-3
-_SIZES = (1e-6, 1e-3, 1.0, 1e3)
+SIZES = (1e-6, 1e-3, 1.0, 1e3)
 _SAME = 1e-6
 _LONGEST_SHOWN = 60
 
@@ -127,7 +127,7 @@ Slopes = Callable[[Array, Array], Array]
 def _waves(n: int) -> Array:
     """Displacements of all sizes, two of each, shape (n, 2 sizes)."""
     waves = np.cos(3.0 * np.arange(n)[:, None] + np.arange(1.0, 3.0))
-    return read_only((waves[:, None] * np.array(_SIZES)[:, None]).reshape(n, -1))
+    return read_only((waves[:, None] * np.array(SIZES)[:, None]).reshape(n, -1))
 
 
 def check_symmetry(
@@ -144,7 +144,7 @@ def check_symmetry(
         return
     terms = np.abs(matrix) @ np.abs(here) + np.abs(there)
     # The largest among samples of the same size, of which there are some at every time.
-    alike = (base.size, times.size, len(_SIZES), -1)
+    alike = (base.size, times.size, len(SIZES), -1)
     largest = np.where(np.isfinite(terms), terms, 0.0).reshape(alike).max(axis=(1, 3), keepdims=True)
     wrong = (off.reshape(alike) > _SAME * largest).reshape(off.shape).any(axis=0)
     if wrong.any():
@@ -158,7 +158,7 @@ def check_symmetry(
 def check_timeless(slopes: Slopes, base: Array, duration: float) -> None:
     """See that a right-hand side without a period does not depend on time."""
     n = base.size
-    sizes = np.array(_SIZES)
+    sizes = np.array(SIZES)
     x = base[:, None] + sizes * np.cos(3.0 * np.arange(n)[:, None] + 1.0)
     one, other = (slopes(np.full(sizes.size, part * duration), x) for part in (0.1234, 0.5678))
     differs = np.isfinite(one) & np.isfinite(other) & (np.abs(one - other) > _SAME * np.abs(one))

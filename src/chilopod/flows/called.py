@@ -15,8 +15,8 @@ from scipy.integrate import solve_ivp
 from chilopod.errors import AnalysisError
 from chilopod.flows import deadline
 from chilopod.flows.arguments import numbers
-from chilopod.flows.jumps import UndeclaredSwitch
-from chilopod.flows.taylor.flow import pieces
+from chilopod.flows.carrying import pieces
+from chilopod.flows.jumps import UndeclaredSwitch, longest_step
 
 Array = NDArray[np.float64]
 Parts = list[tuple[float, float]]
@@ -31,7 +31,6 @@ _ANALYTIC_FLOOR = 1e-14
 _DIFFERENCE_FLOOR = 1e-8
 _SMALL = 1e-4
 _DISAGREES = 1e-5
-_STEPS_IN_FAST_PART = 16
 _MOST_CALLS = 2_000_000
 
 
@@ -44,33 +43,19 @@ class CalledFlow:
     """Flow and derivative of dx/dt = rhs(t, x, *args) from calls of the function.
 
     States are measured in units of their largest size on the way, so that tolerances mean the same in all units.
-
-    Attributes
-    ----------
-    rhs, args, jacobian
-        As for :func:`chilopod.stability.from_rhs`. Without a jacobian the derivative is taken by a complex step if the
-        function takes it near the state, else by central differences.
-    edges
-        Times from 0 to the period at which the integration stops and starts anew.
-    fast
-        Borders of the parts of the period in which the function changes fast, shape (parts, 2): the step is limited
-        there.
-    times
-        One inside every interval between edges.
-    reason
-        Reason for which the function cannot be traced.
-    tolerance
-        Local error per step.
     """
 
+    # as for :func:`chilopod.stability.from_rhs`. Without a jacobian the derivative is taken by a complex step if the
+    # function takes it near the state, else by central differences.
     rhs: Callable[..., ArrayLike]
     args: tuple[Any, ...]
     jacobian: Callable[..., ArrayLike] | None
-    edges: Array
+    edges: Array  # times from 0 to the period at which the integration stops and starts anew
+    # borders of the parts of the period in which the function changes fast, shape (parts, 2): the step is limited there
     fast: Array
-    times: Array
-    reason: str
-    tolerance: float
+    times: Array  # one inside every interval between edges
+    reason: str  # reason for which the function cannot be traced
+    tolerance: float  # local error per step
 
     def flow(self, x: Array, t0: float, t1: float) -> tuple[Array, Array]:
         """State at t1 and its derivative with respect to the state at t0."""
@@ -99,52 +84,45 @@ class CalledFlow:
     def flow_states(self, states: Array, t0: float, t1: float) -> Array:
         """Many states, shape (states, n), without derivatives."""
         parts = self._parts(t0, t1)
-        return np.array([self._carry(x, parts, self.tolerance, self._sizes(x, parts)) for x in states])
+        return np.array([self._over(x, parts, self.tolerance, self._sizes(x, parts))[0] for x in states])
 
     def _parts(self, t0: float, t1: float) -> Parts:
         return pieces(np.unique(np.concatenate([self.edges, self.fast.ravel()])), float(self.edges[-1]), t0, t1)
 
-    def _longest(self, a: float, b: float) -> float:
-        """The longest step in a part."""
-        middle = (0.5 * (a + b)) % float(self.edges[-1])
-        inside = (self.fast[:, 0] < middle) & (middle < self.fast[:, 1])
-        return (b - a) / _STEPS_IN_FAST_PART if inside.any() else np.inf
-
     def _sizes(self, x: Array, parts: Parts) -> Array:
         """The largest modulus of every state on the way, at a glance."""
-        n = x.size
         largest = np.abs(x)
-        unit = np.ones(n) * (float(largest.max()) or 1.0)
+        unit = np.ones(x.size) * (float(largest.max()) or 1.0)
         for a, b in parts:
-            answer = self._solved(self._state_slope(a, b, unit), x / unit, a, b, 1e-3, 1e-6)
+            answer = self._solved(self._slopes(a, b, unit), x / unit, a, b, 1e-3, 1e-6)
             largest = np.maximum(largest, np.abs(answer).max(axis=1) * unit)
             x = answer[:, -1] * unit
         return np.where(largest > 0.0, largest, float(largest.max()) or 1.0)
 
-    def _state_slope(self, a: float, b: float, sizes: Array) -> Callable[[float, Array], Array]:
-        inner_a, inner_b = np.nextafter(a, b), np.nextafter(b, a)
-        # At a switch itself it is anybody's guess which side counts.
-        return lambda t, y: self._slope(min(max(t, inner_a), inner_b), y * sizes) / sizes
+    def _slopes(self, a: float, b: float, sizes: Array, gradient: Gradient | None = None) -> Gradient:
+        """Slope of a state in units of its size, and of the derivative if there is a gradient, within a part."""
+        n = sizes.size
+        inner_a, inner_b = np.nextafter(a, b), np.nextafter(b, a)  # at a switch it is not known which side counts
 
-    def _over(self, x: Array, parts: Parts, tolerance: float, sizes: Array, gradient: Gradient) -> tuple[Array, Array]:
+        def slope(t: float, y: Array) -> Array:
+            t, state = min(max(t, inner_a), inner_b), y[:n] * sizes
+            of_state = self._slope(t, state) / sizes
+            if gradient is None:
+                return of_state
+            matrix = gradient(t, state) * (sizes[None, :] / sizes[:, None])
+            return np.concatenate([of_state, (matrix @ y[n:].reshape(n, n)).ravel()])
+
+        return slope
+
+    def _over(
+        self, x: Array, parts: Parts, tolerance: float, sizes: Array, gradient: Gradient | None = None
+    ) -> tuple[Array, Array]:
+        """State and, if there is a gradient, derivative at the end of some parts."""
         n = x.size
-        y = np.concatenate([x / sizes, np.eye(n).ravel()])
+        y = x / sizes if gradient is None else np.concatenate([x / sizes, np.eye(n).ravel()])
         for a, b in parts:
-            inner_a, inner_b = np.nextafter(a, b), np.nextafter(b, a)
-
-            def both(t: float, y: Array, low: float = inner_a, high: float = inner_b) -> Array:
-                t, state = min(max(t, low), high), y[:n] * sizes
-                matrix = gradient(t, state) * (sizes[None, :] / sizes[:, None])
-                return np.concatenate([self._slope(t, state) / sizes, (matrix @ y[n:].reshape(n, n)).ravel()])
-
-            y = self._solved(both, y, a, b, tolerance, 0.01 * tolerance)[:, -1]
-        return y[:n] * sizes, y[n:].reshape(n, n) * (sizes[:, None] / sizes[None, :])
-
-    def _carry(self, x: Array, parts: Parts, tolerance: float, sizes: Array) -> Array:
-        y = x / sizes
-        for a, b in parts:
-            y = self._solved(self._state_slope(a, b, sizes), y, a, b, tolerance, 0.01 * tolerance)[:, -1]
-        return np.asarray(y * sizes)
+            y = self._solved(self._slopes(a, b, sizes, gradient), y, a, b, tolerance, 0.01 * tolerance)[:, -1]
+        return y[:n] * sizes, y[n:].reshape(-1, n) * (1.0 if gradient is None else sizes[:, None] / sizes[None, :])
 
     def _missed(self, x: Array, parts: Parts, derivative: Array, sizes: Array) -> float:
         """Error of the derivative by differences of the flow: where f jumps with the state, it stays however small
@@ -152,7 +130,8 @@ class CalledFlow:
         direction = np.cos(5.0 * np.arange(x.size) + 0.7)
         off = []
         for h in (_SMALL, _SMALL / 3.0):
-            up, down = (self._carry(x + sign * h * direction * sizes, parts, self.tolerance, sizes) for sign in (1, -1))
+            shift = h * direction * sizes
+            up, down = (self._over(start, parts, self.tolerance, sizes)[0] for start in (x + shift, x - shift))
             off.append(float(np.abs((up - down) / (2.0 * h * sizes) - derivative @ direction).max()))
             if off[-1] <= _DISAGREES * float(np.abs(derivative).max()):
                 return 0.0
@@ -197,11 +176,9 @@ class CalledFlow:
 
     def _by_differences(self, t: float, x: Array, sizes: Array) -> Array:
         columns = []
-        for j in range(x.size):
-            up, down = x.copy(), x.copy()
-            up[j] += _DIFFERENCE * sizes[j]
-            down[j] -= _DIFFERENCE * sizes[j]
-            columns.append((self._slope(t, up) - self._slope(t, down)) / (up[j] - down[j]))
+        for step in np.diag(_DIFFERENCE * sizes):
+            up, down = x + step, x - step
+            columns.append((self._slope(t, up) - self._slope(t, down)) / (up - down).sum())
         return np.array(columns).T
 
     def _solved(
@@ -238,7 +215,7 @@ class CalledFlow:
             method="DOP853",
             rtol=max(tolerance, 2.3e-14),
             atol=smallest,
-            max_step=self._longest(a, b),
+            max_step=longest_step(self.fast, float(self.edges[-1]), a, b),
         )
         if not answer.success:
             raise AnalysisError(

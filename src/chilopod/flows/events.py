@@ -10,11 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import ParameterError
-from chilopod.flows.arguments import numbers
+from chilopod.flows.arguments import SIZES, numbers
 
 Array = NDArray[np.float64]
-
-_SIZES = (1e-6, 1e-3, 1.0, 1e3)
 
 
 @dataclass(frozen=True)
@@ -68,7 +66,7 @@ def check_events(events: tuple[Event, ...], args: tuple[Any, ...], times: Array,
     if not events:
         return
     base = np.zeros(n) if orbit is None else orbit
-    waves = [size * np.cos(3.0 * np.arange(n) + 1.0) for size in _SIZES]
+    waves = [size * np.cos(3.0 * np.arange(n) + 1.0) for size in SIZES]
     places = [(t, base + wave) for t in times.tolist() for wave in [np.zeros(n), *waves]]
     known: dict[int, Array] = {}
     for i, event in enumerate(events):

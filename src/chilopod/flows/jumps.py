@@ -5,12 +5,11 @@ from __future__ import annotations
 import itertools
 import warnings
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from chilopod.flows.arguments import Slopes, numbers
+from chilopod.flows.arguments import Slopes
 
 Array = NDArray[np.float64]
 
@@ -18,6 +17,7 @@ _PROBES = 257
 _GRID = 4096
 _FAST = 0.02
 _MARGIN = 8
+_STEPS_IN_FAST_PART = 16
 _SETTLED = 3  # zooms after which only a jump is left of a change that had smooth parts too
 
 
@@ -47,9 +47,14 @@ def fast_parts(slopes: Slopes, base: Array, edges: Array) -> Array:
     return np.asarray(borders.reshape(-1, 2) * (period / _GRID))
 
 
-def warn_of_jumps(
-    rhs: Callable[..., ArrayLike], args: tuple[Any, ...], n: int, edges: Array, orbit: Array | None
-) -> None:
+def longest_step(fast: Array, period: float, a: float, b: float) -> float:
+    """Longest step from a to b, which no border of the fast parts divides."""
+    middle = (0.5 * (a + b)) % period
+    inside = (fast[:, 0] < middle) & (middle < fast[:, 1])
+    return (b - a) / _STEPS_IN_FAST_PART if inside.any() else np.inf
+
+
+def warn_of_jumps(slopes: Slopes, n: int, edges: Array, orbit: Array | None) -> None:
     """Look for jumps of the right-hand side inside the intervals where it should be smooth.
 
     It is sampled at fixed states away from zero (a jump in a coefficient hides at x = 0). The fourth differences of a
@@ -57,19 +62,12 @@ def warn_of_jumps(
     followed down to an interval of 1e-12 of the period.
     """
     base = np.zeros(n) if orbit is None else orbit
-    states = [base + np.cos(3.0 * np.arange(n) + 1.0 + s) for s in range(2)]
+    states = np.array([base + np.cos(3.0 * np.arange(n) + 1.0 + s) for s in range(2)]).T
     period = float(edges[-1])
 
     def values(t: float) -> Array:
-        parts = []
-        for x in states:
-            try:
-                with np.errstate(all="ignore"):
-                    part = numbers(rhs(t, x, *args), (n,), "rhs")
-            except (ArithmeticError, ValueError):  # not defined at this state
-                part = np.zeros(n)
-            parts.append(np.where(np.isfinite(part), part, 0.0))
-        return np.concatenate(parts)
+        samples = slopes(np.full(2, t), states)
+        return np.where(np.isfinite(samples), samples, 0.0).T.ravel()
 
     found: list[float] = []
     for a, b in zip(edges, edges[1:], strict=False):

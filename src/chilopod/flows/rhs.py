@@ -20,10 +20,11 @@ from chilopod.flows.arguments import (
     sampled,
 )
 from chilopod.flows.called import CalledFlow
+from chilopod.flows.carrying import TooManySteps
 from chilopod.flows.events import Event, check_events, checked_events
 from chilopod.flows.implicit.flow import ImplicitFlow, Stretched, can_be_implicit
 from chilopod.flows.jumps import fast_parts, warn_of_jumps
-from chilopod.flows.taylor.flow import TaylorFlow, TooManySteps
+from chilopod.flows.taylor.flow import TaylorFlow
 from chilopod.flows.tracing.evaluation import evaluate, evaluate_jacobian, evaluate_series
 from chilopod.flows.tracing.trace import Trace, trace
 from chilopod.flows.tracing.traced import Untraceable
@@ -47,51 +48,30 @@ class Flows(NamedTuple):
     """Flows of a right-hand side; the arguments and results are those of :mod:`chilopod.stability.capabilities`.
 
     Every answer follows from the arguments of its call alone.
-
-    Attributes
-    ----------
-    slopes
-        ``slopes(times, states)`` -> dx/dt at many times and states.
-    flow, flow_with_error, flow_states
-        Flow with derivative; with the bound of its error; of many states.
-    flow_tangents
-        Flow of some directions; None if there is only the whole derivative.
-    flow_frame, is_stiff
-        Flow of an orthonormal frame, and whether the flow from a state is an implicit one; None if it never is.
-    velocity_series
-        Taylor coefficients of f along curves; None where f cannot be traced, or depends on time.
-    concurrent
-        True if flows may run in several threads at once.
     """
 
-    slopes: Slopes
+    slopes: Slopes  # `slopes(times, states)` -> dx/dt at many times and states
+    # flow with derivative; with the bound of its error; of many states
     flow: Callable[[Array, float, float], tuple[Array, Array]]
     flow_with_error: Callable[[Array, float, float], tuple[Array, Array, float | Array]]
     flow_states: Callable[[Array, float, float], Array]
+    # flow of some directions; None if there is only the whole derivative
     flow_tangents: Callable[[Array, Array, float, float], tuple[Array, Array]] | None = None
+    # flow of an orthonormal frame, and whether the flow from a state is an implicit one; None if it never is
     flow_frame: Callable[[Array, Array, Array, float, float], Stretched] | None = None
     is_stiff: Callable[[Array, float, float], bool] | None = None
+    # Taylor coefficients of f along curves; None where f cannot be traced, or depends on time
     velocity_series: Callable[[Array], Array] | None = None
-    concurrent: bool = False
+    concurrent: bool = False  # whether flows may run in several threads at once
 
 
 @dataclass
 class RightHandSide:
-    """A right-hand side f(t, x, *args), checked.
+    """A right-hand side f(t, x, *args), checked, with the arguments of :func:`chilopod.stability.from_rhs`.
 
-    Parameters
-    ----------
-    rhs, dimension, args, events, switch_times, jacobian, orbit, method, tolerance
-        See :func:`chilopod.stability.from_rhs`.
-    duration, autonomous
-        Period of the explicit dependence on time; where there is none, about how long a motion takes.
-
-    Attributes
-    ----------
-    start, base
-        State on the orbit, None if it is not known; a state to try f at.
-    edges, times
-        Times from 0 to the period at which f switches; a time inside every interval between them.
+    The ``duration`` is the period of the explicit dependence on time; where there is none, about how long a motion
+    takes. Of the results, ``start`` is the state on the orbit, None if it is not known, and ``base`` a state to try f
+    at; ``edges`` are the times from 0 to the period at which f switches, and ``times`` one inside each interval.
 
     Raises
     ------
@@ -137,7 +117,6 @@ class RightHandSide:
                 self.rhs, self.dimension, self.args, times=(0.0, self.duration), base=self.base, events=pairs
             )
         except Untraceable as reason:
-            self._check_shapes()
             self._refuse_calls(reason)
             flows = self._called(str(reason))
         else:
@@ -148,31 +127,24 @@ class RightHandSide:
             check_timeless(flows.slopes, self.base, self.duration)
         return flows
 
-    def _check_shapes(self) -> None:
+    def _refuse_calls(self, reason: Untraceable) -> None:
+        """Refuse a function of the wrong shape, and what needs one that can be traced."""
         n = self.dimension
         check_shape(self.rhs, self.args, self.times, self.base, (n,), "rhs")
         if self.jacobian is not None:
             check_shape(self.jacobian, self.args, self.times, self.base, (n, n), "jacobian")
-
-    def _refuse_calls(self, reason: Untraceable) -> None:
-        """Refuse what needs a function that can be traced."""
         if self.events:
+            allowed = "arithmetic, elementary functions and numpy arrays, without branches on the state"
             raise ParameterError(
-                f"need functions that can be traced: {reason}",
-                field="events",
-                allowed="arithmetic, elementary functions and numpy arrays, without branches on the state",
+                f"need functions that can be traced: {reason}", field="events", allowed=allowed
             ) from None
         if self.method != "automatic":
-            raise ParameterError(
-                f"needs a function that can be traced: {reason}",
-                field="method",
-                value=self.method,
-                allowed="automatic",
-            ) from None
+            said = f"needs a function that can be traced: {reason}"
+            raise ParameterError(said, field="method", value=self.method, allowed="automatic") from None
 
     def _called(self, reason: str) -> Flows:
         slopes = sampled(self.rhs, self.args, self.dimension)
-        warn_of_jumps(self.rhs, self.args, self.dimension, self.edges, self.start)
+        warn_of_jumps(slopes, self.dimension, self.edges, self.start)
         fast = fast_parts(slopes, self.base, self.edges)
         called = CalledFlow(self.rhs, self.args, self.jacobian, self.edges, fast, self.times, reason, self.tolerance)
         return Flows(slopes, called.flow, called.flow_with_error, called.flow_states)
@@ -181,12 +153,15 @@ class RightHandSide:
         tape, params = traced.tape, traced.params
 
         def slopes(t: Array, x: Array) -> Array:
-            return evaluate(tape, t, x, params)[tape.slopes]
+            return evaluate(tape, tape.slopes, t, x, params)
 
-        @functools.cache
+        made: list[ImplicitFlow] = []  # at first use, for it looks at the whole period
+
         def implicit() -> ImplicitFlow:
-            fast = fast_parts(slopes, self.base, self.edges) if tape.clocks.size else np.empty((0, 2))
-            return ImplicitFlow(tape, params, self.edges, fast, _ESTIMATED * self.tolerance)
+            if not made:
+                fast = fast_parts(slopes, self.base, self.edges) if tape.clocks.size else np.empty((0, 2))
+                made.append(ImplicitFlow(tape, params, self.edges, fast, _ESTIMATED * self.tolerance))
+            return made[0]
 
         if self.method == "implicit":
             stiff = implicit()
@@ -201,7 +176,14 @@ class RightHandSide:
             )
         else:
             taylor = self._taylor(traced)
-            flows = _taylor_flows(slopes, taylor, params)
+            flows = Flows(
+                slopes,
+                lambda x, t0, t1: taylor.advance(x, t0, t1, params)[:2],
+                lambda x, t0, t1: taylor.advance(x, t0, t1, params, bounded=True)[:3],
+                lambda states, t0, t1: taylor.states(states, t0, t1, params),
+                flow_tangents=lambda x, directions, t0, t1: taylor.tangents(x, directions, t0, t1, params),
+                concurrent=True,
+            )
             if taylor.patience:
                 flows = _either(flows, implicit)
         if self.autonomous:
@@ -244,53 +226,33 @@ class RightHandSide:
                 )
 
 
-def _taylor_flows(slopes: Slopes, taylor: TaylorFlow, params: Array) -> Flows:
-    def flow(x: Array, t0: float, t1: float) -> tuple[Array, Array]:
-        passage = taylor.advance(x, t0, t1, params)
-        return passage.state, passage.derivative
-
-    def flow_with_error(x: Array, t0: float, t1: float) -> tuple[Array, Array, Array]:
-        passage = taylor.advance(x, t0, t1, params, bounded=True)
-        return passage.state, passage.derivative, passage.bound
-
-    return Flows(
-        slopes,
-        flow,
-        flow_with_error,
-        lambda states, t0, t1: taylor.states(states, t0, t1, params),
-        flow_tangents=lambda x, directions, t0, t1: taylor.tangents(x, directions, t0, t1, params),
-        concurrent=True,
-    )
-
-
 def _either(flows: Flows, implicit: Callable[[], ImplicitFlow]) -> Flows:
     """Flows by Taylor series, and by the implicit method from every state from which the series take too many steps.
 
     That is found out anew in every call, so that no answer hangs on what was asked before.
     """
-    latest: list[tuple[bytes, float, float] | None] = [None]  # by Taylor series: saves computing it once more
+    latest: tuple[bytes, float, float] | None = None  # by Taylor series: saves computing it once more
 
     def either(name: Literal["flow", "flow_with_error", "flow_states"]) -> Callable[..., Any]:
         taylor = getattr(flows, name)
 
         def flow(x: Array, t0: float, t1: float) -> Any:
+            nonlocal latest
             try:
                 found = taylor(x, t0, t1)
             except TooManySteps:
                 return getattr(implicit(), name)(x, t0, t1)
-            if name != "flow_states":
-                latest[0] = x.tobytes(), t0, t1
+            latest = x.tobytes(), t0, t1
             return found
 
         return flow
 
     def is_stiff(x: Array, t0: float, t1: float) -> bool:
-        if latest[0] == (x.tobytes(), t0, t1):
-            return False
-        try:
-            flows.flow(x, t0, t1)
-        except TooManySteps:
-            return True
+        if latest != (x.tobytes(), t0, t1):
+            try:
+                flows.flow(x, t0, t1)
+            except TooManySteps:
+                return True
         return False
 
     return flows._replace(

@@ -95,23 +95,15 @@ def from_rhs(
     )
     flows = given.flows()
     slopes = flows.slopes
+    rest: dict[str, Any] = {"scale": scale, "symmetry": symmetry, "spatial_symmetry": spatial_symmetry}
+    rest |= {name: part for name, part in flows._asdict().items() if name != "slopes"}
     system = PeriodicSystem(
         dimension=given.dimension,
         period=None if autonomous else length,
-        flow=flows.flow,
         velocity=(lambda x: slopes(np.zeros(1), x[:, None])[:, 0]) if autonomous else None,
         guess_period=length if autonomous else None,
-        scale=None if scale is None else np.asarray(scale, dtype=np.float64),
-        symmetry=None if symmetry is None else np.asarray(symmetry, dtype=np.float64),
-        spatial_symmetry=None if spatial_symmetry is None else np.asarray(spatial_symmetry, dtype=np.float64),
         orbit=given.start,
-        flow_with_error=flows.flow_with_error,
-        flow_states=flows.flow_states,
-        flow_tangents=flows.flow_tangents,
-        flow_frame=flows.flow_frame,
-        is_stiff=flows.is_stiff,
-        velocity_series=flows.velocity_series,
-        concurrent=flows.concurrent,
+        **rest,
     )
     if not given.events:  # which a symmetry would have to respect as well
         if system.symmetry is not None:

@@ -24,97 +24,46 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from chilopod.compiled import fused_njit
-from chilopod.flows.implicit.stages import Method, Problem, Step, at, estimated, stages, turn
-from chilopod.flows.tracing.series import LANES, Series, load
-
-__all__ = ["Control", "Interval", "Method", "Outcome", "advance"]
-
-DONE, NOT_FINITE, BUDGET, STALLED, TIME_OVER = range(5)
-"""How an integration ends."""
+from chilopod.flows.carrying import BUDGET, DONE, NOT_FINITE, STALLED, TIME_OVER
+from chilopod.flows.implicit.stages import Problem, Step, estimated, stages, turn
+from chilopod.flows.tracing.series import loaded, slope_at
 
 _FASTEST_FALL, _FASTEST_GROWTH, _SAFETY = 0.1, 6.0, 0.9
 
 
 class Interval(NamedTuple):
-    """An interval of time on which the right-hand side is smooth.
+    """An interval of time on which the right-hand side is smooth."""
 
-    Attributes
-    ----------
-    t0, t1
-        Start and end.
-    longest
-        Longest step.
-    branches
-        Branches of the switches, shape (switches,).
-    """
-
+    # start and end
     t0: float
     t1: float
-    longest: float
-    branches: Any
+    longest: float  # longest step
+    branches: Any  # branches of the switches, shape (switches,)
 
 
 class Control(NamedTuple):
-    """How an integration steps.
+    """How an integration steps."""
 
-    Attributes
-    ----------
-    tolerance
-        Estimated error of a step over the size of every state and entry of the derivative.
-    most_steps
-        Budget of steps in an interval.
-    units
-        Units of the states, shape (n,), positive.
-    near
-        Entries of the derivative that are under step control, shape (n, n).
-    stop
-        Shape (1,); not zero once there is no more time.
-    """
-
-    tolerance: float
-    most_steps: int
-    units: Any
-    near: Any
-    stop: Any
+    tolerance: float  # estimated error of a step over the size of every state and entry of the derivative
+    most_steps: int  # budget of steps in an interval
+    units: Any  # units of the states, shape (n,), positive
+    near: Any  # entries of the derivative that are under step control, shape (n, n)
+    stop: Any  # shape (1,); not zero once there is no more time
 
 
 class Outcome(NamedTuple):
-    """Results that an integration fills in, in units of the states.
+    """Results that an integration fills in, in units of the states."""
 
-    Attributes
-    ----------
-    derivative
-        Shape (n, n), multiplied by the derivative; shape (0, 0) for none.
-    largest, extent
-        Largest moduli of the states and of the entries of the derivative so far, shapes (n,) and as ``derivative``.
-    frame
-        Orthonormal, shape (n, n), carried along (:func:`.stages.turn`); shape (0, 0) for none.
-    stretch, turned
-        Logarithm of the growth of each direction of the frame, which is added, and cosine of the largest angle it turns
-        by in a step, shape (n,).
-    report
-        Number of steps, and the time reached, shape (2,).
-    """
-
-    derivative: Any
+    derivative: Any  # shape (n, n), multiplied by the derivative; shape (0, 0) for none
+    # largest moduli of the states and of the entries of the derivative so far, shapes (n,) and as `derivative`
     largest: Any
     extent: Any
-    frame: Any
+    frame: Any  # orthonormal, shape (n, n), carried along (:func:`.stages.turn`); shape (0, 0) for none
+    # logarithm of the growth of each direction of the frame, which is added, and cosine of the largest angle it turns
+    # by in a step, shape (n,)
     stretch: Any
     turned: Any
-    report: Any
-
-
-@fused_njit(error_model="numpy")
-def _first_step(jacobian: Any, longest: float) -> float:
-    """A step as long as the fastest rate allows."""
-    rate = 0.0
-    for i in range(jacobian.shape[0]):
-        total = 0.0
-        for j in range(jacobian.shape[0]):
-            total += abs(jacobian[i, j])
-        rate = max(rate, total)
-    return min(longest, 1.0 / rate) if rate > 0.0 else longest
+    report: Any  # number of steps, and the time reached, shape (2,)
 
 
 @fused_njit(error_model="numpy")
@@ -158,12 +107,9 @@ def _take(x: Any, step: Any, last: Any, result: Any) -> None:
 @fused_njit(error_model="numpy")
 def _prepared(tape: Any, units: Any, params: Any, branches: Any, largest: Any) -> Any:
     """A right-hand side with its parameters loaded and room for its values."""
-    n = tape.layout[0]
-    lanes = (n + LANES - 1) // LANES * LANES
-    series = Series(np.zeros((tape.layout[5], 1)), np.zeros((tape.layout[5], 1, lanes)), branches)
-    for i in range(n):
+    series = loaded(tape, params, 1, units.size, branches)
+    for i in range(units.size):
         series.tangents[i, 0, i] = 1.0
-    load(tape, params, series)
     return Problem(tape, units, series, largest)
 
 
@@ -185,19 +131,7 @@ def _room(n: int, s: int) -> Any:
 
 @fused_njit(error_model="numpy", nogil=True)
 def advance(tape: Any, method: Any, params: Any, x: Any, interval: Any, control: Any, result: Any) -> int:
-    """Carry a state over an interval in place.
-
-    Parameters
-    ----------
-    tape
-        :class:`chilopod.flows.tracing.tape.Tape`.
-    method
-        :class:`chilopod.flows.implicit.stages.Method`.
-    params, x
-        Values of the parameters; the state, shape (n,), in units.
-    interval, control, result
-        :class:`Interval`, :class:`Control` and :class:`Outcome`.
-    """
+    """Carry a state x, shape (n,), in units, over an interval in place; how it ends."""
     n, s, t1 = x.size, method.nodes.size, interval.t1
     problem = _prepared(tape, control.units, params, interval.branches, result.largest)
     step = _room(n, s)
@@ -208,12 +142,14 @@ def advance(tape: Any, method: Any, params: Any, x: Any, interval: Any, control:
     fresh = True
     while t < t1:
         if fresh:
-            if not at(problem, x, t, step.slope, step.jacobian):
+            if not slope_at(tape, problem.series, problem.units, t, x, step.slope, step.jacobian):
                 status = NOT_FINITE
                 break
             for i in range(n):
                 result.largest[i] = max(result.largest[i], abs(x[i]))
-            h = h if h > 0.0 else _first_step(step.jacobian, t1 - t)
+            if h == 0.0:  # at first as long as the fastest rate allows
+                rate = np.abs(step.jacobian).sum(axis=1).max()
+                h = min(t1 - t, 1.0 / rate) if rate > 0.0 else t1 - t
             fresh = False
         steps += 1
         if steps > control.most_steps:

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import functools
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-from chilopod.cores import cores
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows import deadline
 from chilopod.flows.balance import numerical_balance
-from chilopod.flows.taylor.flow import RESOLUTION, pieces
+from chilopod.flows.carrying import RESOLUTION, carry_all, failure, pieces
+from chilopod.flows.jumps import longest_step
 from chilopod.flows.tracing import tape as ops
-from chilopod.flows.tracing.evaluation import evaluate, evaluate_jacobian
+from chilopod.flows.tracing.evaluation import branches_of, evaluate, evaluate_jacobian
 from chilopod.flows.tracing.tape import Tape
 from chilopod.frozen import ReadOnlyArrays
 
@@ -27,17 +27,10 @@ _NEAREST = 3  # couplings between two states up to which the derivative of one b
 _MOST_WORK = 3e9  # multiplications
 _FEWEST_STEPS = 2000
 _FEWEST_PER_THREAD = 4
-_STEPS_IN_FAST_PART = 16
 _OWN = 10.0  # two independent errors differ by less than a tenth of them rarely enough
 _FINER = 0.2
 _SHAKE = 2.0**-52
 _ROUNDING = 2.0**-49
-
-_REASONS = {
-    1: "the motion diverges, or the right-hand side is not finite, at t = {t:g}",
-    2: "takes too many steps, and came to t = {t:g} only",
-    3: "cannot be continued beyond t = {t:.17g}: a singularity, or rates beyond the resolution of time",
-}
 
 
 @dataclass(frozen=True)
@@ -70,31 +63,19 @@ class Stretched(ReadOnlyArrays):
 class ImplicitFlow(ReadOnlyArrays):
     """The flow of a tape that is stiff.
 
-    Attributes
-    ----------
-    tape
-        The right-hand side, without events; it may switch in time, not in the state.
-    params
-        Values of its parameters.
-    edges
-        Times from 0 to the period that no step may straddle.
-    fast
-        Borders of the parts of the period in which the function changes fast, shape (parts, 2): the step is limited
-        there.
-    tolerance
-        Estimated error of a step relative to the size of each state and entry of the derivative. The estimate is that
-        of a formula of order s, so the error itself is far smaller where steps are short for the fast states too.
-
     Raises
     ------
     ParameterError
         If the right-hand side has events, or switches in the state.
     """
 
-    tape: Tape
-    params: Array
-    edges: Array
+    tape: Tape  # the right-hand side, without events; it may switch in time, not in the state
+    params: Array  # values of its parameters
+    edges: Array  # times from 0 to the period that no step may straddle
+    # borders of the parts of the period in which the function changes fast, shape (parts, 2): the step is limited there
     fast: Array
+    # estimated error of a step relative to the size of each state and entry of the derivative. The estimate is that of
+    # a formula of order s, so the error itself is far smaller where steps are short for the fast states too.
     tolerance: float
     _cuts: Array = field(init=False, repr=False, compare=False)
 
@@ -134,28 +115,20 @@ class ImplicitFlow(ReadOnlyArrays):
         """Many states, shape (states, n), without derivatives."""
         states, stop = np.array(states, dtype=np.float64), deadline.stop()
 
-        def carry(i: int) -> Array:
-            return self._run(states[i], (t0, t1), _STAGES, self.tolerance, derived=False, stop=stop)[0]
+        def carry(i: int) -> None:
+            states[i] = self._run(states[i], (t0, t1), _STAGES, self.tolerance, derived=False, stop=stop)[0]
 
-        threads = min(cores(), len(states) // _FEWEST_PER_THREAD)
-        if threads > 1:
-            with ThreadPoolExecutor(threads) as pool:
-                return np.array(list(pool.map(carry, range(len(states)))))
-        return np.array([carry(i) for i in range(len(states))]).reshape(states.shape)
+        carry_all(carry, len(states), _FEWEST_PER_THREAD)
+        return states
 
     def flow_frame(self, x: Array, units: Array, frame: Array, t0: float, t1: float) -> Stretched:
         """See :class:`chilopod.stability.capabilities.FlowsFrames`."""
-        other, _ = self._turned(x, units, frame, t0, t1, _OTHER_STAGES)
-        stretch, (state, end, turned) = self._turned(x, units, frame, t0, t1, _STAGES)
-        return Stretched(state, end, stretch, other, turned)
-
-    def _turned(
-        self, x: Array, units: Array, frame: Array, t0: float, t1: float, stages: int
-    ) -> tuple[Array, tuple[Array, Array, Array]]:
-        n = x.size
-        frame, stretch, turned = np.array(frame, order="C"), np.zeros(n), np.ones(n)
-        state, _ = self._run(x, (t0, t1), stages, self.tolerance, units=units, carried=(frame, stretch, turned))
-        return stretch, (state, frame, turned)
+        stretches = []
+        for stages in (_OTHER_STAGES, _STAGES):
+            end, stretch, turned = np.array(frame, order="C"), np.zeros(x.size), np.ones(x.size)
+            state, _ = self._run(x, (t0, t1), stages, self.tolerance, units=units, carried=(end, stretch, turned))
+            stretches.append(stretch)
+        return Stretched(state, end, stretches[1], stretches[0], turned)
 
     def _run(
         self,
@@ -186,13 +159,12 @@ class ImplicitFlow(ReadOnlyArrays):
         result = kernels.Outcome(derivative, np.zeros(n), np.eye(size), *carried, report)
         budget = max(_FEWEST_STEPS, int(_MOST_WORK / (n * stages) ** 3))
         for a, b in pieces(self._cuts, float(self.edges[-1]), *span):
-            interval = kernels.Interval(a, b, self._longest(a, b), self._branches(a, b))
+            branches = _branches(self.tape, params, np.array([0.5 * (a + b)]))[:, 0].copy()
+            interval = kernels.Interval(a, b, longest_step(self.fast, float(self.edges[-1]), a, b), branches)
             control = kernels.Control(tolerance, budget, units, near, stop)
             status = kernels.advance(self.tape, method, params, x, interval, control, result)
-            if status not in _REASONS and status:
-                raise deadline.over()
             if status:
-                raise AnalysisError(_REASONS[status].format(t=report[1]), field="rhs")
+                raise failure(status, report[1])
             budget -= int(report[0])
         return x * units, derivative * (units[:, None] / units if derived else 1.0)
 
@@ -204,14 +176,6 @@ class ImplicitFlow(ReadOnlyArrays):
         links = (jacobian > 0.0) | np.eye(n, dtype=bool)
         return numerical_balance(jacobian), np.linalg.matrix_power(links.astype(np.int64), _NEAREST) > 0
 
-    def _longest(self, a: float, b: float) -> float:
-        middle = (0.5 * (a + b)) % float(self.edges[-1])
-        inside = (self.fast[:, 0] < middle) & (middle < self.fast[:, 1])
-        return (b - a) / _STEPS_IN_FAST_PART if inside.any() else np.inf
-
-    def _branches(self, a: float, b: float) -> Array:
-        return _branches(self.tape, self.params, np.array([0.5 * (a + b)]))[:, 0].copy()
-
 
 def can_be_implicit(tape: Tape) -> bool:
     """True if a right-hand side has no events, and switches in time only."""
@@ -220,17 +184,11 @@ def can_be_implicit(tape: Tape) -> bool:
 
 def _branches(tape: Tape, params: Array, times: Array) -> Array:
     """Branches of switches that know only time, shape (switches, times)."""
-    if tape.switches.shape[1] == 0:
-        return np.zeros((0, times.size))
-    values = evaluate(tape, times, np.zeros((tape.dimension, 1)), params)[tape.switches[1]]
-    floor = tape.switches[0][:, None] == ops.FLOOR
-    return np.where(floor, np.floor(values), np.where(values >= 0.0, 1.0, -1.0))
+    return branches_of(tape, evaluate(tape, tape.switches[1], times, np.zeros((tape.dimension, 1)), params))
 
 
 def _switch_instants(tape: Tape, params: Array, period: float) -> Array:
     """When the switches that know only time leave their branches, by bisection from a grid over the period."""
-    if tape.switches.shape[1] == 0:
-        return np.zeros(0)
     times = np.linspace(0.0, period, RESOLUTION + 1)
     found = []
     for s, branches in enumerate(_branches(tape, params, times)):
@@ -248,10 +206,20 @@ def _switch_instants(tape: Tape, params: Array, period: float) -> Array:
 
 @functools.cache
 def _method(stages: int) -> Any:
-    from chilopod.flows.implicit.radau import radau  # scipy.special takes its time to import
+    """Radau IIA with an odd number of stages."""
+    from scipy.special import roots_jacobi  # takes its time to import
 
-    found = radau(stages)
-    return _compiled().Method(found.nodes.copy(), found.matrix.copy(), found.start.copy(), found.filter)
+    from chilopod.flows.implicit.stages import Method
+
+    nodes = np.append(0.5 * (1.0 + roots_jacobi(stages - 1, 1.0, 0.0)[0]), 1.0)
+    # In Legendre polynomials, whose integrals are known: Lagrange polynomial j is the sum over k of inverse[k, j] P_k.
+    inverse = np.linalg.inv(legendre.legvander(2.0 * nodes - 1.0, stages - 1))
+    integrals = np.array([legendre.legval(2.0 * nodes - 1.0, legendre.legint(row, lbnd=-1)) for row in np.eye(stages)])
+    matrix = np.ascontiguousarray(0.5 * integrals.T @ inverse)
+    values = np.linalg.eigvals(np.linalg.inv(matrix))
+    real = values[np.abs(values.imag).argmin()].real
+    start = legendre.legvander(np.array([-1.0]), stages - 1)[0] @ inverse
+    return Method(nodes, matrix, start, float(1.0 / real))
 
 
 @functools.cache

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from chilopod.compiled import fused_njit
-from chilopod.flows.tracing.series import tangents_at, values_at
+from chilopod.flows.tracing.series import slope_at
 
 _MOST_ROUNDS = 10
 _CLOSE = 1e-7
@@ -67,85 +67,42 @@ def substitute(matrix: Any, order: Any, columns: Any) -> None:
 
 
 class Problem(NamedTuple):
-    """A right-hand side on an interval, in units of the states.
+    """A right-hand side on an interval, in units of the states."""
 
-    Attributes
-    ----------
-    tape
-        Its operations.
-    units
-        Units of the states, shape (n,), positive; everything else here is in these units.
-    series
-        Values and tangents of the tape, the tangents of the states at 1, and the branches of its switches, which hold
-        on the interval.
-    largest
-        Largest moduli of the states so far, shape (n,).
-    """
-
-    tape: Any
-    units: Any
+    tape: Any  # its operations
+    units: Any  # units of the states, shape (n,), positive; everything else here is in these units
+    # values and tangents of the tape, the tangents of the states at 1, and the branches of its switches, which hold on
+    # the interval
     series: Any
-    largest: Any
+    largest: Any  # largest moduli of the states so far, shape (n,)
 
 
 class Method(NamedTuple):
-    """A formula of collocation: nodes, matrix, start and filter of :class:`chilopod.flows.implicit.radau.Radau`."""
+    """Coefficients of Radau IIA."""
 
-    nodes: Any
-    weights: Any
-    start: Any
+    nodes: Any  # c, rising to 1, shape (s,)
+    weights: Any  # a, shape (s, s); the last row has the weights
+    start: Any  # values at 0 of the Lagrange polynomials on the nodes, shape (s,): f there as the stages have it
+    # of the filter 1 / (1 - h gamma J) in the estimate of the error: the inverse of the real eigenvalue of the inverse
+    # of `weights` (Hairer and Wanner, equation IV.8.18)
     gamma: float
 
 
 class Step(NamedTuple):
-    """A step with s stages.
+    """A step with s stages."""
 
-    Attributes
-    ----------
-    slope, jacobian
-        f and its jacobian at the start, shapes (n,) and (n, n).
-    moved
-        States of the stages less the state at the start, shape (s, n).
-    slopes, jacobians
-        f and its jacobian in the stages, shapes (s, n) and (s, n, n).
-    matrix, order
-        Decomposed matrix of Newton's method, shape (s n, s n), and the exchanges of its rows.
-    columns
-        Derivative of the stages with respect to the state at the start, shape (s n, n).
-    reached
-        Derivative of the stages with respect to the start of the interval, shape (s, n, n).
-    """
-
+    # f and its jacobian at the start, shapes (n,) and (n, n)
     slope: Any
     jacobian: Any
-    moved: Any
+    moved: Any  # states of the stages less the state at the start, shape (s, n)
+    # f and its jacobian in the stages, shapes (s, n) and (s, n, n)
     slopes: Any
     jacobians: Any
+    # decomposed matrix of Newton's method, shape (s n, s n), and the exchanges of its rows
     matrix: Any
     order: Any
-    columns: Any
-    reached: Any
-
-
-@fused_njit(error_model="numpy")
-def at(problem: Any, x: Any, t: float, slope: Any, jacobian: Any) -> bool:
-    """f and its jacobian in a state; False if they are not finite."""
-    tape, units = problem.tape, problem.units
-    values, tangents, branches = problem.series.values, problem.series.tangents, problem.series.branches
-    n, first, stop = tape.layout[0], tape.layout[3], tape.layout[4]
-    for i in range(n):
-        values[i, 0] = x[i] * units[i]
-    values[n, 0] = t
-    values_at(tape.program, tape.terms, first, stop, 0, values, branches)
-    tangents_at(tape.program, tape.terms, first, stop, 0, values, tangents)
-    s = 0.0
-    for i in range(n):
-        slope[i] = values[tape.slopes[i], 0] / units[i]
-        s += abs(slope[i])
-        for j in range(n):
-            jacobian[i, j] = tangents[tape.slopes[i], 0, j] * (units[j] / units[i])
-            s += abs(jacobian[i, j])
-    return s < math.inf
+    columns: Any  # derivative of the stages with respect to the state at the start, shape (s n, n)
+    reached: Any  # derivative of the stages with respect to the start of the interval, shape (s, n, n)
 
 
 @fused_njit(error_model="numpy")
@@ -191,7 +148,9 @@ def stages(problem: Any, method: Any, x: Any, t: float, h: float, step: Any) -> 
         for j in range(s):
             for i in range(n):
                 y[i] = x[i] + moved[j, i]
-            if not at(problem, y, t + nodes[j] * h, slopes[j], step.jacobians[j]):
+            if not slope_at(
+                problem.tape, problem.series, problem.units, t + nodes[j] * h, y, slopes[j], step.jacobians[j]
+            ):
                 return False
         for i in range(s):
             for k in range(n):

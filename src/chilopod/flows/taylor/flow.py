@@ -5,47 +5,34 @@ values of its parameters are an argument of every call, so one object serves a w
 
     traced = trace(rhs, n, args, events=[(guard, reset)])
     flow = TaylorFlow(traced.tape, edges=(0.0, T), period=T, directions=(-1.0,))
-    passage = flow.advance(x, t0, t1, traced.params, bounded=True)
-    passage.state, passage.derivative, passage.bound, passage.events
+    state, derivative, bound, steps = flow.advance(x, t0, t1, traced.params, bounded=True)
 
-* Switches of the right-hand side (sign, abs, where, floor, %, ...) are found and crossed exactly, in time and state.
-* Event k happens where its guard g_k(t, x) passes zero, rising if its direction is 1, falling if -1, either way if 0;
-  the state jumps to r_k(t, x). The derivative gets the saltation matrix. ``passage.events`` has their
-  times and numbers. What happens at the start: :func:`chilopod.flows.taylor.switching.await_events`.
-* :meth:`TaylorFlow.advance` raises ``AnalysisError`` where the motion cannot go on (see ``_REASONS``), with the time.
-* :meth:`TaylorFlow.tangents` carries any directions in place of the whole derivative.
-* :meth:`TaylorFlow.states` carries many states without derivatives, on all cores; each with parameters of its own if
-  there is a row for each.
-
-All of it is free of scales: multiply states, times or parameters by powers of ten, and the digits stay.
+Switches of the right-hand side (sign, abs, where, floor, %, ...) are found and crossed exactly, in time and state.
+Event k happens where its guard g_k(t, x) passes zero, rising if its direction is 1, falling if -1, either way if 0; the
+state jumps to r_k(t, x), and the derivative gets the saltation matrix. What happens at the start:
+:func:`chilopod.flows.taylor.switching.await_events`. All of it is free of scales: multiply states, times or parameters
+by powers of ten, and the digits stay.
 """
 
 from __future__ import annotations
 
 import functools
 import math
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chilopod.cores import cores
-from chilopod.errors import AnalysisError, ParameterError
+from chilopod.errors import ParameterError
 from chilopod.flows import deadline
+from chilopod.flows.carrying import RESOLUTION, carry_all, failure, pieces
 from chilopod.flows.tracing.evaluation import evaluate
 from chilopod.flows.tracing.tape import Tape
-from chilopod.frozen import ReadOnlyArrays, read_only
 
 Array = NDArray[np.float64]
 
-RESOLUTION = 4096
-"""A pulse in time has to be seen on a grid of so many points over the period; then it is resolved exactly."""
-
 _MOST_WORK = 1e7
 _FEWEST_STEPS = 5000
-_MOST_EVENTS = 4096
 _MOST_CLOCKS = 8  # tables of 4096 rows, of as many values of the parameters
 _FEWEST_PER_THREAD = 16
 _LEAST_TOLERANCE = 1.2e-16
@@ -57,56 +44,20 @@ _SHAKE = 4.0 * 2.0**-53
 _UNDERFLOW = 1e-290  # numbers below have no full precision
 _NOTHING = np.empty((0, 0))
 
-_REASONS = {
-    1: ("the motion diverges, or the right-hand side is not finite, at t = {t:g}", None),
-    2: (
-        "takes too many steps, and came to t = {t:g} only",
-        "method='implicit' if it is stiff, or a shorter interval",
-    ),
-    3: ("cannot be continued beyond t = {t:.17g}: a singularity, or rates beyond the resolution of time", None),
-    4: (
-        "slides along a switching surface from t = {t:g} on: the motion is pushed back from both sides",
-        "a right-hand side that says how it slides",
-    ),
-    5: ("chatters (Zeno): crossings accumulate at t = {t:g}", "a guard or a reset that ends it"),
-    6: ("grazes a switching surface at t = {t:g}: there the flow has no derivative", None),
-}
+
+class Passage(NamedTuple):
+    """Result of a flow over an interval."""
+
+    state: Array  # at the end, shape (n,)
+    derivative: Array  # with respect to the state at the start, shape (n, n)
+    bound: Array  # bound on the error of each entry of `derivative`, shape (n, n); empty if it was not asked for
+    steps: int  # number of steps
 
 
-class TooManySteps(AnalysisError):
-    """The budget of steps did not suffice, as of a right-hand side that is stiff."""
-
-
-@dataclass(frozen=True)
-class Passage(ReadOnlyArrays):
-    """Result of a flow over an interval.
-
-    Attributes
-    ----------
-    state
-        At the end, shape (n,).
-    derivative
-        With respect to the state at the start, shape (n, n).
-    bound
-        Bound on the error of each entry of ``derivative``, shape (n, n); empty if it was not asked for.
-    events
-        Time and number of each event, shape (events, 2).
-    steps
-        Steps taken.
-    """
-
-    state: Array
-    derivative: Array
-    bound: Array
-    events: Array
-    steps: int
-
-
-@dataclass(frozen=True)
-class TaylorFlow(ReadOnlyArrays):
+class TaylorFlow:
     """The flow of a tape.
 
-    Attributes
+    Parameters
     ----------
     tape
         The right-hand side, with guards and resets.
@@ -124,36 +75,29 @@ class TaylorFlow(ReadOnlyArrays):
         0 for none: then a motion that is slow only at first gets to its end.
     """
 
-    tape: Tape
-    edges: tuple[float, ...] = ()
-    period: float = math.inf
-    directions: tuple[float, ...] = ()
-    tolerance: float = _LEAST_TOLERANCE
-    patience: int = 0
-    _clocks: dict[bytes, Array] = field(init=False, repr=False, compare=False, default_factory=dict)
-
-    @functools.cached_property
-    def _directions(self) -> Array | None:
-        return np.array(self.directions, dtype=np.float64) if self.tape.switches.size else None
-
-    @functools.cached_property
-    def order(self) -> int:
-        """Order of the series, near the one of least work for its tolerance."""
-        return max(8, math.ceil(-0.65 * math.log(self._epsilon)))
+    def __init__(
+        self,
+        tape: Tape,
+        *,
+        edges: tuple[float, ...] = (),
+        period: float = math.inf,
+        directions: tuple[float, ...] = (),
+        tolerance: float = _LEAST_TOLERANCE,
+        patience: int = 0,
+    ) -> None:
+        n = tape.dimension
+        self.tape, self.edges, self.period, self.patience = tape, np.array(edges), period, patience
+        self._epsilon = max(tolerance, _LEAST_TOLERANCE)
+        self.order = max(8, math.ceil(-0.65 * math.log(self._epsilon)))  # about that of least work
+        self._shape = n, tape.parameters
+        self._directions = np.array(directions, dtype=np.float64) if tape.switches.size else None
+        self._shaken = 1.0 + _SHAKE * np.sign(np.cos(3.0 * np.arange(n) + 1.0))
+        self._clock = functools.lru_cache(_MOST_CLOCKS)(self._clock_table)
 
     @functools.cached_property
     def most_steps(self) -> int:
         """Budget of an integration: a few seconds."""
-        nodes = self.tape.program.shape[1]
-        return max(_FEWEST_STEPS, int(_MOST_WORK / (nodes * (1 + self.tape.dimension))))
-
-    @functools.cached_property
-    def _epsilon(self) -> float:
-        return max(self.tolerance, _LEAST_TOLERANCE)
-
-    @functools.cached_property
-    def _shaken(self) -> Array:
-        return read_only(1.0 + _SHAKE * np.sign(np.cos(3.0 * np.arange(self.tape.dimension) + 1.0)))
+        return max(_FEWEST_STEPS, int(_MOST_WORK / (self.tape.program.shape[1] * (1 + self.tape.dimension))))
 
     def advance(
         self, x: Array, t0: float, t1: float, params: Array, *, derived: bool = True, bounded: bool = False
@@ -176,11 +120,11 @@ class TaylorFlow(ReadOnlyArrays):
         x, params = np.array(x, dtype=np.float64), np.array(params, dtype=np.float64)
         if not bounded:
             derivative = np.eye(n) if derived else np.empty((n, 0))
-            events, steps = self._run(x, (t0, t1), params, derivative)
-            return Passage(x, derivative, _NOTHING, events, steps)
+            steps = self._run(x, (t0, t1), params, derivative)
+            return Passage(x, derivative, _NOTHING, steps)
         other_x = x.copy()
         derivative, bound, other = np.eye(n), np.zeros((n, n)), np.eye(n)
-        events, steps = self._run(x, (t0, t1), params, derivative, bound)
+        steps = self._run(x, (t0, t1), params, derivative, bound)
         self._run(other_x * self._shaken, (t0, t1), params, other, other=True)
         difference = np.abs(other - derivative)
         # An entry that is zero but for round-off says nothing of how much the others differ.
@@ -189,7 +133,7 @@ class TaylorFlow(ReadOnlyArrays):
         ratios = np.sort(difference[known] / bound[known])
         usual = float(ratios[ratios.size // 2]) if ratios.size else 0.0
         bound = bound * (1.0 + _COMMON * usual) + _OWN * difference
-        return Passage(x, derivative, bound, events, steps)
+        return Passage(x, derivative, bound, steps)
 
     def tangents(self, x: Array, directions: Array, t0: float, t1: float, params: Array) -> tuple[Array, Array]:
         """State at t1, and the derivative with respect to ``x`` times ``directions``, shape (n, any number).
@@ -209,16 +153,10 @@ class TaylorFlow(ReadOnlyArrays):
         rows = np.array(np.broadcast_to(params, (states.shape[0], params.shape[-1])), order="C")
         none, stop = np.empty((self.tape.dimension, 0)), deadline.stop()
 
-        def carry(numbers: range) -> None:
-            for i in numbers:
-                self._run(states[i], (t0, t1), rows[i], none, stop=stop)
+        def carry(i: int) -> None:
+            self._run(states[i], (t0, t1), rows[i], none, stop=stop)
 
-        threads = min(cores(), states.shape[0] // _FEWEST_PER_THREAD)
-        if threads > 1:
-            with ThreadPoolExecutor(threads) as pool:
-                list(pool.map(carry, (range(i, states.shape[0], threads) for i in range(threads))))
-        else:
-            carry(range(states.shape[0]))
+        carry_all(carry, len(states), _FEWEST_PER_THREAD)
         return states
 
     def _run(
@@ -232,75 +170,36 @@ class TaylorFlow(ReadOnlyArrays):
         other: bool = False,
         stepwise: bool = True,
         stop: Array | None = None,
-    ) -> tuple[Array, int]:
-        """Carry state, derivative and bound over an interval in place; events and number of steps. The ``other`` of two
+    ) -> int:
+        """Carry state, derivative and bound over an interval in place; number of steps. The ``other`` of two
         computations has another order and other steps."""
         kernels = _compiled()
         stop = deadline.stop() if stop is None else stop
-        n, parameters = int(self.tape.layout[0]), int(self.tape.layout[1])
+        n, parameters = self._shape
         if not (x.shape == derivative.shape[:1] == (n,) and params.shape == (parameters,)):
             # Compiled code would read beyond them.
             raise ParameterError("has the wrong shape", field="x", value=x.shape, allowed=f"({n},)")
-        events, report = np.empty((_MOST_EVENTS if self.directions else 0, 2)), np.zeros(4)
+        report, steps = np.zeros(2), 0
         order, shake = (self.order - _OTHER_ORDER, _SHAKE) if other else (self.order, 0.0)
         control = kernels.Control(self._epsilon, order, self.most_steps, self.patience, shake, stepwise, stop)
-        outcome = kernels.Outcome(derivative, bound, events, report)
-        seen = []
-        steps = 0
-        clock = self._clock(params)
-        for span in self._pieces(*interval):
+        outcome = kernels.Outcome(derivative, bound, report)
+        clock = self._clock(params.tobytes())
+        for span in pieces(self.edges, self.period, float(interval[0]), float(interval[1])):
             status = kernels.advance(self.tape, self._directions, clock, params, x, span, control, outcome)
             if status:
-                raise _failure(status, report[3])
+                raise failure(status, report[1])
             steps += int(report[0])
-            if report[2]:
-                seen.append(events[: int(report[2])].copy())
-        return (np.concatenate(seen) if seen else np.empty((0, 2))), steps
+        return steps
 
-    def _clock(self, params: Array) -> tuple[Array, float]:
-        if self.tape.clocks.size == 0:
-            return _NO_CLOCK
-        key = params.tobytes()
-        table = self._clocks.get(key)
-        if table is None:
-            table = _clock_table(self.tape, self.period, params)
-            if len(self._clocks) >= _MOST_CLOCKS:
-                self._clocks.clear()
-            self._clocks[key] = table
-        return table, self.period
-
-    def _pieces(self, t0: float, t1: float) -> list[tuple[float, float]]:
-        """[t0, t1] cut at the edges."""
-        t0, t1 = float(t0), float(t1)
-        if len(self.edges) == 0:
-            return [(t0, t1)] if t1 > t0 else []
-        return pieces(np.asarray(self.edges), self.period, t0, t1)
-
-
-_NO_CLOCK = (np.zeros((0, 0)), 1.0)
-
-
-def _clock_table(tape: Tape, period: float, params: Array) -> Array:
-    times = period * np.arange(RESOLUTION) / RESOLUTION
-    values = evaluate(tape, times, np.zeros((tape.dimension, 1)), params)[tape.clocks]
-    values = np.where(np.isfinite(values), values, 0.0)
-    return np.ascontiguousarray(np.column_stack([values, np.abs(values).max(axis=1)]))
-
-
-def pieces(edges: Array, period: float, t0: float, t1: float) -> list[tuple[float, float]]:
-    """Cut [t0, t1] at times that come again every period; ``edges`` run from 0 to the period."""
-    first, last = int(np.floor(t0 / period)), int(np.ceil(t1 / period))
-    switches = [float(k * period + e) for k in range(first, last + 1) for e in edges[:-1]]
-    inside = [t for t in switches if t0 + 1e-12 * period < t < t1 - 1e-12 * period]
-    cuts = [t0, *inside, t1]
-    return [(a, b) for a, b in zip(cuts, cuts[1:], strict=False) if b > a]
-
-
-def _failure(status: int, t: float) -> AnalysisError:
-    if status not in _REASONS:
-        return deadline.over()
-    reason, advice = _REASONS[status]
-    return (TooManySteps if status == 2 else AnalysisError)(reason.format(t=t), field="rhs", allowed=advice)
+    def _clock_table(self, params: bytes) -> tuple[Array, float]:
+        """Functions of time on a grid over the period, the last of each the largest modulus, and the period."""
+        tape = self.tape
+        if tape.clocks.size == 0:
+            return np.zeros((0, 0)), 1.0
+        times, anywhere = self.period * np.arange(RESOLUTION) / RESOLUTION, np.zeros((tape.dimension, 1))
+        values = evaluate(tape, tape.clocks, times, anywhere, np.frombuffer(params))
+        values = np.where(np.isfinite(values), values, 0.0)
+        return np.ascontiguousarray(np.column_stack([values, np.abs(values).max(axis=1)])), self.period
 
 
 @functools.cache

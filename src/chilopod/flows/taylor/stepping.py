@@ -19,25 +19,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from chilopod.compiled import fused_njit
+from chilopod.flows.carrying import BUDGET, CHATTERS, DONE, GRAZES, NOT_FINITE, STALLED, TIME_OVER
 from chilopod.flows.taylor.exits import first_exit
 from chilopod.flows.taylor.step_length import agrees, step_size
-from chilopod.flows.taylor.switching import (
-    BUDGET,
-    CHATTERS,
-    DONE,
-    GRAZES,
-    NOT_FINITE,
-    STALLED,
-    TIME_OVER,
-    Motion,
-    await_events,
-    cross,
-    is_timed,
-    settle,
-    start,
-)
+from chilopod.flows.taylor.switching import Motion, await_events, cross, is_timed, settle, start
 from chilopod.flows.tracing import tape as ops
-from chilopod.flows.tracing.series import LANES, Series, expand, load
+from chilopod.flows.tracing.series import expand, loaded
 
 _ROUNDING = 2.0**-53
 _FIRST = 0.37  # of the interval: the first step of the second of two computations is no longer
@@ -47,56 +34,27 @@ _AT_ONCE = 1e-13
 
 
 class Control(NamedTuple):
-    """How an integration steps.
+    """How an integration steps."""
 
-    Attributes
-    ----------
-    epsilon
-        Truncation error of a step relative to the size of each state and entry of the derivative.
-    order
-        Order of the series.
-    most_steps
-        Budget of steps in an interval.
-    patience
-        Number of steps after which, and at every doubling, the budget has to suffice for the rest of the interval at
-        the mean length of a step so far; 0 for never.
-    shake
-        Relative error made in every state after every step, and in the time before it: round-off, enlarged.
-    stepwise
-        True if every step computes its own derivative, by which that so far is then multiplied; else it carries the
-        columns of the derivative along, of which there may be any number: directions.
-    stop
-        Shape (1,); not zero once there is no more time.
-    """
-
-    epsilon: float
-    order: int
-    most_steps: int
+    epsilon: float  # truncation error of a step relative to the size of each state and entry of the derivative
+    order: int  # order of the series
+    most_steps: int  # budget of steps in an interval
+    # number of steps after which, and at every doubling, the budget has to suffice for the rest of the interval at the
+    # mean length of a step so far; 0 for never
     patience: int
-    shake: float
+    shake: float  # relative error made in every state after every step, and in the time before it: round-off, enlarged
+    # true if every step computes its own derivative, by which that so far is then multiplied; else it carries the
+    # columns of the derivative along, of which there may be any number: directions
     stepwise: bool
-    stop: Any
+    stop: Any  # shape (1,); not zero once there is no more time
 
 
 class Outcome(NamedTuple):
-    """Results that an integration fills in.
+    """Results that an integration fills in."""
 
-    Attributes
-    ----------
-    derivative
-        Shape (n, columns), multiplied by the derivative; shape (n, 0) for none.
-    bound
-        Bound of its error where steps compute their own derivatives, shape (n, n); shape (0, 0) for none.
-    events
-        Time and number of the events, shape (most, 2).
-    report
-        Number of steps, of crossings, of events, and the time reached, shape (4,).
-    """
-
-    derivative: Any
-    bound: Any
-    events: Any
-    report: Any
+    derivative: Any  # shape (n, columns), multiplied by the derivative; shape (n, 0) for none
+    bound: Any  # bound of its error where steps compute their own derivatives, shape (n, n); shape (0, 0) for none
+    report: Any  # number of steps, and the time reached, shape (2,)
 
 
 class _Block(NamedTuple):
@@ -152,9 +110,7 @@ def _absorb(block: Any, count: int, total: Any, bound: Any) -> None:
     """
     n = total.shape[0]
     before = np.empty((count + 1, n, n))
-    for i in range(n):
-        for j in range(n):
-            before[0, i, j] = 1.0 if i == j else 0.0
+    _assign(before[0], np.eye(n))
     for s in range(count):
         _assign(before[s + 1], block.factors[s] @ before[s])
     after = np.eye(n)
@@ -226,13 +182,13 @@ def _step(tape: Any, motion: Any, control: Any, h: float, noise: int, factor: An
 @fused_njit(error_model="numpy", inline="always")
 def _bound_step(tangents: Any, order: int, h: float, error: Any) -> None:
     """Bound on the error of the derivative of a step: the round-off of its terms, and the last of them."""
-    n = error.shape[0]
+    n, last = error.shape[0], h**order
     for i in range(n):
         for j in range(n):
             s = 0.0
             for k in range(order, 0, -1):
                 s = (s + abs(tangents[i, k, j])) * h
-            error[i, j] = 4.0 * _ROUNDING * s + abs(tangents[i, order, j]) * h**order
+            error[i, j] = 4.0 * _ROUNDING * s + abs(tangents[i, order, j]) * last
         error[i, i] += 2.0 * _ROUNDING
 
 
@@ -285,43 +241,22 @@ def _spent(control: Any, steps: int, done: float, whole: float) -> int:
 @fused_njit(error_model="numpy")
 def _begun(tape: Any, params: Any, x: Any, control: Any, derivative: Any) -> Any:
     """The motion at its start, with room for its series."""
-    n, order, nodes, switches = tape.layout[0], control.order, tape.layout[5], tape.switches.shape[1]
-    columns = derivative.shape[1]
-    lanes = (columns + LANES - 1) // LANES * LANES
-    series = Series(np.zeros((nodes, order + 1)), np.zeros((nodes, order + 1, lanes)), np.zeros(switches))
-    load(tape, params, series)
-    return Motion(x, np.eye(n) if control.stepwise and columns > 0 else derivative, series, np.zeros(switches))
-
-
-@fused_njit(error_model="numpy")
-def _noted(events: Any, passed: int, t: float, event: int) -> int:
-    """Note an event, if there is room and it is one; returns how many there have been."""
-    if event < 0:
-        return passed
-    if passed < events.shape[0]:
-        events[passed, 0] = t
-        events[passed, 1] = event
-    return passed + 1
+    columns, switches = derivative.shape[1], tape.switches.shape[1]
+    series = loaded(tape, params, control.order + 1, columns, np.zeros(switches))
+    seeds = np.eye(x.size) if control.stepwise and columns > 0 else derivative
+    return Motion(x, seeds, series, np.zeros(switches))
 
 
 @fused_njit(error_model="numpy", nogil=True)
 def advance(tape: Any, directions: Any, clock: Any, params: Any, x: Any, span: Any, control: Any, outcome: Any) -> int:
-    """Carry a state over an interval in place.
+    """Carry a state x, shape (n,), over an interval from the start to the end of a span in place; how it ends.
 
     Parameters
     ----------
-    tape
-        :class:`chilopod.flows.tracing.tape.Tape`.
     directions
-        Directions of its events; None where the tape has no switches, and what goes through them is not compiled.
+        Directions of the events; None where the tape has no switches, and what goes through them is not compiled.
     clock
         Values of the functions of time on a grid over the period, the last of each the largest modulus, and the period.
-    params, x
-        Values of the parameters, and the state, shape (n,).
-    span
-        Start and end of the interval.
-    control, outcome
-        :class:`Control` and :class:`Outcome`.
     """
     t0, t1 = span
     n, order, switches = tape.layout[0], control.order, tape.switches.shape[1]
@@ -333,7 +268,7 @@ def advance(tape: Any, directions: Any, clock: Any, params: Any, x: Any, span: A
     factor, work = np.empty((n, columns)), np.empty(order + 1)
     t, last, unit = t0, t0 - (t1 - t0), (t1 - t0) / 8.0
     status = DONE
-    steps, crossings, passed, in_place, in_block, noise = 0, 0, 0, 0, 0, 1
+    steps, in_place, in_block, noise = 0, 0, 0, 1
     at_once = _AT_ONCE * max(abs(t0), abs(t1))
     if directions is not None:
         start(tape, motion, t)
@@ -369,17 +304,14 @@ def advance(tape: Any, directions: Any, clock: Any, params: Any, x: Any, span: A
         t = reached
         unit *= min(max(h, 1e-3), 1e3) if h > 0.0 else 1.0
         if directions is not None and crossing >= 0:
-            crossings += 1
-            status, event = cross(tape, directions, motion, crossing, direction, unit, t, factor)
+            status = cross(tape, directions, motion, crossing, direction, unit, t, factor)
             if status == GRAZES and t - last <= 1e-6 * (t - t0):
                 status = CHATTERS
             last = t
-            passed = _noted(outcome.events, passed, t, event)
             if with_bound:
                 _assign(block.errors[in_block], 16.0 * _ROUNDING * np.abs(factor))
             in_block = _multiply(block, in_block, factor, control.stepwise, outcome)
     if with_bound and in_block > 0:
         _absorb(block, in_block, outcome.derivative, outcome.bound)
-    report = outcome.report
-    report[0], report[1], report[2], report[3] = steps, crossings, passed, t
+    outcome.report[0], outcome.report[1] = steps, t
     return status

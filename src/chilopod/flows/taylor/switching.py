@@ -2,43 +2,25 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from chilopod.compiled import fused_njit
-from chilopod.flows.tracing import tape as ops
-from chilopod.flows.tracing.series import Series, expand, values_at
-
-STEP, FLOOR, GUARD = ops.STEP, ops.FLOOR, ops.GUARD
-
-DONE, NOT_FINITE, BUDGET, STALLED, SLIDES, CHATTERS, GRAZES, TIME_OVER = range(8)
-"""How an integration ends."""
+from chilopod.flows.carrying import DONE, GRAZES, SLIDES
+from chilopod.flows.tracing.series import FLOOR, GUARD, Series, branch_at, choose, expand, expand_values, values_at
 
 _ZERO = 1e-13
 """A switching function this small, relative to what it was before, is zero."""
 
 
 class Motion(NamedTuple):
-    """A state on its way, and its series there.
+    """A state on its way, and its series there."""
 
-    Attributes
-    ----------
-    x
-        State, shape (n,).
-    seeds
-        Directions of the tangents, shape (n, columns).
-    series
-        Series of all nodes from the state.
-    scales
-        Largest value of every switching function so far, shape (switches,).
-    """
-
-    x: Any
-    seeds: Any
-    series: Any
-    scales: Any
+    x: Any  # state, shape (n,)
+    seeds: Any  # directions of the tangents, shape (n, columns)
+    series: Any  # series of all nodes from the state
+    scales: Any  # largest value of every switching function so far, shape (switches,)
 
 
 @fused_njit(error_model="numpy", inline="always")
@@ -54,28 +36,13 @@ def start(tape: Any, motion: Any, t: float) -> None:
 
 
 @fused_njit(error_model="numpy")
-def _expand_values(tape: Any, series: Any, unit: float) -> None:
-    """The first two coefficients of f, without tangents."""
-    alone = Series(series.values, series.tangents[:, :, :0], series.branches)
-    expand(tape, 1, tape.layout[4], unit, alone)
-
-
-@fused_njit(error_model="numpy")
 def settle(tape: Any, motion: Any, unit: float) -> int:
     """Choose the branch of every switch at a state; where its function is zero, by where that goes."""
-    program, switches = tape.program, tape.switches
+    switches = tape.switches
     values, branches, scales = motion.series.values, motion.series.branches, motion.scales
-    for i in range(tape.layout[3], tape.layout[4]):
-        if program[0, i] == STEP:
-            branches[program[2, i]] = 1.0 if values[program[1, i], 0] >= 0.0 else -1.0
-        elif program[0, i] == FLOOR:
-            branches[program[2, i]] = math.floor(values[program[1, i], 0])
-        values_at(program, tape.terms, i, i + 1, 0, values, branches)
-    for s in range(switches.shape[1]):
-        if switches[0, s] == GUARD:
-            branches[s] = 1.0 if values[switches[1, s], 0] >= 0.0 else -1.0
+    choose(tape, motion.series)
     for _ in range(2):
-        _expand_values(tape, motion.series, unit)
+        expand_values(tape, 1, tape.layout[4], unit, motion.series)
         settled = True
         for s in range(switches.shape[1]):
             g = values[switches[1, s], 0]
@@ -106,22 +73,17 @@ def is_timed(tape: Any, s: int) -> bool:
 @fused_njit(error_model="numpy")
 def _carry_over(tape: Any, motion: Any, switched: int, surfaces: Any) -> None:
     """Choose anew the branches of the switches whose own functions jump where another one switches."""
-    program, switches = tape.program, tape.switches
+    program, terms, slopes, switches = tape.program, tape.terms, tape.slopes, tape.switches
     values, branches, scales = motion.series.values, motion.series.branches, motion.scales
-    for i in range(tape.layout[3], tape.layout[4]):
-        if program[0, i] == STEP or program[0, i] == FLOOR:
-            s = program[2, i]
-            g = values[program[1, i], 0]
-            if s != switched and abs(g - surfaces[s]) > _ZERO * scales[s]:
-                if program[0, i] == FLOOR:
-                    branches[s] = math.floor(g)
-                else:
-                    branches[s] = 1.0 if g >= 0.0 else -1.0
-        values_at(program, tape.terms, i, i + 1, 0, values, branches)
+    first = tape.layout[3]
     for s in range(switches.shape[1]):
+        stop = tape.layout[4] if switches[0, s] == GUARD else switches[2, s]
+        values_at(program, terms, slopes, first, stop, 0, 1.0, values, branches)
+        first = stop
         g = values[switches[1, s], 0]
-        if switches[0, s] == GUARD and abs(g - surfaces[s]) > _ZERO * scales[s]:
-            branches[s] = 1.0 if g >= 0.0 else -1.0
+        if s != switched and abs(g - surfaces[s]) > _ZERO * scales[s]:
+            branches[s] = branch_at(switches[0, s], g)
+    values_at(program, terms, slopes, first, tape.layout[4], 0, 1.0, values, branches)
 
 
 @fused_njit(error_model="numpy")
@@ -141,13 +103,9 @@ def _reset(tape: Any, motion: Any, event: int, before: Any, jump: Any) -> bool:
 
 
 @fused_njit(error_model="numpy")
-def cross(
-    tape: Any, directions: Any, motion: Any, s: int, direction: float, unit: float, t: float, jump: Any
-) -> tuple[int, int]:
-    """Go through a switch or an event: the state after it in ``x``, its derivative times ``seeds`` in ``jump``.
-
-    Returns the status, and the number of the event or -1.
-    """
+def cross(tape: Any, directions: Any, motion: Any, s: int, direction: float, unit: float, t: float, jump: Any) -> int:
+    """Go through a switch or an event: the state after it in ``x``, its derivative times ``seeds`` in ``jump``; how it
+    ends."""
     n, switches = tape.layout[0], tape.switches
     values, branches = motion.series.values, motion.series.branches
     g = switches[1, s]
@@ -170,14 +128,14 @@ def cross(
     if moves:
         status = settle(tape, motion, unit)
         if status != DONE:
-            return status, event
+            return status
     elif switches[0, s] == GUARD:
-        return DONE, event  # f does not switch here
+        return DONE  # f does not switch here
     else:
         _carry_over(tape, motion, s, surfaces)
-    _expand_values(tape, motion.series, unit)
+    expand_values(tape, 1, tape.layout[4], unit, motion.series)
     if not moves and values[g, 1] * direction < 0.0:
-        return SLIDES, event
+        return SLIDES
     steepest = 0.0
     for j in range(gradient.size):
         steepest = max(steepest, abs(gradient[j]))
@@ -187,13 +145,13 @@ def cross(
             if values[i, 1] != before[i]:
                 differs = True
         if differs and slope * direction <= 0.0:
-            return GRAZES, event
+            return GRAZES
         if differs:
             for i in range(n):
                 f = (values[i, 1] - before[i]) / slope
                 for j in range(jump.shape[1]):
                     jump[i, j] += f * gradient[j]
-    return DONE, event
+    return DONE
 
 
 @fused_njit(error_model="numpy")

@@ -54,12 +54,14 @@ def describe(value: Any, floats: list[float], seen: dict[int, int]) -> Any:
     Opaque
         If it holds objects of unknown kinds.
     """
-    value = python_function(value)
     if isinstance(value, float | np.floating):  # np.float64 is a float
         floats.append(float(value))
         return "f"
     if isinstance(value, _PLAIN):
         return type(value).__name__, value
+    if isinstance(value, types.ModuleType | types.BuiltinFunctionType | type | np.ufunc):
+        return "id", id(value)
+    value = python_function(value)
     if isinstance(value, np.ndarray):
         if value.dtype.kind == "f":
             floats += value.ravel().tolist()
@@ -87,11 +89,8 @@ def describe(value: Any, floats: list[float], seen: dict[int, int]) -> Any:
         )
     if isinstance(value, functools.partial):
         return "partial", *(describe(part, floats, seen) for part in (value.func, value.args, value.keywords))
-    if isinstance(value, types.MethodType | types.ModuleType | types.BuiltinFunctionType | type | np.ufunc) or (
-        callable(value) and (getattr(value, "__module__", None) or "").partition(".")[0] in _OUTSIDE
-    ):
-        if isinstance(value, types.MethodType):
-            raise Opaque
+    outside = callable(value) and (getattr(value, "__module__", None) or "").partition(".")[0] in _OUTSIDE
+    if outside and not isinstance(value, types.MethodType):
         return "id", id(value)
     raise Opaque
 

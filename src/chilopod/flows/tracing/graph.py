@@ -7,50 +7,32 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from chilopod.flows.tracing.tape import (
-    ASIN,
-    ATAN,
-    CONSTANT,
-    COS,
-    COSH,
-    EXP,
-    FLOOR,
-    LINEAR,
-    LOG,
-    MOVING,
-    NUMBER,
-    PARAMETER,
-    POWER,
-    PRODUCT,
-    QUOTIENT,
-    SELECT,
-    SIN,
-    SINH,
-    SQRT,
-    SQUARE,
-    STATE,
-    STEP,
-    TAN,
-    TANH,
-    TIME,
-    TIMED,
-)
+from chilopod.flows.tracing import tape as ops
 
 Node = tuple[int, tuple[int, ...]]
 
 _FUNCTIONS = {
-    EXP: math.exp,
-    SIN: math.sin,
-    COS: math.cos,
-    TAN: math.tan,
-    SINH: math.sinh,
-    COSH: math.cosh,
-    TANH: math.tanh,
-    LOG: math.log,
-    SQRT: math.sqrt,
-    ATAN: math.atan,
-    ASIN: math.asin,
+    ops.EXP: math.exp,
+    ops.SIN: math.sin,
+    ops.COS: math.cos,
+    ops.TAN: math.tan,
+    ops.SINH: math.sinh,
+    ops.COSH: math.cosh,
+    ops.TANH: math.tanh,
+    ops.LOG: math.log,
+    ops.SQRT: math.sqrt,
+    ops.ATAN: math.atan,
+    ops.ASIN: math.asin,
 }
+
+
+_DERIVATIVES = {
+    ops.EXP: ops.EXP,
+    **{ops.SIN: ops.COS, ops.COS: ops.SIN, ops.SINH: ops.COSH, ops.COSH: ops.SINH},
+}
+"""Functions w of the same operand with c' = w a'; that of the cosine has a sign of its own."""
+
+LEAVES = {ops.STATE: ops.MOVING, ops.TIME: ops.TIMED, ops.PARAMETER: ops.CONSTANT, ops.NUMBER: ops.CONSTANT}
 
 
 class Graph:
@@ -61,49 +43,35 @@ class Graph:
         self.depends: list[int] = []
         self.weights: dict[int, int] = {}  # w of every function node
         self._known: dict[Node, int] = {}
-        self.states = [self._new(STATE, (i,)) for i in range(dimension)]
-        self.time = self._new(TIME, ())
-        self.parameters = [self._new(PARAMETER, (i,)) for i in range(parameters)]
-        self._values: list[float] = []
+        self.states = [self._new(ops.STATE, (i,)) for i in range(dimension)]
+        self.time = self._new(ops.TIME, ())
+        self.parameters = [self._new(ops.PARAMETER, (i,)) for i in range(parameters)]
 
     def _new(self, code: int, operands: tuple[int, ...]) -> int:
         node = (code, operands)
         found = self._known.get(node)
         if found is not None:
             return found
-        if code == STATE:
-            depends = MOVING
-        elif code == TIME:
-            depends = TIMED
-        elif code in (PARAMETER, NUMBER):
-            depends = CONSTANT
-        else:
-            depends = max((self.depends[i] for i in operands), default=CONSTANT)
+        depends = LEAVES.get(code)
         self.nodes.append(node)
-        self.depends.append(depends)
+        self.depends.append(max(self.depends[i] for i in operands) if depends is None else depends)
         self._known[node] = len(self.nodes) - 1
         return len(self.nodes) - 1
 
     def number(self, value: float) -> int:
         """The node of a number."""
-        value = float(value)
         # The bits, because NaN equals nothing and 0.0 equals -0.0.
-        bits = int(np.float64(value).view(np.int64))
-        known = len(self.nodes)
-        node = self._new(NUMBER, (bits,))
-        if node == known:
-            self._values.append(value)
-        return node
+        return self._new(ops.NUMBER, (int(np.float64(value).view(np.int64)),))
 
     def value(self, node: int) -> float | None:
         """The value of a number node, None of any other."""
         code, operands = self.nodes[node]
-        return float(np.int64(operands[0]).view(np.float64)) if code == NUMBER else None
+        return float(np.int64(operands[0]).view(np.float64)) if code == ops.NUMBER else None
 
     def terms(self, node: int) -> list[tuple[int, int]]:
         """A node as a sum: pairs of weight and node."""
         code, operands = self.nodes[node]
-        if code == LINEAR:
+        if code == ops.LINEAR:
             return list(zip(operands[::2], operands[1::2], strict=True))
         return [(self.number(1.0), node)]
 
@@ -125,23 +93,22 @@ class Graph:
             if node in kept:
                 other = self.value(kept[node])
                 if w is not None and other is not None:
+                    kept[node] = self.number(w + other)
                     if w + other == 0.0:
                         del kept[node]
-                    else:
-                        kept[node] = self.number(w + other)
                     continue
                 weight = self.linear([(self.number(1.0), kept[node]), (self.number(1.0), weight)])
             kept[node] = weight
         one = self.number(1.0)
-        if constant != 0.0 or not kept:
-            if not kept:
-                return self.number(constant)
+        if not kept:
+            return self.number(constant)
+        if constant != 0.0:
             kept[self.number(constant)] = one
         if len(kept) == 1:
             ((node, weight),) = kept.items()
             if weight == one:
                 return node
-        return self._new(LINEAR, tuple(i for node in sorted(kept) for i in (kept[node], node)))
+        return self._new(ops.LINEAR, tuple(i for node in sorted(kept) for i in (kept[node], node)))
 
     def add(self, a: int, b: int, sign: float = 1.0) -> int:
         """a + sign b."""
@@ -161,30 +128,27 @@ class Graph:
                 return self.number(0.0)
             if va == 1.0:
                 return b
-            if self.nodes[b][0] == LINEAR and len(self.nodes[b][1]) == 2:
+            if self.nodes[b][0] == ops.LINEAR and len(self.nodes[b][1]) == 2:
                 weight, node = self.nodes[b][1]
                 return self.linear([(self.multiply(a, weight), node)])
-        if self.depends[a] == CONSTANT and self.depends[b] != CONSTANT:
+        if self.depends[a] == ops.CONSTANT and self.depends[b] != ops.CONSTANT:
             return self.linear([(a, b)])
         if va is not None:
             return self.linear([(a, b)])
         if a == b:
-            return self._new(SQUARE, (a,))
+            return self._new(ops.SQUARE, (a,))
         # Numbers in front of a factor go in front of the product, where they cost nothing.
         for one, other in ((a, b), (b, a)):
             code, operands = self.nodes[one]
-            if code == LINEAR and len(operands) == 2 and self.depends[other] != CONSTANT:
+            if code == ops.LINEAR and len(operands) == 2 and self.depends[other] != ops.CONSTANT:
                 return self.linear([(operands[0], self.multiply(operands[1], other))])
         for one, other in ((a, b), (b, a)):
-            if self.depends[one] == MOVING and self.nodes[other] == (SQUARE, (one,)):
-                return self._cube(one, other)
-        return self._new(PRODUCT, (a, b))
-
-    def _cube(self, a: int, square: int) -> int:
-        """As a function with w = 3 a^2, which saves two of three products in the tangents."""
-        node = self._new(POWER, (a, self.number(3.0)))
-        self.weights[node] = self.linear([(self.number(3.0), square)])
-        return node
+            if self.depends[one] == ops.MOVING and self.nodes[other] == (ops.SQUARE, (one,)):
+                # A cube is a function with w = 3 a^2, which saves two of three products in the tangents.
+                node = self._new(ops.POWER, (one, self.number(3.0)))
+                self.weights[node] = self.linear([(self.number(3.0), other)])
+                return node
+        return self._new(ops.PRODUCT, (a, b))
 
     def divide(self, a: int, b: int) -> int:
         """a / b."""
@@ -196,17 +160,17 @@ class Graph:
                 return self.multiply(self.number(1.0 / vb), a)  # exact
         if va == 0.0 and vb is None:
             return self.number(0.0)
-        if self.depends[b] == CONSTANT and self.depends[a] != CONSTANT:
-            return self.multiply(self._new(QUOTIENT, (self.number(1.0), b)), a)
-        return self._new(QUOTIENT, (a, b))
+        if self.depends[b] == ops.CONSTANT and self.depends[a] != ops.CONSTANT:
+            return self.multiply(self._new(ops.QUOTIENT, (self.number(1.0), b)), a)
+        return self._new(ops.QUOTIENT, (a, b))
 
     def power(self, a: int, exponent: int) -> int:
         """a to the power of another node."""
         number = self.value(exponent)
         if number is None:
-            if self.depends[exponent] == CONSTANT:
+            if self.depends[exponent] == ops.CONSTANT:
                 return self._general_power(a, exponent)
-            return self.function(EXP, self.multiply(exponent, self.function(LOG, a)))
+            return self.function(ops.EXP, self.multiply(exponent, self.function(ops.LOG, a)))
         if number == 0.0:
             return self.number(1.0)
         twice = 2.0 * number
@@ -214,7 +178,7 @@ class Graph:
             return self._general_power(a, exponent)
         if number < 0:
             return self.divide(self.number(1.0), self.power(a, self.number(-number)))
-        result = None if number == math.floor(number) else self.function(SQRT, a)
+        result = None if number == math.floor(number) else self.function(ops.SQRT, a)
         whole = int(number)
         while whole:
             if whole & 1:
@@ -229,7 +193,7 @@ class Graph:
         va, ve = self.value(a), self.value(exponent)
         if va is not None and ve is not None and va > 0:
             return self.number(va**ve)
-        node = self._new(POWER, (a, exponent))
+        node = self._new(ops.POWER, (a, exponent))
         if node not in self.weights:
             self.weights[node] = -1
             self.weights[node] = self.multiply(exponent, self.divide(node, a))
@@ -248,24 +212,20 @@ class Graph:
             return node
         one = self.number(1.0)
         self.weights[node] = -1  # w may be made of the node itself
-        if code == EXP:
-            weight = node
-        elif code in (SIN, COS):
-            weight = self.function(COS if code == SIN else SIN, a)
-        elif code in (SINH, COSH):
-            weight = self.function(COSH if code == SINH else SINH, a)
-        elif code == TAN:
+        if code in _DERIVATIVES:
+            weight = self.function(_DERIVATIVES[code], a)
+        elif code == ops.TAN:
             weight = self.add(one, self.multiply(node, node))
-        elif code == TANH:
+        elif code == ops.TANH:
             weight = self.add(one, self.multiply(node, node), -1.0)
-        elif code == LOG:
+        elif code == ops.LOG:
             weight = self.divide(one, a)
-        elif code == SQRT:
+        elif code == ops.SQRT:
             weight = self.divide(self.number(0.5), node)
-        elif code == ATAN:
+        elif code == ops.ATAN:
             weight = self.divide(one, self.add(one, self.multiply(a, a)))
         else:  # ASIN
-            weight = self.divide(one, self.function(SQRT, self.add(one, self.multiply(a, a), -1.0)))
+            weight = self.divide(one, self.function(ops.SQRT, self.add(one, self.multiply(a, a), -1.0)))
         self.weights[node] = weight
         return node
 
@@ -275,24 +235,22 @@ class Graph:
         if value is not None:
             return self.number(math.copysign(1.0, value) if value else 0.0)
         code, operands = self.nodes[a]
-        if code == STEP:
+        if code == ops.STEP:
             return a
-        if code == LINEAR and len(operands) == 2:  # one switch for every multiple of a switching function
+        if code == ops.LINEAR:
             weight = self.value(operands[0])
-            if weight is not None:
+            if weight is not None and len(operands) == 2:  # one switch for every multiple of a switching function
                 return self.multiply(self.number(math.copysign(1.0, weight)), self.step(operands[1]))
-        if code == LINEAR:
-            weight = self.value(operands[0])
             if weight is not None and weight < 0:
                 minus = self.number(-1.0)
                 turned = self.linear([(self.multiply(minus, weight), node) for weight, node in self.terms(a)])
                 return self.multiply(minus, self.step(turned))
-        return self._new(STEP, (a,))
+        return self._new(ops.STEP, (a,))
 
     def floor(self, a: int) -> int:
         """The largest whole number below a node."""
         value = self.value(a)
-        return self._new(FLOOR, (a,)) if value is None else self.number(math.floor(value))
+        return self._new(ops.FLOOR, (a,)) if value is None else self.number(math.floor(value))
 
     def select(self, switch: int, above: int, below: int) -> int:
         """One node where another is positive, else a third."""
@@ -303,14 +261,14 @@ class Graph:
         if value is not None:
             return above if value > 0 else below
         code, operands = self.nodes[sign]
-        if code == LINEAR:  # minus a step
-            return self._new(SELECT, (operands[1], below, above))
-        return self._new(SELECT, (sign, above, below))
+        if code == ops.LINEAR:  # minus a step
+            return self._new(ops.SELECT, (operands[1], below, above))
+        return self._new(ops.SELECT, (sign, above, below))
 
     def operands(self, node: int) -> list[int]:
         """The nodes a node is computed from, weights included."""
         code, operands = self.nodes[node]
-        return [] if code in (STATE, TIME, PARAMETER, NUMBER) else list(operands)
+        return [] if code in LEAVES else list(operands)
 
     def parameters_below(self, node: int) -> frozenset[int]:
         """Numbers of the parameters that a node depends on."""
@@ -321,4 +279,4 @@ class Graph:
             if node not in seen:
                 seen.add(node)
                 ahead += self.operands(node)
-        return frozenset(self.nodes[i][1][0] for i in seen if self.nodes[i][0] == PARAMETER)
+        return frozenset(self.nodes[i][1][0] for i in seen if self.nodes[i][0] == ops.PARAMETER)

@@ -7,51 +7,29 @@ from typing import Any
 
 import numpy as np
 
-from chilopod.flows.tracing.graph import Graph
-from chilopod.flows.tracing.tape import (
-    CONSTANT,
-    COS,
-    FLOOR,
-    GUARD,
-    LINEAR,
-    MOVING,
-    NUMBER,
-    PARAMETER,
-    PRODUCT,
-    SELECT,
-    SIN,
-    SQUARE,
-    STATE,
-    STEP,
-    TIME,
-    TIMED,
-    Tape,
-)
+from chilopod.flows.tracing import tape as ops
+from chilopod.flows.tracing.graph import LEAVES, Graph
+from chilopod.flows.tracing.tape import Tape
 from chilopod.frozen import read_only
 
 Terms = dict[int, list[tuple[int, int]]]
 """Weight and node of every term of the sums."""
 
 
-def ordered(
-    graph: Graph,
-    slopes: Sequence[int],
-    guards: Sequence[int] = (),
-    resets: Sequence[Sequence[int]] = (),
-) -> Tape:
+def ordered(graph: Graph, slopes: Sequence[int], guards: Sequence[int], resets: Sequence[Sequence[int]]) -> Tape:
     """The tape of the operations that some results need: dx/dt, the guards and the resets of events."""
-    flat = _flattened(graph, [*slopes, *guards, *(node for reset in resets for node in reset)])
-    flow = _reached(graph, [*slopes, *guards], flat)
-    every = _reached(graph, [*flow, *(node for reset in resets for node in reset)], flat)
-    leaves = (STATE, TIME, PARAMETER)
-    numbers = [i for i in every if graph.nodes[i][0] == NUMBER]
-    operations = [i for i in every if graph.nodes[i][0] not in (*leaves, NUMBER)]
-    constant = [i for i in operations if graph.depends[i] == CONSTANT]
-    moving = [i for i in operations if graph.depends[i] != CONSTANT and i in set(flow)]
-    later = [i for i in operations if graph.depends[i] != CONSTANT and i not in set(flow)]
+    ends = [*slopes, *guards, *(node for reset in resets for node in reset)]
+    flat = _flattened(graph, ends)
+    flow = set(_reached(graph, [*slopes, *guards], flat))
+    every = _reached(graph, ends, flat)
+    numbers = [i for i in every if graph.nodes[i][0] == ops.NUMBER]
+    operations = [i for i in every if graph.nodes[i][0] not in LEAVES]
+    constant = [i for i in operations if graph.depends[i] == ops.CONSTANT]
+    moving = [i for i in operations if graph.depends[i] != ops.CONSTANT and i in flow]
+    later = [i for i in operations if graph.depends[i] != ops.CONSTANT and i not in flow]
     order = [*graph.states, graph.time, *graph.parameters, *numbers, *constant, *moving, *later]
     place = {node: i for i, node in enumerate(order)}
-    live = _live(graph, [*slopes, *guards, *(node for reset in resets for node in reset)], every, flat)
+    live = _live(graph, ends, every, flat)
     linear = _linear_in_time(graph, every, flat)
     program = np.zeros((6, len(order)), dtype=np.int64)
     terms: list[tuple[int, int]] = []
@@ -60,27 +38,22 @@ def ordered(
         code, operands = graph.nodes[node]
         program[0, i] = code
         program[4, i], program[5, i] = node in live, node in linear
-        if code == LINEAR:
+        if code == ops.LINEAR:
             program[1, i] = len(terms)
             terms += [(place[weight], place[term]) for weight, term in flat[node]]
             program[2, i] = len(terms)
-        elif code in (STEP, FLOOR):
-            program[1, i], program[2, i] = place[operands[0]], len(switches)
-            switches.append((code, place[operands[0]], i))
-        elif code not in (*leaves, NUMBER):
+        elif code in (ops.STEP, ops.FLOOR):
+            program[1, i], program[2, i] = place[operands[0]], -1
+            if node in flow and graph.depends[node] != ops.CONSTANT:
+                program[2, i] = len(switches)
+                switches.append((code, place[operands[0]], i))
+        elif code not in LEAVES:
             program[1 : 1 + len(operands), i] = [place[operand] for operand in operands]
-            if node in graph.weights and graph.depends[node] != CONSTANT:
+            if node in graph.weights and graph.depends[node] != ops.CONSTANT:
                 program[3, i] = place[graph.weights[node]]
-    switches += [(GUARD, place[guard], k) for k, guard in enumerate(guards)]
-    first = len(order) - len(constant) - len(moving) - len(later)
-    layout = [
-        len(graph.states),
-        len(graph.parameters),
-        first,
-        first + len(constant),
-        len(order) - len(later),
-        len(order),
-    ]
+    switches += [(ops.GUARD, place[guard], k) for k, guard in enumerate(guards)]
+    first, stop = len(order) - len(constant) - len(moving) - len(later), len(order) - len(later)
+    layout = [len(graph.states), len(graph.parameters), first, first + len(constant), stop, len(order)]
     parts: tuple[Any, ...] = (
         program,
         np.array(terms, dtype=np.int64).reshape(-1, 2).T,
@@ -108,7 +81,7 @@ def _reached(graph: Graph, roots: Sequence[int], flat: Terms) -> list[int]:
             continue
         seen.add(node)
         ahead += _operands(graph, node, flat)
-        if node in graph.weights and graph.depends[node] != CONSTANT:
+        if node in graph.weights and graph.depends[node] != ops.CONSTANT:
             ahead.append(graph.weights[node])
     return sorted(seen)
 
@@ -122,32 +95,32 @@ def _flattened(graph: Graph, roots: Sequence[int]) -> Terms:
     for node in reached:
         for operand in _operands(graph, node, {}):
             uses[operand] += 1
-        if node in graph.weights and graph.depends[node] != CONSTANT:
+        if node in graph.weights and graph.depends[node] != ops.CONSTANT:
             uses[graph.weights[node]] += 1
     flat: Terms = {}
     for node in reached:
-        if graph.nodes[node][0] != LINEAR:
+        if graph.nodes[node][0] != ops.LINEAR:
             continue
         flat[node] = []
         for weight, term in graph.terms(node):
-            if graph.nodes[term][0] == LINEAR and uses[term] == 1 and graph.depends[term] != CONSTANT:
+            if graph.nodes[term][0] == ops.LINEAR and uses[term] == 1 and graph.depends[term] != ops.CONSTANT:
                 flat[node] += [(graph.multiply(weight, inner), part) for inner, part in flat[term]]
             else:
                 flat[node].append((weight, term))
     # Weights made here may be sums themselves.
     for node in _reached(graph, [weight for terms in flat.values() for weight, _ in terms], flat):
-        if graph.nodes[node][0] == LINEAR and node not in flat:
+        if graph.nodes[node][0] == ops.LINEAR and node not in flat:
             flat[node] = graph.terms(node)
     return flat
 
 
 def _live(graph: Graph, roots: Sequence[int], every: Sequence[int], flat: Terms) -> set[int]:
     """The nodes whose tangents are needed: not those that only serve as the w of a function."""
-    surfaces = [graph.nodes[i][1][0] for i in every if graph.nodes[i][0] in (STEP, FLOOR)]
+    surfaces = [graph.nodes[i][1][0] for i in every if graph.nodes[i][0] in (ops.STEP, ops.FLOOR)]
     ahead, live = [*roots, *surfaces], set[int]()
     while ahead:
         node = ahead.pop()
-        if node in live or graph.depends[node] != MOVING or graph.nodes[node][0] in (STEP, FLOOR):
+        if node in live or graph.depends[node] != ops.MOVING or graph.nodes[node][0] in (ops.STEP, ops.FLOOR):
             continue
         live.add(node)
         ahead += _operands(graph, node, flat)
@@ -157,7 +130,7 @@ def _live(graph: Graph, roots: Sequence[int], every: Sequence[int], flat: Terms)
 def _linear_in_time(graph: Graph, every: Sequence[int], flat: Terms) -> set[int]:
     linear = {graph.time}
     for node in every:
-        if node in flat and all(graph.depends[term] == CONSTANT or term in linear for _, term in flat[node]):
+        if node in flat and all(graph.depends[term] == ops.CONSTANT or term in linear for _, term in flat[node]):
             linear.add(node)
     return linear
 
@@ -167,18 +140,18 @@ def _clocks(graph: Graph, every: Sequence[int], flat: Terms) -> list[int]:
     linear = _linear_in_time(graph, every, flat)
     for node in every:
         code, operands = graph.nodes[node]
-        if code == TIME:
+        if code == ops.TIME:
             plain.add(node)
-        elif graph.depends[node] == TIMED:
+        elif graph.depends[node] == ops.TIMED:
             parts = _operands(graph, node, flat)
-            if code in (LINEAR, PRODUCT, SQUARE, SELECT):
-                simple = all(part in plain or graph.depends[part] == CONSTANT for part in parts)
-            elif code in (SIN, COS):
+            if code in (ops.LINEAR, ops.PRODUCT, ops.SQUARE, ops.SELECT):
+                simple = all(part in plain or graph.depends[part] == ops.CONSTANT for part in parts)
+            elif code in (ops.SIN, ops.COS):
                 simple = operands[0] in linear
             else:
-                simple = code in (STEP, FLOOR) and operands[0] in plain
+                simple = code in (ops.STEP, ops.FLOOR) and operands[0] in plain
             if simple:
                 plain.add(node)
     # Sums and products of these show what they show, but drown a small tail in a large constant.
-    combined = (LINEAR, PRODUCT, SQUARE, SELECT, STEP, FLOOR)
-    return [i for i in every if graph.depends[i] == TIMED and i not in plain and graph.nodes[i][0] not in combined]
+    combined = (ops.LINEAR, ops.PRODUCT, ops.SQUARE, ops.SELECT, ops.STEP, ops.FLOOR)
+    return [i for i in every if graph.depends[i] == ops.TIMED and i not in plain and graph.nodes[i][0] not in combined]

@@ -13,33 +13,22 @@ import numpy as np
 
 from chilopod.compiled import fused_njit
 from chilopod.flows.tracing import tape as ops
-
-LANES = 4
-"""Tangents that one instruction can treat at once."""
+from chilopod.lanes import HALF, as_lanes
 
 LINEAR, PRODUCT, SQUARE, QUOTIENT = ops.LINEAR, ops.PRODUCT, ops.SQUARE, ops.QUOTIENT
-STEP, FLOOR, SELECT = ops.STEP, ops.FLOOR, ops.SELECT
+STEP, FLOOR, SELECT, GUARD = ops.STEP, ops.FLOOR, ops.SELECT, ops.GUARD
 EXP, SIN, COS, TAN, SINH, COSH, TANH = ops.EXP, ops.SIN, ops.COS, ops.TAN, ops.SINH, ops.COSH, ops.TANH
 LOG, SQRT, POWER, ATAN, ASIN = ops.LOG, ops.SQRT, ops.POWER, ops.ATAN, ops.ASIN
 
 
 class Series(NamedTuple):
-    """Taylor coefficients of all nodes of a tape along a motion.
+    """Taylor coefficients of all nodes of a tape along a motion."""
 
-    Attributes
-    ----------
-    values
-        Coefficients, shape (nodes, orders).
-    tangents
-        Derivatives of the coefficients along some directions of the state at the start, shape (nodes, orders, lanes);
-        the lanes are the directions, padded to a multiple of ``LANES``.
-    branches
-        Branch of every switch, shape (switches,).
-    """
-
-    values: Any
+    values: Any  # coefficients, shape (nodes, orders)
+    # derivatives of the coefficients along some directions of the state at the start, shape (nodes, orders, lanes); the
+    # lanes are the directions, padded to a multiple of `HALF`
     tangents: Any
-    branches: Any
+    branches: Any  # branch of every switch, shape (switches,)
 
 
 @fused_njit(error_model="numpy")
@@ -70,153 +59,242 @@ def _function(code: int, a: float, b: float) -> float:
 
 
 @fused_njit(error_model="numpy")
-def values_at(program: Any, terms: Any, start: int, stop: int, k: int, values: Any, branches: Any) -> None:
-    """Coefficient k of the operations from ``start`` up to ``stop``.
+def branch_at(kind: int, value: float) -> float:
+    """Branch of a switch where its function has a value: the largest whole number below, or the sign."""
+    if kind == FLOOR:
+        return math.floor(value)
+    return 1.0 if value >= 0.0 else -1.0
 
-    It takes single arrays: whole tuples would be copied at every call.
+
+@fused_njit(error_model="numpy")
+def values_at(
+    program: Any, terms: Any, slopes: Any, start: int, stop: int, order: int, unit: float, values: Any, branches: Any
+) -> None:
+    """Coefficients 0 to ``order`` of the operations from ``start`` up to ``stop``, and of the states from ``slopes``.
+
+    Single arrays are its arguments, and all orders are one call: arrays are counted as they are handed over, which
+    takes as long as the arithmetic of a small system.
     """
-    for i in range(start, stop):
-        code = program[0, i]
-        a = program[1, i]
-        b = program[2, i]
-        s = 0.0
-        if code == LINEAR:
-            for j in range(a, b):
-                s += values[terms[0, j], 0] * values[terms[1, j], k]
-        elif code == PRODUCT:
-            # Two sums, as every product would have to wait for the last one.
-            half = (k + 1) // 2
-            odd = 0.0
-            for j in range(half):
-                s += values[a, j] * values[b, k - j]
-                odd += values[a, half + j] * values[b, k - half - j]
-            if 2 * half == k:
-                s += values[a, k] * values[b, 0]
-            s += odd
-        elif code == SQUARE:
-            for j in range((k + 1) // 2):
-                s += values[a, j] * values[a, k - j]
-            s *= 2.0
-            if k % 2 == 0:
-                s += values[a, k // 2] * values[a, k // 2]
-        elif code == QUOTIENT:
-            s = values[a, k]
-            for j in range(1, k + 1):
-                s -= values[b, j] * values[i, k - j]
-            s = s / values[b, 0] if values[b, 0] != 0.0 else math.nan
-        elif code in (STEP, FLOOR):
-            if k == 0:
-                s = branches[b]
-        elif code == SELECT:
-            s = values[b, k] if values[a, 0] > 0.0 else values[program[3, i], k]
-        elif k == 0:
-            s = _function(code, values[a, 0], values[b, 0])
-        else:
-            w = program[3, i]
-            for j in range(1, (1 if program[5, a] != 0 else k) + 1):
-                s += j * values[a, j] * values[w, k - j]
-            s /= -k if code == COS else k
-        values[i, k] = s
+    for k in range(order + 1):
+        for i in range(start, stop):
+            code, a, b = program[0, i], program[1, i], program[2, i]
+            s, odd = 0.0, 0.0  # two sums at once do not wait for each other
+            if code == LINEAR:
+                for j in range(a, b):
+                    s += values[terms[0, j], 0] * values[terms[1, j], k]
+            elif code == PRODUCT:
+                half = (k + 1) // 2
+                for j in range(half):
+                    s += values[a, j] * values[b, k - j]
+                    odd += values[a, half + j] * values[b, k - half - j]
+                if 2 * half == k:
+                    s += values[a, k] * values[b, 0]
+                s += odd
+            elif code == SQUARE:
+                half = (k + 1) // 4
+                for j in range(half):
+                    s += values[a, j] * values[a, k - j]
+                    odd += values[a, half + j] * values[a, k - half - j]
+                for j in range(2 * half, (k + 1) // 2):
+                    s += values[a, j] * values[a, k - j]
+                s = 2.0 * (s + odd)
+                if k % 2 == 0:
+                    s += values[a, k // 2] * values[a, k // 2]
+            elif code == QUOTIENT:
+                s = values[a, k]
+                for j in range(1, k + 1):
+                    s -= values[b, j] * values[i, k - j]
+                s = s / values[b, 0] if values[b, 0] != 0.0 else math.nan
+            elif code in (STEP, FLOOR):
+                if k == 0:
+                    s = branches[b] if b >= 0 else branch_at(code, values[a, 0])
+            elif code == SELECT:
+                s = values[b, k] if values[a, 0] > 0.0 else values[program[3, i], k]
+            elif k == 0:
+                s = _function(code, values[a, 0], values[b, 0])
+            else:
+                w = program[3, i]
+                half = 0 if program[5, a] != 0 else k // 2
+                for j in range(1, half + 1):
+                    s += j * values[a, j] * values[w, k - j]
+                    odd += (half + j) * values[a, half + j] * values[w, k - half - j]
+                for j in range(2 * half + 1, (1 if program[5, a] != 0 else k) + 1):
+                    s += j * values[a, j] * values[w, k - j]
+                s = (s + odd) / (-k if code == COS else k)
+            values[i, k] = s
+        if k < order:
+            for i in range(slopes.size):
+                values[i, k + 1] = values[slopes[i], k] * (unit / (k + 1))
 
 
 @fused_njit(error_model="numpy")
 def _convolve(tangents: Any, values: Any, i: int, w: int, a: int, first: int, k: int, factor: float) -> None:
     """Add factor sum of w[j] da[k - j], j from ``first``, to the tangents of order k of node i."""
-    for lane in range(0, tangents.shape[2], LANES):
-        s0 = 0.0
-        s1 = 0.0
-        s2 = 0.0
-        s3 = 0.0
-        for j in range(first, k + 1):
-            f = values[w, j]
-            s0 += f * tangents[a, k - j, lane]
-            s1 += f * tangents[a, k - j, lane + 1]
-            s2 += f * tangents[a, k - j, lane + 2]
-            s3 += f * tangents[a, k - j, lane + 3]
-        tangents[i, k, lane] += factor * s0
-        tangents[i, k, lane + 1] += factor * s1
-        tangents[i, k, lane + 2] += factor * s2
-        tangents[i, k, lane + 3] += factor * s3
+    for lane in range(tangents.shape[2]):
+        s = values[w, first] * tangents[a, k - first, lane]
+        for j in range(first + 1, k + 1):
+            s += values[w, j] * tangents[a, k - j, lane]
+        tangents[i, k, lane] += factor * s
 
 
 @fused_njit(error_model="numpy")
-def tangents_at(program: Any, terms: Any, start: int, stop: int, k: int, values: Any, tangents: Any) -> None:
-    """The same for the tangents, where they are needed; the values of order k have to be there."""
-    lanes = tangents.shape[2]
-    for i in range(start, stop):
-        if program[4, i] == 0:
-            continue
-        code = program[0, i]
-        a = program[1, i]
-        b = program[2, i]
-        if code == SELECT:
-            chosen = b if values[a, 0] > 0.0 else program[3, i]
-            for lane in range(lanes):
-                tangents[i, k, lane] = tangents[chosen, k, lane]
-            continue
-        for lane in range(lanes):
-            tangents[i, k, lane] = 0.0
-        if code == LINEAR:
-            for j in range(a, b):
-                node = terms[1, j]
-                if program[4, node] != 0:
-                    f = values[terms[0, j], 0]
-                    for lane in range(lanes):
-                        tangents[i, k, lane] += f * tangents[node, k, lane]
-        elif code == PRODUCT:
-            if program[4, a] != 0:
-                _convolve(tangents, values, i, b, a, 0, k, 1.0)
-            if program[4, b] != 0:
-                _convolve(tangents, values, i, a, b, 0, k, 1.0)
-        elif code == SQUARE:
-            _convolve(tangents, values, i, a, a, 0, k, 2.0)
-        elif code == QUOTIENT:
-            if program[4, a] != 0:
-                for lane in range(lanes):
-                    tangents[i, k, lane] = tangents[a, k, lane]
-            if program[4, b] != 0:
-                _convolve(tangents, values, i, i, b, 0, k, -1.0)
-            _convolve(tangents, values, i, b, i, 1, k, -1.0)
-            f = 1.0 / values[b, 0]
-            for lane in range(lanes):
-                tangents[i, k, lane] *= f
-        else:
-            _convolve(tangents, values, i, program[3, i], a, 0, k, -1.0 if code == COS else 1.0)
+def _add(tangents: Any, i: int, k: int, a: int, at: int, factor: float) -> None:
+    """Add factor da[at] to the tangents of order k of node i."""
+    for lane in range(tangents.shape[2]):
+        tangents[i, k, lane] += factor * tangents[a, at, lane]
 
 
 @fused_njit(error_model="numpy")
-def load(tape: Any, params: Any, series: Any) -> None:
-    """Numbers, parameters and what depends on them only; the other coefficients of these nodes have to be zero."""
-    layout, values = tape.layout, series.values
-    n = layout[0]
-    for i in range(layout[1]):
+def tangents_at(
+    program: Any, terms: Any, slopes: Any, start: int, stop: int, order: int, unit: float, values: Any, tangents: Any
+) -> None:
+    """The same for the tangents, where they are needed; the values have to be there."""
+    nodes, orders, lanes = tangents.shape
+    tangents = as_lanes(tangents.reshape(nodes, orders, lanes // HALF, HALF), HALF)
+    for k in range(order + 1):
+        for i in range(start, stop):
+            if program[4, i] == 0:
+                continue
+            code, a, b = program[0, i], program[1, i], program[2, i]
+            for lane in range(tangents.shape[2]):
+                tangents[i, k, lane] = 0.0
+            if code == LINEAR:
+                for j in range(a, b):
+                    if program[4, terms[1, j]] != 0:
+                        _add(tangents, i, k, terms[1, j], k, values[terms[0, j], 0])
+            elif code == PRODUCT:
+                if program[4, a] != 0:
+                    _convolve(tangents, values, i, b, a, 0, k, 1.0)
+                if program[4, b] != 0:
+                    _convolve(tangents, values, i, a, b, 0, k, 1.0)
+            elif code == SQUARE:
+                _convolve(tangents, values, i, a, a, 0, k, 2.0)
+            elif code == QUOTIENT:
+                f = 1.0 / values[b, 0]
+                if program[4, a] != 0:
+                    _add(tangents, i, k, a, k, f)
+                if program[4, b] != 0:
+                    _convolve(tangents, values, i, i, b, 0, k, -f)
+                if k > 0:
+                    _convolve(tangents, values, i, b, i, 1, k, -f)
+            elif code == SELECT:
+                _add(tangents, i, k, b if values[a, 0] > 0.0 else program[3, i], k, 1.0)
+            else:
+                _convolve(tangents, values, i, program[3, i], a, 0, k, -1.0 if code == COS else 1.0)
+        if k < order:
+            for i in range(slopes.size):
+                for lane in range(tangents.shape[2]):
+                    tangents[i, k + 1, lane] = (unit / (k + 1)) * tangents[slopes[i], k, lane]
+
+
+@fused_njit(error_model="numpy")
+def loaded(tape: Any, params: Any, orders: int, directions: int, branches: Any) -> Any:
+    """Series with the numbers, the parameters and what depends on them only, and zeros for all that moves."""
+    n, parameters, first, stop, _, nodes = tape.layout
+    values, lanes = np.zeros((nodes, orders)), -(-directions // HALF) * HALF
+    for i in range(parameters):
         values[n + 1 + i, 0] = params[i]
     for i in range(tape.numbers.size):
-        values[n + 1 + layout[1] + i, 0] = tape.numbers[i]
-    for i in range(layout[2], layout[3]):
-        values_at(tape.program, tape.terms, i, i + 1, 0, values, series.branches)
+        values[n + 1 + parameters + i, 0] = tape.numbers[i]
+    values_at(tape.program, tape.terms, tape.slopes, first, stop, 0, 1.0, values, branches)
+    return Series(values, np.zeros((nodes, orders, lanes)), branches)
+
+
+@fused_njit(error_model="numpy")
+def choose(tape: Any, series: Any) -> None:
+    """Choose the branch of every switch by its function at a state, with the values of f and the guards there."""
+    program, terms, slopes, switches = tape.program, tape.terms, tape.slopes, tape.switches
+    values, branches = series.values, series.branches
+    first = tape.layout[3]
+    for s in range(switches.shape[1]):
+        if switches[0, s] != GUARD:
+            values_at(program, terms, slopes, first, switches[2, s], 0, 1.0, values, branches)
+            branches[s] = branch_at(switches[0, s], values[switches[1, s], 0])
+            first = switches[2, s]
+    values_at(program, terms, slopes, first, tape.layout[4], 0, 1.0, values, branches)
+    for s in range(switches.shape[1]):
+        if switches[0, s] == GUARD:
+            branches[s] = branch_at(GUARD, values[switches[1, s], 0])
+
+
+@fused_njit(error_model="numpy")
+def sample(tape: Any, params: Any, times: Any, states: Any, nodes: Any, found: Any) -> None:
+    """Values of some nodes at times and states, shapes (samples,), (n, samples) and (nodes, samples), the branches
+    chosen; of the times or states there may be one for all samples."""
+    series = loaded(tape, params, 1, 0, np.zeros(tape.switches.shape[1]))
+    n, values = tape.layout[0], series.values
+    for m in range(found.shape[1]):
+        for i in range(n):
+            values[i, 0] = states[i, m % states.shape[1]]
+        values[n, 0] = times[m % times.size]
+        choose(tape, series)
+        for i in range(nodes.size):
+            found[i, m] = values[nodes[i], 0]
+
+
+@fused_njit(error_model="numpy")
+def slope_at(tape: Any, series: Any, units: Any, t: float, x: Any, slope: Any, jacobian: Any) -> bool:
+    """f and its jacobian in a state, all in units of the states, with the branches as they are; False if not finite."""
+    program, terms, slopes, first, stop = tape.program, tape.terms, tape.slopes, tape.layout[3], tape.layout[4]
+    values, tangents = series.values, series.tangents
+    for i in range(x.size):
+        values[i, 0] = x[i] * units[i]
+    values[x.size, 0] = t
+    values_at(program, terms, slopes, first, stop, 0, 1.0, values, series.branches)
+    tangents_at(program, terms, slopes, first, stop, 0, 1.0, values, tangents)
+    s = 0.0
+    for i in range(x.size):
+        slope[i] = values[slopes[i], 0] / units[i]
+        s += abs(slope[i])
+        for j in range(x.size):
+            jacobian[i, j] = tangents[slopes[i], 0, j] * (units[j] / units[i])
+            s += abs(jacobian[i, j])
+    return s < math.inf
+
+
+@fused_njit(error_model="numpy")
+def differentiate(tape: Any, params: Any, t: float, x: Any, slope: Any, jacobian: Any) -> None:
+    """f and its jacobian at a state, the branches chosen."""
+    series = loaded(tape, params, 1, x.size, np.zeros(tape.switches.shape[1]))
+    for i in range(x.size):
+        series.values[i, 0] = x[i]
+        series.tangents[i, 0, i] = 1.0
+    series.values[x.size, 0] = t
+    choose(tape, series)
+    slope_at(tape, series, np.ones(x.size), t, x, slope, jacobian)
+
+
+@fused_njit(error_model="numpy")
+def compose(tape: Any, params: Any, curve: Any, branches: Any, found: Any) -> None:
+    """Coefficients of f at time 0 along a curve, shapes (orders, n)."""
+    orders, n = curve.shape
+    series = loaded(tape, params, orders, 0, branches)
+    for k in range(orders):
+        for i in range(n):
+            series.values[i, k] = curve[k, i]
+    nothing, first, stop = np.empty(0, np.int64), tape.layout[3], tape.layout[4]  # no states follow from f
+    values_at(tape.program, tape.terms, nothing, first, stop, orders - 1, 1.0, series.values, branches)
+    for k in range(orders):
+        for i in range(n):
+            found[k, i] = series.values[tape.slopes[i], k]
+
+
+@fused_njit(error_model="numpy", inline="always")
+def expand_values(tape: Any, order: int, stop: int, unit: float, series: Any) -> None:
+    """Coefficients 0 to ``order`` of the states and of all operations up to ``stop``, in powers of the time since the
+    start over ``unit``.
+
+    ``values[state, 0]`` and ``values[time, 0]`` have to be set.
+    """
+    values, first = series.values, tape.layout[3]
+    values[tape.layout[0], 1] = unit
+    values_at(tape.program, tape.terms, tape.slopes, first, stop, order, unit, values, series.branches)
 
 
 @fused_njit(error_model="numpy", inline="always")
 def expand(tape: Any, order: int, stop: int, unit: float, series: Any) -> None:
-    """Coefficients 0 to ``order`` of the states and of all operations up to ``stop``, in powers of the time since the
-    start over ``unit``.
-
-    ``values[state, 0]`` and ``values[time, 0]`` have to be set, and the tangents of the states at order 0.
-    """
-    program, terms, slopes = tape.program, tape.terms, tape.slopes
-    values, tangents, branches = series.values, series.tangents, series.branches
-    n, first = tape.layout[0], tape.layout[3]
-    values[n, 1] = unit
-    for k in range(order + 1):
-        values_at(program, terms, first, stop, k, values, branches)
-        if k < order:
-            for i in range(n):
-                values[i, k + 1] = values[slopes[i], k] * (unit / (k + 1))
-        if tangents.shape[2] > 0:
-            tangents_at(program, terms, first, stop, k, values, tangents)
-            if k < order:
-                for i in range(n):
-                    f = unit / (k + 1)
-                    for lane in range(tangents.shape[2]):
-                        tangents[i, k + 1, lane] = f * tangents[slopes[i], k, lane]
+    """The same with the tangents; those of the states have to be set at order 0."""
+    expand_values(tape, order, stop, unit, series)
+    if series.tangents.shape[2] > 0:
+        program, terms, first = tape.program, tape.terms, tape.layout[3]
+        tangents_at(program, terms, tape.slopes, first, stop, order, unit, series.values, series.tangents)

@@ -39,38 +39,23 @@ class Tape(NamedTuple):
 
     Nodes are numbered: n states, time, parameters, numbers, then operations, each after its operands: those that depend
     on the parameters only, those of f and the guards, those of the resets.
-
-    Attributes
-    ----------
-    program
-        Shape (6, nodes): operation, its three operands (of ``LINEAR`` the first and past-last of its terms; of ``STEP``
-        and ``FLOOR`` the second is the number of the switch; of functions the third is w), whether tangents of the
-        node are needed, and whether it is linear in time.
-    terms
-        Shape (2, terms): weight and node of each term of the ``LINEAR`` operations.
-    numbers
-        Values of the number nodes.
-    layout
-        n, number of parameters, first operation, first that is not constant, first of the resets, number of nodes.
-    slopes
-        Nodes of f, shape (n,).
-    switches
-        Shape (3, switches): kind (``STEP``, ``FLOOR`` or ``GUARD``), node of the switching function, and for guards the
-        number of the event, else the node of the switch.
-    resets
-        Nodes of the resets, shape (events, n).
-    clocks
-        Functions of time alone that are more than polynomials in t, cos(a t), sin(a t): these may hold pulses that a
-        Taylor series does not see.
     """
 
+    # shape (6, nodes): operation, its three operands (of `LINEAR` the first and past-last of its terms; of `STEP` and
+    # `FLOOR` the second is the number of the switch, -1 of one that parameters or a state at an event settle; of
+    # functions the third is w), whether tangents of the node are needed, and whether it is linear in time
     program: Integers
-    terms: Integers
-    numbers: Array
+    terms: Integers  # shape (2, terms): weight and node of each term of the `LINEAR` operations
+    numbers: Array  # values of the number nodes
+    # n, number of parameters, first operation, first that is not constant, first of the resets, number of nodes
     layout: Integers
-    slopes: Integers
+    slopes: Integers  # nodes of f, shape (n,)
+    # shape (3, switches): kind (`STEP` or `FLOOR` in the order of their nodes, then `GUARD`), node of the switching
+    # function, and for guards the number of the event, else the node of the switch
     switches: Integers
-    resets: Integers
+    resets: Integers  # nodes of the resets, shape (events, n)
+    # functions of time alone that are more than polynomials in t, cos(a t), sin(a t): these may hold pulses that a
+    # Taylor series does not see
     clocks: Integers
 
     @property

@@ -29,21 +29,11 @@ _NEAR = 1e-13
 
 @dataclass(frozen=True)
 class Trace:
-    """A tape and the values of its parameters for one function with its arguments.
+    """A tape and the values of its parameters for one function with its arguments."""
 
-    Attributes
-    ----------
-    tape
-        The operations, shared by all functions that differ in floats only.
-    params
-        Values of the parameters, shape (parameters,).
-    derived
-        Whatever follows from the tape alone, kept with it.
-    """
-
-    tape: Tape
-    params: Array
-    derived: dict[Any, Any]
+    tape: Tape  # the operations, shared by all functions that differ in floats only
+    params: Array  # values of the parameters, shape (parameters,)
+    derived: dict[Any, Any]  # whatever follows from the tape alone, kept with it
 
 
 _Kept = dict[Any, tuple[tuple[int, ...], dict[tuple[float, ...], tuple[Tape, dict[Any, Any]]]]]
@@ -63,13 +53,9 @@ def trace(
 
     Parameters
     ----------
-    rhs
-        ``rhs(t, x, *args)`` -> dx/dt, shape (n,). Python code of arithmetic and elementary functions, with numpy, math
-        or neither, also one that numba has compiled.
-    dimension
-        n.
-    args
-        Its parameters. Floats, arrays of floats, and those inside tuples and lists are parameters of the tape.
+    rhs, dimension, args
+        As of :func:`chilopod.stability.from_rhs`. Floats in ``args``, arrays of them, and those inside tuples and lists
+        are parameters of the tape.
     times, base
         Between which times and around which state the tape is compared with the function.
     events
@@ -186,10 +172,9 @@ def _verify(
                 real = np.asarray(rhs(t, x.copy(), *args), dtype=np.float64)
         except Exception:  # not defined at this state
             continue
-        own = evaluate(tape, t, x, params)[tape.slopes]
-        near = evaluate(tape, t * (1 + _NEAR), x * (1 + _NEAR * np.cos(np.arange(n))), params * (1 - _NEAR))[
-            tape.slopes
-        ]
+        own = evaluate(tape, tape.slopes, t, x, params)
+        x = x * (1 + _NEAR * np.cos(np.arange(n)))
+        near = evaluate(tape, tape.slopes, t * (1 + _NEAR), x, params * (1 - _NEAR))
         pairs.append((real, own, np.abs(near - own)))
     if not pairs:
         raise Untraceable("it could not be evaluated at any state it was tried at")

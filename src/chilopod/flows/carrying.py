@@ -1,0 +1,74 @@
+"""Ends of integrations, cuts of intervals and loops over many states, which the compiled flows share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.cores import cores
+from chilopod.errors import AnalysisError
+from chilopod.flows import deadline
+
+Array = NDArray[np.float64]
+
+RESOLUTION = 4096
+"""A pulse in time has to be seen on a grid of so many points over the period; then it is resolved exactly."""
+
+DONE, NOT_FINITE, BUDGET, STALLED, SLIDES, CHATTERS, GRAZES, TIME_OVER = range(8)
+"""How an integration ends."""
+
+_REASONS = {
+    NOT_FINITE: ("the motion diverges, or the right-hand side is not finite, at t = {t:g}", None),
+    BUDGET: (
+        "takes too many steps, and came to t = {t:g} only",
+        "method='implicit' if it is stiff, or a shorter interval",
+    ),
+    STALLED: ("cannot be continued beyond t = {t:.17g}: a singularity, or rates beyond the resolution of time", None),
+    SLIDES: (
+        "slides along a switching surface from t = {t:g} on: the motion is pushed back from both sides",
+        "a right-hand side that says how it slides",
+    ),
+    CHATTERS: ("chatters (Zeno): crossings accumulate at t = {t:g}", "a guard or a reset that ends it"),
+    GRAZES: ("grazes a switching surface at t = {t:g}: there the flow has no derivative", None),
+}
+
+
+class TooManySteps(AnalysisError):
+    """The budget of steps did not suffice, as of a right-hand side that is stiff."""
+
+
+def failure(status: int, t: float) -> AnalysisError:
+    """The error of an integration that ended at a time before its end."""
+    if status not in _REASONS:
+        return deadline.over()
+    reason, advice = _REASONS[status]
+    return (TooManySteps if status == BUDGET else AnalysisError)(reason.format(t=t), field="rhs", allowed=advice)
+
+
+def pieces(edges: Array, period: float, t0: float, t1: float) -> list[tuple[float, float]]:
+    """Cut [t0, t1] at times that come again every period; ``edges`` run from 0 to the period, or are none."""
+    if edges.size == 0:
+        return [(t0, t1)] if t1 > t0 else []
+    first, last = int(np.floor(t0 / period)), int(np.ceil(t1 / period))
+    switches = [float(k * period + e) for k in range(first, last + 1) for e in edges[:-1]]
+    inside = [t for t in switches if t0 + 1e-12 * period < t < t1 - 1e-12 * period]
+    cuts = [t0, *inside, t1]
+    return [(a, b) for a, b in zip(cuts, cuts[1:], strict=False) if b > a]
+
+
+def carry_all(carry: Callable[[int], None], count: int, fewest: int) -> None:
+    """Call a function for all numbers below ``count``, in several threads if each has at least ``fewest`` of them."""
+
+    def carry_some(numbers: range) -> None:
+        for i in numbers:
+            carry(i)
+
+    threads = min(cores(), count // fewest)
+    if threads > 1:
+        with ThreadPoolExecutor(threads) as pool:
+            list(pool.map(carry_some, (range(first, count, threads) for first in range(threads))))
+    else:
+        carry_some(range(count))
