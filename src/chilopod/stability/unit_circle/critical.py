@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bisect
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -35,6 +36,8 @@ class Root:
         The event whose function vanishes there; None where a multiplier was followed by its rank.
     touch
         True if the function does not change sign.
+    known
+        Interval in which there is no other root of the event; (0, 0) if that is not known.
     """
 
     place: float
@@ -42,14 +45,24 @@ class Root:
     right: float
     event: Event | None
     touch: bool = False
+    known: tuple[float, float] = (0.0, 0.0)
 
 
-def rooted(spectra: Spectra, function: Callable[[float], float], low: float, high: float, event: Event | None) -> Root:
-    """The root of a function of the eigenvalues between two places where it has opposite signs."""
+def rooted(
+    spectra: Spectra,
+    function: Callable[[float], float],
+    low: float,
+    high: float,
+    event: Event | None,
+    within: float = 0.0,
+) -> Root:
+    """The root of a function of the eigenvalues between two places where it has opposite signs, to within a distance
+    or to the last digits."""
     most = min(200, max(spectra.left, 1))
-    place = float(brentq(function, low, high, xtol=5e-324, rtol=4 * _EPSILON, maxiter=most, disp=False))
-    reach = 4.0 * _EPSILON * abs(place)
-    return Root(place, max(place - reach, low), min(place + reach, high), event)
+    finest = max(within, 5e-324)
+    place = float(brentq(function, low, high, xtol=finest, rtol=4 * _EPSILON, maxiter=most, disp=False))
+    reach = within + 4.0 * _EPSILON * abs(place)
+    return Root(place, max(place - reach, low), min(place + reach, high), event, known=(low, high))
 
 
 @dataclass(frozen=True)
@@ -87,10 +100,7 @@ class Crossing:
 def tolerances(spectra: Spectra, root: Root) -> Array:
     """Largest margins at a root of multipliers that may be on the circle there, shape (m,)."""
     ulps = _ULPS * max(float(np.spacing(abs(root.place))), 0.5 * (root.right - root.left) / _ULPS)
-    values = spectra.values
-    here = int(np.searchsorted(values, root.place))
-    left = next((v for v in reversed(values[:here]) if root.place - v >= ulps), root.place)
-    right = next((v for v in values[here:] if v - root.place >= ulps), root.place)
+    left, right = spectra.beside(root.place, ulps)
     errors = spectra.margin_errors(root.place)
     if left != right:
         changes = np.abs(spectra.margins(right) - spectra.margins(left))
@@ -100,9 +110,10 @@ def tolerances(spectra: Spectra, root: Root) -> Array:
         return np.asarray(errors)
     # Where the orbit itself is uncertain, multipliers are between those of the nearest places where it is not, or
     # between the one such place and an end of the interval.
+    here = bisect.bisect_left(spectra.values, root.place)
     sides = [
         next((v for v in near if spectra.margin_errors(v).max() <= _TELLING), None)
-        for near in (values[:here][::-1], values[here:])
+        for near in (spectra.values[:here][::-1], spectra.values[here:])
     ]
     telling = [side for side in sides if side is not None]
     if not telling:

@@ -37,6 +37,7 @@ _MOSTLY = 0.25  # of the first places may disagree on what vanishes everywhere: 
 _MANY = 800  # pairs of multipliers; beyond that the bialternate product has too many zeros that mean nothing
 _PROBES = 65
 _FINEST_PROBE = 1e-6  # of the interval
+_OF_ERROR = 0.1  # of what a root may be wrong by: how closely it is enclosed
 _CLOSE = 0.25  # of the nearer end: so far towards the circle a multiplier must be heading
 
 
@@ -259,12 +260,14 @@ class _Finder:
 
     def _root(self, event: Event, left: float, right: float) -> Root:
         reference = float(self.spectra.function(np.array([left, right]), event)[1].max())
+        # Between the two the function is about straight.
+        wrong = np.exp(min(float(self.spectra.function_error(np.array([left]), event)[0]) - reference, 0.0))
 
         def value(place: float) -> float:
             signs, logs = self.spectra.function(np.array([place]), event)
             return float(signs[0] * np.exp(logs[0] - reference)) if np.isfinite(signs[0]) else 0.0
 
-        return rooted(self.spectra, value, left, right, event)
+        return rooted(self.spectra, value, left, right, event, _OF_ERROR * wrong * (0.5 * right - 0.5 * left))
 
     def _between(self, piece: Interval) -> str:
         return between(*map(self.shown, piece))

@@ -151,6 +151,14 @@ class Spectra:
         self.at(np.array([value]))
         return self._known[value] is not None
 
+    def beside(self, place: float, apart: float = 0.0) -> tuple[float, float]:
+        """The nearest values with a matrix on either side of a place, at least so far from it; where there is none, the
+        place or the value that is beyond it."""
+        here = bisect.bisect_left(self.values, place)
+        left = next((v for v in reversed(self.values[:here]) if place - v >= apart), min(self.values[0], place))
+        after = self.values[bisect.bisect_right(self.values, place) :]
+        return left, next((v for v in after if v - place >= apart), max(self.values[-1], place))
+
     def holes(self, low: float, high: float) -> bool:
         """True if there was no matrix somewhere between two values."""
         return any(low < value < high and nu is None for value, nu in self._known.items())

@@ -38,9 +38,15 @@ _ROUGH = 2.0**-34  # of the interval: width at which a piece that is no polynomi
 _FINEST = 1e-12  # of the interval: width of a part in which zeros are not told apart
 _ULPS = 256.0  # width of the finest piece in units in the last place
 
-# How far a polynomial may bulge between two neighbours of ``DENSE``, by its coefficients: T_k'' is k^2 (k^2 - 1)/3 at
-# most.
-_BULGE = np.arange(DEGREE + 1.0) ** 2 * (np.arange(DEGREE + 1.0) ** 2 - 1.0) / 3.0 * (DENSE[1] - DENSE[0]) ** 2 / 8.0
+_WITHIN, _STEADY = np.linspace(0.0, 1.0, 5), 0.25  # of such a part, and of its steepest slope: it goes straight through
+_REAL = 1e-6  # imaginary part of a place where a level is just reached
+_LEAST = 1e-17  # of the largest value: a coefficient that is none
+
+_COMPANION = chebyshev.chebcompanion(np.eye(DEGREE + 1)[DEGREE])
+_LAST_COLUMN = _COMPANION[:, -1] - chebyshev.chebcompanion(np.ones(DEGREE + 1))[:, -1]
+_DEGREES = np.arange(DEGREE + 1.0)
+_BULGE = _DEGREES**2 * (_DEGREES**2 - 1.0) / 3.0 * (DENSE[1] - DENSE[0]) ** 2 / 8.0
+"""How far each Chebyshev polynomial may bulge between two neighbours of ``DENSE``, by its largest second derivative."""
 
 
 @dataclass(frozen=True)
@@ -221,9 +227,7 @@ class _Search:
     def _cut(self, a: float, b: float, coefficients: Array, wrong: float, reference: float) -> list[_Part]:
         """A piece on which the function is a polynomial, cut where its size is what makes a sign certain."""
         level = _CLEAR * wrong
-        turns = _real_roots(chebyshev.chebder(coefficients))
-        cuts = [*_real_roots(coefficients - level * _ONE), *_real_roots(coefficients + level * _ONE)]
-        ends = np.unique([-1.0, *cuts, 1.0])
+        ends = np.concatenate([[-1.0], _crossings_of(coefficients, level), [1.0]])
         values = chebyshev.chebval(0.5 * ends[1:] + 0.5 * ends[:-1], coefficients)
         signs = np.where(np.abs(values) > level, np.sign(values), 0.0)
         borders = np.concatenate([[0], np.flatnonzero(np.diff(signs)) + 1, [signs.size]])
@@ -233,8 +237,9 @@ class _Search:
             if signs[i]:
                 parts.append(_Part(start, end, _Kind.SIGN, float(signs[i])))
                 continue
-            bent = ((turns >= ends[i]) & (turns <= ends[j])).any()
-            kind = _Kind.BENT if bent else _Kind.DOUBT
+            slopes = chebyshev.chebval(ends[i] + _WITHIN * (ends[j] - ends[i]), chebyshev.chebder(coefficients))
+            steady = slopes.min() * slopes.max() > 0.0 and np.abs(slopes).min() > _STEADY * np.abs(slopes).max()
+            kind = _Kind.DOUBT if steady else _Kind.BENT
             parts.append(_Part(start, end, kind, wrong=reference + float(np.log(wrong))))
         return parts
 
@@ -308,21 +313,22 @@ def _wide(part: _Part, a: float, b: float) -> bool:
     return part.kind in _OPEN and 0.5 * part.b - 0.5 * part.a > _NARROW * (0.5 * b - 0.5 * a)
 
 
-_ONE = np.eye(1, DEGREE + 1)[0]
-
-
 def _places(a: float, b: float, parts: Array) -> Array:
     """From -1 ... 1 to a ... b; the ends exactly, no overflow."""
     places = (0.5 * a + 0.5 * b) + (0.5 * b - 0.5 * a) * parts
     return np.asarray(np.where(parts <= -1.0, a, np.where(parts >= 1.0, b, np.clip(places, a, b))))
 
 
-def _real_roots(coefficients: Array) -> Array:
-    """Real roots of a polynomial within -1 ... 1."""
-    kept = np.trim_zeros(coefficients, "b")
-    roots = chebyshev.chebroots(kept) if kept.size > 1 else np.empty(0)
-    real = roots[np.abs(roots.imag) < 1e-6].real
-    return np.asarray(real[np.abs(real) < 1.0])
+def _crossings_of(coefficients: Array, level: float) -> Array:
+    """Places within -1 ... 1 at which a polynomial is a level, or minus that, in order: eigenvalues of the companion
+    matrix of Chebyshev polynomials, as :func:`numpy.polynomial.chebyshev.chebroots` finds them one at a time."""
+    constants = coefficients[0] + np.array([-level, level])
+    last = coefficients[-1] if abs(coefficients[-1]) > _LEAST else _LEAST
+    companions = np.stack([_COMPANION, _COMPANION])
+    companions[:, 0, -1] -= constants / last * _LAST_COLUMN[0]
+    companions[:, 1:, -1] -= coefficients[1:-1] / last * _LAST_COLUMN[1:]
+    roots = np.linalg.eigvals(companions[:, ::-1, ::-1]).ravel()
+    return np.sort(roots[(np.abs(roots.imag) < _REAL) & (np.abs(roots.real) < 1.0)].real)
 
 
 def _joined(pieces: list[Interval]) -> list[Interval]:
