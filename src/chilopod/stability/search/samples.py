@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import bisect
-from collections.abc import Callable
+import contextlib
+from collections.abc import Callable, Iterator
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.errors import AnalysisError
-from chilopod.stability.budget import Budget, SpentError, UserCode
-from chilopod.stability.capabilities import Family
+from chilopod.errors import AnalysisError, ParameterError, in_words
+from chilopod.stability.budget import Budget, SpentError, UserCode, UserError
+from chilopod.stability.capabilities import Family, SystemLike, is_autonomous
 from chilopod.stability.crossing_points.place import Sample
 from chilopod.stability.orbits import Orbit, find_orbit, from_known, known_state
 from chilopod.stability.returns import ReturnMap, return_map, return_maps, section_at
 from chilopod.stability.scales import sizes
-from chilopod.stability.search.family import AskedFamily
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -27,6 +27,7 @@ FIRST_STEPS = 8
 NEAR_FOLD = 0.02
 """Distance of a multiplier from +1 within which a fold may be so near that the search does not tell it."""
 
+_KEPT = 64  # systems: around a point the same one is asked for again and again
 _SHORTEST = 2.0**-10  # step of an orbit that is followed, relative to the first
 _RETURNS = 2  # return maps for every orbit of the budget, to follow the orbit and again to search
 _DEAREST = 8.0  # return maps for an orbit
@@ -45,41 +46,66 @@ _MERGED = 1e-5  # of the interval: a gap in which they still do
 _JUMP = 0.3  # of the orbit between prediction and correction, relative to its size
 
 
+class AskedFamily:
+    """The systems of a family, which have to be of one kind."""
+
+    def __init__(self, family: Family) -> None:
+        self.dimension = 0  # as long as no system is known
+        self.timed = True  # they depend on time
+        self._family = family
+        self._systems: dict[float, SystemLike] = {}
+        self._refused: dict[str, tuple[str, set[float]]] = {}
+
+    def __call__(self, value: float) -> SystemLike:
+        """The system at a value of the parameter."""
+        if value in self._systems:
+            return self._systems[value]
+        with self.asking(value):
+            system = self._family(value)
+        timed = not is_autonomous(system)
+        if self.dimension == 0:
+            self.dimension, self.timed = system.dimension, timed
+        if system.dimension != self.dimension or timed is not self.timed:
+            what = "dimension" if system.dimension != self.dimension else "kind of period"
+            self._refuse(value, what, f"the family changes its {what}")
+            raise AnalysisError(f"changes its {what} at {value:g}", field="family", allowed="systems of one kind")
+        if len(self._systems) >= _KEPT:
+            self._systems.pop(next(iter(self._systems)))
+        self._systems[value] = system
+        return system
+
+    @contextlib.contextmanager
+    def asking(self, value: float) -> Iterator[None]:
+        """Context of calls of the user's functions: exceptions of theirs mean that there is no system."""
+        try:
+            with UserCode("family", value):
+                yield
+        except (UserError, ParameterError) as error:
+            if not self.dimension:
+                raise
+            cause = error.__cause__ if isinstance(error, UserError) else error
+            assert cause is not None
+            self._refuse(value, type(cause).__name__, f"the family raised {in_words(cause)}")
+            raise UserError(error.problem, field=error.field, value=error.value, allowed=error.allowed) from cause
+
+    @property
+    def remarks(self) -> list[str]:
+        """Values at which there was no system, and why, a sentence each."""
+        return [
+            said + (f", and at {len(values) - 1} more values" if len(values) > 1 else "")
+            for said, values in self._refused.values()
+        ]
+
+    def _refuse(self, value: float, kind: str, why: str) -> None:
+        self._refused.setdefault(kind, (f"{why} at {value:.9g}", set()))[1].add(value)
+
+
 class Samples:
-    """Samples of a family, each computed once.
+    """Samples of a family between two values of its parameter, each computed once.
 
-    Parameters
-    ----------
-    family, low, high
-        ``family(value)`` is the system; the interval.
-    guess
-        Guess of the orbit at the lower end, or None if the systems know theirs.
-    budget
-        Orbits that may be computed until the upper end is reached, by twice as many return maps, and as many return
-        maps once more for those in between.
-    seconds
-        Time for all that, once the first orbit is found.
-
-    Attributes
-    ----------
-    width
-        Length of the interval.
-    first
-        The orbit at the lower end, with its error bounds.
-    known
-        True if the systems know their orbits.
-    size
-        Sizes of the states on the first orbit, shape (n,).
-    path
-        The samples by which an orbit that is not known was followed from ``low``, as far as it goes.
-    end
-        Value at which the orbit ends, at most ``high``.
-    spent
-        True if the path ends because the budget was spent.
-    merges
-        True if the path ends where the orbit meets another one, which goes on alone.
-    count
-        Number of orbits computed.
+    From a guess at the lower end, None if the systems know their orbits, the orbit is followed to the upper end. That
+    may take ``budget`` orbits and twice as many return maps, as many return maps again for what lies in between, and
+    ``seconds``.
     """
 
     def __init__(
@@ -87,9 +113,10 @@ class Samples:
     ) -> None:
         self.family = AskedFamily(family)
         self.low, self.high, self.width = low, high, high - low
-        self.known = guess is None
-        self.spent = self.merges = False
-        self.count = self._counted = 0
+        self.known = guess is None  # the systems know their orbits
+        self.spent = False  # the path ends because the budget was spent
+        self.merges = False  # the path ends where the orbit meets another one, which goes on alone
+        self.count = self._counted = 0  # orbits computed
         self._by_value: dict[float, Sample] = {}
         self._values: list[float] = []
         self._missing: dict[float, AnalysisError] = {}

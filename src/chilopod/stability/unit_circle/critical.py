@@ -5,6 +5,7 @@ from __future__ import annotations
 import bisect
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,28 +25,15 @@ _ULPS = 64.0
 _TELLING = 0.01  # error of a margin, which goes from -1 to 1, that tells where the multiplier is
 
 
-@dataclass(frozen=True)
-class Root:
-    """A place where a multiplier may be critical.
-
-    Attributes
-    ----------
-    place, left, right
-        The place, and the interval in which it is enclosed.
-    event
-        The event whose function vanishes there; None where a multiplier was followed by its rank.
-    touch
-        True if the function does not change sign.
-    known
-        Interval in which there is no other root of the event; (0, 0) if that is not known.
-    """
+class Root(NamedTuple):
+    """A place where a multiplier may be critical, and the interval in which it is enclosed."""
 
     place: float
     left: float
     right: float
-    event: Event | None
-    touch: bool = False
-    known: tuple[float, float] = (0.0, 0.0)
+    event: Event | None  # the event whose function vanishes; None where a multiplier was followed by its rank
+    touch: bool = False  # the function does not change sign
+    known: tuple[float, float] = (0.0, 0.0)  # interval without another root of the event, if that is known
 
 
 def rooted(
@@ -67,34 +55,15 @@ def rooted(
 
 @dataclass(frozen=True)
 class Crossing:
-    """Multipliers on the unit circle at a value of the parameter.
-
-    Attributes
-    ----------
-    value
-        Value of the parameter.
-    bracket
-        Interval in which the root finder has enclosed it; errors of the matrices come on top.
-    event
-        Place on the circle.
-    multiplicity
-        Number of multipliers on the circle there, both of a pair counted.
-    change
-        Rise of the number of multipliers outside: positive out of the circle, negative into it, 0 for a touch, or for
-        as many out as in. At an end of the interval: as if they went on as they come.
-    multiplier
-        One of the critical multipliers, of a pair the one with positive imaginary part.
-    collision
-        True if multipliers meet on the circle there and leave it, or come back: a conservative family.
-    """
+    """Multipliers on the unit circle at a value of the parameter."""
 
     value: float
-    bracket: tuple[float, float]
+    bracket: tuple[float, float]  # in which the root finder has enclosed the value; errors of the matrices come on top
     event: Event
-    multiplicity: int
-    change: int
-    multiplier: complex
-    collision: bool = False
+    multiplicity: int  # number of multipliers on the circle, both of a pair counted
+    change: int  # rise of the number outside; 0 for a touch; at an end of the interval as if they went on as they come
+    multiplier: complex  # one of the critical ones, of a pair the one with positive imaginary part
+    collision: bool = False  # they meet on the circle and leave it, or come back: a conservative family
 
 
 def tolerances(spectra: Spectra, root: Root) -> Array:

@@ -74,23 +74,11 @@ def find_crossings(
     affordable: Callable[[], int] | None = None,
     shown: Callable[[float], float] = float,
 ) -> Crossings:
-    """Find every value of a parameter at which eigenvalues of real matrices cross the unit circle.
+    """Every value of a parameter at which eigenvalues of real matrices cross the unit circle.
 
-    Parameters
-    ----------
-    matrices, low, high
-        The family and the interval.
-    budget
-        Number of values at which matrices may be asked for.
-    affordable
-        Number of matrices that can still be had, where that is for their cost to say; the search ends at none.
-    shown
-        ``shown(value)`` is what remarks say of a value.
-
-    Raises
-    ------
-    ParameterError
-        If the interval is empty, reversed or not finite, or the budget too small to begin.
+    Matrices may be asked for at ``budget`` values, or ``affordable()`` more where that is for their cost to say.
+    Remarks say ``shown(value)`` of a value. Raises ParameterError if the interval is empty, reversed or not finite, or
+    the budget too small to begin.
     """
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise ParameterError("must be two finite values", field="between", value=(low, high), allowed="(lower, higher)")

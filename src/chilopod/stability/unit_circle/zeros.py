@@ -40,38 +40,20 @@ _ULPS = 256.0  # width of the finest piece in units in the last place
 
 _WITHIN, _STEADY = np.linspace(0.0, 1.0, 5), 0.25  # of such a part, and of its steepest slope: it goes straight through
 _REAL = 1e-6  # imaginary part of a place where a level is just reached
-_LEAST = 1e-17  # of the largest value: a coefficient that is none
 
-_COMPANION = chebyshev.chebcompanion(np.eye(DEGREE + 1)[DEGREE])
-_LAST_COLUMN = _COMPANION[:, -1] - chebyshev.chebcompanion(np.ones(DEGREE + 1))[:, -1]
 _DEGREES = np.arange(DEGREE + 1.0)
 _BULGE = _DEGREES**2 * (_DEGREES**2 - 1.0) / 3.0 * (DENSE[1] - DENSE[0]) ** 2 / 8.0
 """How far each Chebyshev polynomial may bulge between two neighbours of ``DENSE``, by its largest second derivative."""
 
 
-@dataclass(frozen=True)
-class Zeros:
-    """Zeros that a search found, all intervals in order.
+class Zeros(NamedTuple):
+    """Intervals in which a search found something, in order."""
 
-    Attributes
-    ----------
-    changes
-        Intervals at whose ends the function has opposite signs, one zero each; (a, a) for a zero at an end.
-    touches
-        Intervals with a zero of even order, or without any sign that is certain, between equal signs.
-    unresolved
-        Pieces on which the function is no polynomial: it is not smooth there, or the budget was spent.
-    missing
-        Pieces on which the function cannot be evaluated, or only in part.
-    spent
-        True if the budget ended the search.
-    """
-
-    changes: tuple[Interval, ...]
-    touches: tuple[Interval, ...]
-    unresolved: tuple[Interval, ...]
-    missing: tuple[Interval, ...]
-    spent: bool
+    changes: tuple[Interval, ...]  # opposite signs at the ends, one zero each; (a, a) for a zero at an end
+    touches: tuple[Interval, ...]  # a zero of even order, or no sign that is certain, between equal signs
+    unresolved: tuple[Interval, ...]  # no polynomial: the function is not smooth there, or the budget was spent
+    missing: tuple[Interval, ...]  # the function cannot be evaluated, or only in part
+    spent: bool  # the budget ended the search
 
 
 def between(low: float, high: float) -> str:
@@ -94,20 +76,11 @@ def find_zeros(
     left: Callable[[], int] | None = None,
     skip: Callable[[float, float], bool] | None = None,
 ) -> Zeros:
-    """Find all zeros of an analytic function in an interval.
+    """All zeros of an analytic function, which need not be scaled, in an interval.
 
-    Parameters
-    ----------
-    function, low, high
-        The function, which need not be scaled, and the interval.
-    error
-        Logarithm of the error of the function at some values, shape (k,), by default none: below it a value is zero,
-        and the search stops. Asked for where the search goes deep only.
-    left
-        Number of values of the function that may still be asked for, by default 20 000 in all; at none the widest
-        pieces have been looked at, and the changes of sign met so far are reported.
-    skip
-        True if zeros between two values are of no interest; asked for narrow pieces that were evaluated.
+    Below its ``error``, given as a logarithm, shape (k,), a value is zero. Once no more values may be asked for
+    (``left``, by default 20 000 in all), the widest pieces have been looked at, and the changes of sign met so far are
+    reported. Zeros between two values for which ``skip`` is true are of no interest.
     """
     search = _Search(function, error, skip, low, high)
     room_left = left if left is not None else lambda: 20_000 - search.asked
@@ -227,7 +200,7 @@ class _Search:
     def _cut(self, a: float, b: float, coefficients: Array, wrong: float, reference: float) -> list[_Part]:
         """A piece on which the function is a polynomial, cut where its size is what makes a sign certain."""
         level = _CLEAR * wrong
-        ends = np.concatenate([[-1.0], _crossings_of(coefficients, level), [1.0]])
+        ends = np.concatenate([[-1.0], _levels(coefficients, level), [1.0]])
         values = chebyshev.chebval(0.5 * ends[1:] + 0.5 * ends[:-1], coefficients)
         signs = np.where(np.abs(values) > level, np.sign(values), 0.0)
         borders = np.concatenate([[0], np.flatnonzero(np.diff(signs)) + 1, [signs.size]])
@@ -319,15 +292,11 @@ def _places(a: float, b: float, parts: Array) -> Array:
     return np.asarray(np.where(parts <= -1.0, a, np.where(parts >= 1.0, b, np.clip(places, a, b))))
 
 
-def _crossings_of(coefficients: Array, level: float) -> Array:
-    """Places within -1 ... 1 at which a polynomial is a level, or minus that, in order: eigenvalues of the companion
-    matrix of Chebyshev polynomials, as :func:`numpy.polynomial.chebyshev.chebroots` finds them one at a time."""
-    constants = coefficients[0] + np.array([-level, level])
-    last = coefficients[-1] if abs(coefficients[-1]) > _LEAST else _LEAST
-    companions = np.stack([_COMPANION, _COMPANION])
-    companions[:, 0, -1] -= constants / last * _LAST_COLUMN[0]
-    companions[:, 1:, -1] -= coefficients[1:-1] / last * _LAST_COLUMN[1:]
-    roots = np.linalg.eigvals(companions[:, ::-1, ::-1]).ravel()
+def _levels(coefficients: Array, level: float) -> Array:
+    """Places within -1 ... 1 at which a polynomial is a level, or minus that, in order."""
+    constant = np.eye(1, coefficients.size)[0]
+    both = [chebyshev.chebroots(np.trim_zeros(coefficients + side * constant, "b")) for side in (-level, level)]
+    roots = np.concatenate(both)
     return np.sort(roots[(np.abs(roots.imag) < _REAL) & (np.abs(roots.real) < 1.0)].real)
 
 
