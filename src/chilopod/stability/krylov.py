@@ -66,7 +66,7 @@ _BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once
 
 @dataclass(frozen=True)
 class KrylovSubspace(ReadOnlyArrays):
-    """A subspace V with A V = V H + Q R, where A is applied to the last block alone in every round, and Q continues V."""
+    """A subspace V with A V = V H + Q R; A is applied to the last block alone in every round, and Q continues V."""
 
     basis: Array  # V, orthonormal, shape (n, m)
     first: int  # columns of V that span the block it started from

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -25,8 +26,8 @@ SAFETY = 1.5
 """Factor on the error of a multiplier, for that of its rate of change."""
 
 _TOUCH_STEP = 1e-3  # of the course: how far from a touch the multiplier is looked at
-_AROUND = np.array([-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0]) / 4.0  # of the reach
-_ASIDE = np.arange(1.0, 9.0) / 4.0  # where there is room on one side only
+_ASIDE = np.arange(1.0, 9.0) / 4.0  # of the reach: where a singular orbit is interpolated from, with room on one side
+_AROUND = np.concatenate([-_ASIDE[3::-1], _ASIDE[:4]])  # with room on both sides
 _REACH, _LEAST_REACH = 0.02, 1e-5  # of the course
 _SHORTER = 0.25
 _AGREES = 1e-6  # of the reach, between two interpolations
@@ -63,9 +64,7 @@ class Sample(ReadOnlyArrays):
 class Course:
     """Orbits along a coordinate in which they are smooth: the parameter, or the way along a curve."""
 
-    at: Callable[
-        [Array], Sequence[Sample]
-    ]  # samples at places, which are their values; orbits may hold more than states
+    at: Callable[[Array], Sequence[Sample]]  # samples at places, their values; orbits may hold more than states
     low: float
     high: float
     width: float  # of all that is looked at, which may be more than from low to high
@@ -143,8 +142,7 @@ def _collision_error(course: Course, crossing: Crossing, image: ReturnMap) -> fl
     before, after, apart = course.jacobians(crossing.value)
     slope = abs(_collision(after, crossing) - _collision(before, crossing)) / apart
     # All of eight draws are less than a third of the root mean square in one case of 50 000.
-    uncertain = 3.0 * moved + abs(here)
-    return SAFETY * uncertain / slope if slope > 0.0 else np.inf
+    return SAFETY * (3.0 * moved + abs(here)) / slope if slope > 0.0 else np.inf
 
 
 def _collision(matrix: Array, crossing: Crossing) -> float:
@@ -160,8 +158,7 @@ def _collision(matrix: Array, crossing: Crossing) -> float:
 
 
 Bounded = Callable[[float, Array, Array, ReturnMap], Orbit]
-"""The orbit at a place, with error bounds: from what was interpolated, how far that may be off, and a return map
-near."""
+"""The orbit at a place, with error bounds, from an interpolated one, how far that may be off, and a return map near."""
 
 
 @dataclass(frozen=True)
@@ -185,21 +182,18 @@ def past_singular(course: Course, crossing: Crossing, bounded: Bounded) -> Regul
     """
     if crossing.event is not Event.PLUS or crossing.multiplicity > 1 or crossing.collision:
         return None
-    best: tuple[float, float, _Interpolation] | None = None
+    tried: list[tuple[float, float, _Interpolation]] = []
     for nodes, reach in _nodes(course, crossing.value):
         found = _interpolated(course, crossing.value, nodes, reach)
-        if found is None:
-            continue
-        # Where they do not agree, the root finder's value is not to be thrown away.
-        far = 0.0 if found.converged else abs(found.place)
-        bound = reach * (found.between + far)
-        if best is None or bound < best[0]:
-            best = bound, reach, found
-        if found.converged:
-            break
-    if best is None:
+        if found is not None:
+            # Where they do not agree, the root finder's value is not to be thrown away.
+            far = 0.0 if found.converged else abs(found.place)
+            tried.append((reach * (found.between + far), reach, found))
+            if found.converged:
+                break
+    if not tried:
         return None
-    bound, reach, found = best
+    bound, reach, found = min(tried, key=lambda each: each[0])
     place = crossing.value + reach * found.place
     orbit = bounded(place, found.orbit, found.orbit_error, found.beside.image)
     spec = spectrum(orbit.image)
@@ -219,21 +213,20 @@ def _nodes(course: Course, place: float) -> Iterator[tuple[Array, float]]:
             reach *= _SHORTER
 
 
-class _Interpolation:
-    """Polynomials through the determinant of H' - 1 and the orbit at all nodes, and at all but the outermost."""
+class _Interpolation(NamedTuple):
+    """What polynomials through the determinant of H' - 1 and the orbit tell, in units of the reach from where the
+    multiplier was seen."""
 
-    def __init__(self, beside: Sequence[Sample], nodes: Array, fine: Polynomial, roots: list[float]) -> None:
-        # Zero of the determinant and its slope, in units of the reach from where the multiplier was seen.
-        self.place, self.between = roots[0], abs(roots[0] - roots[1])
-        self.slope = abs(float(fine.deriv()(self.place)))
-        columns = np.array([each.orbit for each in beside]).T
-        fits = [np.array([_fit(nodes[part], column[part])(self.place) for column in columns]) for part in _parts(nodes)]
-        self.orbit: Array = fits[0]
-        self.orbit_error: Array = np.abs(fits[0] - fits[1])
-        self.beside = beside[int(np.abs(nodes).argmin())]
+    place: float  # of the zero of the determinant
+    between: float  # how far it is from that of the polynomial through all places but the outermost two
+    slope: float  # of the determinant
+    orbit: Array  # at the zero
+    orbit_error: Array
+    beside: Sample
 
     @property
     def converged(self) -> bool:
+        """True if the polynomials agree, near where the root finder saw the point."""
         return self.between <= _AGREES and abs(self.place) <= _AT_HOME
 
 
@@ -244,18 +237,16 @@ def _interpolated(course: Course, place: float, nodes: Array, reach: float) -> _
         return None
     # A product over all multipliers stays smooth where the critical one meets another, however close by.
     values = np.array([(spectrum(each.image).values - 1.0).prod().real for each in beside])
-    fits = [_fit(nodes[part], values[part]) for part in _parts(nodes)]
-    roots = [root for fit in fits if (root := _root_near_zero(fit, nodes)) is not None]
-    return _Interpolation(beside, nodes, fits[0], roots) if len(roots) == 2 else None
-
-
-def _parts(nodes: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """All nodes, and all but the two outermost."""
-    return np.ones(nodes.size, dtype=bool), np.abs(nodes) < np.sort(np.abs(nodes))[-2]
-
-
-def _fit(nodes: Array, values: Array) -> Polynomial:
-    return Polynomial.fit(nodes, values, nodes.size - 1)
+    orbits = np.array([each.orbit for each in beside])
+    inner = np.abs(nodes) < np.sort(np.abs(nodes))[-2]
+    fine, coarse = (Polynomial.fit(x, y, x.size - 1) for x, y in ((nodes, values), (nodes[inner], values[inner])))
+    zero, other = _root_near_zero(fine, nodes), _root_near_zero(coarse, nodes)
+    if zero is None or other is None:
+        return None
+    orbit = through(nodes, orbits, zero)
+    off = np.abs(orbit - through(nodes[inner], orbits[inner], zero))
+    near = beside[int(np.abs(nodes).argmin())]
+    return _Interpolation(zero, abs(zero - other), abs(float(fine.deriv()(zero))), orbit, off, near)
 
 
 def _root_near_zero(polynomial: Polynomial, nodes: Array) -> float | None:
@@ -263,3 +254,9 @@ def _root_near_zero(polynomial: Polynomial, nodes: Array) -> float | None:
     real = roots[np.abs(roots.imag) < 1e-9].real
     near = real[np.abs(real) < np.abs(nodes).min()]
     return float(near[np.abs(near).argmin()]) if near.size else None
+
+
+def through(nodes: Array, values: Array, place: float) -> Array:
+    """The polynomial through the rows of ``values`` at some nodes, at another place."""
+    weights = [np.prod([(place - w) / (v - w) for w in nodes if w != v]) for v in nodes]
+    return np.asarray(np.array(weights) @ values)

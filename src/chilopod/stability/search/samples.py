@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import AnalysisError, ParameterError, in_words
 from chilopod.stability.budget import Budget, SpentError, UserCode, UserError
 from chilopod.stability.capabilities import Family, SystemLike, is_autonomous
-from chilopod.stability.crossing_points.place import Sample
+from chilopod.stability.crossing_points.place import Sample, through
 from chilopod.stability.orbits import Orbit, find_orbit, from_known, known_state
 from chilopod.stability.returns import ReturnMap, return_map, return_maps, section_at
 from chilopod.stability.scales import sizes
@@ -36,9 +36,9 @@ _SURE = 1e-4  # singular value of H - 1, in units, above which the orbit is as g
 _BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
 _FORESEEN, _SMALL = 0.3, 0.01  # of a change of the orbit, and of the sizes: what a prediction may miss
 _SAME = 1e-7  # of the sizes: orbits that are nearer to what was foreseen are solved for no better
-_HALVED, _CLOSER = 12, 0.75  # times, and by how much less samples beside a multiplier +1 are apart each time
+_HALVED, _CLOSER = 12, 0.75  # halvings of a gap with a multiplier +1, and what each leaves of its orbits' distance
 _HALFWAY = 0.25  # of a change: an orbit halfway between two is as near as that to their mean
-_BEYOND, _APART = 8, 0.1  # samples beyond two to choose from, and how far from these, of the distance of the two
+_APART = 0.1  # of the distance of two samples: how far from these another one tells of the curve through them
 _BEHIND = 4  # samples by which the next one is foreseen
 _BENT = 0.3  # of the distance of two orbits: how far from the straight line the one between them may be
 _TOUCHING = 0.25  # of a multiplier's distance from +1: straight lines that meet nearer to it may touch it
@@ -62,10 +62,10 @@ class AskedFamily:
             return self._systems[value]
         with self.asking(value):
             system = self._family(value)
-        timed = not is_autonomous(system)
+        kind = system.dimension, not is_autonomous(system)
         if self.dimension == 0:
-            self.dimension, self.timed = system.dimension, timed
-        if system.dimension != self.dimension or timed is not self.timed:
+            self.dimension, self.timed = kind
+        if kind != (self.dimension, self.timed):
             what = "dimension" if system.dimension != self.dimension else "kind of period"
             self._refuse(value, what, f"the family changes its {what}")
             raise AnalysisError(f"changes its {what} at {value:g}", field="family", allowed="systems of one kind")
@@ -137,15 +137,10 @@ class Samples:
         self.allow(self._allowed)
 
     def at(self, values: Array) -> list[Sample]:
-        """Samples at some values within the interval; together where the systems allow it.
-
-        Raises
-        ------
-        AnalysisError
-            If there is none at one of them; those at the others are kept.
-        """
+        """Samples at some values within the interval, together where the systems allow it; AnalysisError if there is
+        none at one of them, when those at the others are kept."""
         wanted = [float(value) for value in values]
-        missing = sorted({value for value in wanted if value not in self._by_value})
+        missing = sorted(set(wanted) - self._by_value.keys())
         if len(missing) > 1 and self._exact:
             _found(lambda: self._keep_known(missing))  # where one fails, each is asked for alone
         for value in missing:
@@ -160,7 +155,7 @@ class Samples:
                 raise
             except AnalysisError as error:
                 self._missing[value] = error
-        for value in wanted:
+        for value in missing:
             if value in self._missing:
                 raise self._missing[value]
         return [self._by_value[value] for value in wanted]
@@ -263,12 +258,12 @@ class Samples:
 
     def _around(self, right: int) -> list[Sample]:
         """Two samples that follow each other, the second of which is number ``right``, and one beyond either."""
-        left = right - 1
-        a, b = self._values[left], self._values[right]
+        a, b = self._values[right - 1 : right + 1]
         # Not so close to the two that a polynomial through them would be told by round-off.
-        before = [v for v in self._values[max(left - _BEYOND, 0) : left][::-1] if a - v >= _APART * (b - a)]
-        after = [v for v in self._values[right + 1 : right + 1 + _BEYOND] if v - b >= _APART * (b - a)]
-        return [self._by_value[v] for v in (a, b, *before[:1], *after[:1])]
+        before = bisect.bisect_right(self._values, a - _APART * (b - a))
+        after = bisect.bisect_left(self._values, b + _APART * (b - a))
+        beyond = self._values[max(before - 1, 0) : before] + self._values[after : after + 1]
+        return [self._by_value[v] for v in (a, b, *beyond)]
 
     def _foreseen(self, samples: list[Sample], value: float) -> Array:
         """The orbit at a value by the polynomial through samples; by the straight line through the first two where
@@ -277,13 +272,14 @@ class Samples:
             samples = samples[:2]
         if len(samples) == 1:
             return samples[0].orbit
-        orbits = np.array([sample.orbit for sample in samples])
-        nodes = [sample.value for sample in samples]
-        t = (value - nodes[0]) / (nodes[1] - nodes[0])
-        line = (1.0 - t) * orbits[0] + t * orbits[1]
-        weights = [np.prod([(value - w) / (v - w) for w in nodes if w != v]) for v in nodes]
-        curve = np.array(weights) @ orbits
-        allowed = _BENT * float((np.abs(orbits[1] - orbits[0]) / self.size).max())
+        first, second = samples[:2]
+        step = second.orbit - first.orbit
+        line = first.orbit + (value - first.value) / (second.value - first.value) * step
+        if len(samples) == 2:
+            return line
+        orbits = np.array([each.orbit for each in samples])
+        curve = through(np.array([each.value for each in samples]), orbits, value)
+        allowed = _BENT * float((np.abs(step) / self.size).max())
         return curve if (np.abs(curve - line) <= allowed * self.size).all() else line
 
     def _followed(self) -> list[Sample]:

@@ -25,8 +25,8 @@ _COMPOSED = 1e-6  # error of the product of the parts, relative to the whole, ab
 
 @dataclass(frozen=True)
 class Cut:
-    """A return in parts, with orthonormal bases of the planes across the motion at the borders where the system does not
-    depend on time, else of the whole space."""
+    """A return in parts, with orthonormal bases at the borders: of the planes across the motion where the system does
+    not depend on time, else of the whole space."""
 
     times: Array  # at the borders, shape (parts + 1,)
     states: Array  # there, shape (parts + 1, n)
