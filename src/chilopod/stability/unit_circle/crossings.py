@@ -248,14 +248,15 @@ class _Finder:
 
     def _root(self, event: Event, left: float, right: float) -> Root:
         reference = float(self.spectra.function(np.array([left, right]), event)[1].max())
-        # Between the two the function is about straight.
-        wrong = np.exp(min(float(self.spectra.function_error(np.array([left]), event)[0]) - reference, 0.0))
+        wrong = float(np.exp(min(float(self.spectra.function_error(np.array([left]), event)[0]) - reference, 0.0)))
+        # Between the two the function is about straight, if it is sure of its signs there.
+        within = _OF_ERROR * wrong * (0.5 * right - 0.5 * left) if wrong < _TELLING else 0.0
 
         def value(place: float) -> float:
             signs, logs = self.spectra.function(np.array([place]), event)
             return float(signs[0] * np.exp(logs[0] - reference)) if np.isfinite(signs[0]) else 0.0
 
-        return rooted(self.spectra, value, left, right, event, _OF_ERROR * wrong * (0.5 * right - 0.5 * left))
+        return rooted(self.spectra, value, left, right, event, within)
 
     def _between(self, piece: Interval) -> str:
         return between(*map(self.shown, piece))
