@@ -26,15 +26,7 @@ from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.budget import Budget
 from chilopod.stability.capabilities import FlowsTangents, given_scale, is_autonomous, returns_per_period
 from chilopod.stability.convergence import RETURN
-from chilopod.stability.returns import (
-    CUTS,
-    REPEATED,
-    Section,
-    carried,
-    return_duration,
-    return_time,
-    section_at,
-)
+from chilopod.stability.returns import CUTS, REPEATED, Section, carried, return_duration, return_time, section_at
 from chilopod.stability.spectrum.errors import FIRST_ORDER, eigenvalue_errors, falling_order
 
 Array = NDArray[np.float64]

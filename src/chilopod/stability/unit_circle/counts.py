@@ -68,13 +68,7 @@ class Accounts:
     """The numbers of multipliers outside the circle, at all values at which spectra are known in an interval, and the
     roots that explain their changes; remarks go to a report, in terms of the parameter at a place."""
 
-    def __init__(
-        self,
-        spectra: Spectra,
-        ends: Interval,
-        parameter: Callable[[float], float],
-        report: Report,
-    ) -> None:
+    def __init__(self, spectra: Spectra, ends: Interval, parameter: Callable[[float], float], report: Report) -> None:
         self._spectra = spectra
         self._ends = ends
         self._parameter = parameter
