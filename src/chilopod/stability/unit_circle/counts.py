@@ -74,6 +74,7 @@ class Accounts:
         self._parameter = parameter
         self._report = report
         self._counts: dict[float, int | None] = {}
+        self._known: dict[tuple[Root, int], list[Crossing]] = {}
         self._settled: set[Interval] = set()  # gaps about which a remark was made
         probes = [spectra.values[0], spectra.values[len(spectra.values) // 2], spectra.values[-1]]
         spectra.disturbed(np.array(probes))  # together
@@ -88,7 +89,7 @@ class Accounts:
             gaps = self._gaps(roots)
             if not gaps:
                 self._remark("the multipliers are nowhere clear of the circle", self._ends)
-                return [crossing for root in roots for crossing in critical_at(self._spectra, root)]
+                return [crossing for root in roots for crossing in self._critical(root)]
             mended = [self._mended(gap) for gap in gaps]
             if not any(each is not None for each in mended):
                 break
@@ -148,7 +149,7 @@ class Accounts:
 
     def _crossings(self, gap: _Gap, root: Root) -> list[Crossing]:
         """Crossings at a root in a gap, with what the number of multipliers outside changes by."""
-        crossings = critical_at(self._spectra, root)
+        crossings = self._critical(root)
         if gap.x is None or gap.y is None:
             # As if the multipliers went on as they come.
             number = sum(crossing.multiplicity for crossing in crossings)
@@ -185,7 +186,7 @@ class Accounts:
             return inside
         # Or it is a collision whose ends are too near each other.
         if not (self._spectra.conservative and gap.change == 0):
-            critical = sum(crossing.multiplicity for crossing in critical_at(self._spectra, inside[0]))
+            critical = sum(crossing.multiplicity for crossing in self._critical(inside[0]))
             self._remark(f"{gap.change:+d} multipliers outside where {critical} are on the circle", (x, y))
         return None
 
@@ -200,8 +201,14 @@ class Accounts:
         self._settled.add(gap)
         self._report.leave(f"{remark}, {between(*map(self._parameter, gap))}")
 
+    def _critical(self, root: Root) -> list[Crossing]:
+        key = root, len(self._spectra.values)  # all that is known of the multipliers beside a root
+        if key not in self._known:
+            self._known[key] = critical_at(self._spectra, root)
+        return self._known[key]
+
     def _is_critical(self, root: Root) -> bool:
-        return self._spectra.exists(root.place) and bool(critical_at(self._spectra, root))
+        return self._spectra.exists(root.place) and bool(self._critical(root))
 
     def _lost(self, root: Root) -> bool:
         """Say so where a root is none only because the multipliers there are not known; False."""
@@ -213,7 +220,7 @@ class Accounts:
 
     def _explains(self, root: Root, change: int) -> bool:
         """True if a change of the count is what the critical multipliers at a root may do."""
-        crossings = critical_at(self._spectra, root)
+        crossings = self._critical(root)
         number = sum(crossing.multiplicity for crossing in crossings)
         if self._spectra.conservative and all(crossing.collision for crossing in crossings):
             return 2 * abs(change) <= number and (root.touch or change != 0)

@@ -38,6 +38,7 @@ _MANY = 800  # pairs of multipliers; beyond that the bialternate product has too
 _PROBES = 65
 _FINEST_PROBE = 1e-6  # of the interval
 _OF_ERROR = 0.01  # of what a root may be wrong by: how closely it is enclosed
+_NARROW = 1e-13  # of the value: nearer than that no root is known before it is looked for
 _CLOSE = 0.25  # of the nearer end: so far towards the circle a multiplier must be heading
 
 
@@ -156,23 +157,23 @@ class _Finder:
 
     def _idle(self, places: Array, event: Event) -> int:
         """Number of factors of the function of an event that vanish for all values of the parameter."""
-        places = places[np.isfinite(self.spectra.at(places)).all(axis=1)]
+        nu = self.spectra.at(places)
+        here = np.isfinite(nu).all(axis=1)
+        places, nu = places[here], nu[here]
         if self._factors(event) == 0:
             return 0
-        numbers = []
-        for place in places.tolist():
-            # Of a matrix with a large eigenvalue the small ones are uncertain, and their products with it.
-            nu = self.spectra.at(np.array([place]))[0]
-            largest = max(1.0, float(np.abs(nu).max()))
-            largest *= min(largest, _HUGE) if event is Event.PAIR else 1.0
-            if float(np.abs(factors(nu, event)).min()) > _IDLE * largest:
-                numbers.append(0)
-            else:
-                sizes, errors = self.spectra.factor_sizes(place, event)
-                if errors[0] <= _TELLING:
-                    numbers.append(int(np.argmin(np.append(sizes <= errors, False))))
+        # Of a matrix with a large eigenvalue the small ones are uncertain, and their products with it.
+        largest = np.maximum(1.0, np.abs(nu).max(axis=1))
+        if event is Event.PAIR:
+            largest = np.minimum(largest, _HUGE) ** 2
+        clear = np.abs(factors(nu, event)).min(axis=1) > _IDLE * largest
+        numbers = [0] * int(clear.sum())
+        for place in places[~clear].tolist():
             if numbers.count(0) > _MOSTLY * places.size:
                 return 0
+            sizes, errors = self.spectra.factor_sizes(place, event)
+            if errors[0] <= _TELLING:
+                numbers.append(int(np.argmin(np.append(sizes <= errors, False))))
         if len(numbers) < _FEWEST_TELLING:
             self.report.leave(LOST)
             return 0
@@ -248,9 +249,12 @@ class _Finder:
 
     def _root(self, event: Event, left: float, right: float) -> Root:
         reference = float(self.spectra.function(np.array([left, right]), event)[1].max())
-        wrong = float(np.exp(min(float(self.spectra.function_error(np.array([left]), event)[0]) - reference, 0.0)))
-        # Between the two the function is about straight, if it is sure of its signs there.
-        within = _OF_ERROR * wrong * (0.5 * right - 0.5 * left) if wrong < _TELLING else 0.0
+        within = 0.1 * (right - left)
+        if within > _NARROW * max(abs(left), abs(right)):
+            error = float(self.spectra.function_error(np.array([left]), event)[0])
+            wrong = float(np.exp(min(error - reference, 0.0)))
+            # Between the two the function is about straight, if it is sure of its signs there.
+            within = _OF_ERROR * wrong * (0.5 * right - 0.5 * left) if wrong < _TELLING else 0.0
 
         def value(place: float) -> float:
             signs, logs = self.spectra.function(np.array([place]), event)
