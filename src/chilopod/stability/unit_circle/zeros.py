@@ -259,7 +259,8 @@ class _Search:
         """The zeros, from the parts as they are."""
         ends = [(x, x) for x in (self.low, self.high) if self.signs.get(x) == 0.0]
         met = sorted((place, sign) for place, sign in self.signs.items() if sign in (-1.0, 1.0))
-        changes, touches = [], []
+        changes: list[Interval] = []
+        touches: list[Interval] = []
         for before, run, after in self._runs():
             first, last = run[0], run[-1]
             u = before or (first.kind is not _Kind.ZERO) * self.signs.get(first.a, 0.0)
