@@ -214,8 +214,8 @@ def _nodes(course: Course, place: float) -> Iterator[tuple[Array, float]]:
 
 
 class _Interpolation(NamedTuple):
-    """What polynomials through the determinant of H' - 1 and the orbit tell, in units of the reach from where the
-    multiplier was seen."""
+    """Place and orbit by polynomials through the determinant of H' - 1 and the orbit, in units of the reach from where
+    the multiplier was seen."""
 
     place: float  # of the zero of the determinant
     between: float  # how far it is from that of the polynomial through all places but the outermost two

@@ -99,7 +99,7 @@ def find_zeros(
 
 
 class _Kind(Enum):
-    """What is known of a function on a part of the interval."""
+    """Knowledge of a function on a part of the interval."""
 
     SIGN = auto()  # it has one sign
     DOUBT = auto()  # it may vanish, and the polynomial goes straight through
