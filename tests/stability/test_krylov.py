@@ -6,10 +6,7 @@ from scipy.linalg import expm
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.stability import Event, PeriodicSystem, from_rhs, multipliers
-from chilopod.stability.krylov.arnoldi import krylov_subspaces
-from chilopod.stability.krylov.closing import closed_orbit
-from chilopod.stability.krylov.leading import leading_multipliers
-from chilopod.stability.krylov.tangent_map import tangent_map, tangent_sizes
+from chilopod.stability.krylov import closed_orbit, krylov_subspaces, leading_multipliers, tangent_map, tangent_sizes
 
 
 def linear(generator, state=None):

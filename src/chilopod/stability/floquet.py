@@ -14,8 +14,7 @@ from chilopod.cores import cores
 from chilopod.flows.arguments import checked_count
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.capabilities import SystemLike, flows_tangents, is_autonomous, is_stiff
-from chilopod.stability.krylov.closing import LARGE
-from chilopod.stability.krylov.leading import leading_multipliers, whole_pairs
+from chilopod.stability.krylov import LARGE, leading_multipliers, whole_pairs
 from chilopod.stability.orbits import Orbit, find_large_orbit, find_orbit, from_known, known_state
 from chilopod.stability.returns import return_maps
 from chilopod.stability.shown import Result, Shown, axes_for, dataset, number, rows, said

@@ -25,8 +25,7 @@ from chilopod.stability.capabilities import (
 )
 from chilopod.stability.convergence import RETURN
 from chilopod.stability.guesses import nearer_states
-from chilopod.stability.krylov.closing import LARGE, closed_orbit
-from chilopod.stability.krylov.tangent_map import TangentMap, tangent_map, tangent_sizes
+from chilopod.stability.krylov import LARGE, TangentMap, closed_orbit, tangent_map, tangent_sizes
 from chilopod.stability.returns import (
     CUTS,
     REPEATED,

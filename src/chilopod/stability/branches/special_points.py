@@ -12,8 +12,7 @@ from chilopod.stability.branches.branch_points import Anchor, BranchPoint, OnCur
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.within import SAME_ORBIT, Within
 from chilopod.stability.crossing_points.description import described
-from chilopod.stability.crossing_points.place import SAFETY, Course, Sample, place_error
-from chilopod.stability.crossing_points.singular import past_singular
+from chilopod.stability.crossing_points.place import SAFETY, Course, Sample, past_singular, place_error
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import NormalForm, normal_form
 from chilopod.stability.orbits import Orbit, bounded, find_orbit

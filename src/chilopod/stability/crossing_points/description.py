@@ -48,24 +48,12 @@ def described(
     kind: Kind | None = None,
     with_normal_form: bool = True,
 ) -> BifurcationPoint:
-    """A bifurcation point.
+    """The bifurcation point at a ``place``, a value of the parameter with the bound of its error, to which round-off is
+    added.
 
-    Parameters
-    ----------
-    system
-        The system at the value.
-    place
-        Value of the parameter and bound of its error, to which round-off is added.
-    orbit
-        The orbit there, with error bounds.
-    crossing, block
-        The critical multipliers of the whole return map, and their block where spatial symmetries split it.
-    formed
-        Computes normal forms, where one multiplier is critical, or one pair.
-    kind
-        Kind of the point, where that is known.
-    with_normal_form
-        True if coefficients and a verdict are wanted.
+    The critical multipliers are given of the whole return map, with their block where spatial symmetries split it, and
+    the kind of the point where it is known; ``formed`` computes normal forms where one multiplier, or one pair, is
+    critical.
     """
     value, error_bound = place
     spec = spectrum(orbit.image)

@@ -1,15 +1,19 @@
-"""Error bounds of the places at which multipliers cross, along a coordinate in which orbits are smooth."""
+"""Places at which multipliers cross, along a coordinate in which orbits are smooth: their error bounds, and at a
+multiplier +1 of the return map H, where H - 1 is singular, the place and the orbit by those beside it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.orbits import Orbit
 from chilopod.stability.returns import ReturnMap
 from chilopod.stability.spectrum import errors
 from chilopod.stability.spectrum.eigenvalues import Spectrum, return_multipliers, spectrum
@@ -21,7 +25,13 @@ Array = NDArray[np.float64]
 SAFETY = 1.5
 """Factor on the error of a multiplier, for that of its rate of change."""
 
-_TOUCH_STEP = 1e-3
+_TOUCH_STEP = 1e-3  # of the course: how far from a touch the multiplier is looked at
+_ASIDE = np.arange(1.0, 9.0) / 4.0  # of the reach: where a singular orbit is interpolated from, with room on one side
+_AROUND = np.concatenate([-_ASIDE[3::-1], _ASIDE[:4]])  # with room on both sides
+_REACH, _LEAST_REACH = 0.02, 1e-5  # of the course
+_SHORTER = 0.25
+_AGREES = 1e-6  # of the reach, between two interpolations
+_AT_HOME = 0.01  # of the reach, from where the root finder saw the point
 _EPSILON = float(np.finfo(float).eps)
 
 
@@ -52,23 +62,13 @@ class Sample(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class Course:
-    """Orbits along a coordinate in which they are smooth: the parameter, or the way along a curve.
+    """Orbits along a coordinate in which they are smooth: the parameter, or the way along a curve."""
 
-    Attributes
-    ----------
-    at
-        ``at(places)``: samples with the coordinate as their ``value``; ``orbit`` may hold more than the state.
-    low, high, width
-        Ends of the course, and width of what is looked at, which may be more.
-    beside
-        Distance from a place at which rates of change are taken.
-    """
-
-    at: Callable[[Array], Sequence[Sample]]
+    at: Callable[[Array], Sequence[Sample]]  # samples at places, their values; orbits may hold more than states
     low: float
     high: float
-    width: float
-    beside: float
+    width: float  # of all that is looked at, which may be more than from low to high
+    beside: float  # distance from a place at which rates of change are taken
 
     def jacobians(self, place: float) -> tuple[Array, Array, float]:
         """Derivatives of the return map to both sides of a place, and how far these are apart."""
@@ -142,8 +142,7 @@ def _collision_error(course: Course, crossing: Crossing, image: ReturnMap) -> fl
     before, after, apart = course.jacobians(crossing.value)
     slope = abs(_collision(after, crossing) - _collision(before, crossing)) / apart
     # All of eight draws are less than a third of the root mean square in one case of 50 000.
-    uncertain = 3.0 * moved + abs(here)
-    return SAFETY * uncertain / slope if slope > 0.0 else np.inf
+    return SAFETY * (3.0 * moved + abs(here)) / slope if slope > 0.0 else np.inf
 
 
 def _collision(matrix: Array, crossing: Crossing) -> float:
@@ -156,3 +155,108 @@ def _collision(matrix: Array, crossing: Crossing) -> float:
     a, *others = sums[np.argsort(np.abs(sums - critical))]
     # Both of a pair have the same sum: the next pair is two further on.
     return float(((a - others[1]) ** 2).real)
+
+
+Bounded = Callable[[float, Array, Array, ReturnMap], Orbit]
+"""The orbit at a place, with error bounds, from an interpolated one, how far that may be off, and a return map near."""
+
+
+@dataclass(frozen=True)
+class Regular(ReadOnlyArrays):
+    """A singular orbit that was interpolated: its place with an error bound, what samples have as their ``orbit``
+    there, and the orbit itself."""
+
+    place: float
+    error_bound: float
+    sampled: Array
+    orbit: Orbit
+
+
+def past_singular(course: Course, crossing: Crossing, bounded: Bounded) -> Regular | None:
+    """Place and orbit at a multiplier +1 of an orbit that is solved for.
+
+    There H - 1 is singular, and Newton's method stops anywhere along the mode where the residual is round-off; so the
+    orbit and the determinant of H' - 1 are interpolated from places to both sides where that is not so, or to one side
+    at an end. They are taken closer together until interpolations of two orders agree. None where it is not singular,
+    or there is no room.
+    """
+    if crossing.event is not Event.PLUS or crossing.multiplicity > 1 or crossing.collision:
+        return None
+    tried: list[tuple[float, float, _Interpolation]] = []
+    for nodes, reach in _nodes(course, crossing.value):
+        found = _interpolated(course, crossing.value, nodes, reach)
+        if found is not None:
+            # Where they do not agree, the root finder's value is not to be thrown away.
+            far = 0.0 if found.converged else abs(found.place)
+            tried.append((reach * (found.between + far), reach, found))
+            if found.converged:
+                break
+    if not tried:
+        return None
+    bound, reach, found = min(tried, key=lambda each: each[0])
+    place = crossing.value + reach * found.place
+    orbit = bounded(place, found.orbit, found.orbit_error, found.beside.image)
+    spec = spectrum(orbit.image)
+    distances = np.abs(spec.values - 1.0)
+    uncertain = float(sum(error * np.delete(distances, i).prod() for i, error in enumerate(spec.error)))
+    return Regular(place, bound + SAFETY * uncertain * reach / found.slope, found.orbit, orbit)
+
+
+def _nodes(course: Course, place: float) -> Iterator[tuple[Array, float]]:
+    """Nodes around a place, or on the side where there is more room, and the reach that they are parts of."""
+    below, above = place - course.low, course.high - place
+    aside = _ASIDE if above > below else -_ASIDE
+    for nodes, room in ((_AROUND, min(below, above)), (aside, max(below, above) / _ASIDE[-1])):
+        reach = min(_REACH * course.width, room)
+        while reach >= _LEAST_REACH * course.width:
+            yield nodes, reach
+            reach *= _SHORTER
+
+
+class _Interpolation(NamedTuple):
+    """Place and orbit by polynomials through the determinant of H' - 1 and the orbit, in units of the reach from where
+    the multiplier was seen."""
+
+    place: float  # of the zero of the determinant
+    between: float  # how far it is from that of the polynomial through all places but the outermost two
+    slope: float  # of the determinant
+    orbit: Array  # at the zero
+    orbit_error: Array
+    beside: Sample
+
+    @property
+    def converged(self) -> bool:
+        """True if the polynomials agree, near where the root finder saw the point."""
+        return self.between <= _AGREES and abs(self.place) <= _AT_HOME
+
+
+def _interpolated(course: Course, place: float, nodes: Array, reach: float) -> _Interpolation | None:
+    try:
+        beside = course.at(place + reach * nodes)
+    except AnalysisError:
+        return None
+    # A product over all multipliers stays smooth where the critical one meets another, however close by.
+    values = np.array([(spectrum(each.image).values - 1.0).prod().real for each in beside])
+    orbits = np.array([each.orbit for each in beside])
+    inner = np.abs(nodes) < np.sort(np.abs(nodes))[-2]
+    fine, coarse = (Polynomial.fit(x, y, x.size - 1) for x, y in ((nodes, values), (nodes[inner], values[inner])))
+    zero, other = _root_near_zero(fine, nodes), _root_near_zero(coarse, nodes)
+    if zero is None or other is None:
+        return None
+    orbit = through(nodes, orbits, zero)
+    off = np.abs(orbit - through(nodes[inner], orbits[inner], zero))
+    near = beside[int(np.abs(nodes).argmin())]
+    return _Interpolation(zero, abs(zero - other), abs(float(fine.deriv()(zero))), orbit, off, near)
+
+
+def _root_near_zero(polynomial: Polynomial, nodes: Array) -> float | None:
+    roots = polynomial.roots()
+    real = roots[np.abs(roots.imag) < 1e-9].real
+    near = real[np.abs(real) < np.abs(nodes).min()]
+    return float(near[np.abs(near).argmin()]) if near.size else None
+
+
+def through(nodes: Array, values: Array, place: float) -> Array:
+    """The polynomial through the rows of ``values`` at some nodes, at another place."""
+    weights = [np.prod([(place - w) / (v - w) for w in nodes if w != v]) for v in nodes]
+    return np.asarray(np.array(weights) @ values)

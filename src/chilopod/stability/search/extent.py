@@ -25,28 +25,14 @@ _PARTS = 5  # of a return, to see how far the motion goes
 
 @dataclass(frozen=True)
 class Extent:
-    """Part of the interval in which an orbit exists.
-
-    Attributes
-    ----------
-    start, end
-        Values between which orbits can be told apart: the ends of the interval, or just beside the folds there.
-    folds
-        Folds in which the orbit begins and ends, if it does.
-    ending
-        A sentence where it ends otherwise before the end of the interval; else empty.
-    shrinks
-        True if it ends in an equilibrium.
-    beside
-        Distance of a fold from ``start`` and ``end``.
-    """
+    """Part of the interval in which an orbit exists, and can be told from others."""
 
     start: float
     end: float
-    folds: tuple[Fold, ...] = ()
-    ending: str = ""
-    shrinks: bool = False
-    beside: float = 0.0
+    folds: tuple[Fold, ...] = ()  # in which the orbit begins and ends, if it does
+    ending: str = ""  # a sentence where it ends otherwise before the end of the interval
+    shrinks: bool = False  # it ends in an equilibrium
+    beside: float = 0.0  # distance of a fold from start and end
 
     def explains(self, value: float) -> bool:
         """True if a value is so near what the orbit begins or ends in that a multiplier +1 is what comes of that."""

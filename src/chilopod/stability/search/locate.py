@@ -13,8 +13,7 @@ from chilopod.flows.balance import numerical_balance
 from chilopod.stability.branches.fold import Fold
 from chilopod.stability.capabilities import Family
 from chilopod.stability.crossing_points.description import Formed, described
-from chilopod.stability.crossing_points.place import Course, place_error
-from chilopod.stability.crossing_points.singular import past_singular
+from chilopod.stability.crossing_points.place import Course, past_singular, place_error
 from chilopod.stability.normal_forms.normal_form import normal_form as normal_form_of
 from chilopod.stability.orbit_blocks import crossings_in, orbit_blocks
 from chilopod.stability.orbits import Orbit, bounded, from_known

@@ -101,18 +101,9 @@ def located(
 ) -> Located:
     """Find and describe what happens along the samples of a family.
 
-    Parameters
-    ----------
-    samples
-        The samples.
-    crossings
-        ``crossings(start, end)`` searches every block of the return map.
-    described
-        ``described(crossing, block)`` gives the point, remarks, or both.
-    fold
-        ``fold(fold)`` gives the point, or a remark, for a fold that the orbit begins or ends in.
-    returns
-        Number of return maps that describing a crossing may take.
+    ``crossings(start, end)`` searches every block of the return map; ``described(crossing, block)`` gives the point,
+    remarks, or both, and may take so many return maps; ``fold(fold)`` a point or a remark for a fold that the orbit
+    begins or ends in.
     """
     with samples.budget:
         here = extent(samples)

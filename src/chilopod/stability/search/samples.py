@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import bisect
-from collections.abc import Callable
+import contextlib
+from collections.abc import Callable, Iterator
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chilopod.errors import AnalysisError
-from chilopod.stability.budget import Budget, SpentError, UserCode
-from chilopod.stability.capabilities import Family
-from chilopod.stability.crossing_points.place import Sample
+from chilopod.errors import AnalysisError, ParameterError, in_words
+from chilopod.stability.budget import Budget, SpentError, UserCode, UserError
+from chilopod.stability.capabilities import Family, SystemLike, is_autonomous
+from chilopod.stability.crossing_points.place import Sample, through
 from chilopod.stability.orbits import Orbit, find_orbit, from_known, known_state
 from chilopod.stability.returns import ReturnMap, return_map, return_maps, section_at
 from chilopod.stability.scales import sizes
-from chilopod.stability.search.family import AskedFamily
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -27,6 +27,7 @@ FIRST_STEPS = 8
 NEAR_FOLD = 0.02
 """Distance of a multiplier from +1 within which a fold may be so near that the search does not tell it."""
 
+_KEPT = 64  # systems: around a point the same one is asked for again and again
 _SHORTEST = 2.0**-10  # step of an orbit that is followed, relative to the first
 _RETURNS = 2  # return maps for every orbit of the budget, to follow the orbit and again to search
 _DEAREST = 8.0  # return maps for an orbit
@@ -35,9 +36,9 @@ _SURE = 1e-4  # singular value of H - 1, in units, above which the orbit is as g
 _BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
 _FORESEEN, _SMALL = 0.3, 0.01  # of a change of the orbit, and of the sizes: what a prediction may miss
 _SAME = 1e-7  # of the sizes: orbits that are nearer to what was foreseen are solved for no better
-_HALVED, _CLOSER = 12, 0.75  # times, and by how much less samples beside a multiplier +1 are apart each time
+_HALVED, _CLOSER = 12, 0.75  # halvings of a gap with a multiplier +1, and what each leaves of its orbits' distance
 _HALFWAY = 0.25  # of a change: an orbit halfway between two is as near as that to their mean
-_BEYOND, _APART = 8, 0.1  # samples beyond two to choose from, and how far from these, of the distance of the two
+_APART = 0.1  # of the distance of two samples: how far from these another one tells of the curve through them
 _BEHIND = 4  # samples by which the next one is foreseen
 _BENT = 0.3  # of the distance of two orbits: how far from the straight line the one between them may be
 _TOUCHING = 0.25  # of a multiplier's distance from +1: straight lines that meet nearer to it may touch it
@@ -45,41 +46,66 @@ _MERGED = 1e-5  # of the interval: a gap in which they still do
 _JUMP = 0.3  # of the orbit between prediction and correction, relative to its size
 
 
+class AskedFamily:
+    """The systems of a family, which have to be of one kind."""
+
+    def __init__(self, family: Family) -> None:
+        self.dimension = 0  # as long as no system is known
+        self.timed = True  # they depend on time
+        self._family = family
+        self._systems: dict[float, SystemLike] = {}
+        self._refused: dict[str, tuple[str, set[float]]] = {}
+
+    def __call__(self, value: float) -> SystemLike:
+        """The system at a value of the parameter."""
+        if value in self._systems:
+            return self._systems[value]
+        with self.asking(value):
+            system = self._family(value)
+        kind = system.dimension, not is_autonomous(system)
+        if self.dimension == 0:
+            self.dimension, self.timed = kind
+        if kind != (self.dimension, self.timed):
+            what = "dimension" if system.dimension != self.dimension else "kind of period"
+            self._refuse(value, what, f"the family changes its {what}")
+            raise AnalysisError(f"changes its {what} at {value:g}", field="family", allowed="systems of one kind")
+        if len(self._systems) >= _KEPT:
+            self._systems.pop(next(iter(self._systems)))
+        self._systems[value] = system
+        return system
+
+    @contextlib.contextmanager
+    def asking(self, value: float) -> Iterator[None]:
+        """Context of calls of the user's functions: exceptions of theirs mean that there is no system."""
+        try:
+            with UserCode("family", value):
+                yield
+        except (UserError, ParameterError) as error:
+            if not self.dimension:
+                raise
+            cause = error.__cause__ if isinstance(error, UserError) else error
+            assert cause is not None
+            self._refuse(value, type(cause).__name__, f"the family raised {in_words(cause)}")
+            raise UserError(error.problem, field=error.field, value=error.value, allowed=error.allowed) from cause
+
+    @property
+    def remarks(self) -> list[str]:
+        """Values at which there was no system, and why, a sentence each."""
+        return [
+            said + (f", and at {len(values) - 1} more values" if len(values) > 1 else "")
+            for said, values in self._refused.values()
+        ]
+
+    def _refuse(self, value: float, kind: str, why: str) -> None:
+        self._refused.setdefault(kind, (f"{why} at {value:.9g}", set()))[1].add(value)
+
+
 class Samples:
-    """Samples of a family, each computed once.
+    """Samples of a family between two values of its parameter, each computed once.
 
-    Parameters
-    ----------
-    family, low, high
-        ``family(value)`` is the system; the interval.
-    guess
-        Guess of the orbit at the lower end, or None if the systems know theirs.
-    budget
-        Orbits that may be computed until the upper end is reached, by twice as many return maps, and as many return
-        maps once more for those in between.
-    seconds
-        Time for all that, once the first orbit is found.
-
-    Attributes
-    ----------
-    width
-        Length of the interval.
-    first
-        The orbit at the lower end, with its error bounds.
-    known
-        True if the systems know their orbits.
-    size
-        Sizes of the states on the first orbit, shape (n,).
-    path
-        The samples by which an orbit that is not known was followed from ``low``, as far as it goes.
-    end
-        Value at which the orbit ends, at most ``high``.
-    spent
-        True if the path ends because the budget was spent.
-    merges
-        True if the path ends where the orbit meets another one, which goes on alone.
-    count
-        Number of orbits computed.
+    From a guess at the lower end, None if the systems know their orbits, the orbit is followed to the upper end. That
+    may take ``budget`` orbits and twice as many return maps, as many return maps again for what lies in between, and
+    ``seconds``.
     """
 
     def __init__(
@@ -87,9 +113,10 @@ class Samples:
     ) -> None:
         self.family = AskedFamily(family)
         self.low, self.high, self.width = low, high, high - low
-        self.known = guess is None
-        self.spent = self.merges = False
-        self.count = self._counted = 0
+        self.known = guess is None  # the systems know their orbits
+        self.spent = False  # the path ends because the budget was spent
+        self.merges = False  # the path ends where the orbit meets another one, which goes on alone
+        self.count = self._counted = 0  # orbits computed
         self._by_value: dict[float, Sample] = {}
         self._values: list[float] = []
         self._missing: dict[float, AnalysisError] = {}
@@ -110,15 +137,10 @@ class Samples:
         self.allow(self._allowed)
 
     def at(self, values: Array) -> list[Sample]:
-        """Samples at some values within the interval; together where the systems allow it.
-
-        Raises
-        ------
-        AnalysisError
-            If there is none at one of them; those at the others are kept.
-        """
+        """Samples at some values within the interval, together where the systems allow it; AnalysisError if there is
+        none at one of them, when those at the others are kept."""
         wanted = [float(value) for value in values]
-        missing = sorted({value for value in wanted if value not in self._by_value})
+        missing = sorted(set(wanted) - self._by_value.keys())
         if len(missing) > 1 and self._exact:
             _found(lambda: self._keep_known(missing))  # where one fails, each is asked for alone
         for value in missing:
@@ -133,7 +155,7 @@ class Samples:
                 raise
             except AnalysisError as error:
                 self._missing[value] = error
-        for value in wanted:
+        for value in missing:
             if value in self._missing:
                 raise self._missing[value]
         return [self._by_value[value] for value in wanted]
@@ -236,12 +258,12 @@ class Samples:
 
     def _around(self, right: int) -> list[Sample]:
         """Two samples that follow each other, the second of which is number ``right``, and one beyond either."""
-        left = right - 1
-        a, b = self._values[left], self._values[right]
+        a, b = self._values[right - 1 : right + 1]
         # Not so close to the two that a polynomial through them would be told by round-off.
-        before = [v for v in self._values[max(left - _BEYOND, 0) : left][::-1] if a - v >= _APART * (b - a)]
-        after = [v for v in self._values[right + 1 : right + 1 + _BEYOND] if v - b >= _APART * (b - a)]
-        return [self._by_value[v] for v in (a, b, *before[:1], *after[:1])]
+        before = bisect.bisect_right(self._values, a - _APART * (b - a))
+        after = bisect.bisect_left(self._values, b + _APART * (b - a))
+        beyond = self._values[max(before - 1, 0) : before] + self._values[after : after + 1]
+        return [self._by_value[v] for v in (a, b, *beyond)]
 
     def _foreseen(self, samples: list[Sample], value: float) -> Array:
         """The orbit at a value by the polynomial through samples; by the straight line through the first two where
@@ -250,13 +272,14 @@ class Samples:
             samples = samples[:2]
         if len(samples) == 1:
             return samples[0].orbit
-        orbits = np.array([sample.orbit for sample in samples])
-        nodes = [sample.value for sample in samples]
-        t = (value - nodes[0]) / (nodes[1] - nodes[0])
-        line = (1.0 - t) * orbits[0] + t * orbits[1]
-        weights = [np.prod([(value - w) / (v - w) for w in nodes if w != v]) for v in nodes]
-        curve = np.array(weights) @ orbits
-        allowed = _BENT * float((np.abs(orbits[1] - orbits[0]) / self.size).max())
+        first, second = samples[:2]
+        step = second.orbit - first.orbit
+        line = first.orbit + (value - first.value) / (second.value - first.value) * step
+        if len(samples) == 2:
+            return line
+        orbits = np.array([each.orbit for each in samples])
+        curve = through(np.array([each.value for each in samples]), orbits, value)
+        allowed = _BENT * float((np.abs(step) / self.size).max())
         return curve if (np.abs(curve - line) <= allowed * self.size).all() else line
 
     def _followed(self) -> list[Sample]:

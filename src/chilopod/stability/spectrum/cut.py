@@ -25,29 +25,15 @@ _COMPOSED = 1e-6  # error of the product of the parts, relative to the whole, ab
 
 @dataclass(frozen=True)
 class Cut:
-    """A return in parts.
+    """A return in parts, with orthonormal bases at the borders: of the planes across the motion where the system does
+    not depend on time, else of the whole space."""
 
-    Attributes
-    ----------
-    times, states
-        Times and states at the borders, shapes (parts + 1,) and (parts + 1, n).
-    units
-        Sizes of the states, shape (n,).
-    sections
-        Orthonormal bases at the borders, in units: of the plane across the motion where the system does not depend on
-        time, else of the whole space.
-    factors
-        Derivatives of the flow over the parts in these bases; the last one with the symmetry in time.
-    errors
-        Bounds on the errors of their entries.
-    """
-
-    times: Array
-    states: Array
-    units: Array
-    sections: Sequence[Array]
-    factors: Sequence[Array]
-    errors: Sequence[Array]
+    times: Array  # at the borders, shape (parts + 1,)
+    states: Array  # there, shape (parts + 1, n)
+    units: Array  # sizes of the states, shape (n,)
+    sections: Sequence[Array]  # the bases, in units
+    factors: Sequence[Array]  # derivatives of the flow over the parts in these, the last one with the symmetry in time
+    errors: Sequence[Array]  # bounds on the errors of their entries
 
     @property
     def basis(self) -> Array:

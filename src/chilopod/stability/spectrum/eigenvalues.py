@@ -16,27 +16,16 @@ Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
 _EPSILON = float(np.finfo(float).eps)
-_SCALAR = 4.0  # factor on an error that is one number for all entries, which err independently
 
 
 @dataclass(frozen=True)
 class Spectrum(ReadOnlyArrays):
-    """Eigenvalues of a return map with left and right eigenvectors.
+    """Eigenvalues of a return map with left and right eigenvectors."""
 
-    Attributes
-    ----------
-    values
-        Eigenvalues by falling modulus, shape (n,).
-    right, left
-        Unit right eigenvectors as columns, and left ones with left[:, i]^H right[:, i] = 1.
-    error
-        Bound on the error of each value, shape (n,): condition number times the error of the matrix, to first order.
-    """
-
-    values: ComplexArray
-    right: ComplexArray
-    left: ComplexArray
-    error: Array
+    values: ComplexArray  # by falling modulus, shape (n,)
+    right: ComplexArray  # unit eigenvectors as columns
+    left: ComplexArray  # likewise, with left[:, i]^H right[:, i] = 1
+    error: Array  # bound on the error of each value, shape (n,)
 
     def nearest(self, target: complex) -> int:
         """Index of the eigenvalue nearest to a number."""
@@ -63,14 +52,11 @@ def spectrum(image: ReturnMap) -> Spectrum:
     norms = np.linalg.norm(right, axis=0)
     right, left = right / norms, left * norms
     # d nu = left^H E right, of which a bound of every entry of E tells the most.
-    if isinstance(image.error, np.ndarray):
-        error += (np.abs(left) * (image.error @ np.abs(right))).sum(axis=0)
-    else:
-        error += _SCALAR * image.error * np.linalg.norm(left, axis=0)
+    wrong = np.broadcast_to(image.error, image.jacobian.shape)
+    error += (np.abs(left) * (wrong @ np.abs(right))).sum(axis=0)
     error = np.where(np.isfinite(error), error, np.inf)
     if (error > FIRST_ORDER * np.abs(values[0])).any():
-        off = np.abs(out_of) @ np.broadcast_to(image.error, image.jacobian.shape) @ np.abs(into)
-        error = np.minimum(error, eigenvalue_errors(values, jacobian, off))
+        error = np.minimum(error, eigenvalue_errors(values, jacobian, np.abs(out_of) @ wrong @ np.abs(into)))
     return Spectrum(values, right, left, error)
 
 

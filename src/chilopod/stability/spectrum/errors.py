@@ -15,11 +15,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-SAFETY = 10.0
-"""Factor on the largest move seen under random changes."""
-
-DRAWS = 8
-"""Number of random changes."""
+SAFETY, DRAWS = 10.0, 8
+"""Factor on the largest move seen under random changes, and the number of these."""
 
 FIRST_ORDER = 1e-6
 """Error, relative to the largest eigenvalue, up to which first-order bounds hold."""

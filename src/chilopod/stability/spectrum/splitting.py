@@ -19,44 +19,20 @@ from chilopod.stability.spectrum.errors import DRAWS, SAFETY
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-_GAP = 1.0
-"""Groups are separated by at least this much in ln|eigenvalue|."""
-
-_PASSES = 40
-"""Passes through the product: a gap of 1 leaves exp(-40) of the neighbouring group."""
-
-_AVERAGED = 20
-"""Passes, the last ones, over which the growth is averaged."""
-
-_AT_REST = 1e-8
-"""A basis that moves by less from one pass to the next has converged."""
+_GAP = 1.0  # in ln|eigenvalue|, at least, between groups
+_PASSES = 40  # through the product: a gap of 1 leaves exp(-40) of the neighbouring group
+_AVERAGED = 20  # the last passes, over which the growth is averaged
+_AT_REST = 1e-8  # motion of a basis in a pass that has converged
 
 
 def split_product(
     factors: Sequence[Array], errors: Sequence[Array] | None = None
 ) -> tuple[ComplexArray, ComplexArray, Array]:
-    """Logarithms of the eigenvalues of ``factors[-1] @ ... @ factors[0]``, and its eigenvectors.
+    """Logarithms ln|eigenvalue| + i angle of the eigenvalues of ``factors[-1] @ ... @ factors[0]`` by falling modulus,
+    shape (n,), its unit eigenvectors as columns, and bounds on how far the logarithms move when the entries of the
+    factors are off by their errors, to first order between groups.
 
-    Parameters
-    ----------
-    factors
-        Square matrices (n, n), each invertible and of moderate condition.
-    errors
-        Bounds on the errors of their entries; zero by default.
-
-    Returns
-    -------
-    logarithms
-        ln|eigenvalue| + i angle, by falling modulus, shape (n,).
-    vectors
-        Unit eigenvectors as columns, shape (n, n).
-    bounds
-        Bounds on how far the logarithms move by the errors, to first order between groups, shape (n,).
-
-    Raises
-    ------
-    AnalysisError
-        If a factor has no finite inverse.
+    Each factor has to be invertible and of moderate condition; AnalysisError where one has no finite inverse.
     """
     n = factors[0].shape[0]
     errors = [np.zeros((n, n)) for _ in factors] if errors is None else errors

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import bisect
-import functools
 import itertools
 from collections.abc import Callable
 from dataclasses import replace
@@ -27,14 +26,12 @@ from chilopod.stability.unit_circle.zeros import Interval, between
 
 Array = NDArray[np.float64]
 
-_CLEARLY = 1e-5  # a multiplier this far from the circle is decided, if errors elsewhere are far smaller
-_ROOM = 1e3
+_CLEARLY, _ROOM = 1e-5, 1e3  # distance from the circle, or errors elsewhere times that, that needs no error of its own
 _GREY = 32.0  # a multiplier between one and this many errors from the circle may have left it or not
-_ROUNDS = 200
-_GROWTH = 8.0
-_JUMP = 0.5
+_ROUNDS = 200  # of balancing: each adds a root, joins two or counts nearer to one
+_GROWTH = 8.0  # from one distance from a root at which multipliers are counted to the next
+_JUMP, _WIDER = 0.5, 100.0  # of the change of a multiplier on an interval wider by that: what is left in a jump
 _SHADOW = 1.5  # widths of a touch within which a crossing explains it
-_WIDER = 100.0
 _EPSILON = float(np.finfo(float).eps)
 
 
@@ -52,28 +49,32 @@ class Report:
         self.remarks.append(remark)
 
 
-class _Anew(NamedTuple):
-    """Roots with which the counts are to be compared once more."""
+class _Gap(NamedTuple):
+    """Roots between two neighbouring places at which the multipliers outside are counted, with the counts; one place
+    is None beyond the first or the last of them."""
 
-    roots: list[Root]
+    x: float | None
+    y: float | None
+    before: int
+    after: int
+    inside: list[Root]
+
+    @property
+    def change(self) -> int:
+        return self.after - self.before
 
 
 class Accounts:
     """The numbers of multipliers outside the circle, at all values at which spectra are known in an interval, and the
     roots that explain their changes; remarks go to a report, in terms of the parameter at a place."""
 
-    def __init__(
-        self,
-        spectra: Spectra,
-        ends: Interval,
-        parameter: Callable[[float], float],
-        report: Report,
-    ) -> None:
+    def __init__(self, spectra: Spectra, ends: Interval, parameter: Callable[[float], float], report: Report) -> None:
         self._spectra = spectra
         self._ends = ends
         self._parameter = parameter
         self._report = report
         self._counts: dict[float, int | None] = {}
+        self._known: dict[tuple[Root, int], list[Crossing]] = {}
         self._settled: set[Interval] = set()  # gaps about which a remark was made
         probes = [spectra.values[0], spectra.values[len(spectra.values) // 2], spectra.values[-1]]
         spectra.disturbed(np.array(probes))  # together
@@ -84,126 +85,130 @@ class Accounts:
         self._spectra.at(np.array(self._ends))
         roots = [root for root in roots if self._is_critical(root) or self._lost(root)]
         for _ in range(_ROUNDS):
-            roots, found, again = self._walk(sorted(_without_shadows(roots), key=lambda root: root.place))
-            if not again:
+            roots = sorted(_without_shadows(roots), key=lambda root: root.place)
+            gaps = self._gaps(roots)
+            if not gaps:
+                self._remark("the multipliers are nowhere clear of the circle", self._ends)
+                return [crossing for root in roots for crossing in self._critical(root)]
+            mended = [self._mended(gap) for gap in gaps]
+            if not any(each is not None for each in mended):
                 break
+            pairs = zip(gaps, mended, strict=True)
+            roots = [root for gap, each in pairs for root in (gap.inside if each is None else each)]
         else:
             self._report.leave("the counts of multipliers outside did not settle")
-        return found
+        found = [crossing for gap in gaps for root in gap.inside for crossing in self._crossings(gap, root)]
+        return sorted(found, key=lambda crossing: crossing.value)
 
     def count(self, place: float) -> int | None:
-        """Number of multipliers outside the circle; None where one of them is too near to say."""
-        self._count_clear([place])
+        """Number of multipliers outside the circle; None where one of them is too near to say, or there is none."""
         if place not in self._counts:
-            self._counts[place] = self._counted(place)
+            self._counts[place] = self._counted(place) if self._spectra.exists(place) else None
         return self._counts[place]
 
-    def _count_clear(self, places: list[float]) -> None:
-        """Count where all multipliers are clear of the circle; where not, compute their errors together."""
-        new = np.array([place for place in places if place not in self._counts])
-        if not new.size:
-            return
-        found = margins(self._spectra.at(new))
-        clear = np.abs(found).min(axis=1, initial=np.inf) > self._clearly
-        if self._spectra.resting or self._spectra.conservative:
-            clear[:] = False
-        self._counts.update(zip(new[clear].tolist(), (found[clear] > 0.0).sum(axis=1).tolist(), strict=True))
-        self._spectra.disturbed(new[~clear])
-
     def _counted(self, place: float) -> int | None:
-        found = self._spectra.margins(place)
-        errors = self._spectra.margin_errors(place)
+        spectra = self._spectra
+        found, errors = spectra.margins(place), spectra.margin_errors(place)
         outside = int((found > errors).sum())
-        if self._spectra.conservative:
-            sizes = np.abs(found) / errors
-            for event in Event:
-                # Those that meet may have left the circle or not.
-                distances, uncertain = self._spectra.factor_sizes(place, event)
-                idle = self._spectra.idle[event]
-                if (distances[idle:] <= _GREY * uncertain[idle:]).any():
-                    return None
-            return None if ((sizes > 1.0) & (sizes <= _GREY)).any() else outside
-        return outside if int((np.abs(found) <= errors).sum()) <= self._spectra.resting else None
+        if not spectra.conservative:
+            return outside if int((np.abs(found) <= errors).sum()) <= spectra.resting else None
+        for event in Event:
+            # Those that meet may have left the circle or not.
+            sizes, uncertain = spectra.factor_sizes(place, event)
+            if (sizes <= _GREY * uncertain)[spectra.idle[event] :].any():
+                return None
+        away = np.abs(found) / errors
+        return None if ((away > 1.0) & (away <= _GREY)).any() else outside
 
-    def _walk(self, roots: list[Root]) -> tuple[list[Root], list[Crossing], bool]:
-        """Compare counts along all gaps between decided places; the roots after that, what crosses at them, and whether
-        to do it again."""
-        decided = self._decided(roots)
-        if not decided:
-            self._remark("the multipliers are nowhere clear of the circle", self._ends)
-            return roots, self._unchanged(roots), False
-        kept = self._beyond(roots, decided)
-        crossings = [crossing for root in kept for crossing in self._at_end(root, decided)]
-        places, again = [root.place for root in roots], False
-        for (x, before), (y, after) in itertools.pairwise(decided):
-            inside = roots[bisect.bisect_right(places, x) : bisect.bisect_left(places, y)]
-            found = self._in_gap(inside, x, y, before, after)
-            if isinstance(found, _Anew):
-                kept += found.roots
-                again = True
-            else:
-                kept += inside
-                crossings += found
-        return kept, sorted(crossings, key=lambda crossing: crossing.value), again
-
-    def _unchanged(self, roots: list[Root]) -> list[Crossing]:
-        return [crossing for root in roots for crossing in critical_at(self._spectra, root)]
-
-    def _beyond(self, roots: list[Root], decided: list[tuple[float, int]]) -> list[Root]:
-        """Roots beyond the first and the last decided place, the ends of the interval among them."""
-        first, last = decided[0][0], decided[-1][0]
-        kept = [root for root in roots if not first <= root.place <= last]
-        for place in self._ends:
-            if first <= place <= last or place not in self._spectra.values:
-                continue
-            if not any((root.place < first, root.place > last) == (place < first, place > last) for root in kept):
-                end = Root(place, place, place, None, True)
-                if self._is_critical(end):
-                    kept.append(end)
-                else:
-                    self._lost(end)
-        return kept
-
-    def _in_gap(self, inside: list[Root], x: float, y: float, before: int, after: int) -> list[Crossing] | _Anew:
-        """Crossings in a gap, if they explain the change of the count; else the roots to go on with."""
-        change = after - before
-        if (not inside and change == 0) or (x, y) in self._settled:
-            return self._unchanged(inside)
-        explained = len(inside) == 1 and self._explains(inside[0], change)
-        if self._spectra.left <= 0 and not explained:
-            self._report.spent = True
-            return self._unchanged(inside)
-        if not inside:
-            return _Anew(self._followed(x, y, before, after))
-        if len(inside) > 1:
-            return _Anew(self._separated(inside))
-        if not explained:
-            if inside[0].touch and change != 0:
-                return _Anew(self._followed(x, y, before, after))
-            if self._tightened(inside[0], x, y):
-                return _Anew(inside)
-            # Or it is a collision whose ends are too near each other.
-            if not (self._spectra.conservative and change == 0):
-                critical = sum(crossing.multiplicity for crossing in critical_at(self._spectra, inside[0]))
-                self._remark(f"{change:+d} multipliers outside where {critical} are on the circle", (x, y))
-        return self._changed(inside[0], change, x, y)
-
-    def _decided(self, roots: list[Root]) -> list[tuple[float, int]]:
-        """Places with a count, those within the brackets of roots left out."""
-        values = self._spectra.values
-        within: set[float] = set()
+    def _gaps(self, roots: list[Root]) -> list[_Gap]:
+        """The interval cut where multipliers are counted, with the roots in every part; none if that is nowhere."""
+        values, within = self._spectra.values, set[float]()
         for root in roots:
-            left, right = (root.place, root.place) if root.touch else (root.left, root.right)
+            left, right = (root.place, root.place) if root.touch else root.known
             within.update(values[bisect.bisect_left(values, left) : bisect.bisect_right(values, right)])
-        self._count_clear([v for v in values if v not in within])
-        return [(v, count) for v in values if v not in within and (count := self.count(v)) is not None]
+        new = np.array([v for v in values if v not in within and v not in self._counts])
+        if new.size:
+            found = margins(self._spectra.at(new))
+            clear = np.abs(found).min(axis=1, initial=np.inf) > self._clearly
+            clear &= not (self._spectra.resting or self._spectra.conservative)
+            self._counts.update(zip(new[clear].tolist(), (found[clear] > 0.0).sum(axis=1).tolist(), strict=True))
+            self._spectra.disturbed(new[~clear])  # together
+            for place in new[~clear].tolist():
+                self.count(place)
+        asked = (v for v in values if v not in within or v in self._counts)
+        decided = [(v, count) for v in asked if (count := self.count(v)) is not None]
+        if not decided:
+            return []
+        (first, low), (last, high) = decided[0], decided[-1]
+        places = [place for place, _ in decided]
+        gaps = [_Gap(x, y, before, after, []) for (x, before), (y, after) in itertools.pairwise(decided)]
+        gaps = [_Gap(None, first, low, low, []), *gaps, _Gap(last, None, high, high, [])]
+        for root in roots:
+            gaps[bisect.bisect_right(places, root.place)].inside.append(root)
+        return gaps
+
+    def _crossings(self, gap: _Gap, root: Root) -> list[Crossing]:
+        """Crossings at a root in a gap, with what the number of multipliers outside changes by."""
+        crossings = self._critical(root)
+        if gap.x is None or gap.y is None:
+            # As if the multipliers went on as they come.
+            number = sum(crossing.multiplicity for crossing in crossings)
+            surely = int((self._spectra.margins(root.place) > tolerances(self._spectra, root)).sum())
+            outside = gap.before - surely
+            change = (2 * outside - number) * (1 if gap.x is None else -1) if 0 <= outside <= number else 0
+            return [replace(crossing, change=change) for crossing in crossings]
+        if len(gap.inside) > 1 or not self._explains(root, gap.change):
+            return crossings
+        if len(crossings) == 1:
+            return [replace(crossings[0], change=gap.change)]
+        a, b = gap.x, gap.y
+        near = [
+            (each, outside_near(self._spectra, each, b) - outside_near(self._spectra, each, a)) for each in crossings
+        ]
+        return [replace(each, change=change) for each, change in near]
+
+    def _mended(self, gap: _Gap) -> list[Root] | None:
+        """Roots in place of those in a gap that do not explain its counts; None if they do, or nothing helps."""
+        inside, x, y = gap.inside, gap.x, gap.y
+        if x is None or y is None:
+            return None if inside else self._at_end(self._ends[0] if x is None else self._ends[1], x, y)
+        explained = self._explains(inside[0], gap.change) if len(inside) == 1 else not inside and gap.change == 0
+        if explained or (x, y) in self._settled:
+            return None
+        if self._spectra.left <= 0:
+            self._report.spent = True
+            return None
+        if not inside or (len(inside) == 1 and inside[0].touch and gap.change != 0):
+            return self._followed(x, y, gap.before, gap.after)
+        if len(inside) > 1:
+            return self._separated(inside)
+        if self._tightened(inside[0], x, y):
+            return inside
+        # Or it is a collision whose ends are too near each other.
+        if not (self._spectra.conservative and gap.change == 0):
+            critical = sum(crossing.multiplicity for crossing in self._critical(inside[0]))
+            self._remark(f"{gap.change:+d} multipliers outside where {critical} are on the circle", (x, y))
+        return None
+
+    def _at_end(self, place: float, x: float | None, y: float | None) -> list[Root] | None:
+        """A root at an end of the interval that no count decides."""
+        if place in (x, y) or place not in self._spectra.values:
+            return None
+        end = Root(place, place, place, None, True)
+        return [end] if self._is_critical(end) or self._lost(end) else None
 
     def _remark(self, remark: str, gap: Interval) -> None:
         self._settled.add(gap)
         self._report.leave(f"{remark}, {between(*map(self._parameter, gap))}")
 
+    def _critical(self, root: Root) -> list[Crossing]:
+        key = root, len(self._spectra.values)  # all that is known of the multipliers beside a root
+        if key not in self._known:
+            self._known[key] = critical_at(self._spectra, root)
+        return self._known[key]
+
     def _is_critical(self, root: Root) -> bool:
-        return self._spectra.exists(root.place) and bool(critical_at(self._spectra, root))
+        return self._spectra.exists(root.place) and bool(self._critical(root))
 
     def _lost(self, root: Root) -> bool:
         """Say so where a root is none only because the multipliers there are not known; False."""
@@ -215,7 +220,7 @@ class Accounts:
 
     def _explains(self, root: Root, change: int) -> bool:
         """True if a change of the count is what the critical multipliers at a root may do."""
-        crossings = critical_at(self._spectra, root)
+        crossings = self._critical(root)
         number = sum(crossing.multiplicity for crossing in crossings)
         if self._spectra.conservative and all(crossing.collision for crossing in crossings):
             return 2 * abs(change) <= number and (root.touch or change != 0)
@@ -224,77 +229,47 @@ class Accounts:
         alone = len(crossings) == 1 and number == (2 if crossings[0].event is Event.PAIR else 1)
         return abs(change) == number if alone else abs(change) <= number and (change - number) % 2 == 0
 
-    def _changed(self, root: Root, change: int, x: float, y: float) -> list[Crossing]:
-        """Crossings at a root between two places at which the counts are known."""
-        crossings = critical_at(self._spectra, root)
-        if len(crossings) == 1:
-            return [replace(crossings[0], change=change)]
-        near = functools.partial(outside_near, self._spectra)
-        return [replace(each, change=near(each, y) - near(each, x)) for each in crossings]
-
-    def _at_end(self, root: Root, decided: list[tuple[float, int]]) -> list[Crossing]:
-        """Crossings at a root beyond the last decided place, as if the multipliers went on as they come."""
-        first = root.place < decided[0][0]
-        count = decided[0 if first else -1][1]
-        crossings = critical_at(self._spectra, root)
-        number = sum(crossing.multiplicity for crossing in crossings)
-        surely = int((self._spectra.margins(root.place) > tolerances(self._spectra, root)).sum())
-        outside = count - surely
-        change = (2 * outside - number) * (1 if first else -1) if 0 <= outside <= number else 0
-        return [replace(crossing, change=change) for crossing in crossings]
-
     def _followed(self, x: float, y: float, before: int, after: int) -> list[Root]:
         """Roots of the multipliers of those ranks that are inside the circle at one end of a gap and outside at the
         other."""
-        changed = f"{after - before:+d} multipliers outside"
-        if self._spectra.holes(x, y):
-            self._remark(f"{changed}, and no matrices in between", (x, y))
-            return []
-        if self._spectra.conservative:
+        changed, spectra = f"{after - before:+d} multipliers outside", self._spectra
+        if spectra.conservative and not spectra.holes(x, y):
             return self._bisected(x, y, before, after)
         roots: list[Root] = []
         said = False
         for rank in range(min(before, after), max(before, after)):
-            if self._spectra.left <= 0:
-                self._report.spent = True
-                break
 
             def margin(place: float, rank: int = rank) -> float:
                 # Those that rest on the circle are of any rank in between, and add nothing.
-                found = float(self._spectra.margins(place)[rank : rank + self._spectra.resting + 1].sum())
+                found = float(spectra.margins(place)[rank : rank + spectra.resting + 1].sum())
                 return found if np.isfinite(found) else 0.0
 
-            if margin(x) * margin(y) >= 0.0:
-                break  # errors were not what they were said to be
-            root = rooted(self._spectra, margin, x, y, None)
-            place = root.place
-            if not self._spectra.exists(place):
-                self._report.spent |= self._spectra.left <= 0
-                if not self._report.spent:
-                    self._remark(f"{changed}, and no matrices in between", (x, y))
-                    said = True
+            if spectra.holes(x, y) or spectra.left <= 0 or margin(x) * margin(y) >= 0.0:
+                break  # the last: errors were not what they were said to be
+            root = rooted(spectra, margin, x, y, None)
+            if not spectra.exists(root.place):
                 break
-            if self._jumps(place, rank):
-                values = self._spectra.values
-                here = int(np.searchsorted(values, place))
-                near = [v for v in values[max(here - 6, 0) : here + 7] if self.count(v) is not None]
-                left = max((v for v in near if v <= place and (margin(v) > 0) == (margin(x) > 0)), default=x)
-                right = min((v for v in near if v >= place and (margin(v) > 0) == (margin(y) > 0)), default=y)
-                self._remark(f"a multiplier jumps across the circle at {self._parameter(place):.9g}", (left, right))
+            if self._jumps(root.place, rank):
+                near = [v for v in spectra.values if x <= v <= y and self.count(v) is not None]
+                left = max(v for v in near if v <= root.place and (margin(v) > 0) == (margin(x) > 0))
+                right = min(v for v in near if v >= root.place and (margin(v) > 0) == (margin(y) > 0))
+                self._remark(
+                    f"a multiplier jumps across the circle at {self._parameter(root.place):.9g}", (left, right)
+                )
                 said = True
-                continue
-            apart = 16.0 * _EPSILON * abs(place)
-            if all(abs(place - other.place) > apart for other in roots) and self._is_critical(root):
-                roots.append(root)
-        if not (roots or said or self._report.spent):
-            self._remark(f"{changed}, and none found on the circle", (x, y))
+            elif all(abs(root.place - other.place) > 16.0 * _EPSILON * abs(root.place) for other in roots):
+                roots += [root] * self._is_critical(root)
+        self._report.spent |= spectra.left <= 0
+        if not (said or self._report.spent) and (not roots or spectra.holes(x, y)):
+            why = "and no matrices in between" if spectra.holes(x, y) else "and none found on the circle"
+            self._remark(f"{changed}, {why}", (x, y))
         return roots
 
     def _bisected(self, x: float, y: float, before: int, after: int) -> list[Root]:
         """The root of a conservative family where the count changes: found by halving, as far as counts are certain."""
         gap = (x, y)
         while x < (middle := 0.5 * x + 0.5 * y) < y and self._spectra.left > 0:
-            if not self._spectra.exists(middle) or (count := self.count(middle)) is None:
+            if (count := self.count(middle)) is None:
                 break
             x, y = (middle, y) if count == before else (x, middle)
         for event in (Event.MINUS, Event.PLUS, Event.PAIR):
@@ -306,46 +281,38 @@ class Accounts:
 
     def _jumps(self, place: float, rank: int) -> bool:
         """True if the multiplier of a rank is not continuous at a place: its change does not fall with the width."""
-        values = self._spectra.values
-        here = int(np.searchsorted(values, place))
-        left = values[here - 1] if here > 0 else place
-        right = next((v for v in values[here:] if v > place), place)
+        spectra = self._spectra
+        left, right = spectra.beside(place)
         width = max(right - left, 4.0 * float(np.spacing(abs(place))))
-        wide_left = next((v for v in reversed(values[:here]) if place - v >= _WIDER * width), values[0])
-        wide_right = next((v for v in values[here:] if v - place >= _WIDER * width), values[-1])
-        small = abs(self._spectra.margins(right)[rank] - self._spectra.margins(left)[rank])
-        large = abs(self._spectra.margins(wide_right)[rank] - self._spectra.margins(wide_left)[rank])
-        errors = self._spectra.margin_errors(left)[rank] + self._spectra.margin_errors(right)[rank]
+        wide = spectra.beside(place, _WIDER * width)
+        small, large = (abs(spectra.margins(b)[rank] - spectra.margins(a)[rank]) for a, b in ((left, right), wide))
+        errors = spectra.margin_errors(left)[rank] + spectra.margin_errors(right)[rank]
         return bool(small > _JUMP * large and small > _WIDER * errors)
 
     def _separated(self, inside: list[Root]) -> list[Root]:
-        """Roots with a decided place between them; those without one made a single root."""
+        """Roots with a counted place between them; those without one made a single root."""
         roots = [inside[0]]
         for root in inside[1:]:
             last = roots[-1]
             middle = 0.5 * last.place + 0.5 * root.place
-            if last.place < middle < root.place and self._spectra.exists(middle) and self.count(middle) is not None:
+            if last.place < middle < root.place and self.count(middle) is not None:
                 roots.append(root)
-                continue
-            if last.touch != root.touch:
+            elif last.touch != root.touch:
                 roots[-1] = last if root.touch else root
             else:
-                roots[-1] = Root(
-                    last.place, min(last.left, root.left), max(last.right, root.right), last.event, last.touch
-                )
+                left, right = min(last.left, root.left), max(last.right, root.right)
+                roots[-1] = Root(last.place, left, right, last.event, last.touch)
         return roots
 
     def _tightened(self, root: Root, x: float, y: float) -> bool:
-        """True if places nearer to a root could be decided."""
+        """True if places nearer to a root could be counted."""
         found = False
         for side, end in ((-1.0, x), (1.0, y)):
             reach = max(8.0 * float(np.spacing(abs(root.place))), root.right - root.left)
-            while True:
-                place = root.place + side * reach
-                if not x < place < y or self._spectra.left <= 0 or abs(place - end) < 0.1 * reach:
-                    break
-                if self._spectra.exists(place) and self.count(place) is not None:
-                    found = True
+            while x < (place := root.place + side * reach) < y and self._spectra.left > 0:
+                known = self.count(place) is not None
+                found |= known
+                if known or abs(place - end) < 0.1 * _GROWTH * reach:
                     break
                 reach *= _GROWTH
         return found

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import bisect
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,74 +25,51 @@ _ULPS = 64.0
 _TELLING = 0.01  # error of a margin, which goes from -1 to 1, that tells where the multiplier is
 
 
-@dataclass(frozen=True)
-class Root:
-    """A place where a multiplier may be critical.
-
-    Attributes
-    ----------
-    place, left, right
-        The place, and the interval in which it is enclosed.
-    event
-        The event whose function vanishes there; None where a multiplier was followed by its rank.
-    touch
-        True if the function does not change sign.
-    """
+class Root(NamedTuple):
+    """A place where a multiplier may be critical, and the interval in which it is enclosed."""
 
     place: float
     left: float
     right: float
-    event: Event | None
-    touch: bool = False
+    event: Event | None  # the event whose function vanishes; None where a multiplier was followed by its rank
+    touch: bool = False  # the function does not change sign
+    known: tuple[float, float] = (0.0, 0.0)  # interval without another root of the event, if that is known
 
 
-def rooted(spectra: Spectra, function: Callable[[float], float], low: float, high: float, event: Event | None) -> Root:
-    """The root of a function of the eigenvalues between two places where it has opposite signs."""
+def rooted(
+    spectra: Spectra,
+    function: Callable[[float], float],
+    low: float,
+    high: float,
+    event: Event | None,
+    within: float = 0.0,
+) -> Root:
+    """The root of a function of the eigenvalues between two places where it has opposite signs, to within a distance
+    or to the last digits."""
     most = min(200, max(spectra.left, 1))
-    place = float(brentq(function, low, high, xtol=5e-324, rtol=4 * _EPSILON, maxiter=most, disp=False))
-    reach = 4.0 * _EPSILON * abs(place)
-    return Root(place, max(place - reach, low), min(place + reach, high), event)
+    finest = max(within, 5e-324)
+    place = float(brentq(function, low, high, xtol=finest, rtol=4 * _EPSILON, maxiter=most, disp=False))
+    reach = within + 4.0 * _EPSILON * abs(place)
+    return Root(place, max(place - reach, low), min(place + reach, high), event, known=(low, high))
 
 
 @dataclass(frozen=True)
 class Crossing:
-    """Multipliers on the unit circle at a value of the parameter.
-
-    Attributes
-    ----------
-    value
-        Value of the parameter.
-    bracket
-        Interval in which the root finder has enclosed it; errors of the matrices come on top.
-    event
-        Place on the circle.
-    multiplicity
-        Number of multipliers on the circle there, both of a pair counted.
-    change
-        Rise of the number of multipliers outside: positive out of the circle, negative into it, 0 for a touch, or for
-        as many out as in. At an end of the interval: as if they went on as they come.
-    multiplier
-        One of the critical multipliers, of a pair the one with positive imaginary part.
-    collision
-        True if multipliers meet on the circle there and leave it, or come back: a conservative family.
-    """
+    """Multipliers on the unit circle at a value of the parameter."""
 
     value: float
-    bracket: tuple[float, float]
+    bracket: tuple[float, float]  # in which the root finder has enclosed the value; errors of the matrices come on top
     event: Event
-    multiplicity: int
-    change: int
-    multiplier: complex
-    collision: bool = False
+    multiplicity: int  # number of multipliers on the circle, both of a pair counted
+    change: int  # rise of the number outside; 0 for a touch; at an end of the interval as if they went on as they come
+    multiplier: complex  # one of the critical ones, of a pair the one with positive imaginary part
+    collision: bool = False  # they meet on the circle and leave it, or come back: a conservative family
 
 
 def tolerances(spectra: Spectra, root: Root) -> Array:
     """Largest margins at a root of multipliers that may be on the circle there, shape (m,)."""
     ulps = _ULPS * max(float(np.spacing(abs(root.place))), 0.5 * (root.right - root.left) / _ULPS)
-    values = spectra.values
-    here = int(np.searchsorted(values, root.place))
-    left = next((v for v in reversed(values[:here]) if root.place - v >= ulps), root.place)
-    right = next((v for v in values[here:] if v - root.place >= ulps), root.place)
+    left, right = spectra.beside(root.place, ulps)
     errors = spectra.margin_errors(root.place)
     if left != right:
         changes = np.abs(spectra.margins(right) - spectra.margins(left))
@@ -100,9 +79,10 @@ def tolerances(spectra: Spectra, root: Root) -> Array:
         return np.asarray(errors)
     # Where the orbit itself is uncertain, multipliers are between those of the nearest places where it is not, or
     # between the one such place and an end of the interval.
+    here = bisect.bisect_left(spectra.values, root.place)
     sides = [
         next((v for v in near if spectra.margin_errors(v).max() <= _TELLING), None)
-        for near in (values[:here][::-1], values[here:])
+        for near in (spectra.values[:here][::-1], spectra.values[here:])
     ]
     telling = [side for side in sides if side is not None]
     if not telling:

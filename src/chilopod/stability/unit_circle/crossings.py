@@ -37,6 +37,8 @@ _MOSTLY = 0.25  # of the first places may disagree on what vanishes everywhere: 
 _MANY = 800  # pairs of multipliers; beyond that the bialternate product has too many zeros that mean nothing
 _PROBES = 65
 _FINEST_PROBE = 1e-6  # of the interval
+_OF_ERROR = 0.01  # of what a root may be wrong by: how closely it is enclosed
+_NARROW = 1e-13  # of the value: nearer than that no root is known before it is looked for
 _CLOSE = 0.25  # of the nearer end: so far towards the circle a multiplier must be heading
 
 
@@ -73,23 +75,11 @@ def find_crossings(
     affordable: Callable[[], int] | None = None,
     shown: Callable[[float], float] = float,
 ) -> Crossings:
-    """Find every value of a parameter at which eigenvalues of real matrices cross the unit circle.
+    """Every value of a parameter at which eigenvalues of real matrices cross the unit circle.
 
-    Parameters
-    ----------
-    matrices, low, high
-        The family and the interval.
-    budget
-        Number of values at which matrices may be asked for.
-    affordable
-        Number of matrices that can still be had, where that is for their cost to say; the search ends at none.
-    shown
-        ``shown(value)`` is what remarks say of a value.
-
-    Raises
-    ------
-    ParameterError
-        If the interval is empty, reversed or not finite, or the budget too small to begin.
+    Matrices may be asked for at ``budget`` values, or ``affordable()`` more where that is for their cost to say.
+    Remarks say ``shown(value)`` of a value. Raises ParameterError if the interval is empty, reversed or not finite, or
+    the budget too small to begin.
     """
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise ParameterError("must be two finite values", field="between", value=(low, high), allowed="(lower, higher)")
@@ -167,23 +157,23 @@ class _Finder:
 
     def _idle(self, places: Array, event: Event) -> int:
         """Number of factors of the function of an event that vanish for all values of the parameter."""
-        places = places[np.isfinite(self.spectra.at(places)).all(axis=1)]
+        nu = self.spectra.at(places)
+        here = np.isfinite(nu).all(axis=1)
+        places, nu = places[here], nu[here]
         if self._factors(event) == 0:
             return 0
-        numbers = []
-        for place in places.tolist():
-            # Of a matrix with a large eigenvalue the small ones are uncertain, and their products with it.
-            nu = self.spectra.at(np.array([place]))[0]
-            largest = max(1.0, float(np.abs(nu).max()))
-            largest *= min(largest, _HUGE) if event is Event.PAIR else 1.0
-            if float(np.abs(factors(nu, event)).min()) > _IDLE * largest:
-                numbers.append(0)
-            else:
-                sizes, errors = self.spectra.factor_sizes(place, event)
-                if errors[0] <= _TELLING:
-                    numbers.append(int(np.argmin(np.append(sizes <= errors, False))))
+        # Of a matrix with a large eigenvalue the small ones are uncertain, and their products with it.
+        largest = np.maximum(1.0, np.abs(nu).max(axis=1))
+        if event is Event.PAIR:
+            largest = np.minimum(largest, _HUGE) ** 2
+        clear = np.abs(factors(nu, event)).min(axis=1) > _IDLE * largest
+        numbers = [0] * int(clear.sum())
+        for place in places[~clear].tolist():
             if numbers.count(0) > _MOSTLY * places.size:
                 return 0
+            sizes, errors = self.spectra.factor_sizes(place, event)
+            if errors[0] <= _TELLING:
+                numbers.append(int(np.argmin(np.append(sizes <= errors, False))))
         if len(numbers) < _FEWEST_TELLING:
             self.report.leave(LOST)
             return 0
@@ -259,12 +249,18 @@ class _Finder:
 
     def _root(self, event: Event, left: float, right: float) -> Root:
         reference = float(self.spectra.function(np.array([left, right]), event)[1].max())
+        within = 0.1 * (right - left)
+        if within > _NARROW * max(abs(left), abs(right)):
+            error = float(self.spectra.function_error(np.array([left]), event)[0])
+            wrong = float(np.exp(min(error - reference, 0.0)))
+            # Between the two the function is about straight, if it is sure of its signs there.
+            within = _OF_ERROR * wrong * (0.5 * right - 0.5 * left) if wrong < _TELLING else 0.0
 
         def value(place: float) -> float:
             signs, logs = self.spectra.function(np.array([place]), event)
             return float(signs[0] * np.exp(logs[0] - reference)) if np.isfinite(signs[0]) else 0.0
 
-        return rooted(self.spectra, value, left, right, event)
+        return rooted(self.spectra, value, left, right, event, within)
 
     def _between(self, piece: Interval) -> str:
         return between(*map(self.shown, piece))

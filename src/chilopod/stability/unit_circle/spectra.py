@@ -53,34 +53,15 @@ class Spectra:
     Errors are found by changing M at random by what it may be wrong by (:mod:`chilopod.stability.spectrum.errors`). An
     entry with a relative error is off by that times the geometric mean of the largest entries of its row and its
     column, the states being in units that balance M: that does not depend on the units the states came in, and a small
-    multiplier beside a huge one is not lost where the matrix keeps them apart.
-
-    Parameters
-    ----------
-    matrices
-        The family; values at which errors matter are asked for twice.
-    budget
-        Number of values at which M may be asked for.
-    affordable
-        Number of matrices that can still be had, where that is for their cost to say.
-
-    Attributes
-    ----------
-    values
-        The values at which there is a matrix, in order.
-    size
-        Number of eigenvalues; 0 as long as no matrix is known.
-    idle
-        For each event, number of factors of its function that vanish throughout, as far as that is known.
-    conservative
-        True if multipliers come in pairs with product 1 throughout, and may stay on the circle.
+    multiplier beside a huge one is not lost where the matrix keeps them apart. M may be asked for at ``budget`` values,
+    twice where errors matter, or ``affordable()`` more where that is for its cost to say.
     """
 
     def __init__(self, matrices: Matrices, budget: int, affordable: Callable[[], int] | None = None) -> None:
-        self.values: list[float] = []
-        self.size = 0
-        self.idle = dict.fromkeys(Event, 0)
-        self.conservative = False
+        self.values: list[float] = []  # at which there is a matrix, in order
+        self.size = 0  # number of eigenvalues, once a matrix is known
+        self.idle = dict.fromkeys(Event, 0)  # factors of the function of an event that vanish throughout
+        self.conservative = False  # multipliers come in pairs with product 1 throughout, and may stay on the circle
         self._matrices = matrices
         self._budget = budget
         self._affordable = affordable
@@ -150,6 +131,14 @@ class Spectra:
         """True if there is a matrix at a value; asked for if that is not known."""
         self.at(np.array([value]))
         return self._known[value] is not None
+
+    def beside(self, place: float, apart: float = 0.0) -> tuple[float, float]:
+        """The nearest values with a matrix on either side of a place, at least so far from it; where there is none, the
+        place or the value that is beyond it."""
+        here = bisect.bisect_left(self.values, place)
+        left = next((v for v in reversed(self.values[:here]) if place - v >= apart), min(self.values[0], place))
+        after = self.values[bisect.bisect_right(self.values, place) :]
+        return left, next((v for v in after if v - place >= apart), max(self.values[-1], place))
 
     def holes(self, low: float, high: float) -> bool:
         """True if there was no matrix somewhere between two values."""

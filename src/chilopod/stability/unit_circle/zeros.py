@@ -1,18 +1,20 @@
 """All zeros of an analytic function in an interval.
 
 The interval is cut until the function is a polynomial of degree eight on every piece, to a small part of its size
-there (the idea of Chebfun: Battles & Trefethen, SIAM J. Sci. Comput. 25, 2004), or to its own error. The zeros of the
-polynomials then say where those of the function are; where two of them lie close together, or have just left the real
-axis, the piece around them is looked at on its own scale. What is reported rests on signs of the function itself, at
-points that separate the zeros; a zero on the border of two pieces lies between the last such point of one and the first
-of the other.
+there (the idea of Chebfun: Battles & Trefethen, SIAM J. Sci. Comput. 25, 2004), or to its own error. So every piece
+falls into parts where the function has a sign for certain and narrow parts where it may vanish. Between opposite signs
+such a part holds one zero, if the polynomial goes straight through it and the function itself has these signs at both
+its ends. Any other one, which may hold no zero, two, or a double one, is looked at on its own scale, until the function
+has a sign there or is zero within its error.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from enum import Enum, auto
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -26,42 +28,32 @@ SignedLog = Callable[[Array], tuple[Array, Array]]
 """A function given as ``numpy.linalg.slogdet`` gives a determinant: signs, shape (k,), and logarithms of sizes, shape
 (k,), so that no size is too small or too large; NaN where the function cannot be evaluated."""
 
-_RESOLVED = 1e-4  # of the largest value on the piece
-_CLEAR = 4.0  # times what it may be wrong by: so far from zero a piece has none
-_NEAR = 0.02  # a pair of zeros this close to each other, or to the real axis, relative to the piece, is looked at again
-_FINEST = 1e-12  # width of a piece about a pair of zeros, relative to the interval
-_ROUGH = 2.0**-34  # width at which a piece that is no polynomial is given up, relative to the interval
-_HOLE = 2.0**-8  # width of a piece in which the function exists in part, relative to the interval
-_ULPS = 256.0  # width of the finest piece in units in the last place
+_RESOLVED = 1e-4  # of the largest value on a piece: what its polynomial may be wrong by
+_CLEAR = 4.0  # times that: a value so far from zero has its sign for certain
+_ROUNDING = 32.0 * float(np.finfo(float).eps)  # of the largest value: what any polynomial may be wrong by
+_NARROW = 0.05  # of a piece: widest part without a certain sign; on a wider one the polynomial tells too little
 _DEEP = 2.0**-4  # of the interval: on pieces no wider than this the error of the function is asked for
-_APART = 4.0  # times how far two zeros are apart: half the width of the piece made around them
-_EPSILON = float(np.finfo(float).eps)
-_REAL = 1e-10  # imaginary part of a zero that is real
+_HOLE = 2.0**-8  # of the interval: width of a piece in which the function exists in part
+_ROUGH = 2.0**-34  # of the interval: width at which a piece that is no polynomial is given up
+_FINEST = 1e-12  # of the interval: width of a part in which zeros are not told apart
+_ULPS = 256.0  # width of the finest piece in units in the last place
+
+_WITHIN, _STEADY = np.linspace(0.0, 1.0, 5), 0.25  # of such a part, and of its steepest slope: it goes straight through
+_REAL = 1e-6  # imaginary part of a place where a level is just reached
+
+_DEGREES = np.arange(DEGREE + 1.0)
+_BULGE = _DEGREES**2 * (_DEGREES**2 - 1.0) / 3.0 * (DENSE[1] - DENSE[0]) ** 2 / 8.0
+"""How far each Chebyshev polynomial may bulge between two neighbours of ``DENSE``, by its largest second derivative."""
 
 
-@dataclass(frozen=True)
-class Zeros:
-    """Zeros that a search found, all intervals in order.
+class Zeros(NamedTuple):
+    """Intervals in which a search found something, in order."""
 
-    Attributes
-    ----------
-    changes
-        Intervals at whose ends the function has opposite signs, one zero each; (a, a) for a zero at an end.
-    touches
-        Intervals with a zero of even order, or without any sign that is certain, between equal signs.
-    unresolved
-        Pieces on which the function is no polynomial: it is not smooth there, or the budget was spent.
-    missing
-        Pieces on which the function cannot be evaluated, or only in part.
-    spent
-        True if the budget ended the search.
-    """
-
-    changes: tuple[Interval, ...]
-    touches: tuple[Interval, ...]
-    unresolved: tuple[Interval, ...]
-    missing: tuple[Interval, ...]
-    spent: bool
+    changes: tuple[Interval, ...]  # opposite signs at the ends, one zero each; (a, a) for a zero at an end
+    touches: tuple[Interval, ...]  # a zero of even order, or no sign that is certain, between equal signs
+    unresolved: tuple[Interval, ...]  # no polynomial: the function is not smooth there, or the budget was spent
+    missing: tuple[Interval, ...]  # the function cannot be evaluated, or only in part
+    spent: bool  # the budget ended the search
 
 
 def between(low: float, high: float) -> str:
@@ -84,46 +76,52 @@ def find_zeros(
     left: Callable[[], int] | None = None,
     skip: Callable[[float, float], bool] | None = None,
 ) -> Zeros:
-    """Find all zeros of an analytic function in an interval.
+    """All zeros of an analytic function, which need not be scaled, in an interval.
 
-    Parameters
-    ----------
-    function, low, high
-        The function, which need not be scaled, and the interval.
-    error
-        Logarithm of the error of the function at some values, shape (k,), by default none: below it a value is zero,
-        and the search stops. Asked for where the search goes deep only.
-    left
-        Number of values of the function that may still be asked for, by default 20 000 in all; at none the widest
-        pieces have been looked at, and the changes of sign met so far are reported.
-    skip
-        True if zeros between two values are of no interest; asked for narrow pieces that were evaluated.
+    Below its ``error``, given as a logarithm, shape (k,), a value is zero. Once no more values may be asked for
+    (``left``, by default 20 000 in all), the widest pieces have been looked at, and the changes of sign met so far are
+    reported. Zeros between two values for which ``skip`` is true are of no interest.
     """
     search = _Search(function, error, skip, low, high)
     room_left = left if left is not None else lambda: 20_000 - search.asked
     pieces = [(low, high)]
-    spent = False
     while pieces:
         room = max(room_left(), 0) // (2 * PLACES.size)
         pieces.sort(key=lambda piece: 0.5 * piece[0] - 0.5 * piece[1])  # the widest first
-        if room < len(pieces):
-            spent = True
-            if room == 0:
-                search.unresolved += pieces
-                break
+        if room == 0:
+            search.put([_Part(a, b, _Kind.ROUGH) for a, b in pieces])
+            search.spent = True
+            break
+        search.spent |= room < len(pieces)
         pieces = pieces[room:] + search.look(pieces[:room])
-    return search.result(spent)
+        pieces = pieces or search.doubtful(room_left())
+    return search.result()
 
 
-@dataclass
-class _Piece:
-    """A piece on which the function is a polynomial, and the points that should separate its zeros."""
+class _Kind(Enum):
+    """Knowledge of a function on a part of the interval."""
+
+    SIGN = auto()  # it has one sign
+    DOUBT = auto()  # it may vanish, and the polynomial goes straight through
+    BENT = auto()  # it may vanish, and the polynomial turns
+    ZERO = auto()  # it is zero within its error
+    ROUGH = auto()  # it is no polynomial
+    MISSING = auto()  # it cannot be evaluated
+    SKIPPED = auto()  # its zeros are of no interest
+
+
+class _Part(NamedTuple):
+    """A part of the interval, with the sign, where it is certain, or the logarithm of what the polynomial may be wrong
+    by."""
 
     a: float
     b: float
-    expected: int
-    borders: tuple[bool, bool]
-    separators: Array
+    kind: _Kind
+    sign: float = 0.0
+    wrong: float = -np.inf
+
+
+_OPEN = (_Kind.DOUBT, _Kind.BENT)
 
 
 @dataclass
@@ -133,32 +131,36 @@ class _Search:
     skip: Callable[[float, float], bool] | None
     low: float
     high: float
+    spent: bool = False
     asked: int = 0
-    points: dict[float, float] = field(default_factory=dict)  # places that separate zeros, with the sign there
-    sampled: dict[float, float] = field(default_factory=dict)  # signs wherever the function was evaluated
-    roots: list[tuple[float, float]] = field(default_factory=list)  # of polynomials, with what they may be wrong by
-    flat: list[Interval] = field(default_factory=list)  # zero within the error
-    unresolved: list[Interval] = field(default_factory=list)
-    missing: list[Interval] = field(default_factory=list)
+    signs: dict[float, float] = field(default_factory=dict)  # wherever the function was evaluated
+    parts: list[_Part] = field(default_factory=list)  # in order
+
+    def put(self, parts: list[_Part]) -> None:
+        """Put parts in the place of what was known there."""
+        for part in parts:
+            before = [each._replace(b=min(each.b, part.a)) for each in self.parts if each.a < part.a]
+            after = [each._replace(a=max(each.a, part.b)) for each in self.parts if each.b > part.b]
+            self.parts = [*before, part, *after]
 
     def look(self, pieces: list[Interval]) -> list[Interval]:
         """Look at some pieces at once; those that are left to be looked at."""
         places = np.array([_places(a, b, PLACES) for a, b in pieces])
         signs, logs = (part.reshape(places.shape) for part in self._ask(places.ravel()))
         left: list[Interval] = []
-        resolved: list[_Piece] = []
         for (a, b), row_signs, row_logs in zip(pieces, signs, logs, strict=True):
-            outcome = self._piece(a, b, row_signs, row_logs)
-            if isinstance(outcome, _Piece):
-                resolved.append(outcome)
+            parts = self._parts(a, b, row_signs, row_logs)
+            if parts:
+                self.put(parts)
             else:
-                left += outcome
-        return left + self._separate(resolved)
+                middle = 0.5 * a + 0.5 * b
+                left += [(a, middle), (middle, b)]
+        return left
 
     def _ask(self, places: Array) -> tuple[Array, Array]:
         signs, logs = self.function(places)
         self.asked += places.size
-        self.sampled.update(zip(places.tolist(), signs.tolist(), strict=True))
+        self.signs.update(zip(places.tolist(), signs.tolist(), strict=True))
         return signs, logs
 
     def _fine(self, a: float, b: float, part: float) -> bool:
@@ -166,157 +168,123 @@ class _Search:
         least = max(part * (0.5 * self.high - 0.5 * self.low), 0.5 * _ULPS * float(np.spacing(max(abs(a), abs(b)))))
         return 0.5 * b - 0.5 * a <= least
 
-    def _piece(self, a: float, b: float, signs: Array, logs: Array) -> _Piece | list[Interval]:
+    def _parts(self, a: float, b: float, signs: Array, logs: Array) -> list[_Part]:
+        """Parts of a piece; none if it has to be cut."""
         absent = np.isnan(signs) | np.isnan(logs)
         if absent.any():
-            if absent.all() or self._fine(a, b, _HOLE):
-                self.missing.append((a, b))
-                return []
-            return _halves(a, b)
+            return [_Part(a, b, _Kind.MISSING)] if absent.all() or self._fine(a, b, _HOLE) else []
         reference = float(logs.max())
         if reference == -np.inf:
-            self.flat.append((a, b))
-            return []
-        values = signs * np.exp(logs - reference)
-        coefficients, off, dense = interpolated(values)
-        uncertain = float(off)
-        real, close, spread = _roots(coefficients)
-        unclear = DENSE[np.abs(dense) <= _CLEAR * uncertain]
-        if not unclear.size and not real.size and not close.size:
-            return _Piece(a, b, 0, (False, False), np.empty(0))
-        # Where the polynomial says nothing there must be one of its zeros at hand, or the end of the piece.
-        known = np.concatenate([real, close, [-1.0, 1.0]])
-        vague = bool((np.abs(unclear[:, None] - known).min(axis=1) > _NEAR).any()) if unclear.size else False
-        single = real[(np.abs(real[:, None] - close) > _NEAR).all(axis=1)]
-        slopes = np.abs(chebyshev.chebval(single, chebyshev.chebder(coefficients)))
-        vague |= bool((_CLEAR * uncertain > _NEAR * slopes).any())
+            return [_Part(a, b, _Kind.ZERO)]
+        coefficients, off, dense = interpolated(signs * np.exp(logs - reference))
+        wrong = max(float(off), _ROUNDING)
+        if max(dense.min(), -dense.max()) > _CLEAR * wrong + float(np.abs(coefficients) @ _BULGE):
+            return [_Part(a, b, _Kind.SIGN, float(np.sign(dense[0])))]
         if self.skip is not None and self._fine(a, b, _DEEP) and self.skip(a, b):
-            return []
-        noise = 0.0
-        if self.error is not None and (close.size or vague or uncertain > _RESOLVED) and self._fine(a, b, _DEEP):
-            noise = _CLEAR * float(np.exp(min(self.error(_places(a, b, PLACES)).max() - reference, 0.0)))
-        if noise >= 1.0:
-            self.flat.append((a, b))
-            return []
-        if uncertain > noise and (uncertain > _RESOLVED or vague):
-            if self._fine(a, b, _ROUGH):
-                (self.flat if self._fine(a, b, _FINEST) else self.unresolved).append((a, b))
-                return []
-            return _halves(a, b)
-        if close.size:
-            around = self._pair(a, b, close, spread, coefficients, uncertain, reference)
-            if around is not None:
-                return around
-            real = self._touches(a, b, real, close, coefficients, max(noise, uncertain))
-        slopes = np.abs(chebyshev.chebval(real, chebyshev.chebder(coefficients)))
-        reach = _CLEAR * max(uncertain, noise) / np.maximum(slopes, 1e-300)
-        self.roots += zip(_places(a, b, real).tolist(), (reach * (0.5 * b - 0.5 * a)).tolist(), strict=True)
-        # A zero that may lie on either side of a border is left to whoever compares the signs on both sides.
-        doubt = _CLEAR * max(uncertain, noise)
-        at_left, at_right = bool(abs(values[0]) <= doubt), bool(abs(values[DEGREE]) <= doubt)
-        kept = real[~(at_left & (real + 1.0 <= reach)) & ~(at_right & (1.0 - real <= reach))]
-        alone = (at_left or at_right) and not kept.size
-        stations = np.concatenate([[-1.0] if at_left or alone else [], kept, [1.0] if at_right or alone else []])
-        return _Piece(a, b, kept.size, (at_left, at_right), _places(a, b, 0.5 * (stations[1:] + stations[:-1])))
+            return [_Part(a, b, _Kind.SKIPPED)]
+        parts = self._cut(a, b, coefficients, wrong, reference)
+        if wrong <= _RESOLVED and not any(_wide(part, a, b) for part in parts):
+            return parts
+        if self.error is not None and self._fine(a, b, _DEEP):
+            noise = float(np.exp(min(self.error(_places(a, b, PLACES)).max() - reference, 0.0)))
+            if _CLEAR * noise >= 1.0:
+                return [_Part(a, b, _Kind.ZERO)]
+            if wrong <= _CLEAR * noise:
+                # What is wide now does not become narrower on a smaller piece.
+                parts = self._cut(a, b, coefficients, _CLEAR * noise, reference)
+                return [part._replace(wrong=-np.inf) if _wide(part, a, b) else part for part in parts]
+        if self._fine(a, b, _ROUGH):
+            return [_Part(a, b, _Kind.ZERO if self._fine(a, b, _FINEST) else _Kind.ROUGH)]
+        return []
 
-    def _pair(
-        self,
-        a: float,
-        b: float,
-        close: Array,
-        spread: Array,
-        coefficients: Array,
-        uncertain: float,
-        reference: float,
-    ) -> list[Interval] | None:
-        """Pieces around the first pair of zeros that the error leaves apart; None if there is none."""
-        # The error may fall with the function: it is the one in the middle of a pair that counts.
-        sure = np.zeros(close.size)
-        if self.error is not None:
-            sure = _CLEAR * np.exp(np.minimum(self.error(_places(a, b, close)) - reference, 0.0))
-        touching = np.abs(chebyshev.chebval(close, coefficients)) + uncertain < sure
-        if touching.all() or self._fine(a, b, _FINEST):
-            return None
-        curvature = abs(float(chebyshev.chebval(close[~touching][0], chebyshev.chebder(coefficients, 2))))
-        # Wide enough that the pieces beside it are clear of zeros, and the pair in it for certain.
-        unsure = np.sqrt(_CLEAR * max(uncertain, _EPSILON) / max(curvature, _EPSILON))
-        reach = min(max(_APART * float(spread[~touching][0]), _APART * unsure), _APART * _NEAR)
-        return _around(a, b, float(close[~touching][0]), reach)
-
-    def _touches(self, a: float, b: float, real: Array, close: Array, coefficients: Array, noise: float) -> Array:
-        """Note where pairs of zeros cannot be told apart; the zeros that are left."""
-        curvature = np.abs(chebyshev.chebval(close, chebyshev.chebder(coefficients, 2)))
-        reach = np.minimum(2.0 * np.sqrt(2.0 * noise / np.maximum(curvature, 1e-300)) + _REAL, _NEAR)
-        for center, width in zip(close.tolist(), reach.tolist(), strict=True):
-            members = real[np.abs(real - center) <= _NEAR]
-            ends = np.clip([min([center, *members]) - width, max([center, *members]) + width], -1.0, 1.0)
-            start, end = _places(a, b, ends).tolist()
-            self.flat.append((start, end))
-            real = real[np.abs(real - center) > _NEAR]
-        return real
-
-    def _separate(self, pieces: list[_Piece]) -> list[Interval]:
-        """Take the signs that separate the zeros of some pieces; the pieces whose zeros do not show in them."""
-        wanted = np.concatenate([piece.separators for piece in pieces]) if pieces else np.empty(0)
-        signs = self._ask(wanted)[0] if wanted.size else wanted
-        left: list[Interval] = []
-        for piece in pieces:
-            own, signs = signs[: piece.separators.size], signs[piece.separators.size :]
-            inner = list(zip(piece.separators.tolist(), own.tolist(), strict=True))
-            ends = [(place, self.sampled[place]) for place in (piece.a, piece.b)]
-            sequence = ends[:1] * (not piece.borders[0]) + inner + ends[1:] * (not piece.borders[1])
-            changes = sum(u * v < 0.0 for (_, u), (_, v) in itertools.pairwise(sequence))
-            touched = any(piece.a <= start and end <= piece.b for start, end in self.flat)
-            if changes != piece.expected and not touched:
-                if self._fine(piece.a, piece.b, _FINEST):
-                    self.flat.append((piece.a, piece.b))  # a pair of zeros that rounding hides
-                else:
-                    left += _halves(piece.a, piece.b)
+    def _cut(self, a: float, b: float, coefficients: Array, wrong: float, reference: float) -> list[_Part]:
+        """A piece on which the function is a polynomial, cut where its size is what makes a sign certain."""
+        level = _CLEAR * wrong
+        ends = np.concatenate([[-1.0], _levels(coefficients, level), [1.0]])
+        values = chebyshev.chebval(0.5 * ends[1:] + 0.5 * ends[:-1], coefficients)
+        signs = np.where(np.abs(values) > level, np.sign(values), 0.0)
+        borders = np.concatenate([[0], np.flatnonzero(np.diff(signs)) + 1, [signs.size]])
+        parts = []
+        for i, j in itertools.pairwise(borders.tolist()):
+            start, end = _places(a, b, ends[[i, j]]).tolist()
+            if signs[i]:
+                parts.append(_Part(start, end, _Kind.SIGN, float(signs[i])))
                 continue
-            self.points.update((place, sign) for place, sign in ends + inner if sign in (-1.0, 1.0))
-        return left
+            slopes = chebyshev.chebval(ends[i] + _WITHIN * (ends[j] - ends[i]), chebyshev.chebder(coefficients))
+            steady = slopes.min() * slopes.max() > 0.0 and np.abs(slopes).min() > _STEADY * np.abs(slopes).max()
+            kind = _Kind.DOUBT if steady else _Kind.BENT
+            parts.append(_Part(start, end, kind, wrong=reference + float(np.log(wrong))))
+        return parts
 
-    def result(self, spent: bool) -> Zeros:
-        for a, b in self.unresolved:
-            # Nothing separates the zeros here; the changes of sign that were met are certain nevertheless.
-            self.points.update((x, s) for x, s in self.sampled.items() if a <= x <= b and s in (-1.0, 1.0))
-        flat = _joined(self.flat)
-        missing = _joined(self.missing)
-        changes, touched = [], set()
-        for (p, u), (q, v) in itertools.pairwise(sorted(self.points.items())):
-            inside = [piece for piece in flat if p <= piece[0] and piece[1] <= q]
-            if u * v < 0.0 and not any(p <= a and b <= q for a, b in missing):
-                changes.append((p, q))
-                touched.update(inside)
-        changes = self._narrowed(changes)
-        ends = [(x, x) for x in (self.low, self.high) if self.sampled.get(x) == 0.0]
-        touches = [
-            piece
-            for piece in flat
-            if piece not in touched and not any(a <= piece[1] and piece[0] <= b for a, b in changes + ends)
-        ]
-        return Zeros(
-            tuple(sorted(changes + ends)), tuple(touches), tuple(_joined(self.unresolved)), tuple(missing), spent
-        )
-
-    def _narrowed(self, changes: list[Interval]) -> list[Interval]:
-        """Intervals cut down to what the polynomials may be wrong by, where the function changes sign there."""
-        cut = []
-        for p, q in changes:
-            known = [(reach, root) for root, reach in self.roots if p <= root <= q]
-            if known:
-                reach, root = min(known)
-                reach = max(reach, 1e-13 * abs(root))
-                cut.append((max(p, root - reach), min(q, root + reach)))
-            else:
-                cut.append((p, q))
-        if not cut:
+    def doubtful(self, room: int) -> list[Interval]:
+        """Pieces around what has to be looked at on its own scale; ``room`` values of the function may be asked for."""
+        runs = [run for run in self._runs() if any(part.kind in _OPEN for part in run[1])]
+        ends = [(run[0].a, run[-1].b) for _, run, _ in runs]
+        unknown = sorted({place for place in itertools.chain(*ends) if place not in self.signs})
+        if room < len(unknown) + len(runs):
+            self.spent = True
             return []
-        signs = self._ask(np.array(cut).ravel())[0].reshape(-1, 2)
-        return [
-            new if u * v < 0.0 and new[0] < new[1] else old
-            for old, new, (u, v) in zip(changes, cut, signs.tolist(), strict=True)
-        ]
+        if unknown:
+            self._ask(np.array(unknown))
+        pieces = []
+        for (before, run, after), (a, b) in zip(runs, ends, strict=True):
+            # Beyond what is known the function has the sign that it has at the end.
+            seen = before in (self.signs[a], 0.0) and after in (self.signs[b], 0.0)
+            if seen and before * after <= 0.0 and all(part.kind is not _Kind.BENT for part in run):
+                continue
+            if self._fine(a, b, _FINEST) or self._vanishes(a, b, max(part.wrong for part in run)):
+                self.put([_Part(a, b, _Kind.ZERO)])
+                continue
+            wider = 0.5 * (b - a)
+            pieces.append((max(a - wider, self.low), min(b + wider, self.high)))
+        return pieces
+
+    def _vanishes(self, a: float, b: float, wrong: float) -> bool:
+        """True if a function that comes to zero as far as its polynomial tells is wrong by as much itself."""
+        return self.error is not None and wrong <= float(self.error(np.array([0.5 * a + 0.5 * b]))[0]) + np.log(_CLEAR)
+
+    def _runs(self) -> Iterator[tuple[float, list[_Part], float]]:
+        """Parts where the function may vanish, as far as they follow each other, with the signs before and after, 0
+        at the ends of what is known."""
+        before, run = 0.0, []
+        for part in [*self.parts, _Part(self.high, self.high, _Kind.SKIPPED)]:
+            if part.kind in (*_OPEN, _Kind.ZERO):
+                run.append(part)
+                continue
+            if run:
+                yield before, run, part.sign
+            before, run = part.sign, []
+
+    def result(self) -> Zeros:
+        """The zeros, from the parts as they are."""
+        ends = [(x, x) for x in (self.low, self.high) if self.signs.get(x) == 0.0]
+        met = sorted((place, sign) for place, sign in self.signs.items() if sign in (-1.0, 1.0))
+        changes: list[Interval] = []
+        touches: list[Interval] = []
+        for before, run, after in self._runs():
+            first, last = run[0], run[-1]
+            u = before or (first.kind is not _Kind.ZERO) * self.signs.get(first.a, 0.0)
+            v = after or (last.kind is not _Kind.ZERO) * self.signs.get(last.b, 0.0)
+            if u * v < 0.0:
+                left = [place for place, sign in met if place <= first.a and sign == u]
+                right = [place for place, sign in met if place >= last.b and sign == v]
+                changes += zip(left[-1:], right[:1], strict=False)
+            else:
+                touches += [part[:2] for part in run if part.kind is _Kind.ZERO]
+        of_kind = {kind: _joined([part[:2] for part in self.parts if part.kind is kind]) for kind in _Kind}
+        for a, b in of_kind[_Kind.ROUGH]:
+            # Nothing separates the zeros here; the changes of sign that were met are certain nevertheless.
+            within = [each for each in met if a <= each[0] <= b]
+            changes += [(x, y) for (x, u), (y, v) in itertools.pairwise(within) if u != v]
+        changes = sorted(changes + ends)
+        apart = [(a, b) for a, b in _joined(touches) if not any(x <= b and a <= y for x, y in changes)]
+        rough, missing = of_kind[_Kind.ROUGH], of_kind[_Kind.MISSING]
+        return Zeros(tuple(changes), tuple(apart), tuple(rough), tuple(missing), self.spent)
+
+
+def _wide(part: _Part, a: float, b: float) -> bool:
+    """True if a part without a certain sign is a large part of its piece."""
+    return part.kind in _OPEN and 0.5 * part.b - 0.5 * part.a > _NARROW * (0.5 * b - 0.5 * a)
 
 
 def _places(a: float, b: float, parts: Array) -> Array:
@@ -325,34 +293,12 @@ def _places(a: float, b: float, parts: Array) -> Array:
     return np.asarray(np.where(parts <= -1.0, a, np.where(parts >= 1.0, b, np.clip(places, a, b))))
 
 
-def _halves(a: float, b: float) -> list[Interval]:
-    middle = 0.5 * a + 0.5 * b
-    return [(a, middle), (middle, b)]
-
-
-def _around(a: float, b: float, center: float, reach: float) -> list[Interval]:
-    """A piece cut in three, the middle one narrow about a center; in two where the center is near an end."""
-    places = _places(a, b, np.array([center - reach, center + reach])).tolist()
-    cuts = [a, *(place for place in places if a < place < b), b]
-    return list(itertools.pairwise(cuts))
-
-
-def _roots(coefficients: Array) -> tuple[Array, Array, Array]:
-    """Real roots within the piece; where two roots come close to each other, within it or just outside, and how far
-    apart they are."""
-    kept = np.trim_zeros(coefficients, "b")
-    if kept.size < 2:
-        return np.empty(0), np.empty(0), np.empty(0)
-    roots = chebyshev.chebroots(kept)
-    near = roots[(np.abs(roots.real) <= 1.0 + _NEAR) & (np.abs(roots.imag) < _NEAR)]
-    real = np.sort(near.real[np.abs(near.imag) < _REAL])
-    upper = near[near.imag > _REAL]
-    gaps = np.diff(real)
-    close = np.concatenate([upper.real, 0.5 * (real[1:] + real[:-1])[gaps < _NEAR]])
-    spread = np.concatenate([upper.imag, gaps[gaps < _NEAR]])
-    # A pair beyond an end that is farther from it than its members are from each other belongs to another piece.
-    own = np.abs(close) <= 1.0 + spread
-    return real[np.abs(real) <= 1.0], np.clip(close[own], -1.0, 1.0), spread[own]
+def _levels(coefficients: Array, level: float) -> Array:
+    """Places within -1 ... 1 at which a polynomial is a level, or minus that, in order."""
+    constant = np.eye(1, coefficients.size)[0]
+    both = [chebyshev.chebroots(np.trim_zeros(coefficients + side * constant, "b")) for side in (-level, level)]
+    roots = np.concatenate(both)
+    return np.sort(roots[(np.abs(roots.imag) < _REAL) & (np.abs(roots.real) < 1.0)].real)
 
 
 def _joined(pieces: list[Interval]) -> list[Interval]:

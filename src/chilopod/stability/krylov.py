@@ -1,0 +1,389 @@
+"""Multipliers of largest modulus of a large system, without the derivative of its flow as a matrix: what
+``multipliers(leading=)`` computes.
+
+The derivative is known by what it does to directions. A block of them meets multipliers that agree, as those of a ring
+do, in as many copies as it has columns, and the compiled flow carries several directions at nearly the cost of one, so
+nothing is gained by one direction at a time (Arnoldi's method as in ARPACK), nor by restarts: the subspace may grow to
+the whole space, where it is exact.
+
+The orbit is found by Newton's method, every linear system solved in such a subspace to about the accuracy that the
+method can use (Dembo, Eisenstat and Steihaug, *SIAM J. Numer. Anal.* 19, 400, 1982), with the directions that contract
+least in the rounds before in the block it starts from. Of a strongly dissipative system it takes a few directions
+(compare the Newton-Picard methods of Lust, Roose, Spence and Champneys, *SIAM J. Sci. Comput.* 19, 1188, 1998).
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chilopod.errors import AnalysisError
+from chilopod.frozen import ReadOnlyArrays
+from chilopod.stability.budget import Budget
+from chilopod.stability.capabilities import FlowsTangents, given_scale, is_autonomous, returns_per_period
+from chilopod.stability.convergence import RETURN
+from chilopod.stability.returns import CUTS, REPEATED, Section, carried, return_duration, return_time, section_at
+from chilopod.stability.spectrum.errors import FIRST_ORDER, eigenvalue_errors, falling_order
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+LARGE = 100
+"""States from which on a few directions are cheaper than the whole derivative."""
+
+_LANES = 4  # columns that the compiled code carries at once
+_ROUND_OFF = 1e-14  # of the largest image: what is outside a subspace by rounding alone
+_GROWTH = 1.125  # from one subspace that is looked at to the next
+_SINGULAR = 1e-13  # singular values of H' - 1 that count as zero, H' or the unit matrix being one
+
+_PARTS = 16  # of a return, where the sizes of the states are looked at
+_SWEEPS, _MOST_SWEEPS = 3, 30  # through what the states make of each other; more where the orbit tells no sizes
+_STEADY = 2.0  # ratios of sizes that change by less are known well enough
+
+_ROUNDS = 30  # of Newton's method
+_WORSE = 10.0  # residuals may grow by so much
+_RESTS = 1e-8  # of the sizes: a motion that short is none
+_UNSOLVED = 0.5  # of a residual, in the whole space: no step of Newton's method
+_COARSE, _FINE = 1e-2, 1e-6  # of a residual: how accurately linear systems are solved
+
+_FEWEST, _SPARE = 8, 2  # columns of a block, and those beyond the multipliers that are asked for
+_CONVERGED = 1e-13  # residual, of the size of the matrix
+_SAFETY = 4.0  # on a norm of which eight components or more, in random directions, are known
+_BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
+
+
+@dataclass(frozen=True)
+class KrylovSubspace(ReadOnlyArrays):
+    """A subspace V with A V = V H + Q R; A is applied to the last block alone in every round, and Q continues V."""
+
+    basis: Array  # V, orthonormal, shape (n, m)
+    first: int  # columns of V that span the block it started from
+    matrix: Array  # H = V^T A V, shape (m, m)
+    coupling: Array  # R, shape (q, m), zero but for the columns of the last block; q = 0 where V is invariant
+
+    def solve_shifted(self, right: Array) -> tuple[Array, float]:
+        """The v in V with the least |(A - 1) v - right|, and what is left of it relative to |right|, for a ``right`` in
+        the block that V started from: block GMRES (Saad, *Iterative Methods for Sparse Linear Systems*, 2003, section
+        6.12)."""
+        m = self.matrix.shape[0]
+        whole = np.concatenate([self.matrix - np.eye(m), self.coupling])
+        inside = np.concatenate([self.basis.T @ right, np.zeros(len(self.coupling))])
+        left, values, right_vectors = np.linalg.svd(whole, full_matrices=False)
+        kept = values > _SINGULAR * max(1.0, float(np.linalg.norm(self.matrix)))
+        found = right_vectors[kept].T @ (left[:, kept].T @ inside / values[kept])
+        return self.basis @ found, float(np.linalg.norm(whole @ found - inside) / np.linalg.norm(inside))
+
+
+def krylov_subspaces(apply: Callable[[Array], Array], start: Array) -> Iterator[KrylovSubspace]:
+    """Subspaces of a matrix, given by what it makes of directions, shape (n, any), from a block to start from, shape
+    (n, columns). Each is larger by an eighth or more, so that what is made of all of them costs no more than a few
+    times what is made of the last one, which is invariant."""
+    n = len(start)
+    block = _orthonormal(start, _ROUND_OFF * float(np.linalg.norm(start)), n)[0]
+    first = block.shape[1]
+    basis, matrix, coupling = block, np.zeros((0, 0)), np.zeros((first, 0))
+    largest, look = 0.0, 0.0
+    while True:
+        m, old = basis.shape[1], matrix.shape[0]
+        image = apply(block)
+        largest = max(largest, float(np.linalg.norm(image, axis=0).max()))
+        inside = basis.T @ image
+        outside = image - basis @ inside
+        again = basis.T @ outside  # once more, for an orthogonal basis (Giraud et al., Numer. Math. 101, 2005)
+        inside += again
+        outside -= basis @ again
+        block, tail = _orthonormal(outside, _ROUND_OFF * largest, n - m)
+        matrix = np.hstack([np.concatenate([matrix, coupling]), inside])
+        coupling = np.concatenate([np.zeros((tail.shape[0], old)), tail], axis=1)
+        if m >= look or not tail.size:
+            yield KrylovSubspace(basis, first, matrix, coupling)
+            look = _GROWTH * m
+        if not tail.size:
+            return
+        basis = np.concatenate([basis, block], axis=1)
+
+
+def _orthonormal(block: Array, negligible: float, most: int) -> tuple[Array, Array]:
+    """An orthonormal basis of the columns of a block and their coordinates in it, but for what is negligible."""
+    left, values, right = np.linalg.svd(block, full_matrices=False)
+    count = min(int((values > negligible).sum()), most)
+    return left[:, :count], values[:count, None] * right[:count]
+
+
+@dataclass(frozen=True)
+class TangentMap(ReadOnlyArrays):
+    """The return map H at a state (see :mod:`chilopod.stability.returns`), and its derivative H' without the matrix."""
+
+    system: FlowsTangents
+    point: Array  # state at time 0, shape (n,)
+    state: Array  # H(point)
+    duration: float  # of a return
+    returns: int  # in the full period
+    velocity: Array | None  # dx/dt at ``state``, where the system does not depend on time
+    normal: Array | None  # of the section, likewise
+
+    @property
+    def section(self) -> Section | None:
+        """The section that a return ends on, through ``point``."""
+        return None if self.normal is None else Section(self.point, self.normal, self.duration)
+
+    def images(self, directions: Array) -> Array:
+        """H' times directions, shape (n, m) both."""
+        return self._in_parts(directions, (0.0,))[1]
+
+    def images_with_error(self, directions: Array) -> tuple[Array, Array, Array]:
+        """The same, with bounds on the errors of the images, shape (n, m), and of ``state``, shape (n,): by their sizes
+        as a whole, not of every entry.
+
+        As in :func:`chilopod.stability.returns.flow_with_error` they are a multiple of the difference to a second
+        computation which takes the interval in parts.
+        """
+        state, images = self._in_parts(directions, (0.0,))
+        other, parts = self._in_parts(directions, CUTS)
+        return images, REPEATED * np.abs(parts - images), REPEATED * np.abs(self._across(other - state))
+
+    def _in_parts(self, directions: Array, cuts: tuple[float, ...]) -> tuple[Array, Array]:
+        times = [cut * self.duration for cut in cuts] + [self.duration]
+        state, images = self.point, directions
+        for a, b in zip(times, times[1:], strict=False):
+            state, images = self.system.flow_tangents(np.array(state), np.array(images), a, b)
+            if np.shape(state) != self.point.shape or np.shape(images) != directions.shape:
+                raise AnalysisError(
+                    f"gives shapes {np.shape(state)} and {np.shape(images)}",
+                    field="flow_tangents",
+                    allowed=f"{self.point.shape} and {directions.shape}",
+                )
+        if not np.isfinite(images).all():
+            raise AnalysisError("the flow is not finite over one return", field="flow")
+        if self.system.symmetry is not None:
+            state, images = self.system.symmetry @ state, self.system.symmetry @ images
+        return state, self._across(images)
+
+    def _across(self, directions: Array) -> Array:
+        """Directions at the end of a return along the motion into the section."""
+        if self.velocity is None or self.normal is None:
+            return directions
+        rate = float(self.normal @ self.velocity)
+        along: Array = np.multiply.outer(self.velocity, self.normal @ directions) / rate
+        return directions - along
+
+
+def tangent_map(system: FlowsTangents, x: Array, section: Section | None = None) -> TangentMap:
+    """The return map at a state at time 0, shape (n,), on a section if the system does not depend on time.
+
+    Raises AnalysisError if the flow gives anything that is not finite, or does not come back to the section.
+    """
+    velocity, normal = None, None
+    duration = return_time(system, x, section) if is_autonomous(system) and section else return_duration(system)
+    state = carried(system, x[None], 0.0, duration)[0]
+    if not np.isfinite(state).all():
+        raise AnalysisError("the flow is not finite over one return", field="flow")
+    if system.symmetry is not None:
+        state = system.symmetry @ state
+    if is_autonomous(system):
+        assert section is not None
+        velocity, normal = np.asarray(system.velocity(np.array(state)), dtype=np.float64), section.normal
+    return TangentMap(system, x, state, duration, returns_per_period(system), velocity, normal)
+
+
+def tangent_sizes(system: FlowsTangents, x: Array, duration: float) -> Array:
+    """Sizes of the states, shape (n,), as :func:`chilopod.stability.scales.sizes` says, without the matrix.
+
+    A state is as large as it becomes during a return, or as what the others, disturbed by their own sizes at random,
+    make of it within a part of the return. Where the orbit is zero throughout that alone gives the ratios: the
+    one-sided Krylov balancing of Chen and Demmel, *Linear Algebra Appl.* 309, 261-287, 2000.
+    """
+    given = given_scale(system)
+    if given is not None:
+        return given
+    random = np.random.default_rng(0)
+    times = np.linspace(0.0, duration, _PARTS + 1).tolist()
+    state, size = x, np.abs(x)
+    for a, b in itertools.pairwise(times):
+        state = carried(system, state[None], a, b)[0]
+        if not np.isfinite(state).all():
+            raise AnalysisError("the flow is not finite over one return", field="flow")
+        size = np.maximum(size, np.abs(state))
+    moves = bool(size.any())
+    if not moves:
+        size = np.ones(x.size)
+    for _ in range(_SWEEPS if moves else _MOST_SWEEPS):
+        signs = random.choice([-1.0, 1.0], (x.size, _LANES))
+        driven = np.sqrt(
+            np.square(system.flow_tangents(np.array(x), size[:, None] * signs, 0.0, times[1])[1]).mean(axis=1)
+        )
+        larger = np.maximum(size, driven)
+        if not moves:
+            larger /= larger.max()
+            if float((larger / size).max()) <= _STEADY * float((larger / size).min()):
+                break
+        size = larger
+    return np.where(size > 0.0, size, size[size > 0.0].min())
+
+
+def closed_orbit(
+    system: FlowsTangents,
+    x: Array,
+    section: Section | None = None,
+    farthest: float = np.inf,
+    budget: Budget | None = None,
+) -> tuple[TangentMap, Array]:
+    """The return map in a state on a periodic orbit near a guess, and the sizes of the states, shape (n,) all.
+
+    The guess may miss itself by ``farthest``, relative to the sizes. A return ends on the section, by default across
+    the motion in the guess, where the system does not depend on time. Each round takes a return map from the budget.
+    Raises AnalysisError if Newton's method does not converge.
+    """
+    size = tangent_sizes(system, x, return_duration(system) if section is None else section.duration)
+    section = section_at(system, x, size) if section is None else section
+    best = np.inf
+    slowest = np.random.default_rng(0).standard_normal((x.size, _LANES - 1))
+    for rounds in range(_ROUNDS):
+        if budget is not None:
+            budget.take()
+        image = tangent_map(system, x, section)
+        size = np.maximum(size, np.maximum(np.abs(x), np.abs(image.state)) if x.any() else 0.0)
+        residual = (image.state - x) / size
+        off = float(np.abs(residual).max())
+        if RETURN.met(off, best):
+            if image.velocity is not None and np.abs(image.velocity * image.duration / size).max() <= _RESTS:
+                break
+            if section is not None:
+                image = tangent_map(system, x, section_at(system, x, size, image.duration))
+            return image, size
+        if off > farthest or (rounds > 4 and off > _WORSE * best):
+            break
+        best, farthest = min(best, off), np.inf
+        move, slowest = _move(image, residual, size, slowest, float(np.clip(off, _FINE, _COARSE)))
+        x = x - size * move
+        if not np.isfinite(x).all():
+            break
+        if section is not None:
+            section = replace(section, duration=image.duration)
+    raise AnalysisError(
+        f"no periodic orbit found near the guess (it misses itself by {best:.1e} of its size)",
+        field="orbit",
+        allowed="a guess closer to the orbit",
+    )
+
+
+def _move(image: TangentMap, residual: Array, size: Array, slowest: Array, accuracy: float) -> tuple[Array, Array]:
+    """The solution of (H' - 1) move = residual, in units of the sizes, and the directions that contract least."""
+    units = size[:, None]
+    start = np.column_stack([residual / np.linalg.norm(residual), slowest])
+    for subspace in krylov_subspaces(lambda directions: image.images(units * directions) / units, start):
+        move, left = subspace.solve_shifted(residual)
+        if left <= accuracy:
+            break
+    if left > _UNSOLVED:
+        raise AnalysisError("no move closes the motion: one return later all states near the guess are off alike")
+    values, vectors = np.linalg.eig(subspace.matrix)
+    largest = vectors[:, np.argsort(-np.abs(values))[: _LANES - 1]]
+    return move, subspace.basis @ np.where(largest.imag.any(axis=0), largest.imag + largest.real, largest.real)
+
+
+@dataclass(frozen=True)
+class LeadingMultipliers(ReadOnlyArrays):
+    """The largest eigenvalues of the derivative of a return map by falling modulus, shape (count,), or one more where
+    that would part a pair; a bound on the error of each; and about the modulus of the following one."""
+
+    values: ComplexArray
+    error: Array
+    following: float
+
+
+@dataclass(frozen=True)
+class _Ritz:
+    """Eigenvalues of H in a Krylov subspace, by falling modulus, and how far they are from those of the matrix."""
+
+    values: ComplexArray
+    vectors: ComplexArray  # unit columns
+    condition: Array  # norm of the left eigenvector for a right one of norm 1
+    residual: Array
+
+
+def leading_multipliers(image: TangentMap, size: Array, count: int) -> LeadingMultipliers:
+    """The ``count`` multipliers of largest modulus of the return map in a state on the orbit, the states being of some
+    sizes, shape (n,).
+
+    A value theta with the vector y, |y| = 1, is off by w^T (H' y - theta y) / w^T y, exactly, with w the left
+    eigenvector of the multiplier. H' y is computed anew, with its error; of w, the components in the random directions
+    from which the subspace grew are known, and w is almost never much longer than they tell (Kenney and Laub, *SIAM J.
+    Sci. Comput.* 15, 36, 1994).
+    """
+    n, units = size.size, size[:, None]
+    width = min(n, max(_FEWEST, -(-(count + _SPARE) // _LANES) * _LANES))
+    start = np.random.default_rng(0).standard_normal((n, width))
+    for subspace in krylov_subspaces(lambda directions: image.images(units * directions) / units, start):
+        ritz = _ritz(subspace)
+        chosen = whole_pairs(ritz.values, count)
+        if _settled(ritz, chosen, float(np.linalg.norm(subspace.matrix, 2))):
+            break
+    values, vectors = ritz.values[:chosen], subspace.basis @ ritz.vectors[:, :chosen]
+    both, errors, state_error = image.images_with_error(units * np.hstack([vectors.real, vectors.imag]))
+    images = (both[:, :chosen] + 1j * both[:, chosen:]) / units
+    residual = np.linalg.norm(images - values * vectors, axis=0)
+    residual += np.linalg.norm((errors[:, :chosen] + errors[:, chosen:]) / units, axis=0)
+    residual += 4.0 * np.finfo(float).eps * np.linalg.norm(images, axis=0)
+    residual += _bend(image, size, subspace, state_error, units * np.hstack([vectors.real, vectors.imag]), both)
+    error = ritz.condition[:chosen] * residual
+    if (error > FIRST_ORDER * np.abs(values).max(initial=0.0)).any():
+        wrong = np.full(subspace.matrix.shape, float(residual.max()))
+        error = np.minimum(error, eigenvalue_errors(ritz.values, subspace.matrix, wrong)[:chosen])
+    following = float(np.abs(ritz.values[chosen])) if chosen < ritz.values.size else 0.0
+    return LeadingMultipliers(values, error, following)
+
+
+def _ritz(subspace: KrylovSubspace) -> _Ritz:
+    values, vectors = np.linalg.eig(subspace.matrix)
+    order = falling_order(values)
+    values, vectors = values[order].astype(np.complex128), vectors[:, order].astype(np.complex128)
+    try:
+        left = np.linalg.inv(vectors)
+    except np.linalg.LinAlgError:
+        left = np.full_like(vectors, np.inf)
+    n, known = subspace.basis.shape[0], left[:, : subspace.first]
+    seen = _SAFETY * np.sqrt(n / subspace.first) * np.linalg.norm(known, axis=1)
+    condition = np.linalg.norm(left, axis=1)
+    if subspace.coupling.size:
+        condition = np.maximum(condition, seen)
+    return _Ritz(values, vectors, condition, np.linalg.norm(subspace.coupling @ vectors, axis=0))
+
+
+def whole_pairs(values: ComplexArray, count: int) -> int:
+    """A number of multipliers, or one more where the last one would be without its conjugate."""
+    count = min(count, values.size)
+    if count < values.size and values[count - 1].imag > 0.0 and values[count].imag < 0.0:
+        count += 1
+    return count
+
+
+def _settled(ritz: _Ritz, chosen: int, largest: float) -> bool:
+    """True if the chosen ones are known to round-off, and no other one may yet become larger."""
+    if ritz.values.size <= chosen:
+        return False
+    least = float(np.abs(ritz.values[chosen - 1]))
+    known = ritz.residual <= _CONVERGED * largest
+    rising = ~known & (np.abs(ritz.values) + ritz.residual > least)
+    return bool(known[:chosen].all() and not rising.any())
+
+
+def _bend(
+    image: TangentMap, size: Array, subspace: KrylovSubspace, state_error: Array, directions: Array, images: Array
+) -> Array:
+    """Change of the derivative within the error of the orbit, along the direction in which the orbit is least sure, on
+    each of some vectors given by real and imaginary parts."""
+    _, values, right = np.linalg.svd(subspace.matrix - np.eye(len(subspace.matrix)))
+    values = values[values > _SINGULAR * values[0]]
+    weakest = subspace.basis @ right[values.size - 1]
+    wrong = float(np.linalg.norm((np.abs(image.state - image.point) + state_error) / size))
+    off = wrong * max(1.0, 1.0 / float(values[-1]))
+    x = image.point + _BESIDE * size * weakest
+    beside = tangent_map(image.system, x, image.section).images(directions)
+    change = np.linalg.norm((beside - images) / size[:, None], axis=0)
+    half = change.size // 2
+    return (change[:half] + change[half:]) * (off / _BESIDE)
