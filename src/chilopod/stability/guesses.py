@@ -1,118 +1,127 @@
-"""States nearer to a periodic orbit than a guess: where Newton's method starts from once it has failed."""
+"""Guesses of periodic orbits: whole ones, and where Newton's method starts from once it has failed at a state."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
-from chilopod.errors import AnalysisError
+from chilopod.errors import AnalysisError, ParameterError
+from chilopod.flows.arguments import finite_array
 from chilopod.stability.capabilities import Autonomous, SystemLike, is_autonomous, returns_per_period
-from chilopod.stability.returns import Section, return_duration, returned_states, section_at, whole_period
+from chilopod.stability.returns import carried, checked_flow, return_duration, returned_states
 from chilopod.stability.scales import sizes
+from chilopod.stability.shooting import Nodes, node_count, nodes_along
 
 Array = NDArray[np.float64]
 
-_SHOTS, _LONGEST_SHOT = 20, 4.0  # rounds, and guessed periods
-_FARTHEST_MOVE = 0.3  # of the sizes, and of how far the motion would go at its speed, in a move of Newton's method
-_FARTHEST_STRETCH = 0.3  # likewise of the period
-_CLOSED = 1e-6  # of the same: a motion that about closes
+_OF_GUESS = 16  # nodes of an orbit that was given
+_FEWEST_ROWS = 5
+_FEWEST_NODES = 3
+_SAME_PERIOD = 1e-6
 _ONWARD = 0.382  # of the guessed return, where a guess is of no use
 _LONGEST_SETTLING = 300  # returns
 _MARCHED, _MARCHES = 48, 8  # steps a guessed period, and guessed periods, in which a motion is to come back
 _COMES_BACK = 0.1  # of its size
 _STILL = 1e-3  # of how much the others move
-_SINGULAR = 1e-13  # singular values that count as zero, the largest being one
-_AT_REST = 1e-10  # of the sizes: a motion that short leads nowhere
 
 
-def nearer_states(system: SystemLike, x: Array) -> Iterator[tuple[Array, Section | None]]:
-    """States nearer to an orbit than a guess, with sections across the motion."""
-    if is_autonomous(system):
-        shot = _shot(system, x)
-        if shot is not None:
-            yield shot
-    yield from _onward(system, x)
-    yield from _settled(system, x)
+def whole_orbit(guess: Any, system: SystemLike) -> Nodes | None:
+    """Nodes of a guess that is a whole orbit; None for one that is a single state.
 
+    Parameters
+    ----------
+    guess
+        States at even times over one period from time 0 on, shape (times, n), without the end; or times, shape
+        (times,), and states there, as a tuple or as an ``xarray.DataArray`` over ``time``: from the first to the last
+        one period passes.
+    system
+        Its period is that of the first form; of a system without one the guess of it.
 
-def _shot(system: Autonomous, x: Array) -> tuple[Array, Section | None] | None:
-    """A state and a period at which the motion about closes, by Newton's method for both together, each move at right
-    angles to the motion (Seydel, *Practical Bifurcation and Stability Analysis*, 2010, section 7.1).
-
-    Unlike a return to a section it needs no motion that comes back from the guess: of an orbit with a strongly stable
-    direction only guesses on its stable manifold do.
+    Raises
+    ------
+    ParameterError
+        If it is no such array, not finite, too short, or the times do not rise or are of another period.
     """
-    count = returns_per_period(system)
-    turn = np.eye(x.size) if system.symmetry is None else system.symmetry
-    duration = system.guess_period / count
-    longest, best = _LONGEST_SHOT * duration, np.inf
-    try:
-        for _ in range(_SHOTS):
-            size = sizes(system, x, duration)
-            later, derivative = system.flow(x, 0.0, duration)
-            start = np.asarray(system.velocity(x)) * duration / size
-            end = turn @ np.asarray(system.velocity(later)) * duration / size
-            residual = (turn @ later - x) / size
-            moved = float(np.linalg.norm(start))
-            off = float(np.abs(residual).max())
-            if not off <= 2.0 * best or moved <= _AT_REST:
-                return None
-            if off <= _CLOSED * moved:
-                return x, section_at(system, x, size, duration)
-            best = min(best, off)
-            closing = (turn @ derivative) * size / size[:, None] - np.eye(x.size)
-            bordered = np.block([[closing, end[:, None]], [start[None] / moved, np.zeros((1, 1))]])
-            move = np.linalg.lstsq(bordered, np.append(-residual, 0.0), rcond=_SINGULAR)[0]
-            move *= min(1.0, _FARTHEST_MOVE * min(1.0, moved) / float(np.abs(move[:-1]).max(initial=0.0) or np.inf))
-            x = x + move[:-1] * size
-            duration *= 1.0 + float(np.clip(move[-1], -_FARTHEST_STRETCH, _FARTHEST_STRETCH))
-            if duration > longest:
-                return None
-    except (AnalysisError, np.linalg.LinAlgError):
+    if hasattr(guess, "coords") and "time" in guess.coords:
+        guess = guess.coords["time"].values, guess.values
+    n, whole = system.dimension, return_duration(system) * returns_per_period(system)
+    if isinstance(guess, tuple) and len(guess) == 2 and np.ndim(guess[1]) == 2:
+        states = finite_array(guess[1], (len(guess[1]), n), "orbit")
+        times = finite_array(guess[0], (len(states),), "orbit")
+    elif np.ndim(guess) == 2:
+        states = finite_array(guess, (np.shape(guess)[0], n), "orbit")
+        states = np.vstack([states, states[:1]])
+        times = np.linspace(0.0, whole, len(states))
+    else:
         return None
-    return None
+    if len(states) < _FEWEST_ROWS:
+        raise ParameterError("has too few states", field="orbit", value=len(states), allowed=f"{_FEWEST_ROWS} or more")
+    if not (np.diff(times) > 0.0).all():
+        raise ParameterError("has times that do not rise", field="orbit")
+    lasts = float(times[-1] - times[0])
+    if not is_autonomous(system) and not abs(lasts - whole) <= _SAME_PERIOD * whole:
+        raise ParameterError("is not of one period", field="orbit", value=f"{lasts:g} s", allowed=f"{whole:g} s")
+    duration = lasts / returns_per_period(system)
+    return Nodes(CubicSpline(times - times[0], states)(np.arange(_OF_GUESS) * duration / _OF_GUESS), duration)
 
 
-def _onward(system: SystemLike, x: Array) -> list[tuple[Array, Section | None]]:
+def nearer_orbits(system: SystemLike, x: Array) -> Iterator[Nodes]:
+    """Nodes nearer to an orbit than a guessed state."""
+    for start in (_magnified, _onward, _settled):
+        yield from start(system, x)
+
+
+def _magnified(system: SystemLike, x: Array) -> list[Nodes]:
+    """Several nodes on the motion from a state, where a return magnifies deviations too much for one."""
+    duration = return_duration(system)
+    try:
+        count = node_count(checked_flow(system, x, 0.0, duration)[1], sizes(system, x, duration))
+        return [nodes_along(system, x, duration, count)] if count >= _FEWEST_NODES else []
+    except (AnalysisError, np.linalg.LinAlgError):
+        return []
+
+
+def _onward(system: SystemLike, x: Array) -> list[Nodes]:
     """A state further along the motion, where every state may be time 0: in the guess itself something may just have
     happened, such as an impact, and a motion that ends there ends before it or after it by round-off."""
-    if not isinstance(system, Autonomous):
+    if not is_autonomous(system):
         return []
+    duration = return_duration(system)
     try:
-        return [(system.flow(np.array(x), 0.0, _ONWARD * return_duration(system))[0], None)]
+        return [Nodes(carried(system, x[None], 0.0, _ONWARD * duration), duration)]
     except AnalysisError:
         return []
 
 
-def _settled(system: SystemLike, x: Array) -> list[tuple[Array, Section | None]]:
-    """States on the orbit that attracts the motion from a state, if one does, with sections across it."""
+def _settled(system: SystemLike, x: Array) -> Iterator[Nodes]:
+    """States on the orbit that attracts the motion from a state, if one does."""
     if is_autonomous(system):
-        return _settled_autonomous(system, x)
-    found: list[tuple[Array, Section | None]] = []
+        yield from _settled_autonomous(system, x)
+        return
     for count in (_LONGEST_SETTLING // 10, _LONGEST_SETTLING):
         try:
             for _ in range(count):
                 x = returned_states(system, x[None])[0]
         except AnalysisError:
-            break
+            return
         if not np.isfinite(x).all():
-            break
-        found.append((x, None))
-    return found
+            return
+        yield Nodes(x[None], return_duration(system))
 
 
-def _settled_autonomous(system: Autonomous, x: Array) -> list[tuple[Array, Section | None]]:
+def _settled_autonomous(system: Autonomous, x: Array) -> list[Nodes]:
     """As :func:`_settled`, with a new guess of the period: when the motion first comes close to where it was."""
     step = system.guess_period / _MARCHED
-    whole = whole_period(system)
     try:
         for _ in range(_LONGEST_SETTLING // 4):
-            x = whole.flow(x, 0.0, system.guess_period)[0]
+            x = carried(system, x[None], 0.0, system.guess_period)[0]
         path = [x]
         for _ in range(_MARCHES * _MARCHED):
-            path.append(whole.flow(path[-1], 0.0, step)[0])
+            path.append(carried(system, path[-1][None], 0.0, step)[0])
     except AnalysisError:
         return []
     states = np.array(path)
@@ -128,5 +137,4 @@ def _settled_autonomous(system: Autonomous, x: Array) -> list[tuple[Array, Secti
     turned = np.flatnonzero((away[1:-1] <= away[:-2]) & (away[1:-1] <= away[2:]) & (away[1:-1] < _COMES_BACK)) + 1
     if not turned.size:
         return []
-    count = 1 if system.symmetry is None else returns_per_period(system)
-    return [(x, section_at(system, x, None, float(turned[0]) * step / count))]
+    return [Nodes(x[None], float(turned[0]) * step / returns_per_period(system))]

@@ -192,6 +192,13 @@ def flow_with_error(system: SystemLike, x: Array, t0: float, t1: float) -> tuple
     return state, derivative, (REPEATED * off + 1e-15 * largest) * units
 
 
+def checked_flow(system: SystemLike, x: Array, t0: float, t1: float) -> tuple[Array, Array]:
+    """The flow and its derivative, of the right shapes."""
+    state, derivative = system.flow(np.array(x), t0, t1)  # a system may write into what it is given
+    _check_shapes(state, derivative, x.size)
+    return state, derivative
+
+
 def _check_shapes(state: Array, derivative: Array, n: int) -> None:
     if np.shape(state) != (n,) or np.shape(derivative) != (n, n):
         raise AnalysisError(
@@ -255,7 +262,7 @@ def _return_to_section(system: Autonomous, x: Array, with_error: bool, section: 
     assert section is not None
     count = returns_per_period(system)
     turn = np.eye(x.size) if system.symmetry is None else system.symmetry
-    start, rest, first = _crossing(system, x, section, system.flow)
+    start, rest, first = crossing(system, x, section, system.flow)
     error: float | Array = np.nan
     if with_error:
         state, jacobian, error = flow_with_error(system, x, 0.0, start + rest)
@@ -283,11 +290,11 @@ def return_time(system: Autonomous, x: Array, section: Section) -> float:
         If it does not come back.
     """
     nothing = np.broadcast_to(0.0, (x.size, x.size))
-    start, rest, _ = _crossing(system, x, section, lambda x, t0, t1: (carried(system, x[None], t0, t1)[0], nothing))
+    start, rest, _ = crossing(system, x, section, lambda x, t0, t1: (carried(system, x[None], t0, t1)[0], nothing))
     return start + rest
 
 
-def _crossing(
+def crossing(
     system: Autonomous, x: Array, section: Section, flow: Callable[[Array, float, float], tuple[Array, Array]]
 ) -> tuple[float, float, tuple[Array, Array]]:
     """When a motion is back at the section: a time shortly before, the rest of it, and the flow up to that time."""
@@ -360,7 +367,7 @@ def returned_states(system: SystemLike, states: Array, section: Section | None =
     result = np.empty_like(states)
     for i, rest in enumerate(rests):
         if rest is None:
-            _, rest, (state, _) = _crossing(system, states[i], section, system.flow)
+            _, rest, (state, _) = crossing(system, states[i], section, system.flow)
         else:
             state = before[i]
         result[i] = turned(system, carried(system, state[None], 0.0, rest))[0]

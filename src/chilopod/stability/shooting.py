@@ -1,41 +1,44 @@
-"""Multiple shooting: a periodic orbit as states at several instants, each carried to the next one.
+"""The equations of a periodic orbit: states at instants that divide a return evenly, each carried to the next one.
 
-Over a whole return a motion may magnify a deviation by thousands, and a correction that is as far off is none. Over a
-part of it a deviation grows by a root of that. The linear equations are condensed to the first state, the time of a
-return and the parameter (Ascher, Mattheij & Russell, *Numerical Solution of Boundary Value Problems*, section 4.3).
+One node is single shooting. Over a whole return a motion may magnify a deviation by thousands, and a correction that is
+as far off is none; over a part of it a deviation grows by a root of that. The linear equations are condensed to the
+first state, the time of a return and the parameter (Ascher, Mattheij & Russell, *Numerical Solution of Boundary Value
+Problems*, section 4.3), the time to that at which the return ends on the section.
 """
 
 from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
-from chilopod.errors import AnalysisError, ParameterError
-from chilopod.flows.arguments import finite_array
+from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.capabilities import SystemLike, is_autonomous, returns_per_period
-from chilopod.stability.convergence import NODES
-from chilopod.stability.returns import Section, carried, return_duration
+from chilopod.stability.budget import Budget, SpentError
+from chilopod.stability.capabilities import Autonomous, SystemLike, is_autonomous
+from chilopod.stability.convergence import NODES, RETURN
+from chilopod.stability.returns import Section, carried, checked_flow, crossing, section_at
 
 Array = NDArray[np.float64]
 
-_ROUNDS, FEW_ROUNDS = 40, 12  # where corrections are damped, and on a curve, whose points are near
-_LONGEST = 3.0  # times the time of a return that was guessed
-_SHORTEST = 2.0**-8  # of a correction
+_EVALUATIONS, FEW_ROUNDS = 60, 12  # where corrections are damped, and on a curve, whose points are near
+_LONGEST = 4.0  # times the time of a return that was guessed
+_STRAYS = 20  # evaluations where the motion does not come back to the section
+_SHORTEST = 2.0**-6  # of a correction
 _DIFFERENCE = 1e-7  # of the parameter's scale
 _QUICKEST = 0.3  # of the time of a return: its largest correction
-_CUTOFF, _FAMILY = 1e-15, 1e-8  # singular values that count as zero, the largest being one; of families of orbits
+_FARTHEST, _FARTHER = 10.0, 2.0  # of the sizes of the states: the largest correction, and how much it grows by the next
+_NEAR = 1e-2  # of the sizes of the states: a motion that closes so nearly comes back to a section
+_CAREFUL = 0.3  # likewise, where the motion does not come back to the section
+_CUTOFF, _SINGULAR, _FAMILY = 1e-15, 1e-13, 1e-8  # singular values that count as zero, the largest being one
+_MAGNIFIED = 1e9  # correction over residual beyond which the equations may be singular
+_NOTHING = 1e-13  # of the sizes of the states: a state that small may be zero
 _GROWTH = 4.0  # of a deviation from one node to the next, about
 _MOST = 32
-_OF_GUESS = 16  # nodes of an orbit that was given
-_FEWEST_ROWS = 5
-_SAME_PERIOD = 1e-6
 
 
 @dataclass(frozen=True)
@@ -65,6 +68,10 @@ class Closed(ReadOnlyArrays):
     ----------
     nodes
         Its states.
+    sizes
+        Sizes of the states, shape (n,), no smaller than the states are.
+    end
+        Where the last node returns to, shape (n,).
     jacobian
         Derivative of a return, without the change of its time, shape (n, n): the product of those between nodes, which
         no rounding of a whole return disturbs.
@@ -73,6 +80,8 @@ class Closed(ReadOnlyArrays):
     """
 
     nodes: Nodes
+    sizes: Array
+    end: Array
     jacobian: Array
     by_value: Array
 
@@ -111,52 +120,14 @@ def nodes_along(system: SystemLike, x: Array, duration: float, count: int, value
     return Nodes(np.array(states), duration, value)
 
 
-def nodes_of(guess: Any, system: SystemLike) -> Nodes | None:
-    """Nodes of a guess that is a whole orbit; None for one that is a single state.
-
-    Parameters
-    ----------
-    guess
-        States at even times over one period from time 0 on, shape (times, n), without the end; or times, shape
-        (times,), and states there, as a tuple or as an ``xarray.DataArray`` over ``time``: from the first to the last
-        one period passes.
-    system
-        Its period is that of the first form; of a system without one the guess of it.
-
-    Raises
-    ------
-    ParameterError
-        If it is no such array, not finite, too short, or the times do not rise or are of another period.
-    """
-    if hasattr(guess, "coords") and "time" in guess.coords:
-        guess = guess.coords["time"].values, guess.values
-    n, whole = system.dimension, return_duration(system) * returns_per_period(system)
-    if isinstance(guess, tuple) and len(guess) == 2 and np.ndim(guess[1]) == 2:
-        states = finite_array(guess[1], (len(guess[1]), n), "orbit")
-        times = finite_array(guess[0], (len(states),), "orbit")
-    elif np.ndim(guess) == 2:
-        states = finite_array(guess, (np.shape(guess)[0], n), "orbit")
-        states = np.vstack([states, states[:1]])
-        times = np.linspace(0.0, whole, len(states))
-    else:
-        return None
-    if len(states) < _FEWEST_ROWS:
-        raise ParameterError("has too few states", field="orbit", value=len(states), allowed=f"{_FEWEST_ROWS} or more")
-    if not (np.diff(times) > 0.0).all():
-        raise ParameterError("has times that do not rise", field="orbit")
-    lasts = float(times[-1] - times[0])
-    if not is_autonomous(system) and not abs(lasts - whole) <= _SAME_PERIOD * whole:
-        raise ParameterError("is not of one period", field="orbit", value=f"{lasts:g} s", allowed=f"{whole:g} s")
-    duration = lasts / returns_per_period(system)
-    return Nodes(CubicSpline(times - times[0], states)(np.arange(_OF_GUESS) * duration / _OF_GUESS), duration)
-
-
 def shot(
     system_at: Callable[[float], SystemLike],
     start: Nodes,
     sizes: Array,
     section: Section | None,
     free: Free | None = None,
+    shared: Array | None = None,
+    budget: Budget | None = None,
 ) -> Closed:
     """The orbit near some nodes, by Newton's method, damped while the parameter is given.
 
@@ -167,99 +138,174 @@ def shot(
     start
         Guess.
     sizes
-        Sizes of the states, shape (n,).
+        Sizes of the states, shape (n,); they grow with the states while the parameter is given.
     section
         Section that holds the first state, of a system without a period of its own; else None.
     free
         Equation for the parameter; None where it is given.
+    shared
+        Basis of the states among which the first one is corrected, shape (n, k); None for all.
+    budget
+        Budget that a return is taken from for every evaluation.
 
     Raises
     ------
     AnalysisError
         If it does not converge, or the motion does not get from a node to the next one.
     """
-    linear = _Linear(system_at, start, sizes, section, free)
-    best, before = np.inf, 1.0
-    for _ in range(_ROUNDS if free is None else FEW_ROUNDS):
-        off = linear.residual
-        if NODES.met(off, best):
-            return linear.closed()
-        best = min(best, off)
-        linear, before = _damped(linear, min(1.0, 2.0 * before)) if free is None else (linear.moved(1.0), 1.0)
-        if not 1.0 / _LONGEST <= linear.nodes.duration / start.duration <= _LONGEST:
+    equations = _Equations(_Problem(system_at, free, shared, budget), start, _Frame(sizes, sizes, section))
+    rule, best, part, strays = RETURN if free is None else NODES, np.inf, 1.0, 0
+    correction: _Correction | None = None
+    cutoff = _CUTOFF if free is not None else _SINGULAR if len(start.states) == 1 else _FAMILY
+    for _ in range(_EVALUATIONS if free is None else FEW_ROUNDS):
+        if correction is None:
+            if rule.met(equations.residual, best):
+                return (equations if free is not None else equations.cleared()).closed()
+            if not 1.0 / _LONGEST <= equations.nodes.duration / start.duration <= _LONGEST:
+                break
+            strays += equations.astray
+            if strays > _STRAYS:
+                break
+            best = min(best, equations.residual)
+            correction = equations.correction(equations, cutoff)
+        there = equations.after(correction, part)
+        if there is not None and (free is not None or equations.is_nearer(there, correction, part, cutoff)):
+            equations, part, correction = there, min(1.0, 2.0 * part), None
+        elif part > _SHORTEST:
+            part *= 0.5
+        elif cutoff == _SINGULAR:
+            # It followed round-off, along a family of orbits: without that direction it converges.
+            cutoff, part = _FAMILY, 1.0
+            correction = equations.correction(equations, cutoff)
+        elif equations.residual <= rule.settled:
+            return equations.cleared().closed()
+        else:
             break
-    raise AnalysisError("corrections of the orbit's nodes do not converge", field="orbit")
+    raise AnalysisError(
+        f"no periodic orbit found near the guess (it misses itself by {best:.1e} of its size)",
+        field="orbit",
+        allowed="a guess closer to the orbit",
+    )
 
 
-def _damped(linear: _Linear, part: float) -> tuple[_Linear, float]:
-    """As much of a correction as leaves less to correct by the same linear equations, and how much that is (Deuflhard,
-    *Newton Methods for Nonlinear Problems*, section 3.3)."""
-    while part >= _SHORTEST:
-        with contextlib.suppress(AnalysisError):
-            there = linear.moved(part)
-            if linear.correction_left(there) <= max(
-                (1.0 - 0.25 * part) * linear.correction_left(linear), NODES.settled
-            ):
-                return there, part
-        part *= 0.5
-    raise AnalysisError("corrections of the orbit's nodes do not converge", field="orbit")
+@dataclass(frozen=True)
+class _Problem:
+    """What does not change from one correction to the next; see :func:`shot`."""
+
+    system_at: Callable[[float], SystemLike]
+    free: Free | None
+    shared: Array | None
+    budget: Budget | None
+
+    def beside(self, value: float) -> tuple[SystemLike, float] | None:
+        """The system at a value of the parameter beside another one, and how far; None where the parameter is given."""
+        if self.free is None:
+            return None
+        step = _DIFFERENCE * self.free.scale
+        try:
+            return self.system_at(value + step), step
+        except AnalysisError:  # the end of what there is
+            return self.system_at(value - step), -step
 
 
-class _Linear:
+class _Correction(NamedTuple):
+    """Changes of the nodes, shape (m, n), of the time of a return and of the parameter."""
+
+    states: Array
+    duration: float
+    value: float
+
+
+class _Frame(NamedTuple):
+    """What a correction goes by: sizes of the states, and of the states where corrections are allowed to lead, shape
+    (n,) both; the section that holds the first one; and whether the motion does not come back to it."""
+
+    sizes: Array
+    reach: Array
+    section: Section | None
+    astray: bool = False
+
+
+class _Equations:
     """The equations at some nodes and their derivatives."""
 
-    def __init__(
-        self,
-        system_at: Callable[[float], SystemLike],
-        nodes: Nodes,
-        sizes: Array,
-        section: Section | None,
-        free: Free | None,
-    ) -> None:
-        self._given = system_at, sizes, section, free
-        self.nodes = nodes
-        system = system_at(nodes.value)
+    def __init__(self, problem: _Problem, nodes: Nodes, frame: _Frame) -> None:
+        if problem.budget is not None:
+            problem.budget.take()
+        self._problem, self.nodes, free = problem, nodes, problem.free
+        system = problem.system_at(nodes.value)
+        # Flows between the nodes, and derivatives by the time of a return and by the parameter.
         m, n = nodes.states.shape
-        part, timed = nodes.duration / m, not is_autonomous(system)
-        ends, self._factors = np.empty((m, n)), np.empty((m, n, n))
-        # Derivatives by the time of a return and by the parameter.
+        self._ends, self._factors = np.empty((m, n)), np.empty((m, n, n))
         self._by_time, self._by_value = np.zeros((m, n)), np.zeros((m, n))
-        step = 0.0 if free is None else _DIFFERENCE * free.scale
-        beside = None
+        if free is None and m == 1 and frame.section is not None and is_autonomous(system):
+            frame = self._to_section(system, frame)
+        else:
+            self._to_nodes(system)
+        if is_autonomous(system):
+            self._by_time = np.array([system.velocity(np.array(end)) for end in self._ends]) / m
+        if system.symmetry is not None:
+            for last in (self._ends, self._factors, self._by_time, self._by_value):
+                last[-1] = system.symmetry @ last[-1]
+        self._off = self._ends - np.roll(self.nodes.states, -1, axis=0)
+        sizes, x = frame.sizes, nodes.states[0]
+        if free is None and x.any():
+            sizes = np.maximum(sizes, np.maximum(np.abs(nodes.states), np.abs(self._ends)).max(axis=0))
+        self._across = 0.0 if frame.section is None else float(frame.section.normal @ (x - frame.section.point))
+        self._missing = 0.0
         if free is not None:
-            try:
-                beside = system_at(nodes.value + step)
-            except AnalysisError:  # the end of what there is
-                step = -step
-                beside = system_at(nodes.value + step)
-        for i, x in enumerate(nodes.states):
-            a, b = (i * part, (i + 1) * part) if timed else (0.0, part)
-            try:
-                ends[i], self._factors[i] = system.flow(np.array(x), a, b)
-                if beside is not None:
-                    with np.errstate(all="ignore"):  # what is not finite is refused below
-                        self._by_value[i] = (carried(beside, x[None], a, b)[0] - ends[i]) / step
-            except AnalysisError as error:
-                raise AnalysisError(f"node {i} of {m}: {error.problem}", field="orbit") from error
-            if is_autonomous(system):
-                self._by_time[i] = np.asarray(system.velocity(ends[i])) / m
-        turn = np.eye(n) if system.symmetry is None else system.symmetry
-        ends[-1], self._factors[-1] = turn @ ends[-1], turn @ self._factors[-1]
-        self._by_time[-1], self._by_value[-1] = turn @ self._by_time[-1], turn @ self._by_value[-1]
-        self._off = ends - np.roll(nodes.states, -1, axis=0)
-        across = 0.0 if section is None else float(section.normal @ (nodes.states[0] - section.point))
-        here = np.append(nodes.states[0], nodes.value)
-        units = np.append(sizes, 1.0 if free is None else free.scale)
-        missing = 0.0 if free is None else float(free.row @ ((here - free.start) / units) - free.target)
-        self._extra = np.array([across, missing])
-        self.residual = max(float(np.abs(self._off / sizes).max()), abs(missing))
+            moved = (np.append(x, nodes.value) - free.start) / np.append(sizes, free.scale)
+            self._missing = float(free.row @ moved - free.target)
+        self.residual = max(float(np.abs(self._off / sizes).max()), abs(self._missing))
+        self._frame = frame._replace(sizes=sizes, reach=np.minimum(sizes, frame.reach))
         if not np.isfinite(self.residual):
             raise AnalysisError("the motion is not finite between two nodes", field="orbit")
+
+    @property
+    def astray(self) -> bool:
+        """True if the motion does not come back to the section."""
+        return self._frame.astray
+
+    def _to_nodes(self, system: SystemLike) -> None:
+        """Carry every node to the next one."""
+        m, value = len(self.nodes.states), self.nodes.value
+        part, beside = self.nodes.duration / m, self._problem.beside(value)
+        for i, x in enumerate(self.nodes.states):
+            a, b = (0.0, part) if is_autonomous(system) else (i * part, (i + 1) * part)
+            try:
+                self._ends[i], self._factors[i] = checked_flow(system, x, a, b)
+                if beside is not None:
+                    with np.errstate(all="ignore"):  # what is not finite is refused later
+                        self._by_value[i] = (carried(beside[0], x[None], a, b)[0] - self._ends[i]) / beside[1]
+            except AnalysisError as error:
+                if m == 1 or isinstance(error, SpentError):
+                    raise
+                raise AnalysisError(f"node {i} of {m}: {error.problem}", field="orbit") from error
+
+    def _to_section(self, system: Autonomous, frame: _Frame) -> _Frame:
+        """Carry a single node to where its motion is back at the section; where it does not come back, over the time
+        that was guessed, with a section of its own."""
+        x, duration = self.nodes.states[0], self.nodes.duration
+        assert frame.section is not None
+        if not frame.astray:
+            try:
+                near = replace(frame.section, duration=duration)
+                start, rest, (before, first) = crossing(system, x, near, system.flow)
+                self._ends[0], second = checked_flow(system, before, 0.0, rest)
+                self._factors[0] = second @ first
+                self.nodes = replace(self.nodes, duration=start + rest)
+                return frame
+            except SpentError:
+                raise
+            except AnalysisError:
+                pass
+        self._ends[0], self._factors[0] = checked_flow(system, x, 0.0, duration)
+        return frame._replace(section=section_at(system, x, frame.sizes, duration), astray=True)
 
     def _totals(self, off: Array) -> list[Array]:
         """Each later node as a linear function of first state, time, parameter, and 1, shape (n, n+3)."""
         n = off.shape[1]
-        total = np.hstack([np.eye(n), np.zeros((n, 3))])
+        total = np.eye(n, n + 3)
         totals = [total]
         for factor, by_time, by_value, each in zip(self._factors, self._by_time, self._by_value, off, strict=True):
             total = factor @ total
@@ -270,39 +316,90 @@ class _Linear:
     def closed(self) -> Closed:
         """The nodes as a solution."""
         total, n = self._totals(self._off)[-1], self._off.shape[1]
-        return Closed(self.nodes, total[:, :n], total[:, n + 1])
+        return Closed(self.nodes, self._frame.sizes, self._ends[-1], total[:, :n], total[:, n + 1])
 
-    def _solved(self, off: Array, extra: Array) -> tuple[Array, float, float]:
-        """Corrections of the nodes, the time of a return and the parameter, by these linear equations."""
-        _, sizes, section, free = self._given
-        n, totals = off.shape[1], self._totals(off)
-        units = np.append(sizes, [self.nodes.duration, 1.0 if free is None else free.scale])
-        matrix, right = np.zeros((n + 2, n + 2)), np.zeros(n + 2)
-        matrix[:n] = (totals[-1][:, : n + 2] - np.eye(n, n + 2)) * units / sizes[:, None]
-        right[:n] = -totals[-1][:, n + 2] / sizes
-        # Without a section the time of a return is given, and without another equation the parameter.
-        matrix[n, n] = matrix[n + 1, n + 1] = 1.0
-        if section is not None:
-            matrix[n, n], matrix[n, :n], right[n] = 0.0, section.normal * sizes, -extra[0]
+    def correction(self, other: _Equations, cutoff: float) -> _Correction:
+        """Correction that these linear equations make of what is off here or at other nodes."""
+        section, free, sizes = self._frame.section, self._problem.free, self._frame.sizes
+        n, totals = sizes.size, self._totals(other._off)
+        last, time = totals[-1], np.zeros(n + 3)
+        if section is not None:  # the time at which the return ends on it
+            speed = float(section.normal @ last[:, n])
+            if speed == 0.0:
+                raise AnalysisError("the motion does not cross the section", field="orbit")
+            time = -(section.normal @ last) / speed
+            time[n] = 0.0
+            time[n + 2] -= other._across / speed
+            last = last + np.outer(last[:, n], time)
+        matrix, right = (last[:, :n] - np.eye(n)) * sizes / sizes[:, None], -last[:, n + 2] / sizes
         if free is not None:
-            matrix[n + 1, :n], matrix[n + 1, n + 1], right[n + 1] = free.row[:n], free.row[n], -extra[1]
-        try:
-            move = units * np.linalg.lstsq(matrix, right, rcond=_FAMILY if free is None else _CUTOFF)[0]
-        except np.linalg.LinAlgError:
-            raise AnalysisError("the equations of the orbit's nodes have no solution", field="orbit") from None
-        states = np.array([each @ np.append(move, 1.0) for each in totals[:-1]])
-        return states, float(move[n]), float(move[n + 1])
+            by_value = last[:, n + 1] * free.scale / sizes
+            matrix = np.block([[matrix, by_value[:, None]], [free.row[None]]])
+            right = np.append(right, -other._missing)
+        move = _solution(matrix, right, cutoff, self._problem.shared, sizes)
+        value = 0.0 if free is None else float(move[n]) * free.scale
+        every = np.concatenate([sizes * move[:n], [0.0, value, 1.0]])
+        every[n] = time @ every
+        return _Correction(np.array([total @ every for total in totals[:-1]]), float(every[n]), value)
 
-    def moved(self, part: float) -> _Linear:
-        """The equations after that part of a correction, or less of it where the time would change much."""
-        states, duration, value = self._solved(self._off, self._extra)
+    def after(self, correction: _Correction, part: float) -> _Equations | None:
+        """The equations after that part of a correction, or less of it where states or the time would change much; None
+        where the motion ends before, while the parameter is given."""
         here = self.nodes
-        part = min(part, _QUICKEST * here.duration / max(abs(duration), 1e-300))
-        there = Nodes(here.states + part * states, here.duration + part * duration, here.value + part * value)
-        system_at, sizes, section, free = self._given
-        return _Linear(system_at, there, sizes, section, free)
+        part = min(part, _QUICKEST * here.duration / max(abs(correction.duration), 1e-300))
+        frame = self._frame
+        farthest = _CAREFUL if frame.astray else _FARTHEST
+        part = min(part, farthest / max(float(np.abs(correction.states / frame.reach).max()), 1e-300))
+        there = Nodes(
+            here.states + part * correction.states,
+            here.duration + part * correction.duration,
+            here.value + part * correction.value,
+        )
+        # All may only be getting larger.
+        astray, reach = frame.astray and self.residual > _NEAR, frame.reach * (1.0 if frame.astray else _FARTHER)
+        try:
+            return _Equations(self._problem, there, frame._replace(reach=reach, astray=astray))
+        except AnalysisError as error:
+            if self._problem.free is not None or isinstance(error, SpentError):
+                raise
+            return None
 
-    def correction_left(self, other: _Linear) -> float:
-        """Size of the correction that these linear equations make of what is off at other nodes."""
-        states, duration, _ = self._solved(other._off, other._extra)
-        return max(float(np.abs(states / self._given[1]).max()), abs(duration) / self.nodes.duration)
+    def is_nearer(self, there: _Equations, correction: _Correction, part: float, cutoff: float) -> bool:
+        """True if other equations, after part of a correction, are off by half as much, or have less to correct by the
+        linear equations here (Deuflhard, *Newton Methods for Nonlinear Problems*, section 3.3)."""
+        if float(np.abs(there._off / self._frame.sizes).max()) <= 0.5 * self.residual:
+            return True
+        before, left = self._length(correction), self._length(self.correction(there, cutoff))
+        return left <= max((1.0 - 0.25 * part) * before, NODES.settled)
+
+    def _length(self, correction: _Correction) -> float:
+        states = float(np.abs(correction.states / self._frame.sizes).max())
+        return max(states, abs(correction.duration) / self.nodes.duration)
+
+    def cleared(self) -> _Equations:
+        """The orbit with the states of its first node that are only just not zero at zero, if it is an orbit still:
+        what is left of a guess would pass for the size of the orbit."""
+        x = self.nodes.states[0]
+        small = (x != 0.0) & (np.abs(x) <= _NOTHING * self._frame.sizes)
+        if not small.any():
+            return self
+        states = np.vstack([np.where(small, 0.0, x), self.nodes.states[1:]])
+        there = _Equations(self._problem, replace(self.nodes, states=states), self._frame)
+        return there if there.residual <= max(RETURN.round_off, self.residual) else self
+
+
+def _solution(matrix: Array, right: Array, cutoff: float, shared: Array | None, sizes: Array) -> Array:
+    """Solution of linear equations in units, among the ``shared`` states if there are such; the shortest where orbits
+    come in families."""
+    if shared is not None:
+        basis = np.linalg.qr(shared / sizes[:, None])[0]
+        return np.asarray(basis @ _solution(basis.T @ matrix @ basis, basis.T @ right, cutoff, None, sizes))
+    try:
+        if cutoff == _SINGULAR:
+            with contextlib.suppress(np.linalg.LinAlgError):
+                regular = np.linalg.solve(matrix, right)
+                if np.abs(regular).max() <= _MAGNIFIED * np.abs(right).max():
+                    return np.asarray(regular)
+        return np.asarray(np.linalg.lstsq(matrix, right, rcond=cutoff)[0])
+    except np.linalg.LinAlgError:
+        raise AnalysisError("the equations of the orbit's nodes have no solution", field="orbit") from None
