@@ -284,7 +284,9 @@ def _solved(
         with contextlib.suppress(AnalysisError):
             closed, _ = closed_orbit(system, x, section, budget=budget)
             return _found(system, closed.point, closed.duration, size, with_error)
-    size = np.maximum(size, np.abs(start.states).max(axis=0))
+    if len(start.states) > 1:  # which tell the sizes better than the first one
+        largest = np.abs(start.states).max(axis=0)
+        size = np.where(largest > 0.0, largest, float(largest.max()) or 1.0)
     found = shot(lambda _: system, start, size, section, shared=_shared(system, x, size), budget=budget)
     x, duration = found.nodes.states[0], found.nodes.duration
     if with_error or is_autonomous(system):

@@ -305,12 +305,13 @@ class Samples:
             last, guess = path[-1], self._foreseen(path[: -_BEHIND - 1 : -1], target)
             try:
                 found = self._sampled(target, guess, last)
+                # A large jump means that Newton's method has found another orbit.
+                other = self.jumped(found.orbit, guess) or not self._connected(last, guess, found)
             except SpentError:
                 break
             except AnalysisError:
-                found = None
-            # A large jump means that Newton's method has found another orbit.
-            if found is None or self.jumped(found.orbit, guess) or not self._connected(last, guess, found):
+                other = True
+            if other:
                 target = 0.5 * (last.value + target)
                 if abs(target - last.value) < smallest:
                     break
