@@ -69,10 +69,15 @@ def whole_orbit(guess: Any, system: SystemLike) -> Nodes | None:
     return Nodes(CubicSpline(times - times[0], states)(np.arange(_OF_GUESS) * duration / _OF_GUESS), duration)
 
 
-def nearer_orbits(system: SystemLike, x: Array) -> Iterator[Nodes]:
-    """Nodes nearer to an orbit than a guessed state."""
+def nearer_orbits(system: SystemLike, x: Array) -> Iterator[tuple[Nodes, bool]]:
+    """Where to start from once Newton's method has failed at a guessed state, and whether to step carefully: the guess
+    itself first, where the period belongs to the orbit, since of an orbit with a strongly stable direction only guesses
+    on its stable manifold come back to a section."""
+    if is_autonomous(system):
+        yield Nodes(x[None], return_duration(system)), True
     for start in (_magnified, _onward, _settled):
-        yield from start(system, x)
+        for nodes in start(system, x):
+            yield nodes, False
 
 
 def _magnified(system: SystemLike, x: Array) -> list[Nodes]:

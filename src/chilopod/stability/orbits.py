@@ -52,7 +52,8 @@ _KNOWN = 1e-4  # of a known orbit: it is one, if not to the last digit
 _SETTLING = 100  # return maps that letting the motion settle is counted as: without derivatives it costs less
 _MOST_PARTS = 8  # of a return: a guess of the period may be so many times too long
 _CLOSES = 1e-8  # of the motion, and of the sizes of the states: an orbit that closes so nearly is solved for once more
-_CHANCE = 1e-13  # of the sizes of the states: two computations of a stiff motion may agree by chance
+_COARSE = 1e-11  # of the sizes of the states: such an error is estimated by two computations too
+_CHANCE = 1e-13  # of the sizes of the states: two computations may agree by chance
 _SYMMETRIC = 1e-12  # of the sizes of the states: a symmetry that holds so closely is one of the orbit's
 _BESIDE = 1e-6  # of the sizes of the states, where the derivative is taken once more to see it change
 
@@ -96,13 +97,7 @@ class Orbit(Shown, ReadOnlyArrays):
 
 
 def known_state(system: SystemLike) -> Array:
-    """The state on its orbit that a system knows of itself.
-
-    Raises
-    ------
-    AnalysisError
-        If it knows none.
-    """
+    """The state on its orbit that a system knows of itself; an AnalysisError if it knows none."""
     orbit = known_orbit(system)
     if orbit is None:
         raise AnalysisError(
@@ -175,9 +170,9 @@ def find_orbit(
             raise
         if budget is not None:
             budget.take(_SETTLING)
-        for nearer in nearer_orbits(system, x):
+        for nearer, careful in nearer_orbits(system, x):
             with contextlib.suppress(AnalysisError):
-                found = _solved(system, nearer, with_error, budget)
+                found = _solved(system, nearer, with_error, budget, careful=careful)
                 return _shortest(system, found, with_error, budget) if shortened else found
         raise failed
 
@@ -241,14 +236,7 @@ def from_known(
     budget: Budget | None = None,
 ) -> Orbit:
     """The orbit through a state that is on it, by what the system says of itself; improved if not to the last digit.
-
-    Parameters
-    ----------
-    system, x, with_error, budget
-        As for :func:`find_orbit`.
-    image
-        The return map at ``x``, if it was computed already.
-    """
+    The return map there may have been computed already."""
     if is_autonomous(system):
         return find_orbit(system, x, with_error, budget=budget)
     image = return_map(system, x, with_error) if image is None else image
@@ -274,7 +262,12 @@ def _relative(values: Array, size: Array) -> float:
 
 
 def _solved(
-    system: SystemLike, start: Nodes, with_error: bool, budget: Budget | None, section: Section | None = None
+    system: SystemLike,
+    start: Nodes,
+    with_error: bool,
+    budget: Budget | None,
+    section: Section | None = None,
+    careful: bool = False,
 ) -> Orbit:
     """The orbit near some nodes, of which the first one stays on the section: by default across the motion there."""
     x, duration = start.states[0], start.duration
@@ -287,7 +280,9 @@ def _solved(
     if len(start.states) > 1:  # which tell the sizes better than the first one
         largest = np.abs(start.states).max(axis=0)
         size = np.where(largest > 0.0, largest, float(largest.max()) or 1.0)
-    found = shot(lambda _: system, start, size, section, shared=_shared(system, x, size), budget=budget)
+    found = shot(
+        lambda _: system, start, size, section, shared=_shared(system, x, size), budget=budget, careful=careful
+    )
     x, duration = found.nodes.states[0], found.nodes.duration
     if with_error or is_autonomous(system):
         return _found(system, x, duration, found.sizes, with_error)
@@ -322,17 +317,8 @@ def _shared(system: SystemLike, x: Array, size: Array) -> Array | None:
 
 
 def bounded(system: SystemLike, x: Array, image: ReturnMap, error: Array | None = None) -> Orbit:
-    """The orbit through a state that is on it, with the section across its own motion and with error bounds.
-
-    Parameters
-    ----------
-    system, x
-        The system and the state, shape (n,).
-    image
-        The return map there, or near.
-    error
-        Bound on the error of the state, shape (n,), if it is known.
-    """
+    """The orbit through a state that is on it, shape (n,), with the section across its motion and with error bounds;
+    ``image`` is the return map there or near, ``error`` a bound on that of the state, shape (n,), if it is known."""
     return _bounded(system, x, image.period / image.returns, error)
 
 
@@ -345,11 +331,14 @@ def _bounded(system: SystemLike, x: Array, duration: float, error: Array | None 
     image = return_map(system, x, True, section)
     scaled = image.jacobian * size / size[:, None] - np.eye(x.size)
     if error is None:
-        # The state is as uncertain as the flow, of which the derivative's error tells, times what H - 1 makes of it.
-        wrong = np.abs(image.state - x) + (_matrix(image.error, size) @ size)
-        duration = image.period / image.returns
-        if is_stiff(system, x, duration):  # its derivative may be nothing, and err by nothing
-            wrong += REPEATED * np.abs(_in_parts(system, x, duration) - image.state) + _CHANCE * size
+        # The state is as uncertain as the flow, of which the derivative's error tells, or where that is coarse two
+        # computations, times what H - 1 makes of it.
+        flow = _matrix(image.error, size) @ size
+        stiff = is_stiff(system, x, duration)  # the derivative may be nothing, and err by nothing
+        if stiff or (flow > _COARSE * size).any():
+            twice = REPEATED * np.abs(_in_parts(system, x, image.period / image.returns) - image.state) + _CHANCE * size
+            flow = flow + twice if stiff else np.minimum(flow, twice)
+        wrong = np.abs(image.state - x) + flow
         inverse = basis @ np.linalg.pinv(basis.T @ scaled @ basis, rcond=_SINGULAR) @ basis.T
         error = size * (np.abs(inverse) @ (wrong / size)) + np.abs(x - given)
     # The derivative is that of a state so far off: along the direction in which the orbit is least sure.

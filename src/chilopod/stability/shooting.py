@@ -43,17 +43,8 @@ _MOST = 32
 
 @dataclass(frozen=True)
 class Nodes(ReadOnlyArrays):
-    """An orbit as states at instants that divide a return evenly.
-
-    Attributes
-    ----------
-    states
-        Shape (m, n), the first at time 0.
-    duration
-        Time of a return, s.
-    value
-        Parameter.
-    """
+    """States at instants that divide a return evenly, shape (m, n), the first at time 0, the time of the return,
+    and the value of the parameter."""
 
     states: Array
     duration: float
@@ -62,21 +53,10 @@ class Nodes(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class Closed(ReadOnlyArrays):
-    """An orbit that was solved for.
+    """An orbit that was solved for: its nodes, the sizes of the states, shape (n,), and where the last node returns to.
 
-    Attributes
-    ----------
-    nodes
-        Its states.
-    sizes
-        Sizes of the states, shape (n,), no smaller than the states are.
-    end
-        Where the last node returns to, shape (n,).
-    jacobian
-        Derivative of a return, without the change of its time, shape (n, n): the product of those between nodes, which
-        no rounding of a whole return disturbs.
-    by_value
-        Derivative of a return with respect to the parameter, likewise, shape (n,); zeros where that is given.
+    The derivatives of a return, with respect to the state, shape (n, n), and to the parameter, shape (n,), are without
+    the change of its time: products of those between nodes, which no rounding of a whole return disturbs.
     """
 
     nodes: Nodes
@@ -88,17 +68,8 @@ class Closed(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class Free:
-    """The parameter as an unknown, with the equation that it takes.
-
-    Attributes
-    ----------
-    row, target
-        ``row . moved = target`` for the displacement of first state and parameter from ``start``, in units.
-    start
-        State and parameter, shape (n+1,).
-    scale
-        Unit of the parameter.
-    """
+    """The parameter as an unknown, in units of ``scale``, with the equation that it takes: ``row . moved = target`` for
+    the displacement of first state and parameter from ``start``, shape (n+1,), in units."""
 
     row: Array
     target: float
@@ -128,15 +99,14 @@ def shot(
     free: Free | None = None,
     shared: Array | None = None,
     budget: Budget | None = None,
+    careful: bool = False,
 ) -> Closed:
     """The orbit near some nodes, by Newton's method, damped while the parameter is given.
 
     Parameters
     ----------
-    system_at
-        The system at a value of the parameter.
-    start
-        Guess.
+    system_at, start
+        The system at a value of the parameter, and the guess.
     sizes
         Sizes of the states, shape (n,); they grow with the states while the parameter is given.
     section
@@ -146,20 +116,22 @@ def shot(
     shared
         Basis of the states among which the first one is corrected, shape (n, k); None for all.
     budget
-        Budget that a return is taken from for every evaluation.
-
-    Raises
-    ------
-    AnalysisError
-        If it does not converge, or the motion does not get from a node to the next one.
+        Budget that every evaluation takes a return from.
+    careful
+        True to take short steps and any time of a return until the motion about closes: a single node's motion need not
+        come back to the section then.
     """
-    equations = _Equations(_Problem(system_at, free, shared, budget), start, _Frame(sizes, sizes, section))
+    equations = _Equations(
+        _Problem(system_at, free, shared, budget, careful), start, _Frame(sizes, sizes, section, careful)
+    )
     rule, best, part, strays = RETURN if free is None else NODES, np.inf, 1.0, 0
     correction: _Correction | None = None
+    whole = True
     cutoff = _CUTOFF if free is not None else _SINGULAR if len(start.states) == 1 else _FAMILY
     for _ in range(_EVALUATIONS if free is None else FEW_ROUNDS):
         if correction is None:
-            if rule.met(equations.residual, best):
+            # Halved steps may lead to where the motion jumps, and the residual falls as they do.
+            if rule.met(equations.residual, best if whole else np.inf):
                 return (equations if free is not None else equations.cleared()).closed()
             if not 1.0 / _LONGEST <= equations.nodes.duration / start.duration <= _LONGEST:
                 break
@@ -169,16 +141,14 @@ def shot(
             best = min(best, equations.residual)
             correction = equations.correction(equations, cutoff)
         there = equations.after(correction, part)
-        if there is not None and (free is not None or equations.is_nearer(there, correction, part, cutoff)):
-            equations, part, correction = there, min(1.0, 2.0 * part), None
+        if there is not None and (free is not None or equations.is_nearer(there, correction, part, cutoff, best)):
+            equations, part, correction, whole = there, min(1.0, 2.0 * part), None, part == 1.0
         elif part > _SHORTEST:
             part *= 0.5
         elif cutoff == _SINGULAR:
             # It followed round-off, along a family of orbits: without that direction it converges.
             cutoff, part = _FAMILY, 1.0
             correction = equations.correction(equations, cutoff)
-        elif equations.residual <= rule.settled:
-            return equations.cleared().closed()
         else:
             break
     raise AnalysisError(
@@ -196,6 +166,7 @@ class _Problem:
     free: Free | None
     shared: Array | None
     budget: Budget | None
+    careful: bool
 
     def beside(self, value: float) -> tuple[SystemLike, float] | None:
         """The system at a value of the parameter beside another one, and how far; None where the parameter is given."""
@@ -238,6 +209,7 @@ class _Equations:
         m, n = nodes.states.shape
         self._ends, self._factors = np.empty((m, n)), np.empty((m, n, n))
         self._by_time, self._by_value = np.zeros((m, n)), np.zeros((m, n))
+        self._returned = False
         if free is None and m == 1 and frame.section is not None and is_autonomous(system):
             frame = self._to_section(system, frame)
         else:
@@ -293,12 +265,11 @@ class _Equations:
                 start, rest, (before, first) = crossing(system, x, near, system.flow)
                 self._ends[0], second = checked_flow(system, before, 0.0, rest)
                 self._factors[0] = second @ first
-                self.nodes = replace(self.nodes, duration=start + rest)
+                self.nodes, self._returned = replace(self.nodes, duration=start + rest), True
                 return frame
-            except SpentError:
-                raise
-            except AnalysisError:
-                pass
+            except AnalysisError as error:
+                if not self._problem.careful or isinstance(error, SpentError):
+                    raise
         self._ends[0], self._factors[0] = checked_flow(system, x, 0.0, duration)
         return frame._replace(section=section_at(system, x, frame.sizes, duration), astray=True)
 
@@ -339,7 +310,8 @@ class _Equations:
         move = _solution(matrix, right, cutoff, self._problem.shared, sizes)
         value = 0.0 if free is None else float(move[n]) * free.scale
         every = np.concatenate([sizes * move[:n], [0.0, value, 1.0]])
-        every[n] = time @ every
+        if not self._returned:  # else it is solved for at the next node
+            every[n] = time @ every
         return _Correction(np.array([total @ every for total in totals[:-1]]), float(every[n]), value)
 
     def after(self, correction: _Correction, part: float) -> _Equations | None:
@@ -348,7 +320,9 @@ class _Equations:
         here = self.nodes
         part = min(part, _QUICKEST * here.duration / max(abs(correction.duration), 1e-300))
         frame = self._frame
-        farthest = _CAREFUL if frame.astray else _FARTHEST
+        farthest = _FARTHEST
+        if frame.astray:
+            farthest = _CAREFUL * min(1.0, float(np.linalg.norm(self._by_time[0] * here.duration / frame.sizes)))
         part = min(part, farthest / max(float(np.abs(correction.states / frame.reach).max()), 1e-300))
         there = Nodes(
             here.states + part * correction.states,
@@ -364,9 +338,12 @@ class _Equations:
                 raise
             return None
 
-    def is_nearer(self, there: _Equations, correction: _Correction, part: float, cutoff: float) -> bool:
+    def is_nearer(self, there: _Equations, correction: _Correction, part: float, cutoff: float, best: float) -> bool:
         """True if other equations, after part of a correction, are off by half as much, or have less to correct by the
-        linear equations here (Deuflhard, *Newton Methods for Nonlinear Problems*, section 3.3)."""
+        linear equations here (Deuflhard, *Newton Methods for Nonlinear Problems*, section 3.3); astray, where steps are
+        short, if they are not off by much more than the best ones."""
+        if self.astray:
+            return there.residual <= 2.0 * best
         if float(np.abs(there._off / self._frame.sizes).max()) <= 0.5 * self.residual:
             return True
         before, left = self._length(correction), self._length(self.correction(there, cutoff))
