@@ -30,22 +30,8 @@ _STILL = 1e-3  # of how much the others move
 
 
 def whole_orbit(guess: Any, system: SystemLike) -> Nodes | None:
-    """Nodes of a guess that is a whole orbit; None for one that is a single state.
-
-    Parameters
-    ----------
-    guess
-        States at even times over one period from time 0 on, shape (times, n), without the end; or times, shape
-        (times,), and states there, as a tuple or as an ``xarray.DataArray`` over ``time``: from the first to the last
-        one period passes.
-    system
-        Its period is that of the first form; of a system without one the guess of it.
-
-    Raises
-    ------
-    ParameterError
-        If it is no such array, not finite, too short, or the times do not rise or are of another period.
-    """
+    """Nodes of a guess that is a whole orbit, in the forms that :func:`~chilopod.stability.find_orbit` takes; None for
+    one that is a single state."""
     if hasattr(guess, "coords") and "time" in guess.coords:
         guess = guess.coords["time"].values, guess.values
     n, whole = system.dimension, return_duration(system) * returns_per_period(system)

@@ -140,7 +140,7 @@ def find_orbit(
     settle
         True to let the motion settle where Newton's method fails: up to 330 returns, or 83 guessed periods.
     budget
-        Return maps that may be evaluated, which are taken from it: up to 30 for every start of Newton's method, and 100
+        Return maps that may be evaluated, which are taken from it: up to 60 for every start of Newton's method, and 100
         for letting the motion settle.
     shortest
         True to look for the shortest period, where no section tells how long a return takes.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.labels import Labelled
-from chilopod.stability.symmetry.closure import Images
+from chilopod.stability.symmetry.groups import Images
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.spectra import Event
 
@@ -105,18 +105,8 @@ class SymmetricCrossing:
 
 
 def symmetric_crossing(block: Block, critical: Event, returns: int = 1) -> SymmetricCrossing:
-    """Crossing of the unit circle by an eigenvalue of a block's reduced matrix, simple there.
-
-    Parameters
-    ----------
-    block
-        The block; :func:`chilopod.stability.symmetry.isotypic.isotypic` makes them.
-    critical
-        Event: the place of the circle where it crosses.
-    returns
-        Number of returns in a period. Where it is even, -1 breaks the symmetry in time: the new orbits have the same
-        period, not twice of it.
-    """
+    """Crossing of the unit circle by a simple eigenvalue of a block's reduced matrix. Where the number of returns in a
+    period is even, -1 breaks the symmetry in time: the new orbits have the same period, not twice of it."""
     # At -1 all is odd by the shift by one return.
     quadratic = _quadratics(block.representation) if critical is Event.PLUS else 0
     kind = _kind(block, critical, quadratic, returns)

@@ -8,6 +8,7 @@ Springer 1988, proposition XII.1.3).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,10 +20,12 @@ from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.arguments import finite_array
 from chilopod.flows.balance import numerical_balance
 from chilopod.frozen import ReadOnlyArrays, read_only
-from chilopod.stability.symmetry.closure import SAME, factors
 
 Array = NDArray[np.float64]
 
+_PROBES = 3  # vectors: one alone may by chance lie close to a mirror plane
+_SAME = 1e-7  # two elements of a cyclic group of ten thousand are 6e-4 apart; round-off of as many products is 1e-11
+_CELL = 8.0 * _SAME
 _LARGEST_ORDER = 10_000  # a group of more elements is refused
 _MOST_GENERATORS = 500
 _MOST_ENTRIES = 2**25  # numbers in the matrices of all elements: 256 MiB
@@ -39,19 +42,16 @@ class Group(ReadOnlyArrays):
 
     Attributes
     ----------
-    generators
-        Elements whose products are the group, those given that are needed, shape (generators, n, n).
-    elements
-        All elements, the identity first, shape (order, n, n).
+    generators, elements
+        Elements whose products are the group, and all of them, the identity first, shape (any, n, n) both.
     to_orthogonal, from_orthogonal
         Coordinates y = to_orthogonal x in which every element is an orthogonal matrix, and back, shape (n, n) both.
     scales
-        Scales of the coordinates x, as the elements tell them, shape (n,): entry (i, j) of an element is of the order
-        of ``scales[i] / scales[j]`` at most. Between coordinates that no element mixes they say nothing.
+        Scales of the coordinates x, shape (n,): entry (i, j) of an element is of the order of ``scales[i] / scales[j]``
+        at most. Between coordinates that no element mixes they say nothing.
     component
-        Number of the set of coordinates that each one belongs to, shape (n,): elements mix only coordinates of one set,
-        such as one kind of state over all cells of a ring. ``to_orthogonal`` does not mix the sets either, so that
-        their units do not matter to each other.
+        Number of the set of coordinates that each one belongs to, shape (n,), such as one kind of state over all cells
+        of a ring: neither elements nor ``to_orthogonal`` mix the sets, and their units do not matter to each other.
     """
 
     generators: Array
@@ -78,27 +78,17 @@ class Group(ReadOnlyArrays):
 
 
 def finite_group(generators: ArrayLike) -> Group:
-    """The group of all products of some matrices.
-
-    Parameters
-    ----------
-    generators
-        Real matrices, shape (n, n) each, such as the cyclic shift and the reversal of a ring, in any units.
-
-    Raises
-    ------
-    ParameterError
-        If they are no finite square matrices of one shape, not invertible, or have too many products.
-    """
+    """The group of all products of some real matrices, shape (n, n) each, such as the cyclic shift and the reversal of
+    a ring, in any units; a ParameterError if they have too many of them, or are no such matrices."""
     given = _checked(generators)
     n = given.shape[1]
     most = max(1, min(_LARGEST_ORDER, _MOST_ENTRIES // n**2))
     returns = [_powers(matrix, most) for matrix in given]
     scales = _coordinate_scales(np.asarray(np.max([envelope for envelope, _ in returns], axis=0)))
     for matrix, (_, residual) in zip(given, returns, strict=True):
-        if np.abs(_scaled(residual, scales)).max() > SAME:
+        if np.abs(_scaled(residual, scales)).max() > _SAME:
             raise _infinite(matrix, most)
-    found = factors(_scaled(given, scales), most)
+    found = _factors(_scaled(given, scales), most)
     if found is None:
         raise ParameterError(
             "generate an infinite group, or too large a one",
@@ -125,7 +115,7 @@ def isotropy(group: Group, x: Array, error: Array | float = 0.0) -> Group:
     invariant.
     """
     moved = np.abs(group.elements @ x - x)
-    allowed = (np.abs(group.elements) + np.eye(group.dimension)) @ (error + SAME * np.abs(x))
+    allowed = (np.abs(group.elements) + np.eye(group.dimension)) @ (error + _SAME * np.abs(x))
     return _subgroup(group, np.all(moved <= allowed, axis=1), "orbit")
 
 
@@ -136,10 +126,7 @@ def centraliser(group: Group, gamma: Array) -> Group:
     Where the whole group leaves an orbit invariant, P commutes with the derivative Phi of the flow, and with M exactly
     if it does with gamma.
 
-    Raises
-    ------
-    ParameterError
-        If gamma is not invertible or does not normalise the group: gamma P gamma^-1 is an element wherever P is one.
+    It must normalise the group: gamma P gamma^-1 is an element wherever P is one.
     """
     matrix = _scaled(gamma, group.scales)
     own = _scaled(group.elements, group.scales)
@@ -148,13 +135,13 @@ def centraliser(group: Group, gamma: Array) -> Group:
     if size == 0.0 or np.linalg.matrix_rank(matrix) < group.dimension:
         raise ParameterError("is not invertible", field="symmetry")
     for image in matrix @ _scaled(group.generators, group.scales):  # which is P gamma for some element P
-        if not np.abs(right - image).max(axis=(1, 2)).min() <= SAME * size:
+        if not np.abs(right - image).max(axis=(1, 2)).min() <= _SAME * size:
             raise ParameterError(
                 "does not normalise the group of the spatial symmetries",
                 field="symmetry",
                 allowed="S P S^-1 in the group for every P of it",
             )
-    return _subgroup(group, np.all(np.abs(left - right) <= SAME * size, axis=(1, 2)), "symmetry")
+    return _subgroup(group, np.all(np.abs(left - right) <= _SAME * size, axis=(1, 2)), "symmetry")
 
 
 def commutes(group: Group, matrix: Array, error: Array | float = 0.0) -> float:
@@ -239,7 +226,7 @@ def _scaled(matrices: Array, scales: Array) -> Array:
 
 def _subgroup(group: Group, members: NDArray[np.bool_], field: str) -> Group:
     chosen = np.flatnonzero(members)
-    found = factors(_scaled(group.elements[chosen], group.scales), len(chosen))
+    found = _factors(_scaled(group.elements[chosen], group.scales), len(chosen))
     if found is None:
         raise AnalysisError(
             "is kept by elements that form no group: its error is at the edge of what tells them apart", field=field
@@ -265,8 +252,61 @@ def _with_metric(generators: Array, elements: Array, scales: Array) -> Group:
         ) from None
     group = Group(generators, elements, root / scales, scales[:, None] * inverse, scales, component)
     q = group.orthogonal
-    if not np.abs(np.swapaxes(q, 1, 2) @ q - np.eye(n)).max() < SAME:
+    if not np.abs(np.swapaxes(q, 1, 2) @ q - np.eye(n)).max() < _SAME:
         raise AnalysisError(
             "are no exact symmetries, or too oblique", field="generators", allowed="matrices exact to 1e-9 or better"
         )
     return group
+
+
+class Images:
+    """Images of the probes, each with the number of its element."""
+
+    def __init__(self, dimension: int) -> None:
+        random = np.random.default_rng(0)
+        self.probes: Array = random.uniform(-1.0, 1.0, (dimension, _PROBES))
+        self._weights: Array = random.uniform(-1.0, 1.0, (dimension, _PROBES)) / dimension
+        self.all: list[Array] = []
+        self._cells: dict[int, list[int]] = {}
+
+    def add(self, image: Array) -> None:
+        """Give an image the next number."""
+        self._cells.setdefault(self._cell(image), []).append(len(self.all))
+        self.all.append(image)
+
+    def number(self, image: Array) -> int | None:
+        """Number of an image, shape (n, probes), None if it is not there."""
+        cell = self._cell(image)
+        for near in (cell, cell - 1, cell + 1):
+            for number in self._cells.get(near, ()):
+                if np.abs(self.all[number] - image).max() < _SAME:
+                    return number
+        return None
+
+    def _cell(self, image: Array) -> int:
+        return math.floor(float(np.vdot(self._weights, image)) / _CELL)
+
+
+def _factors(generators: Array, largest: int) -> tuple[NDArray[np.intp], NDArray[np.intp]] | None:
+    """Every element as a generator, with entries of order one, times an earlier element: their numbers, shape (order,)
+    both, without meaning for the identity, which comes first; None if there are more than ``largest`` elements."""
+    images, by, of = Images(generators.shape[1]), [0], [0]
+    images.add(images.probes)
+    needed: list[int] = []
+    for new, image in enumerate(generators @ images.probes):
+        if images.number(image) is not None:
+            continue
+        needed.append(new)  # and the order at least doubles
+        images, by, of = Images(generators.shape[1]), [0], [0]
+        images.add(images.probes)
+        done = 0
+        while done < len(images.all):
+            for number, product in zip(needed, generators[needed] @ images.all[done], strict=True):
+                if images.number(product) is None:
+                    if len(images.all) == largest:
+                        return None
+                    images.add(product)
+                    by.append(number)
+                    of.append(done)
+            done += 1
+    return np.array(by), np.array(of)

@@ -25,9 +25,7 @@ ComplexArray = NDArray[np.complex128]
 
 _TRIES = 8  # random matrices: one in millions is not generic
 _DISTINCT = 1e-7  # eigenvalues of a random matrix of norm one that lie closer together are one
-_EXACT = 1e-6
-"""Entries of orthogonal matrices that are told apart from zero, and numbers from whole numbers; the elements are exact
-to about 1e-12."""
+_EXACT = 1e-6  # entries of orthogonal matrices and numbers are told apart from 0 and from whole numbers
 
 
 @dataclass(frozen=True)
@@ -78,34 +76,16 @@ class Block(ReadOnlyArrays):
         return self.dimension if self.real else 1
 
     def reduced(self, matrices: ArrayLike) -> Array:
-        """Reduced form of matrices that commute with the group.
+        """Reduced form of matrices M, shape (..., n, n), that commute with the group.
 
-        Parameters
-        ----------
-        matrices
-            M, shape (..., n, n).
-
-        Returns
-        -------
         Real type: A, shape (..., m, m), with dual @ M @ basis = A ⊗ I_d; of a matrix that does not commute, the mean of
         P M P^-1 over the group is taken. Complex type: dual @ M @ basis, shape (..., m d, m d).
         """
         return self._diagonal(self.dual @ np.asarray(matrices, dtype=np.float64) @ self.basis)
 
     def reduced_error(self, matrices: ArrayLike, error: ArrayLike = 0.0) -> Array:
-        """Bound on the absolute error of the entries of the reduced matrices.
-
-        Parameters
-        ----------
-        matrices
-            M, shape (..., n, n).
-        error
-            Bound on the absolute error of the entries of M: one for all, or anything that fits their shape.
-
-        Returns
-        -------
-        Shape of :meth:`reduced`: what ``error`` and the round-off of the reduction amount to.
-        """
+        """What a bound on the absolute error of the entries of matrices, one for all or of their shape, and the
+        round-off of the reduction amount to in the reduced matrices."""
         round_off = 2.0 * len(self.basis) * np.finfo(float).eps * np.abs(np.asarray(matrices, dtype=np.float64))
         entries = np.asarray(error, dtype=np.float64) + round_off
         return self._diagonal(np.abs(self.dual) @ entries @ np.abs(self.basis))
@@ -118,15 +98,8 @@ class Block(ReadOnlyArrays):
         return np.asarray(np.einsum("...iaja->...ij", full.reshape(*full.shape[:-2], m, d, m, d)) / d)
 
     def mode(self, eigenvector: ArrayLike, direction: ArrayLike) -> ComplexArray:
-        """The eigenvector of a matrix that commutes with the group, to an eigenvector of its reduced matrix.
-
-        Parameters
-        ----------
-        eigenvector
-            Eigenvector of the reduced matrix of a block of real type, shape (m,).
-        direction
-            Any vector, shape (d,).
-        """
+        """The eigenvector of a matrix that commutes with the group, to an eigenvector of its reduced matrix of real
+        type, shape (m,), and any vector, shape (d,)."""
         a, w = np.asarray(eigenvector, dtype=np.complex128), np.asarray(direction, dtype=np.complex128)
         return np.asarray(self.basis @ np.kron(a, w))
 
@@ -134,11 +107,8 @@ class Block(ReadOnlyArrays):
 def isotypic(group: Group) -> tuple[Block, ...]:
     """The blocks of a finite group, the trivial one first, then by rising dimension and falling kernel.
 
-    Raises
-    ------
-    AnalysisError
-        The matrices of the group are not exact enough to tell its representations apart, or one of these is of
-        quaternionic type.
+    An AnalysisError says that the matrices are not exact enough to tell its representations apart, or that one of these
+    is of quaternionic type.
     """
     random = np.random.default_rng(0)
     for _ in range(_TRIES):
