@@ -17,7 +17,7 @@ from chilopod.paper.size import Size
 from chilopod.paper.table import OfPlanar, Row
 from chilopod.planar import PlanarModel
 from chilopod.robot import load_robot
-from chilopod.stability.returns import whole_period
+from chilopod.stability.problem.returns import whole_period
 from chilopod.trials import NONE, Disturbance, Trial, run
 
 ROBOT = load_robot("aoi2022-planar")

@@ -144,7 +144,7 @@ class ImplicitFlow(ReadOnlyArrays):
         return np.array([carry(i) for i in range(len(states))]).reshape(states.shape)
 
     def flow_frame(self, x: Array, units: Array, frame: Array, t0: float, t1: float) -> Stretched:
-        """See :class:`chilopod.stability.capabilities.FlowsFrames`."""
+        """See :class:`chilopod.stability.problem.capabilities.FlowsFrames`."""
         other, _ = self._turned(x, units, frame, t0, t1, _OTHER_STAGES)
         stretch, (state, end, turned) = self._turned(x, units, frame, t0, t1, _STAGES)
         return Stretched(state, end, stretch, other, turned)

@@ -27,7 +27,7 @@ from chilopod.paper.walk_measures import by_spring
 from chilopod.planar import PlanarModel
 from chilopod.progress import Progress, part, silent
 from chilopod.robot import Robot
-from chilopod.stability.returns import whole_period
+from chilopod.stability.problem.returns import whole_period
 from chilopod.trials import AVERAGED, Disturbance, Trial, mean_joint_angles, run
 
 Array = NDArray[np.float64]

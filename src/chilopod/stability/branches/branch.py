@@ -27,10 +27,10 @@ from chilopod.stability.branches.closure import closes
 from chilopod.stability.branches.curve import PRECISION, Curve
 from chilopod.stability.branches.inspection import Found, inspect
 from chilopod.stability.branches.stepping import taken
-from chilopod.stability.budget import Budget
-from chilopod.stability.capabilities import Family, given_scale
-from chilopod.stability.orbits import Orbit
+from chilopod.stability.orbits.orbit import Orbit
 from chilopod.stability.points import BifurcationPoint, Kind
+from chilopod.stability.problem.budget import Budget
+from chilopod.stability.problem.capabilities import Family, given_scale
 from chilopod.stability.shown import Result, axes_for, columns, dataset, mark, rows, said
 from chilopod.stability.spectrum.errors import VERDICTS
 from chilopod.stability.tracing.ending import Ending

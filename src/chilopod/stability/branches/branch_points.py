@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.returns import ReturnMap, Section
+from chilopod.stability.problem.returns import ReturnMap, Section
 from chilopod.stability.spectrum.errors import stable_within
 
 Array = NDArray[np.float64]

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.stability.budget import Budget, UserCode
-from chilopod.stability.capabilities import Family, FlowsEach, SystemLike, returns_per_period
-from chilopod.stability.returns import (
+from chilopod.stability.problem.budget import Budget, UserCode
+from chilopod.stability.problem.capabilities import Family, FlowsEach, SystemLike, returns_per_period
+from chilopod.stability.problem.returns import (
     CUTS,
     ReturnMap,
     Section,
@@ -35,7 +35,7 @@ _KEPT = 8  # systems: making one may cost more than a flow
 class FamilyReturns:
     """Return maps of the systems of a family.
 
-    Where these flow each (see :class:`chilopod.stability.capabilities.FlowsEach`), the derivative with respect to the
+    Where these flow each (see :class:`chilopod.stability.FlowsEach`), the derivative with respect to the
     parameter costs next to nothing on two cores.
 
     Parameters

@@ -24,9 +24,9 @@ from chilopod.errors import AnalysisError
 from chilopod.stability.branches.branch_points import BranchPoint, Step
 from chilopod.stability.branches.curve import Curve
 from chilopod.stability.branches.special_points import Place, blocks_along, special_point
-from chilopod.stability.capabilities import flows_with_error
 from chilopod.stability.orbit_blocks import Blocks, block_of, crossings_in
-from chilopod.stability.returns import ReturnMap
+from chilopod.stability.problem.capabilities import flows_with_error
+from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.spectrum.eigenvalues import counts_outside, spectrum
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.critical import Crossing

@@ -17,9 +17,9 @@ from chilopod.stability.crossing_points.singular import past_singular
 from chilopod.stability.normal_forms.center_manifold import CriticalOrbit
 from chilopod.stability.normal_forms.normal_form import NormalForm, normal_form
 from chilopod.stability.orbit_blocks import Blocks, orbit_blocks
-from chilopod.stability.orbits import Orbit, bounded, find_orbit
+from chilopod.stability.orbits.orbit import Orbit, bounded, find_orbit
 from chilopod.stability.points import Kind
-from chilopod.stability.returns import ReturnMap, returned_states
+from chilopod.stability.problem.returns import ReturnMap, returned_states
 from chilopod.stability.symmetry.isotypic import Block
 from chilopod.stability.unit_circle.critical import Crossing
 from chilopod.stability.unit_circle.spectra import TARGETS, Event

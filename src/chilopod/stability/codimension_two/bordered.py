@@ -25,12 +25,12 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.budget import Budget, UserCode
-from chilopod.stability.capabilities import KnowsOrbit, Scaled, SystemLike
 from chilopod.stability.convergence import BORDERED
-from chilopod.stability.orbits import from_known, known_state
-from chilopod.stability.returns import ReturnMap, Section, return_map, section_at
-from chilopod.stability.scales import sizes
+from chilopod.stability.orbits.orbit import from_known, known_state
+from chilopod.stability.problem.budget import Budget, UserCode
+from chilopod.stability.problem.capabilities import KnowsOrbit, Scaled, SystemLike
+from chilopod.stability.problem.returns import ReturnMap, Section, return_map, section_at
+from chilopod.stability.problem.scales import sizes
 from chilopod.stability.symmetry.mirrored import symmetric_states
 
 Array = NDArray[np.float64]

@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from chilopod.errors import AnalysisError, ParameterError
-from chilopod.stability.budget import Budget
 from chilopod.stability.codimension_two.bordered import Equations, Family2, Place, Spot, knows_orbit
 from chilopod.stability.codimension_two.codimension2 import Codimension2, CodimensionTwo, Start2
 from chilopod.stability.codimension_two.curve2 import Curve2, Point2
 from chilopod.stability.codimension_two.detection import Detector, Signals, across, critical
 from chilopod.stability.points import BifurcationPoint, Kind
-from chilopod.stability.returns import return_duration, whole_period
-from chilopod.stability.scales import sizes
+from chilopod.stability.problem.budget import Budget
+from chilopod.stability.problem.returns import return_duration, whole_period
+from chilopod.stability.problem.scales import sizes
 from chilopod.stability.symmetry.mirrored import reverses
 from chilopod.stability.tracing.ending import Ending
 from chilopod.stability.tracing.tracer import Pace, trace

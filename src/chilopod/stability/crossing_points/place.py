@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.returns import ReturnMap
+from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.spectrum import errors
 from chilopod.stability.spectrum.eigenvalues import Spectrum, return_multipliers, spectrum
 from chilopod.stability.unit_circle.critical import Crossing

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
 from chilopod.stability.crossing_points.place import SAFETY, Course, Sample
-from chilopod.stability.orbits import Orbit
-from chilopod.stability.returns import ReturnMap
+from chilopod.stability.orbits.orbit import Orbit
+from chilopod.stability.problem.returns import ReturnMap
 from chilopod.stability.spectrum.eigenvalues import spectrum
 from chilopod.stability.unit_circle.critical import Crossing
 from chilopod.stability.unit_circle.spectra import Event

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.stability.budget import Budget
-from chilopod.stability.capabilities import FlowsTangents
 from chilopod.stability.convergence import RETURN
 from chilopod.stability.krylov.arnoldi import krylov_subspaces
 from chilopod.stability.krylov.tangent_map import TangentMap, tangent_map, tangent_sizes
-from chilopod.stability.returns import Section, return_duration, section_at
+from chilopod.stability.problem.budget import Budget
+from chilopod.stability.problem.capabilities import FlowsTangents
+from chilopod.stability.problem.returns import Section, return_duration, section_at
 
 Array = NDArray[np.float64]
 

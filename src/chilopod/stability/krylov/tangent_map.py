@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.capabilities import FlowsTangents, given_scale, is_autonomous, returns_per_period
-from chilopod.stability.returns import CUTS, REPEATED, Section, carried, return_duration, return_time
+from chilopod.stability.problem.capabilities import FlowsTangents, given_scale, is_autonomous, returns_per_period
+from chilopod.stability.problem.returns import CUTS, REPEATED, Section, carried, return_duration, return_time
 
 Array = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ _STEADY = 2.0  # ratios of sizes that change by less are known well enough
 
 @dataclass(frozen=True)
 class TangentMap(ReadOnlyArrays):
-    """The return map H at a state (see :mod:`chilopod.stability.returns`), and its derivative H' without the matrix.
+    """The return map H at a state (see :mod:`~chilopod.stability.problem.returns`) and its derivative H', no matrix.
 
     Attributes
     ----------
@@ -57,8 +57,8 @@ class TangentMap(ReadOnlyArrays):
         """The same, with bounds on the errors of the images, shape (n, m), and of ``state``, shape (n,): by their sizes
         as a whole, not of every entry.
 
-        As in :func:`chilopod.stability.returns.flow_with_error` they are a multiple of the difference to a second
-        computation which takes the interval in parts.
+        As in :func:`~chilopod.stability.problem.returns.flow_with_error` they are a multiple of the difference to a
+        second computation which takes the interval in parts.
         """
         state, images = self._in_parts(directions, (0.0,))
         other, parts = self._in_parts(directions, CUTS)
@@ -113,7 +113,7 @@ def tangent_map(system: FlowsTangents, x: Array, section: Section | None = None)
 
 
 def tangent_sizes(system: FlowsTangents, x: Array, duration: float) -> Array:
-    """Sizes of the states, shape (n,), as :func:`chilopod.stability.scales.sizes` says, without the matrix.
+    """Sizes of the states, shape (n,), as :func:`chilopod.stability.problem.scales.sizes` says, without the matrix.
 
     A state is as large as it becomes during a return, or as what the others, disturbed by their own sizes at random,
     make of it within a part of the return. Where the orbit is zero throughout that alone gives the ratios: the

@@ -6,8 +6,8 @@ import contextlib
 from collections.abc import Iterator
 
 from chilopod.errors import AnalysisError, ParameterError, in_words
-from chilopod.stability.budget import UserCode, UserError
-from chilopod.stability.capabilities import Family, SystemLike, is_autonomous
+from chilopod.stability.problem.budget import UserCode, UserError
+from chilopod.stability.problem.capabilities import Family, SystemLike, is_autonomous
 
 _KEPT = 64  # systems: around a point the same one is asked for again and again
 

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError
-from chilopod.stability.budget import Budget, SpentError, UserCode
-from chilopod.stability.capabilities import Family
 from chilopod.stability.crossing_points.place import Sample
-from chilopod.stability.orbits import Orbit, find_orbit, from_known, known_state
-from chilopod.stability.returns import ReturnMap, return_map, return_maps, section_at
-from chilopod.stability.scales import sizes
+from chilopod.stability.orbits.orbit import Orbit, find_orbit, from_known, known_state
+from chilopod.stability.problem.budget import Budget, SpentError, UserCode
+from chilopod.stability.problem.capabilities import Family
+from chilopod.stability.problem.returns import ReturnMap, return_map, return_maps, section_at
+from chilopod.stability.problem.scales import sizes
 from chilopod.stability.search.family import AskedFamily
 
 Array = NDArray[np.float64]

@@ -7,7 +7,7 @@ import functools
 import numpy as np
 from numpy.typing import NDArray
 
-from chilopod.stability.capabilities import SystemLike, spatial_symmetries
+from chilopod.stability.problem.capabilities import SystemLike, spatial_symmetries
 from chilopod.stability.symmetry.groups import finite_group
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 from chilopod.errors import ChilopodError
-from chilopod.stability.budget import Budget
+from chilopod.stability.problem.budget import Budget
 from chilopod.stability.tracing.ending import Ending
 
 _SHORTEST = 1e-5  # step at which a curve is lost, relative to the longest

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.flows.balance import numerical_balance
-from chilopod.stability.capabilities import SystemLike, given_scale
+from chilopod.stability.problem.capabilities import SystemLike, given_scale
 
 Array = NDArray[np.float64]
 

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from chilopod.errors import AnalysisError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.budget import Budget, SpentError
-from chilopod.stability.capabilities import Autonomous, SystemLike, is_autonomous
 from chilopod.stability.convergence import NODES, RETURN
-from chilopod.stability.returns import Section, carried, checked_flow, crossing, section_at
+from chilopod.stability.problem.budget import Budget, SpentError
+from chilopod.stability.problem.capabilities import Autonomous, SystemLike, is_autonomous
+from chilopod.stability.problem.returns import Section, carried, checked_flow, crossing, section_at
 
 Array = NDArray[np.float64]
 

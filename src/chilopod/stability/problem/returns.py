@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.frozen import ReadOnlyArrays
-from chilopod.stability.capabilities import (
+from chilopod.stability.problem.capabilities import (
     Autonomous,
     FlowsMany,
     SystemLike,
@@ -28,7 +28,7 @@ from chilopod.stability.capabilities import (
     returns_per_period,
     spatial_symmetries,
 )
-from chilopod.stability.scales import sizes
+from chilopod.stability.problem.scales import sizes
 
 Array = NDArray[np.float64]
 

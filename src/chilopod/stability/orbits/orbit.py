@@ -12,8 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.arguments import finite_array
 from chilopod.frozen import ReadOnlyArrays, in_one_line
-from chilopod.stability.budget import Budget, SpentError
-from chilopod.stability.capabilities import (
+from chilopod.stability.krylov.closing import LARGE, closed_orbit
+from chilopod.stability.krylov.tangent_map import TangentMap, tangent_map, tangent_sizes
+from chilopod.stability.orbits.guesses import nearer_orbits, whole_orbit
+from chilopod.stability.orbits.shooting import Nodes, shot
+from chilopod.stability.problem.budget import Budget, SpentError
+from chilopod.stability.problem.capabilities import (
     FlowsTangents,
     SystemLike,
     flows_tangents,
@@ -24,10 +28,7 @@ from chilopod.stability.capabilities import (
     returns_per_period,
     spatial_symmetries,
 )
-from chilopod.stability.guesses import nearer_orbits, whole_orbit
-from chilopod.stability.krylov.closing import LARGE, closed_orbit
-from chilopod.stability.krylov.tangent_map import TangentMap, tangent_map, tangent_sizes
-from chilopod.stability.returns import (
+from chilopod.stability.problem.returns import (
     CUTS,
     REPEATED,
     ReturnMap,
@@ -38,8 +39,7 @@ from chilopod.stability.returns import (
     section_at,
     turned,
 )
-from chilopod.stability.scales import sizes
-from chilopod.stability.shooting import Nodes, shot
+from chilopod.stability.problem.scales import sizes
 from chilopod.stability.shown import Shown
 from chilopod.stability.symmetry.mirrored import symmetric_states
 

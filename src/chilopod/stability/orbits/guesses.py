@@ -11,10 +11,10 @@ from scipy.interpolate import CubicSpline
 
 from chilopod.errors import AnalysisError, ParameterError
 from chilopod.flows.arguments import finite_array
-from chilopod.stability.capabilities import Autonomous, SystemLike, is_autonomous, returns_per_period
-from chilopod.stability.returns import carried, checked_flow, return_duration, returned_states
-from chilopod.stability.scales import sizes
-from chilopod.stability.shooting import Nodes, node_count, nodes_along
+from chilopod.stability.orbits.shooting import Nodes, node_count, nodes_along
+from chilopod.stability.problem.capabilities import Autonomous, SystemLike, is_autonomous, returns_per_period
+from chilopod.stability.problem.returns import carried, checked_flow, return_duration, returned_states
+from chilopod.stability.problem.scales import sizes
 
 Array = NDArray[np.float64]
 
