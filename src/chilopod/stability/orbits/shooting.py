@@ -160,7 +160,7 @@ def shot(
 
 @dataclass(frozen=True)
 class _Problem:
-    """What does not change from one correction to the next; see :func:`shot`."""
+    """Arguments of :func:`shot` that hold for all corrections."""
 
     system_at: Callable[[float], SystemLike]
     free: Free | None
@@ -188,8 +188,8 @@ class _Correction(NamedTuple):
 
 
 class _Frame(NamedTuple):
-    """What a correction goes by: sizes of the states, and of the states where corrections are allowed to lead, shape
-    (n,) both; the section that holds the first one; and whether the motion does not come back to it."""
+    """Frame of a correction: sizes of the states, and of those where it may lead, shape (n,) both, the section that holds
+    the first one, and whether the motion does not come back to it."""
 
     sizes: Array
     reach: Array

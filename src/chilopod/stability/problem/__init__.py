@@ -1,1 +1,1 @@
-"""What is asked of a system: its capabilities, return map and sizes, and the budget of what asks."""
+"""A system as the analyses see it: capabilities, return map, sizes of its states, and the budget of a search."""

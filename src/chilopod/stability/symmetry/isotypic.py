@@ -84,8 +84,8 @@ class Block(ReadOnlyArrays):
         return self._diagonal(self.dual @ np.asarray(matrices, dtype=np.float64) @ self.basis)
 
     def reduced_error(self, matrices: ArrayLike, error: ArrayLike = 0.0) -> Array:
-        """What a bound on the absolute error of the entries of matrices, one for all or of their shape, and the
-        round-off of the reduction amount to in the reduced matrices."""
+        """Bound on the absolute error of the reduced matrices, from one on the entries of the matrices (a number or of
+        their shape) and round-off."""
         round_off = 2.0 * len(self.basis) * np.finfo(float).eps * np.abs(np.asarray(matrices, dtype=np.float64))
         entries = np.asarray(error, dtype=np.float64) + round_off
         return self._diagonal(np.abs(self.dual) @ entries @ np.abs(self.basis))
