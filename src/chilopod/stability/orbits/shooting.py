@@ -188,8 +188,8 @@ class _Correction(NamedTuple):
 
 
 class _Frame(NamedTuple):
-    """Frame of a correction: sizes of the states, and of those where it may lead, shape (n,) both, the section that holds
-    the first one, and whether the motion does not come back to it."""
+    """Frame of a correction: sizes of the states, and of those where it may lead, shape (n,) both, the section that
+    holds the first one, and whether the motion does not come back to it."""
 
     sizes: Array
     reach: Array
